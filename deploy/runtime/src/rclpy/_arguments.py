@@ -1,0 +1,271 @@
+"""
+The command line of a ROS 2 process: what stands between `--ros-args` and `--`.
+
+The grammar is that of docs.ros.org, "Passing ROS arguments to nodes via the command-line". The parameters
+come from `-p` and from the files of `--params-file`: see `_parameter_files`.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from dataclasses import dataclass, field, replace
+
+from rclpy._parameter_files import NodeParameters, ParameterFileError, parse_value, read_parameter_file
+from rclpy.exceptions import RCLInvalidROSArgsError, UnknownROSArgsError
+from rclpy.expand_topic_name import expand_topic_name
+from rclpy.impl.logging_severity import LoggingSeverity
+from rclpy.logging import get_logger
+from rclpy.parameter import Parameter
+
+_TOKEN = "[A-Za-z_][A-Za-z0-9_]*"
+_NAME = rf"(?:~/|/)?{_TOKEN}(?:/{_TOKEN})*"
+_NODE_PREFIX = rf"(?:(?P<node>{_TOKEN}):)?"
+_RENAME_NODE = re.compile(rf"{_NODE_PREFIX}__(?:node|name):=(?P<to>{_TOKEN})")
+_MOVE_NODE = re.compile(rf"{_NODE_PREFIX}__ns:=(?P<to>/(?:{_TOKEN}(?:/{_TOKEN})*)?)")
+_REMAP = re.compile(rf"{_NODE_PREFIX}(?P<kind>rostopic://|rosservice://)?(?P<from>{_NAME}):=(?P<to>{_NAME})")
+_PARAMETER_NAME = rf"(?:{_TOKEN}|/)+(?:\.(?:{_TOKEN}|/)+)*"
+_PARAMETER = re.compile(rf"{_NODE_PREFIX}(?P<name>{_PARAMETER_NAME}):=(?P<value>.+)", re.DOTALL)
+_ALL_NODES = "/**"
+
+
+@dataclass(frozen=True, slots=True)
+class RemapRule:
+    """`[node:][kind]match:=replacement`; `match` is `__node`, `__ns` or a name of a topic or service."""
+
+    match: str
+    replacement: str
+    node: str | None = None
+    kind: str | None = None
+
+    def applies_to(self, node_name: str) -> bool:
+        """Tell whether the rule is meant for the node with that name."""
+        return self.node is None or self.node == node_name
+
+
+@dataclass(frozen=True, slots=True)
+class RosArguments:
+    """
+    What a command line says to the nodes of a process.
+
+    `log_level` is the default level, `log_levels` that of loggers by name; `None` and absent ones are not
+    given. `remaining` is the command line without its ROS arguments.
+    """
+
+    remaps: tuple[RemapRule, ...] = ()
+    parameters: tuple[NodeParameters, ...] = ()
+    log_level: LoggingSeverity | None = None
+    log_levels: dict[str, LoggingSeverity] = field(default_factory=dict)
+    stdout_logs: bool = True
+    rosout_logs: bool = True
+    enclave: str = "/"
+    remaining: list[str] = field(default_factory=list)
+
+    def before(self, fallback: RosArguments) -> RosArguments:
+        """
+        Return the arguments of a node that has some of its own and obeys those of its process (`fallback`).
+
+        The node's own remaps are tried first, its own parameters win.
+        """
+        return replace(
+            self, remaps=self.remaps + fallback.remaps, parameters=fallback.parameters + self.parameters
+        )
+
+    def node_name(self, name: str, namespace: str) -> tuple[str, str]:
+        """Return the name and namespace that a node constructed with these gets."""
+        name = self._replacement("__node", name) or name
+        # Prefixes of further rules mean the new name.
+        return name, self._replacement("__ns", name) or namespace
+
+    def remap_topic(self, fqn: str, node_name: str, node_namespace: str) -> str:
+        """Return the fully qualified name that the node uses for its topic `fqn`."""
+        return self._remap(fqn, node_name, node_namespace, "rosservice://")
+
+    def remap_service(self, fqn: str, node_name: str, node_namespace: str) -> str:
+        """Return the fully qualified name that the node uses for its service `fqn`."""
+        return self._remap(fqn, node_name, node_namespace, "rostopic://")
+
+    def parameter_overrides(self, fqn: str) -> dict[str, Parameter]:
+        """Return the parameters given for the node with the fully qualified name `fqn`."""
+        overrides: dict[str, Parameter] = {}
+        for source in self.parameters:
+            for pattern, parameters in source.items():
+                if _matches(pattern, fqn):
+                    overrides.update(parameters)
+        return overrides
+
+    def _replacement(self, match: str, node_name: str) -> str | None:
+        rules = (rule for rule in self.remaps if rule.match == match and rule.applies_to(node_name))
+        return next((rule.replacement for rule in rules), None)
+
+    def _remap(self, fqn: str, node_name: str, node_namespace: str, other_kind: str) -> str:
+        for rule in self.remaps:
+            if rule.match in ("__node", "__ns") or rule.kind == other_kind:
+                continue
+            if not rule.applies_to(node_name):
+                continue
+            if expand_topic_name(rule.match, node_name, node_namespace) == fqn:
+                return expand_topic_name(rule.replacement, node_name, node_namespace)
+        return fqn
+
+
+def parse(argv: list[str] | None) -> RosArguments:
+    """
+    Parse a command line, `sys.argv` if it is `None`.
+
+    :raises RCLInvalidROSArgsError: if a ROS argument has an invalid value; the message is one line.
+    :raises UnknownROSArgsError: if a ROS argument is not known.
+    :raises NotImplementedError: if a ROS argument asks for what this runtime cannot do.
+    """
+    return _Parser(sys.argv if argv is None else argv).parse()
+
+
+def remove_ros_args(argv: list[str] | None) -> list[str]:
+    """Return a command line (`sys.argv` if it is `None`) without its ROS arguments, which are not checked."""
+    remaining = []
+    ros = False
+    for argument in sys.argv if argv is None else argv:
+        if argument == "--ros-args":
+            ros = True
+        elif ros and argument == "--":
+            ros = False
+        elif not ros and not _as_rule(argument):
+            remaining.append(argument)
+    return remaining
+
+
+class _Parser:
+    """One pass over a command line."""
+
+    def __init__(self, argv: list[str]) -> None:
+        self._argv = argv
+        self._remaps: list[RemapRule] = []
+        self._parameters: NodeParameters = {}
+        self._log_level: LoggingSeverity | None = None
+        self._log_levels: dict[str, LoggingSeverity] = {}
+        self._switches = {"stdout": True, "rosout": True, "external-lib": True}
+        self._enclave = "/"
+
+    def parse(self) -> RosArguments:
+        readers = {
+            "-r": self._remap,
+            "--remap": self._remap,
+            "-p": self._parameter,
+            "--param": self._parameter,
+            "--params-file": self._parameter_file,
+            "--log-level": self._level,
+            "-e": self._set_enclave,
+            "--enclave": self._set_enclave,
+            "--log-config-file": self._unsupported,
+            "--log-file-name": self._unsupported,
+        }
+        remaining: list[str] = []
+        unknown: list[str] = []
+        ros = False
+        arguments = iter(self._argv)
+        for argument in arguments:
+            if argument == "--ros-args":
+                ros = True
+            elif not ros:
+                # Before `--ros-args` existed, rules stood among the other arguments; ROS 2 still takes them.
+                if rule := _as_rule(argument):
+                    self._remaps.append(rule)
+                    get_logger("rcl").warning(
+                        f"Found remap rule '{argument}'. This syntax is deprecated. "
+                        f"Use '--ros-args --remap {argument}' instead."
+                    )
+                else:
+                    remaining.append(argument)
+            elif argument == "--":
+                ros = False
+            elif reader := readers.get(argument):
+                value = next(arguments, None)
+                if value is None:
+                    raise RCLInvalidROSArgsError(f"Failed to parse ROS arguments: {argument} needs a value")
+                reader(argument, value)
+            elif switch := re.fullmatch("--(enable|disable)-(stdout|rosout|external-lib)-logs", argument):
+                self._switches[switch[2]] = switch[1] == "enable"
+            else:
+                unknown.append(argument)
+        if unknown:
+            raise UnknownROSArgsError(f"Found unknown ROS arguments: {unknown}")
+        return RosArguments(
+            remaps=tuple(self._remaps),
+            parameters=(self._parameters,),
+            log_level=self._log_level,
+            log_levels=self._log_levels,
+            stdout_logs=self._switches["stdout"],
+            rosout_logs=self._switches["rosout"],
+            enclave=self._enclave,
+            remaining=remaining,
+        )
+
+    def _remap(self, flag: str, value: str) -> None:
+        rule = _as_rule(value)
+        if not rule:
+            raise _invalid(
+                flag, value, "expected [node:]from:=to, where from is a topic, a service, __node or __ns"
+            )
+        self._remaps.append(rule)
+
+    def _parameter(self, flag: str, value: str) -> None:
+        rule = _PARAMETER.fullmatch(value)
+        if not rule:
+            raise _invalid(flag, value, "expected [node:]name:=value")
+        name = rule["name"]
+        try:
+            parameter = Parameter(name, value=parse_value(rule["value"]))
+        except ValueError as error:
+            raise _invalid(flag, value, str(error)) from None
+        self._parameters.setdefault(rule["node"] or _ALL_NODES, {})[name] = parameter
+
+    def _parameter_file(self, flag: str, value: str) -> None:
+        try:
+            nodes = read_parameter_file(value)
+        except ParameterFileError as error:
+            raise RCLInvalidROSArgsError(f"Failed to parse ROS arguments: {error}") from None
+        for node, parameters in nodes.items():
+            self._parameters.setdefault(node, {}).update(parameters)
+
+    def _level(self, flag: str, value: str) -> None:
+        logger, separator, level = value.rpartition(":=")
+        try:
+            severity = LoggingSeverity[level.upper()]
+        except KeyError:
+            names = ", ".join(severity.name.lower() for severity in LoggingSeverity)
+            raise _invalid(flag, value, f"'{level}' is no severity ({names})") from None
+        if not separator:
+            self._log_level = severity
+        elif logger:
+            self._log_levels[logger] = severity
+        else:
+            raise _invalid(flag, value, "the name of the logger is empty")
+
+    def _set_enclave(self, flag: str, value: str) -> None:
+        self._enclave = value
+
+    def _unsupported(self, flag: str, value: str) -> None:
+        raise NotImplementedError(f"{flag}: this runtime writes no log files of its own")
+
+
+def _as_rule(argument: str) -> RemapRule | None:
+    """Parse a remap rule; `None` if the argument is none."""
+    if match := _RENAME_NODE.fullmatch(argument):
+        return RemapRule("__node", match["to"], match["node"])
+    if match := _MOVE_NODE.fullmatch(argument):
+        return RemapRule("__ns", match["to"], match["node"])
+    if match := _REMAP.fullmatch(argument):
+        return RemapRule(match["from"], match["to"], match["node"], match["kind"])
+    return None
+
+
+def _matches(pattern: str, fqn: str) -> bool:
+    """Tell whether a node name of a parameter file, perhaps with wildcards, means the node `fqn`."""
+    absolute = pattern if pattern.startswith("/") else f"/{pattern}"
+    # `/*` is one token, `/**` any number of them.
+    expression = re.escape(absolute).replace(r"/\*\*", r"(/\w+)*").replace(r"/\*", r"/\w+")
+    return re.fullmatch(expression, fqn) is not None
+
+
+def _invalid(flag: str, value: str, reason: str) -> RCLInvalidROSArgsError:
+    return RCLInvalidROSArgsError(f"Failed to parse ROS arguments: '{flag} {value}': {reason}")

@@ -1,0 +1,88 @@
+"""A span of time in whole nanoseconds."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import builtin_interfaces.msg
+from rclpy.constants import S_TO_NS
+
+_MIN = -(2**63)
+_MAX = 2**63 - 1
+
+
+class DurationType(Protocol):
+    """What `Duration.get_c_duration` returns: anything with its nanoseconds."""
+
+    @property
+    def nanoseconds(self) -> int: ...
+
+
+class Duration:
+    """A span of time between two points, possibly negative, with a resolution of one nanosecond."""
+
+    __slots__ = ("__weakref__", "_nanoseconds")
+
+    # Equality without a hash, as rclpy's Duration.
+    __hash__ = None  # type: ignore[assignment]
+
+    def __init__(self, *, seconds: int | float = 0, nanoseconds: int = 0):
+        """
+        Create a duration of `seconds` (its fraction counts) plus `nanoseconds` (its fraction is discarded).
+
+        :raises OverflowError: if the sum does not fit into 64 bits.
+        """
+        total = int(seconds * S_TO_NS) + int(nanoseconds)
+        if not _MIN <= total <= _MAX:
+            raise OverflowError("Total nanoseconds value is too large to store in C duration.")
+        self._nanoseconds = total
+
+    @property
+    def nanoseconds(self) -> int:
+        """The whole duration [ns]."""
+        return self._nanoseconds
+
+    def __repr__(self) -> str:
+        return f"Duration(nanoseconds={self._nanoseconds})"
+
+    def __str__(self) -> str:
+        return "Infinite" if self._nanoseconds == _MAX else f"{self._nanoseconds} nanoseconds"
+
+    def __eq__(self, other: object) -> bool:
+        return self._nanoseconds == other._nanoseconds if isinstance(other, Duration) else NotImplemented
+
+    def __lt__(self, other: object) -> bool:
+        return self._nanoseconds < other._nanoseconds if isinstance(other, Duration) else NotImplemented
+
+    def __le__(self, other: object) -> bool:
+        return self._nanoseconds <= other._nanoseconds if isinstance(other, Duration) else NotImplemented
+
+    def __gt__(self, other: object) -> bool:
+        return self._nanoseconds > other._nanoseconds if isinstance(other, Duration) else NotImplemented
+
+    def __ge__(self, other: object) -> bool:
+        return self._nanoseconds >= other._nanoseconds if isinstance(other, Duration) else NotImplemented
+
+    def to_msg(self) -> builtin_interfaces.msg.Duration:
+        """Convert to a message; its nanoseconds are never negative, so -0.1 s is -1 s + 900,000,000 ns."""
+        seconds, nanoseconds = divmod(self._nanoseconds, S_TO_NS)
+        return builtin_interfaces.msg.Duration(sec=seconds, nanosec=nanoseconds)
+
+    @classmethod
+    def from_msg(cls, msg: builtin_interfaces.msg.Duration) -> Duration:
+        """
+        Convert from a message.
+
+        :raises TypeError: if `msg` is not a `builtin_interfaces.msg.Duration`.
+        """
+        if not isinstance(msg, builtin_interfaces.msg.Duration):
+            raise TypeError("Must pass a builtin_interfaces.msg.Duration object")
+        return cls(seconds=msg.sec, nanoseconds=msg.nanosec)
+
+    def get_c_duration(self) -> DurationType:
+        """Return what rclpy hands to C: here the duration itself."""
+        return self
+
+
+Infinite = Duration(nanoseconds=_MAX)
+"""The duration that never ends (`RMW_DURATION_INFINITE`)."""

@@ -1,0 +1,1 @@
+"""Modules behind rclpy's public ones, at the places where rclpy has them."""

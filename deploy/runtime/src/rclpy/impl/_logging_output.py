@@ -1,0 +1,210 @@
+"""
+Where log messages go: the console, in rcutils' format, and the `/rosout` publishers of the nodes.
+
+The environment configures the console as in ROS 2 (docs.ros.org, "About logging and logger configuration"):
+`RCUTILS_CONSOLE_OUTPUT_FORMAT`, `RCUTILS_COLORIZED_OUTPUT`, `RCUTILS_LOGGING_USE_STDOUT` and
+`RCUTILS_LOGGING_BUFFERED_STREAM`.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import sys
+import threading
+import time
+from collections.abc import Callable
+from typing import NamedTuple, TextIO
+
+from rclpy.impl.logging_severity import LoggingSeverity
+
+_DEFAULT_FORMAT = "[{severity}] [{time}] [{name}]: {message}"
+_ESCAPES = {r"\x1b": "\x1b", r"\a": "\a", r"\b": "\b", r"\n": "\n", r"\r": "\r", r"\t": "\t"}
+_NAMES = {int(severity): severity.name for severity in LoggingSeverity}
+_NO_COLOR = "\033[0m"
+_COLORS = {0: _NO_COLOR, 10: "\033[32m", 20: _NO_COLOR, 30: "\033[33m", 40: "\033[31m", 50: "\033[31m"}
+
+
+class LogRecord(NamedTuple):
+    """One message; `stamp` is nanoseconds of system time, `level` a `LoggingSeverity` value."""
+
+    stamp: int
+    level: int
+    name: str
+    message: str
+    file: str
+    function: str
+    line: int
+
+
+def _seconds(record: LogRecord) -> str:
+    return f"{record.stamp // 1_000_000_000:010d}.{record.stamp % 1_000_000_000:09d}"
+
+
+def _date(record: LogRecord) -> str:
+    date = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(record.stamp // 1_000_000_000))
+    return f"{date}.{record.stamp % 1_000_000_000 // 1_000_000:03d}"
+
+
+_TOKENS: dict[str, Callable[[LogRecord], str]] = {
+    "severity": lambda record: _NAMES[record.level],
+    "name": lambda record: record.name,
+    "message": lambda record: record.message,
+    "function_name": lambda record: record.function,
+    "file_name": lambda record: record.file,
+    "time": _seconds,
+    "date_time_with_ms": _date,
+    "time_as_nanoseconds": lambda record: f"{record.stamp:019d}",
+    "line_number": lambda record: str(record.line),
+}
+
+
+def _compile(output_format: str) -> list[str | Callable[[LogRecord], str]]:
+    """Split a format into text and the functions that fill in its tokens; unknown tokens stay as text."""
+    unescaped = re.sub(r"\\(?:x1b|[abnrt])", lambda escape: _ESCAPES[escape[0]], output_format)
+    parts = re.split("(" + "|".join(f"{{{token}}}" for token in _TOKENS) + ")", unescaped)
+    return [_TOKENS[part[1:-1]] if index % 2 else part for index, part in enumerate(parts)]
+
+
+def _switch(variable: str) -> bool | None:
+    """
+    Read an environment variable that is 0, 1 or empty.
+
+    :raises RuntimeError: if it is something else.
+    """
+    value = os.environ.get(variable, "")
+    if value not in ("", "0", "1"):
+        raise RuntimeError(f"unexpected value [{value}] specified for {variable}. Valid values are 0 or 1.")
+    return value == "1" if value else None
+
+
+class _Console:
+    """The console as the environment wants it."""
+
+    def __init__(self) -> None:
+        self.use_stdout = bool(_switch("RCUTILS_LOGGING_USE_STDOUT"))
+        self.flush = _switch("RCUTILS_LOGGING_BUFFERED_STREAM") is not None
+        self.colorized = _switch("RCUTILS_COLORIZED_OUTPUT")
+        self.parts = _compile(os.environ.get("RCUTILS_CONSOLE_OUTPUT_FORMAT") or _DEFAULT_FORMAT)
+
+    def write(self, record: LogRecord) -> None:
+        stream = sys.stdout if self.use_stdout else sys.stderr
+        if stream is None:
+            return
+        text = "".join([part if isinstance(part, str) else part(record) for part in self.parts])
+        try:
+            if self.colorized if self.colorized is not None else stream.isatty():
+                text = f"{_COLORS[record.level]}{text}{_NO_COLOR}"
+            _write_line(stream, text)
+            if self.flush:
+                stream.flush()
+        except (OSError, ValueError):
+            # A closed or full console is no reason to fail; C's fprintf does not either.
+            return
+
+
+def _write_line(stream: TextIO, text: str) -> None:
+    try:
+        stream.write(f"{text}\n")
+    except UnicodeEncodeError:
+        encoding = stream.encoding or "ascii"
+        stream.write(text.encode(encoding, "backslashreplace").decode(encoding) + "\n")
+
+
+_console: _Console | None = None
+_console_enabled = True
+# Logger name -> publishers of the nodes with that logger; the first one publishes.
+_rosout: dict[str, list[Callable[[LogRecord], None]]] = {}
+_rosout_lock = threading.RLock()
+_publishing = threading.local()
+
+
+def initialize() -> None:
+    """
+    Read the environment, if that has not happened yet.
+
+    :raises RuntimeError: if a variable has a value that is not valid.
+    """
+    global _console
+    if _console is None:
+        _console = _Console()
+
+
+def shutdown() -> None:
+    """Forget the environment; the next message reads it again."""
+    global _console
+    _console = None
+
+
+def enable_console(enabled: bool) -> None:
+    """Switch the console on or off (`--disable-stdout-logs`)."""
+    global _console_enabled
+    _console_enabled = enabled
+
+
+def add_rosout_publisher(logger_name: str, publish: Callable[[LogRecord], None]) -> None:
+    """
+    Hand each message of the logger `logger_name`, and of its children made from now on, to `publish`.
+
+    `publish` is called on the thread that logs.
+    """
+    with _rosout_lock:
+        _rosout.setdefault(logger_name, []).append(publish)
+
+
+def remove_rosout_publisher(publish: Callable[[LogRecord], None]) -> None:
+    """End what `add_rosout_publisher` began, for the logger and its children."""
+    with _rosout_lock:
+        for name in list(_rosout):
+            _rosout[name] = [other for other in _rosout[name] if other != publish]
+            if not _rosout[name]:
+                del _rosout[name]
+
+
+def share_rosout_publisher(parent: str, child: str) -> Callable[[LogRecord], None] | None:
+    """Let the logger `child` publish as `parent` does; return the publisher, `None` if there is none."""
+    with _rosout_lock:
+        publishers = _rosout.get(parent)
+        if not publishers:
+            return None
+        add_rosout_publisher(child, publishers[0])
+        return publishers[0]
+
+
+def unshare_rosout_publisher(child: str, publish: Callable[[LogRecord], None]) -> None:
+    """End what one call of `share_rosout_publisher` began."""
+    with _rosout_lock:
+        publishers = _rosout.get(child, [])
+        if publish in publishers:
+            publishers.remove(publish)
+        if not publishers:
+            _rosout.pop(child, None)
+
+
+def output(record: LogRecord) -> None:
+    """Write a message to the console and publish it."""
+    if _console_enabled:
+        _ready_console().write(record)
+    publishers = _rosout.get(record.name)
+    # Publishing may log: such a message reaches the console only, else it would never end.
+    if publishers and not getattr(_publishing, "active", False):
+        _publishing.active = True
+        try:
+            publishers[0](record)
+        except Exception as error:
+            print(f"Failed to publish log message to rosout: {error}", file=sys.stderr)
+        finally:
+            _publishing.active = False
+
+
+def _ready_console() -> _Console:
+    global _console
+    if _console is None:
+        try:
+            _console = _Console()
+        except RuntimeError as error:
+            print(f"[rclpy] error initializing logging: {error}", file=sys.stderr)
+            _console = _Console.__new__(_Console)
+            _console.use_stdout, _console.flush, _console.colorized = False, False, None
+            _console.parts = _compile(_DEFAULT_FORMAT)
+    return _console

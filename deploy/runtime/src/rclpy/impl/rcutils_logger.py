@@ -1,0 +1,226 @@
+"""The logger that `rclpy.logging.get_logger` and `Node.get_logger` return."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable
+from types import CodeType, FrameType
+from typing import Any
+
+from rclpy.impl import _logging_levels, _logging_output
+from rclpy.impl.logging_severity import LoggingSeverity
+
+_SEPARATOR = "."
+# Frames of these files log for somebody else; the caller is the first frame outside of them.
+_internal_callers = [__file__]
+
+
+def _find_caller(frame: FrameType) -> FrameType:
+    """Return the first frame that is not one of the logging modules."""
+    caller: FrameType | None = frame
+    while caller is not None and caller.f_code.co_filename in _internal_callers:
+        caller = caller.f_back
+    return caller or frame
+
+
+class _Filters:
+    """
+    What one logging call in the source was asked to leave out, and what it needs to remember for that.
+
+    The filters apply in this order: throttle, skip first, once.
+    """
+
+    __slots__ = ("_last", "_logged", "_skipped", "name", "options", "severity")
+
+    OPTIONS = ("throttle_duration_sec", "throttle_time_source_type", "skip_first", "once")
+
+    def __init__(self, severity: LoggingSeverity, name: str, options: dict[str, Any]) -> None:
+        """
+        Begin to filter a call with these keyword `options`.
+
+        :raises ValueError: if the time source is no clock.
+        """
+        self.severity = severity
+        self.name = name
+        self.options = options
+        self._last: int | None = None
+        self._skipped = False
+        self._logged = False
+        clock = options.get("throttle_time_source_type")
+        if options.get("throttle_duration_sec") and clock is not None:
+            from rclpy.clock import Clock
+
+            if not isinstance(clock, Clock):
+                raise ValueError(f'Received throttle_time_source_type of "{clock}" is not a clock instance')
+
+    def check_unchanged(self, severity: LoggingSeverity, name: str, options: dict[str, Any]) -> None:
+        """
+        Check that the call still asks for the same.
+
+        :raises ValueError: if it does not.
+        """
+        if severity != self.severity:
+            raise ValueError("Logger severity cannot be changed between calls.")
+        if name != self.name:
+            raise ValueError("Logger name cannot be changed between calls.")
+        if options != self.options:
+            if _requested(options) != _requested(self.options):
+                raise ValueError("Requested logging filters cannot be changed between calls.")
+            raise ValueError("Logging filter parameters cannot be changed between calls.")
+
+    def should_log(self) -> bool:
+        """Decide about this call; the filters before the one that leaves a message out have counted it."""
+        options = self.options
+        if duration := options.get("throttle_duration_sec"):
+            clock = options.get("throttle_time_source_type")
+            # Steady by default: setting the wall clock neither opens nor closes the valve.
+            now = time.monotonic_ns() if clock is None else clock.now().nanoseconds
+            if self._last is not None and now < self._last + duration * 1e9:
+                return False
+            self._last = now
+        if options.get("skip_first") and not self._skipped:
+            self._skipped = True
+            return False
+        if options.get("once"):
+            if self._logged:
+                return False
+            self._logged = True
+        return True
+
+
+def _requested(options: dict[str, Any]) -> set[str]:
+    """Name the filters that keyword arguments ask for."""
+    return {option.split("_")[0] for option, value in options.items() if value}
+
+
+def _check_options(options: dict[str, Any]) -> None:
+    """
+    Check the keyword arguments of a logging call.
+
+    :raises TypeError: if one is unknown, or one that another needs is missing.
+    """
+    for option in options:
+        if option not in _Filters.OPTIONS:
+            raise TypeError(
+                f'parameter "{option}" is not one of the recognized logging options '
+                f'"{list(_Filters.OPTIONS)}"'
+            )
+    if options.get("throttle_time_source_type") and "throttle_duration_sec" not in options:
+        raise TypeError(
+            'required parameter "throttle_duration_sec" not specified but is required for the the logging '
+            'filter "throttle"'
+        )
+
+
+class RcutilsLogger:
+    """
+    Logs messages under a name; names form a tree with dots.
+
+    Filters belong to the place in the source that logs: `once=True`, `skip_first=True`,
+    `throttle_duration_sec=` [s] with the optional clock `throttle_time_source_type=`.
+    """
+
+    def __init__(self, name: str = "") -> None:
+        self.name = name
+        # The place of a call in the source -> its filters.
+        self.contexts: dict[tuple[CodeType, int], _Filters] = {}
+        self._shared_publisher: Callable[[_logging_output.LogRecord], None] | None = None
+
+    def __del__(self) -> None:
+        if self._shared_publisher is not None:
+            _logging_output.unshare_rosout_publisher(self.name, self._shared_publisher)
+
+    def get_child(self, name: str) -> RcutilsLogger:
+        """
+        Return the logger `name` below this one.
+
+        :raises ValueError: if `name` is empty.
+        """
+        if not name:
+            raise ValueError("Child logger name must not be empty.")
+        if not self.name:
+            return RcutilsLogger(name)
+        child = RcutilsLogger(self.name + _SEPARATOR + name)
+        child._shared_publisher = _logging_output.share_rosout_publisher(self.name, child.name)
+        return child
+
+    def set_level(self, level: int | LoggingSeverity) -> None:
+        """
+        Let messages below `level` be left out; UNSET means as the parent does.
+
+        :raises ValueError: if `level` is no severity.
+        """
+        _logging_levels.set_level(self.name, LoggingSeverity(level))
+
+    def get_effective_level(self) -> LoggingSeverity:
+        """Return the level that applies: this logger's own, or that of an ancestor."""
+        return LoggingSeverity(_logging_levels.effective_level(self.name))
+
+    def is_enabled_for(self, severity: int | LoggingSeverity) -> bool:
+        """
+        Tell whether messages of `severity` are logged.
+
+        :raises ValueError: if `severity` is none.
+        """
+        return LoggingSeverity(severity) >= _logging_levels.effective_level(self.name)
+
+    def log(self, message: str, severity: int | LoggingSeverity, **kwargs: Any) -> bool:
+        """
+        Log `message`, unless the logger's level or a filter leaves it out.
+
+        :param kwargs: filters, see the class; and `name`, to log under another name.
+        :returns: whether it was logged.
+        :raises TypeError: if `message` is no string or a filter is not known.
+        :raises ValueError: if a filter's value is invalid, or the same call asked for something else before.
+        """
+        if severity < _logging_levels.effective_level(self.name):
+            return False
+        severity = LoggingSeverity(severity)
+        name = kwargs.pop("name", self.name) if kwargs else self.name
+        if kwargs:
+            _check_options(kwargs)
+        if not isinstance(message, str):
+            raise TypeError(f"a log message must be a str, not {type(message).__name__}: {message!r}")
+
+        frame = _find_caller(sys._getframe(1))
+        code = frame.f_code
+        # The position in the code tells apart two calls on one line.
+        place = (code, frame.f_lasti)
+        filters = self.contexts.get(place)
+        if filters is None:
+            filters = self.contexts.setdefault(place, _Filters(severity, name, kwargs))
+        else:
+            filters.check_unchanged(severity, name, kwargs)
+        if kwargs and not filters.should_log():
+            return False
+        _logging_output.output(
+            _logging_output.LogRecord(
+                time.time_ns(), int(severity), name, message, code.co_filename, code.co_name, frame.f_lineno
+            )
+        )
+        return True
+
+    def debug(self, message: str, **kwargs: Any) -> bool:
+        """Log with severity DEBUG, see `log`."""
+        return self.log(message, LoggingSeverity.DEBUG, **kwargs)
+
+    def info(self, message: str, **kwargs: Any) -> bool:
+        """Log with severity INFO, see `log`."""
+        return self.log(message, LoggingSeverity.INFO, **kwargs)
+
+    def warning(self, message: str, **kwargs: Any) -> bool:
+        """Log with severity WARN, see `log`."""
+        return self.log(message, LoggingSeverity.WARN, **kwargs)
+
+    def warn(self, message: str, **kwargs: Any) -> bool:
+        """Log with severity WARN: the old name of `warning`."""
+        return self.warning(message, **kwargs)
+
+    def error(self, message: str, **kwargs: Any) -> bool:
+        """Log with severity ERROR, see `log`."""
+        return self.log(message, LoggingSeverity.ERROR, **kwargs)
+
+    def fatal(self, message: str, **kwargs: Any) -> bool:
+        """Log with severity FATAL, see `log`."""
+        return self.log(message, LoggingSeverity.FATAL, **kwargs)

@@ -1,0 +1,103 @@
+"""Loggers, and the levels below which they are silent."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rclpy.impl import _logging_levels, _logging_output, rcutils_logger
+from rclpy.impl.logging_severity import LoggingSeverity
+from rclpy.impl.rcutils_logger import RcutilsLogger
+
+if TYPE_CHECKING:
+    from rclpy._arguments import RosArguments
+
+_root_logger = RcutilsLogger()
+
+
+def get_logger(name: str) -> RcutilsLogger:
+    """
+    Return a logger with that name.
+
+    :raises ValueError: if `name` is empty.
+    """
+    if not name:
+        raise ValueError("Logger name must not be empty.")
+    return _root_logger.get_child(name)
+
+
+def initialize() -> None:
+    """
+    Configure logging from the environment, if that has not happened yet.
+
+    :raises RuntimeError: if an environment variable has a value that is not valid.
+    """
+    _logging_output.initialize()
+
+
+def shutdown() -> None:
+    """Forget the configuration of logging: the levels, and what was read from the environment."""
+    _logging_output.shutdown()
+    _logging_levels.clear()
+
+
+def clear_config() -> None:
+    """Configure logging from the environment again, and forget all levels."""
+    shutdown()
+    initialize()
+
+
+def set_logger_level(name: str, level: int | LoggingSeverity, detailed_error: bool = False) -> None:
+    """
+    Set the level of the logger `name`; '' names the default of all loggers.
+
+    :param detailed_error: has no effect here: the only error names its reason.
+    :raises ValueError: if `level` is no severity.
+    """
+    _logging_levels.set_level(name, LoggingSeverity(level))
+
+
+def get_logger_effective_level(name: str) -> LoggingSeverity:
+    """Return the level that applies to the logger `name`: its own, or that of an ancestor."""
+    return LoggingSeverity(_logging_levels.effective_level(name))
+
+
+def get_logger_level(name: str) -> LoggingSeverity:
+    """Return the level that was set for exactly the logger `name`, UNSET if none was."""
+    return LoggingSeverity(_logging_levels.get_level(name))
+
+
+def get_logging_severity_from_string(log_severity: str) -> LoggingSeverity:
+    """
+    Return the severity with that name, whatever its case.
+
+    :raises RuntimeError: if there is none.
+    """
+    try:
+        return LoggingSeverity[log_severity.upper()]
+    except KeyError:
+        raise RuntimeError(f"Failed to get severity name: '{log_severity}' is none") from None
+
+
+def get_logging_directory() -> Path:
+    """Return the directory for log files: `$ROS_LOG_DIR`, else `$ROS_HOME/log`, else `~/.ros/log`."""
+    directory = os.environ.get("ROS_LOG_DIR") or os.path.join(os.environ.get("ROS_HOME") or "~/.ros", "log")
+    return Path(directory).expanduser()
+
+
+def _configure(arguments: RosArguments) -> None:
+    """
+    Configure logging from the environment and the command line of a process.
+
+    :raises RuntimeError: if an environment variable has a value that is not valid.
+    """
+    initialize()
+    _logging_output.enable_console(arguments.stdout_logs)
+    if arguments.log_level is not None:
+        _logging_levels.set_level("", arguments.log_level)
+    for name, level in arguments.log_levels.items():
+        _logging_levels.set_level(name, level)
+
+
+rcutils_logger._internal_callers.append(__file__)

@@ -1,0 +1,154 @@
+"""A point in time on one of the clocks."""
+
+from __future__ import annotations
+
+from typing import Protocol, overload
+
+import builtin_interfaces.msg
+from rclpy.clock_type import ClockType
+from rclpy.constants import S_TO_NS
+from rclpy.duration import Duration
+
+_MAX = 2**63 - 1
+
+
+class TimeHandle(Protocol):
+    """What rclpy's C layer keeps of a time."""
+
+    @property
+    def nanoseconds(self) -> int: ...
+
+    @property
+    def clock_type(self) -> ClockType: ...
+
+
+class Time:
+    """
+    A point in time: nanoseconds since the epoch of a clock, and the type of that clock.
+
+    Only times of the same clock type compare and subtract.
+    """
+
+    __slots__ = ("__weakref__", "_clock_type", "_nanoseconds")
+
+    # Equality without a hash, as rclpy's Time.
+    __hash__ = None  # type: ignore[assignment]
+
+    def __init__(
+        self,
+        *,
+        seconds: int | float = 0,
+        nanoseconds: int = 0,
+        clock_type: ClockType = ClockType.SYSTEM_TIME,
+    ):
+        """
+        Create the time `seconds` plus `nanoseconds` after the epoch of `clock_type`.
+
+        :raises TypeError: if `clock_type` is no clock type.
+        :raises ValueError: if `seconds` or `nanoseconds` are negative.
+        :raises OverflowError: if the sum does not fit into 63 bits.
+        """
+        if not isinstance(clock_type, ClockType):
+            raise TypeError("Clock type must be a ClockType enum")
+        if seconds < 0:
+            raise ValueError("Seconds value must not be negative")
+        if nanoseconds < 0:
+            raise ValueError("Nanoseconds value must not be negative")
+        total = int(seconds * S_TO_NS) + int(nanoseconds)
+        if total > _MAX:
+            raise OverflowError("Total nanoseconds value is too large to store in C time point.")
+        self._nanoseconds = total
+        self._clock_type = clock_type
+
+    @classmethod
+    def _of(cls, nanoseconds: int, clock_type: ClockType) -> Time:
+        """Create a time from a clock's own reading, which needs no check."""
+        time = cls.__new__(cls)
+        time._nanoseconds = nanoseconds
+        time._clock_type = clock_type
+        return time
+
+    @property
+    def nanoseconds(self) -> int:
+        """Nanoseconds since the epoch of the clock."""
+        return self._nanoseconds
+
+    def seconds_nanoseconds(self) -> tuple[int, int]:
+        """Return the whole seconds since the epoch, and the nanoseconds within the last one."""
+        return divmod(self._nanoseconds, S_TO_NS)
+
+    @property
+    def clock_type(self) -> ClockType:
+        """The type of the clock this time was read from."""
+        return self._clock_type
+
+    def __repr__(self) -> str:
+        return f"Time(nanoseconds={self._nanoseconds}, clock_type={self._clock_type.name})"
+
+    def __add__(self, other: Duration) -> Time:
+        if not isinstance(other, Duration):
+            return NotImplemented
+        try:
+            return Time(nanoseconds=self._nanoseconds + other._nanoseconds, clock_type=self._clock_type)
+        except OverflowError as error:
+            raise OverflowError("Addition leads to overflow in C storage.") from error
+
+    def __radd__(self, other: Duration) -> Time:
+        return self.__add__(other)
+
+    @overload
+    def __sub__(self, other: Time) -> Duration: ...
+
+    @overload
+    def __sub__(self, other: Duration) -> Time: ...
+
+    def __sub__(self, other: Time | Duration) -> Time | Duration:
+        if isinstance(other, Time):
+            if self._clock_type != other._clock_type:
+                raise TypeError("Can't subtract times with different clock types")
+            return Duration(nanoseconds=self._nanoseconds - other._nanoseconds)
+        if isinstance(other, Duration):
+            try:
+                return Time(nanoseconds=self._nanoseconds - other._nanoseconds, clock_type=self._clock_type)
+            except ValueError as error:
+                raise ValueError("Subtraction leads to negative time.") from error
+        return NotImplemented
+
+    def _comparable(self, other: Time) -> int:
+        if self._clock_type != other._clock_type:
+            raise TypeError("Can't compare times with different clock types")
+        return other._nanoseconds
+
+    def __eq__(self, other: object) -> bool:
+        return self._nanoseconds == self._comparable(other) if isinstance(other, Time) else NotImplemented
+
+    def __ne__(self, other: object) -> bool:
+        return self._nanoseconds != self._comparable(other) if isinstance(other, Time) else NotImplemented
+
+    def __lt__(self, other: object) -> bool:
+        return self._nanoseconds < self._comparable(other) if isinstance(other, Time) else NotImplemented
+
+    def __le__(self, other: object) -> bool:
+        return self._nanoseconds <= self._comparable(other) if isinstance(other, Time) else NotImplemented
+
+    def __gt__(self, other: object) -> bool:
+        return self._nanoseconds > self._comparable(other) if isinstance(other, Time) else NotImplemented
+
+    def __ge__(self, other: object) -> bool:
+        return self._nanoseconds >= self._comparable(other) if isinstance(other, Time) else NotImplemented
+
+    def to_msg(self) -> builtin_interfaces.msg.Time:
+        """Convert to a message, which does not say the clock type."""
+        seconds, nanoseconds = divmod(self._nanoseconds, S_TO_NS)
+        return builtin_interfaces.msg.Time(sec=seconds, nanosec=nanoseconds)
+
+    @classmethod
+    def from_msg(cls, msg: builtin_interfaces.msg.Time, clock_type: ClockType = ClockType.ROS_TIME) -> Time:
+        """
+        Convert from a message.
+
+        :raises TypeError: if `msg` is not a `builtin_interfaces.msg.Time`.
+        """
+        if not isinstance(msg, builtin_interfaces.msg.Time):
+            raise TypeError("Must pass a builtin_interfaces.msg.Time object")
+        return cls(seconds=msg.sec, nanoseconds=msg.nanosec, clock_type=clock_type)

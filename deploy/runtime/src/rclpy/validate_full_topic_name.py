@@ -1,0 +1,42 @@
+"""The rule for names as they stand on the network: absolute and fully expanded."""
+
+from __future__ import annotations
+
+import re
+from typing import Literal
+
+from rclpy.exceptions import InvalidServiceNameException, InvalidTopicNameException
+
+# DDS allows 255 characters, of which ROS keeps 8 for its prefixes and suffixes.
+_MAX_LENGTH = 255 - 8
+
+
+def validate_full_topic_name(name: str, *, is_service: bool = False) -> Literal[True]:
+    """
+    Check that `name` is a valid fully qualified topic (or service) name.
+
+    :raises InvalidTopicNameException: if it is not; `InvalidServiceNameException` if `is_service`.
+    """
+    if problem := _problem(name, "topic name", _MAX_LENGTH):
+        error = InvalidServiceNameException if is_service else InvalidTopicNameException
+        raise error(name, *problem)
+    return True
+
+
+def _problem(name: str, what: str, max_length: int) -> tuple[str, int] | None:
+    """Say what is wrong with the fully qualified `name` and at which index, or `None`."""
+    if not name:
+        return f"{what} must not be empty", 0
+    if name[0] != "/":
+        return f"{what} must be absolute, it must lead with a '/'", 0
+    if name[-1] == "/":
+        return f"{what} must not end with a '/'", len(name) - 1
+    if stray := re.search(r"[^0-9A-Za-z_/]", name):
+        return f"{what} must not contain characters other than alphanumerics, '_', or '/'", stray.start()
+    if bad := re.search(r"/(?:(/)|[0-9])", name):
+        if bad[1]:
+            return f"{what} must not contain repeated '/'", bad.end() - 1
+        return f"{what} must not have a token that starts with a number", bad.end() - 1
+    if len(name) > max_length:
+        return f"{what} length should not exceed '{max_length}'", max_length - 1
+    return None

@@ -1,0 +1,31 @@
+"""The rule for namespaces."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from rclpy import validate_full_topic_name
+from rclpy.exceptions import InvalidNamespaceException
+
+# Two characters stay for a separator and the shortest node name.
+_MAX_LENGTH = validate_full_topic_name._MAX_LENGTH - 2
+
+
+def validate_namespace(namespace: str) -> Literal[True]:
+    """
+    Check that `namespace` is valid: absolute, with or without tokens.
+
+    A node's constructor takes '' and relative namespaces too; they are made absolute before.
+
+    :raises InvalidNamespaceException: if it is not valid; the message points at the place.
+    """
+    if problem := _problem(namespace):
+        raise InvalidNamespaceException(namespace, *problem)
+    return True
+
+
+def _problem(namespace: str) -> tuple[str, int] | None:
+    """Say what is wrong with `namespace` and at which index, or `None`."""
+    if namespace == "/":
+        return None
+    return validate_full_topic_name._problem(namespace, "namespace", _MAX_LENGTH)
