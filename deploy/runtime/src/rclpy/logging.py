@@ -86,7 +86,7 @@ def get_logging_directory() -> Path:
     return Path(directory).expanduser()
 
 
-def _configure(arguments: RosArguments) -> None:
+def _apply_arguments(arguments: RosArguments) -> None:
     """
     Configure logging from the environment and the command line of a process.
 

@@ -121,7 +121,9 @@ class Future:
         """Call `waiter` once, on the completing thread: when done or cancelled, at once if that is so."""
         with self._lock:
             if not (self._done or self._cancelled):
-                self._waiters.append(waiter)
+                # Who waits with a timeout comes again and again.
+                if waiter not in self._waiters:
+                    self._waiters.append(waiter)
                 return
         waiter()
 

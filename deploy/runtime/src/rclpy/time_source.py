@@ -1,0 +1,154 @@
+"""Simulated time: clocks that follow `/clock` while the parameter `use_sim_time` of their node is true."""
+
+from __future__ import annotations
+
+import weakref
+from typing import TYPE_CHECKING
+
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.clock import ROSClock
+from rclpy.clock_type import ClockType
+from rclpy.parameter import Parameter
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.time import Time
+
+if TYPE_CHECKING:
+    import rosgraph_msgs.msg
+    from rclpy.node import Node
+    from rclpy.subscription import Subscription
+
+CLOCK_TOPIC = "/clock"
+USE_SIM_TIME_NAME = "use_sim_time"
+
+
+class TimeSource:
+    """Sets the clocks attached to it to the time that a simulator publishes."""
+
+    def __init__(self, *, node: Node | None = None) -> None:
+        """Create a time source, and attach `node` if there is one."""
+        self._clock_sub: Subscription | None = None
+        self._node_weak_ref: weakref.ReferenceType[Node] | None = None
+        self._associated_clocks: set[ROSClock] = set()
+        # Zero: no time was heard yet.
+        self._last_time_set = Time(clock_type=ClockType.ROS_TIME)
+        self._ros_time_is_active = False
+        if node is not None:
+            self.attach_node(node)
+
+    @property
+    def ros_time_is_active(self) -> bool:
+        """Whether the clocks follow `/clock`; may be set."""
+        return self._ros_time_is_active
+
+    @ros_time_is_active.setter
+    def ros_time_is_active(self, enabled: bool) -> None:
+        if self._ros_time_is_active == enabled:
+            return
+        self._ros_time_is_active = enabled
+        for clock in self._associated_clocks:
+            clock._set_ros_time_is_active(enabled)
+        if enabled:
+            self._subscribe()
+        else:
+            self._unsubscribe()
+
+    def attach_node(self, node: Node) -> None:
+        """
+        Follow the parameter `use_sim_time` of `node`, which is declared if need be, through its subscription.
+
+        :raises TypeError: if `node` is none.
+        """
+        from rclpy.node import Node
+
+        if not isinstance(node, Node):
+            raise TypeError("Node must be of type rclpy.node.Node")
+        if self._node_weak_ref is not None:
+            self.detach_node()
+        self._node_weak_ref = weakref.ref(node)
+
+        if not node.has_parameter(USE_SIM_TIME_NAME):
+            node.declare_parameter(USE_SIM_TIME_NAME, False)
+        parameter = node.get_parameter(USE_SIM_TIME_NAME)
+        if parameter.type_ is Parameter.Type.BOOL:
+            self.ros_time_is_active = parameter.value
+        elif parameter.type_ is not Parameter.Type.NOT_SET:
+            node.get_logger().error(
+                f"Invalid type for parameter '{USE_SIM_TIME_NAME}' {parameter.type_!r} should be bool"
+            )
+        node.add_on_set_parameters_callback(self._check)
+        node.add_post_set_parameters_callback(self._follow)
+
+    def detach_node(self) -> None:
+        """Follow the node no longer."""
+        node = self._node()
+        self._unsubscribe()
+        if node is not None:
+            node.remove_on_set_parameters_callback(self._check)
+            node.remove_post_set_parameters_callback(self._follow)
+        self._node_weak_ref = None
+
+    def attach_clock(self, clock: ROSClock) -> None:
+        """
+        Set `clock` from now on.
+
+        :raises ValueError: if it is no clock of ROS time.
+        """
+        if not isinstance(clock, ROSClock):
+            raise ValueError("Only clocks with type ROS_TIME can be attached.")
+        clock.set_ros_time_override(self._last_time_set)
+        clock._set_ros_time_is_active(self.ros_time_is_active)
+        self._associated_clocks.add(clock)
+
+    def clock_callback(self, msg: rosgraph_msgs.msg.Clock) -> None:
+        """Set all clocks to the simulator's time; a negative one is none and dropped."""
+        try:
+            time = Time.from_msg(msg.clock)
+        except ValueError as error:
+            if node := self._node():
+                node.get_logger().warning(f"dropped a message on {CLOCK_TOPIC}: {error}", once=True)
+            return
+        # Clocks that are attached later start with it.
+        self._last_time_set = time
+        for clock in self._associated_clocks:
+            clock.set_ros_time_override(time)
+
+    def _subscribe(self) -> None:
+        node = self._node()
+        if node is None or self._clock_sub is not None:
+            return
+        from rosgraph_msgs.msg import Clock
+
+        self._clock_sub = node.create_subscription(
+            Clock,
+            CLOCK_TOPIC,
+            self.clock_callback,
+            QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT),
+            # Of its own, so that time goes on while a callback of the node sleeps.
+            callback_group=MutuallyExclusiveCallbackGroup(),
+        )
+
+    def _unsubscribe(self) -> None:
+        node = self._node()
+        if node is not None and self._clock_sub is not None:
+            node.destroy_subscription(self._clock_sub)
+        self._clock_sub = None
+
+    def _check(self, parameters: list[Parameter]) -> SetParametersResult:
+        """Let `use_sim_time` be a bool only."""
+        for parameter in parameters:
+            if parameter.name == USE_SIM_TIME_NAME and parameter.type_ is not Parameter.Type.BOOL:
+                reason = f"{USE_SIM_TIME_NAME} parameter set to something besides a bool"
+                if node := self._node():
+                    node.get_logger().error(reason)
+                return SetParametersResult(successful=False, reason=reason)
+        return SetParametersResult(successful=True)
+
+    def _follow(self, parameters: list[Parameter]) -> None:
+        """Do as `use_sim_time` says, once nobody has rejected it."""
+        for parameter in parameters:
+            if parameter.name == USE_SIM_TIME_NAME:
+                self.ros_time_is_active = parameter.value
+
+    def _node(self) -> Node | None:
+        return None if self._node_weak_ref is None else self._node_weak_ref()

@@ -1,0 +1,144 @@
+"""What is known of a publisher or subscription in the graph."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from typing import Any
+
+from rclpy.qos import HistoryPolicy, QoSPresetProfiles, QoSProfile
+from rclpy.type_hash import TypeHash
+
+
+class TopicEndpointTypeEnum(IntEnum):
+    """Whether an endpoint is a publisher or a subscription."""
+
+    INVALID = 0
+    PUBLISHER = 1
+    SUBSCRIPTION = 2
+
+
+class TopicEndpointInfo:
+    """An endpoint: whose it is, its type, its identity and its quality of service."""
+
+    __slots__ = (
+        "_node_name",
+        "_node_namespace",
+        "_topic_type",
+        "_topic_type_hash",
+        "_endpoint_type",
+        "_endpoint_gid",
+        "_qos_profile",
+    )
+
+    # Equality without a hash, as rclpy's TopicEndpointInfo, which can be changed.
+    __hash__ = None  # type: ignore[assignment]
+
+    def __init__(self, **kwargs: Any) -> None:
+        """Create from the properties by name; what is not given is empty or unknown."""
+        assert all(f"_{key}" in self.__slots__ for key in kwargs), (
+            f"Invalid arguments passed to constructor: {list(kwargs)}"
+        )
+        self.node_name = kwargs.get("node_name", "")
+        self.node_namespace = kwargs.get("node_namespace", "")
+        self.topic_type = kwargs.get("topic_type", "")
+        self.topic_type_hash = kwargs.get("topic_type_hash", TypeHash())
+        self.endpoint_type = kwargs.get("endpoint_type", TopicEndpointTypeEnum.INVALID)
+        self.endpoint_gid = kwargs.get("endpoint_gid", [])
+        self.qos_profile = kwargs.get("qos_profile", QoSPresetProfiles.UNKNOWN.value)
+
+    @property
+    def node_name(self) -> str:
+        """The name of the node the endpoint belongs to."""
+        return self._node_name
+
+    @node_name.setter
+    def node_name(self, value: str) -> None:
+        assert isinstance(value, str), f"node_name must be a str, not {value!r}"
+        self._node_name = value
+
+    @property
+    def node_namespace(self) -> str:
+        """The namespace of that node."""
+        return self._node_namespace
+
+    @node_namespace.setter
+    def node_namespace(self, value: str) -> None:
+        assert isinstance(value, str), f"node_namespace must be a str, not {value!r}"
+        self._node_namespace = value
+
+    @property
+    def topic_type(self) -> str:
+        """The type of the messages, for example `std_msgs/msg/String`."""
+        return self._topic_type
+
+    @topic_type.setter
+    def topic_type(self, value: str) -> None:
+        assert isinstance(value, str), f"topic_type must be a str, not {value!r}"
+        self._topic_type = value
+
+    @property
+    def topic_type_hash(self) -> TypeHash:
+        """The hash of the type's definition; a dictionary of its properties may be assigned too."""
+        return self._topic_type_hash
+
+    @topic_type_hash.setter
+    def topic_type_hash(self, value: TypeHash | dict[str, Any]) -> None:
+        assert isinstance(value, (TypeHash, dict)), f"topic_type_hash must be a TypeHash, not {value!r}"
+        self._topic_type_hash = TypeHash(**value) if isinstance(value, dict) else value
+
+    @property
+    def endpoint_type(self) -> TopicEndpointTypeEnum:
+        """Whether it is a publisher or a subscription."""
+        return self._endpoint_type
+
+    @endpoint_type.setter
+    def endpoint_type(self, value: TopicEndpointTypeEnum | int) -> None:
+        assert isinstance(value, int), f"endpoint_type must be a TopicEndpointTypeEnum, not {value!r}"
+        self._endpoint_type = TopicEndpointTypeEnum(value)
+
+    @property
+    def endpoint_gid(self) -> list[int]:
+        """The bytes of the identity that the middleware gave it."""
+        return self._endpoint_gid
+
+    @endpoint_gid.setter
+    def endpoint_gid(self, value: list[int]) -> None:
+        assert all(isinstance(byte, int) for byte in value), f"endpoint_gid must be ints, not {value!r}"
+        self._endpoint_gid = value
+
+    @property
+    def qos_profile(self) -> QoSProfile:
+        """Its quality of service; a dictionary of policies may be assigned too."""
+        return self._qos_profile
+
+    @qos_profile.setter
+    def qos_profile(self, value: QoSProfile | dict[str, Any]) -> None:
+        assert isinstance(value, (QoSProfile, dict)), f"qos_profile must be a QoSProfile, not {value!r}"
+        self._qos_profile = QoSProfile(**value) if isinstance(value, dict) else value
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, TopicEndpointInfo):
+            return False
+        return all(getattr(self, slot) == getattr(other, slot) for slot in self.__slots__)
+
+    def __str__(self) -> str:
+        qos = self.qos_profile
+        depth = f" ({qos.depth})" if qos.history == HistoryPolicy.KEEP_LAST else ""
+        return "\n".join(
+            (
+                f"Node name: {self.node_name}",
+                f"Node namespace: {self.node_namespace}",
+                f"Topic type: {self.topic_type}",
+                f"Topic type hash: {self.topic_type_hash}",
+                f"Endpoint type: {self.endpoint_type.name}",
+                f"GID: {'.'.join(f'{byte:02x}' for byte in self.endpoint_gid)}",
+                "QoS profile:",
+                f"  Reliability: {qos.reliability.name}",
+                f"  History (Depth): {qos.history.name}{depth}",
+                f"  Durability: {qos.durability.name}",
+                f"  Lifespan: {qos.lifespan}",
+                f"  Deadline: {qos.deadline}",
+                f"  Liveliness: {qos.liveliness.name}",
+                f"  Liveliness lease duration: {qos.liveliness_lease_duration}",
+            )
+        )
