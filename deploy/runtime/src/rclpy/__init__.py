@@ -1,0 +1,190 @@
+"""rclpy, the ROS 2 client library for Python, on Eclipse Cyclone DDS and without a ROS installation.
+
+The names, signatures and behaviour are those of ROS 2 Jazzy; what is not supported raises NotImplementedError.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from types import TracebackType
+from typing import TYPE_CHECKING
+
+from rclpy.context import Context
+from rclpy.parameter import Parameter
+from rclpy.signals import (
+    SignalHandlerOptions,
+    _shut_down_by_signal,
+    install_signal_handlers,
+    uninstall_signal_handlers,
+)
+from rclpy.task import Future
+from rclpy.utilities import get_default_context, get_rmw_implementation_identifier, ok, try_shutdown
+from rclpy.utilities import shutdown as _shutdown
+
+if TYPE_CHECKING:
+    from rclpy.executors import Executor
+    from rclpy.node import Node
+
+__all__ = [
+    "Context",
+    "Future",
+    "InitContextManager",
+    "Parameter",
+    "SignalHandlerOptions",
+    "create_node",
+    "get_default_context",
+    "get_global_executor",
+    "get_rmw_implementation_identifier",
+    "init",
+    "ok",
+    "shutdown",
+    "spin",
+    "spin_once",
+    "spin_until_future_complete",
+    "try_shutdown",
+]
+
+_executor: Executor | None = None
+
+
+class InitContextManager:
+    """What :func:`init` returns: in a ``with``, it shuts down at the end."""
+
+    def __init__(self, context: Context, installed_handlers: bool) -> None:
+        self.context = context
+        self._installed_handlers = installed_handlers
+
+    def __enter__(self) -> InitContextManager:
+        return self
+
+    def __exit__(
+        self,
+        exc_type: type[BaseException] | None,
+        exc_val: BaseException | None,
+        exc_tb: TracebackType | None,
+    ) -> None:
+        if self.context.ok():
+            shutdown(context=self.context, uninstall_handlers=self._installed_handlers)
+        elif self._installed_handlers:
+            uninstall_signal_handlers()
+
+
+def init(
+    *,
+    args: list[str] | None = None,
+    context: Context | None = None,
+    domain_id: int | None = None,
+    signal_handler_options: SignalHandlerOptions | None = None,
+) -> InitContextManager:
+    """
+    Begin.
+
+    :param args: command line arguments, ``sys.argv`` if ``None``; those after ``--ros-args`` count.
+    :param context: what to initialize; the default context if ``None``.
+    :param domain_id: DDS domain, by default the one that ``ROS_DOMAIN_ID`` names.
+    :param signal_handler_options: which signals shut down; by default SIGINT and SIGTERM, for the default
+        context.
+    :raises RuntimeError: if the context is initialized already.
+    """
+    default = get_default_context()
+    context = default if context is None else context
+    if signal_handler_options is None:
+        signal_handler_options = SignalHandlerOptions.ALL if context is default else SignalHandlerOptions.NO
+    context.init(args, domain_id=domain_id)
+    _shut_down_by_signal(context)
+    install_signal_handlers(signal_handler_options)
+    return InitContextManager(context, signal_handler_options != SignalHandlerOptions.NO)
+
+
+def get_global_executor() -> Executor:
+    """Return the executor of :func:`spin` and its like, where none is given."""
+    global _executor
+    if _executor is None:
+        from rclpy.executors import SingleThreadedExecutor
+
+        _executor = SingleThreadedExecutor()
+
+        def end() -> None:
+            global _executor
+            ended, _executor = _executor, None
+            if ended is not None:
+                ended.shutdown()
+
+        get_default_context().on_shutdown(end)
+    return _executor
+
+
+def shutdown(*, context: Context | None = None, uninstall_handlers: bool | None = None) -> None:
+    """
+    End: whoever spins returns.
+
+    :param context: what to shut down; the default context if ``None``.
+    :param uninstall_handlers: whether to handle signals no longer; by default so for the default context.
+    :raises RuntimeError: if the context does not run.
+    """
+    _shutdown(context=context)
+    if uninstall_handlers or (uninstall_handlers is None and context is None):
+        uninstall_signal_handlers()
+
+
+def create_node(
+    node_name: str,
+    *,
+    context: Context | None = None,
+    cli_args: list[str] | None = None,
+    namespace: str | None = None,
+    use_global_arguments: bool = True,
+    enable_rosout: bool = True,
+    start_parameter_services: bool = True,
+    parameter_overrides: list[Parameter] | None = None,
+    allow_undeclared_parameters: bool = False,
+    automatically_declare_parameters_from_overrides: bool = False,
+    enable_logger_service: bool = False,
+) -> Node:
+    """Create a node; see :class:`rclpy.node.Node`."""
+    from rclpy.node import Node
+
+    return Node(
+        node_name,
+        context=context,
+        cli_args=cli_args,
+        namespace=namespace,
+        use_global_arguments=use_global_arguments,
+        enable_rosout=enable_rosout,
+        start_parameter_services=start_parameter_services,
+        parameter_overrides=parameter_overrides,
+        allow_undeclared_parameters=allow_undeclared_parameters,
+        automatically_declare_parameters_from_overrides=automatically_declare_parameters_from_overrides,
+        enable_logger_service=enable_logger_service,
+    )
+
+
+def _with_executor(node: Node, executor: Executor | None, work: Callable[[Executor], None]) -> None:
+    chosen = get_global_executor() if executor is None else executor
+    try:
+        chosen.add_node(node)
+        work(chosen)
+    finally:
+        chosen.remove_node(node)
+
+
+def spin_once(node: Node, *, executor: Executor | None = None, timeout_sec: float | None = None) -> None:
+    """Run one callback of ``node``, waiting at most ``timeout_sec`` for it (``None``: for ever)."""
+    _with_executor(node, executor, lambda chosen: chosen.spin_once(timeout_sec))
+
+
+def spin(node: Node, executor: Executor | None = None) -> None:
+    """Run the callbacks of ``node`` until the context is shut down."""
+
+    def work(chosen: Executor) -> None:
+        while chosen.context.ok():
+            chosen.spin_once()
+
+    _with_executor(node, executor, work)
+
+
+def spin_until_future_complete(
+    node: Node, future: Future, executor: Executor | None = None, timeout_sec: float | None = None
+) -> None:
+    """Run the callbacks of ``node`` until ``future`` is done, but no longer than ``timeout_sec``."""
+    _with_executor(node, executor, lambda chosen: chosen.spin_until_future_complete(future, timeout_sec))

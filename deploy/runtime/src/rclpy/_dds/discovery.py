@@ -1,0 +1,121 @@
+"""What DDS discovery has found in the domain: participants, writers and readers of all processes."""
+
+from __future__ import annotations
+
+import ctypes as ct
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from rclpy.qos import QoSProfile
+
+from . import qos
+from .library import (
+    ANY_STATE,
+    BUILTIN_PARTICIPANTS,
+    BUILTIN_PUBLICATIONS,
+    BUILTIN_SUBSCRIPTIONS,
+    BuiltinEndpoint,
+    BuiltinParticipant,
+    Pointer,
+    SampleInfo,
+    blocking,
+    checked,
+)
+
+_NOT_READ = 0x7E  # ANY_STATE without the sample state "read"
+_ALIVE = 16
+_NOT_ALIVE = 3 | 12 | 32 | 64  # any sample and view state, instance disposed or without writers
+_INITIAL_CAPACITY = 64
+
+
+@dataclass(frozen=True)
+class Endpoint:
+    """A reader or writer somewhere in the domain, by its DDS names."""
+
+    gid: bytes
+    participant: bytes
+    topic: str
+    type_name: str
+    user_data: str
+    profile: QoSProfile
+
+
+class _BuiltinReader:
+    """A reader of one of Cyclone's built-in topics."""
+
+    def __init__(self, participant: int, topic: int, structure: type[ct.Structure]) -> None:
+        self._structure = ct.POINTER(structure)
+        self._capacity = _INITIAL_CAPACITY
+        self.handle = checked(blocking.dds_create_reader(participant, topic, None, None), "built-in reader")
+        self.news = checked(blocking.dds_create_readcondition(self.handle, _NOT_READ), "read condition")
+
+    def _loan(self, operation: str, mask: int) -> Iterator[tuple[Any, SampleInfo]]:
+        read = getattr(blocking, operation)
+        while True:
+            capacity = self._capacity
+            samples = (Pointer * capacity)()
+            infos = (SampleInfo * capacity)()
+            count = checked(read(self.handle, samples, infos, capacity, capacity, mask), "discovery")
+            if count < capacity:
+                break
+            blocking.dds_return_loan(self.handle, samples, count)
+            self._capacity *= 2  # there may be more: once more, with room for it
+        try:
+            for index in range(count):
+                yield ct.cast(samples[index], self._structure).contents, infos[index]
+        finally:
+            if count:
+                blocking.dds_return_loan(self.handle, samples, count)
+
+    def alive(self) -> Iterator[Any]:
+        """What exists now. The structures live only as long as the iteration."""
+        for _ in self._loan("dds_take_mask", _NOT_ALIVE):
+            pass  # what has gone is not kept
+        for structure, info in self._loan("dds_read_mask", ANY_STATE):
+            if info.valid_data and info.instance_state == _ALIVE:
+                yield structure
+
+
+class Discovery:
+    """The graph of DDS entities, as this participant has discovered it."""
+
+    def __init__(self, participant: int) -> None:
+        self._participants = _BuiltinReader(participant, BUILTIN_PARTICIPANTS, BuiltinParticipant)
+        self._writers = _BuiltinReader(participant, BUILTIN_PUBLICATIONS, BuiltinEndpoint)
+        self._readers = _BuiltinReader(participant, BUILTIN_SUBSCRIPTIONS, BuiltinEndpoint)
+
+    @property
+    def news(self) -> list[int]:
+        """The DDS conditions that are true while there is something new."""
+        return [self._participants.news, self._writers.news, self._readers.news]
+
+    def participants(self) -> dict[bytes, str]:
+        """The GUID of every participant and its USER_DATA."""
+        return {bytes(found.key.bytes): qos.user_data(found.qos) for found in self._participants.alive()}
+
+    def writers(self, wanted: Callable[[str], bool] = lambda topic: True) -> list[Endpoint]:
+        """Every writer on a topic that is ``wanted``."""
+        return _endpoints(self._writers, wanted)
+
+    def readers(self, wanted: Callable[[str], bool] = lambda topic: True) -> list[Endpoint]:
+        """Every reader on a topic that is ``wanted``."""
+        return _endpoints(self._readers, wanted)
+
+
+def endpoint(found: BuiltinEndpoint) -> Endpoint:
+    """A built-in topic's sample as an object of its own."""
+    return Endpoint(
+        gid=bytes(found.key.bytes),
+        participant=bytes(found.participant_key.bytes),
+        topic=found.topic_name.decode(errors="replace"),
+        type_name=found.type_name.decode(errors="replace"),
+        user_data=qos.user_data(found.qos),
+        profile=qos.profile_of(found.qos),
+    )
+
+
+def _endpoints(reader: _BuiltinReader, wanted: Callable[[str], bool]) -> list[Endpoint]:
+    return [
+        endpoint(found) for found in reader.alive() if wanted(found.topic_name.decode(errors="replace"))
+    ]

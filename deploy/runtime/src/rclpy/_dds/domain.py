@@ -1,0 +1,83 @@
+"""How a process joins a DDS domain: the ROS 2 environment variables, in Cyclone DDS' terms.
+
+Source: REP-2005-style variables of ROS 2 Jazzy – ROS_AUTOMATIC_DISCOVERY_RANGE, ROS_STATIC_PEERS,
+ROS_LOCALHOST_ONLY (deprecated there, still obeyed), ROS_DOMAIN_ID – and Cyclone's CYCLONEDDS_URI, whose
+settings win.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections.abc import Mapping
+from xml.sax.saxutils import quoteattr
+
+from .library import PRECONDITION_NOT_MET, blocking, checked
+
+RANGES = ("SUBNET", "LOCALHOST", "OFF", "SYSTEM_DEFAULT")
+
+_lock = threading.Lock()
+_users: dict[int, int] = {}  # domain id -> participants of this process in it
+_handles: dict[int, int] = {}
+
+
+def domain_id_from_environment(environment: Mapping[str, str] = os.environ) -> int:
+    """ROS_DOMAIN_ID, 0 if it is not set. Raises ValueError if it is no number from 0 to 232."""
+    text = environment.get("ROS_DOMAIN_ID", "").strip() or "0"
+    if not text.isdecimal() or int(text) > 232:
+        raise ValueError(f"ROS_DOMAIN_ID must be a whole number from 0 to 232, not '{text}'")
+    return int(text)
+
+
+def configuration(environment: Mapping[str, str] = os.environ) -> str:
+    """Cyclone's configuration for the discovery range that the environment asks for.
+
+    In LOCALHOST the loopback interface is the only one. Multicast on it lets our own processes meet at once;
+    real Jazzy nodes do not multicast there but probe participant indices on localhost, so we take an index
+    and probe, too. Up to 100 processes fit (Jazzy's own limit of 33 would stop a fleet).
+    """
+    discovery_range = environment.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "").strip().upper() or "SUBNET"
+    if discovery_range not in RANGES:
+        raise ValueError(
+            f"ROS_AUTOMATIC_DISCOVERY_RANGE must be one of {', '.join(RANGES)}, not '{discovery_range}'"
+        )
+    if environment.get("ROS_LOCALHOST_ONLY", "0") == "1" and discovery_range == "SUBNET":
+        discovery_range = "LOCALHOST"
+    peers = [peer.strip() for peer in environment.get("ROS_STATIC_PEERS", "").split(";") if peer.strip()]
+    general, discovery = "", ""
+    if discovery_range == "LOCALHOST":
+        interface = '<NetworkInterface name="lo" multicast="true"/>'
+        general = f"<General><Interfaces>{interface}</Interfaces></General>"
+        peers = ["localhost", *peers]
+    elif discovery_range == "OFF":
+        general = "<General><AllowMulticast>false</AllowMulticast></General>"
+        tag = f"<Tag>ros_discovery_off_{os.getpid()}</Tag>"
+        discovery = f"<Discovery><ParticipantIndex>none</ParticipantIndex>{tag}</Discovery>"
+    if discovery_range == "LOCALHOST" or (discovery_range == "SUBNET" and peers):
+        addresses = "".join(f"<Peer address={quoteattr(peer)}/>" for peer in peers)
+        discovery = (
+            "<Discovery><ParticipantIndex>auto</ParticipantIndex>"
+            "<MaxAutoParticipantIndex>99</MaxAutoParticipantIndex>"
+            f"<Peers>{addresses}</Peers></Discovery>"
+        )
+    own = f"<CycloneDDS><Domain>{general}{discovery}</Domain></CycloneDDS>" if general or discovery else ""
+    return ",".join(part for part in (own, environment.get("CYCLONEDDS_URI", "")) if part)
+
+
+def enter(domain_id: int) -> None:
+    """Configure a domain before this process' first participant in it."""
+    with _lock:
+        if not _users.get(domain_id):
+            handle = blocking.dds_create_domain(domain_id, configuration().encode())
+            # Somebody else in this process (an application with its own DDS code) made it first: theirs wins.
+            if handle != PRECONDITION_NOT_MET:
+                _handles[domain_id] = checked(handle, f"cannot configure DDS domain {domain_id}")
+        _users[domain_id] = _users.get(domain_id, 0) + 1
+
+
+def leave(domain_id: int) -> None:
+    """Undo one ``enter``; the last one ends the domain and its threads."""
+    with _lock:
+        _users[domain_id] -= 1
+        if not _users[domain_id] and domain_id in _handles:
+            blocking.dds_delete(_handles.pop(domain_id))

@@ -1,0 +1,213 @@
+"""The C API of Eclipse Cyclone DDS, as far as this runtime needs it, through ctypes.
+
+The PyPI distribution ``cyclonedds`` carries the C library; its Python layer is not imported. That layer holds
+the interpreter lock while it writes, announces XTypes information that a ROS 2 node does not announce, and
+takes 130 ms to import. The C functions below are Cyclone's own interface for applications that bring their
+messages as CDR, the one that ``rmw_cyclonedds`` builds on, too.
+
+Two handles on one library: ``blocking`` releases the interpreter lock during a call and is for everything that
+may wait; ``quick`` keeps it, which is cheaper, and is for calls that never block.
+"""
+
+from __future__ import annotations
+
+import ctypes as ct
+import importlib.util
+import sys
+from pathlib import Path
+from typing import Any
+
+Entity = ct.c_int32
+Pointer = ct.c_void_p
+Duration = ct.c_int64
+
+INFINITY = 0x7FFFFFFFFFFFFFFF  # DDS_INFINITY [ns]
+LENGTH_UNLIMITED = -1
+ANY_STATE = 0x7F  # every sample, view and instance state
+SERDATA_KIND_DATA = 2
+LIBRARY_HANDLE = 0x7FFF0000 + 256  # DDS_CYCLONEDDS_HANDLE, owner of what belongs to no participant
+PRECONDITION_NOT_MET = -4
+TIMEOUT = -10
+
+BUILTIN_PARTICIPANTS = 0x7FFF0000 + 1
+BUILTIN_PUBLICATIONS = 0x7FFF0000 + 3
+BUILTIN_SUBSCRIPTIONS = 0x7FFF0000 + 4
+
+
+class DDSError(RuntimeError):
+    """A call into DDS failed; ``code`` is the DDS return code."""
+
+    def __init__(self, code: int, what: str) -> None:
+        reason = quick.dds_strretcode(code)
+        super().__init__(f"{what}: {reason.decode() if reason else 'unknown error'} (DDS return code {code})")
+        self.code = code
+
+
+class TopicDescriptor(ct.Structure):
+    """dds_topic_descriptor_t: how DDS sees a type."""
+
+    _fields_ = [
+        ("size", ct.c_uint32),
+        ("align", ct.c_uint32),
+        ("flagset", ct.c_uint32),
+        ("nkeys", ct.c_uint32),
+        ("typename", ct.c_char_p),
+        ("keys", Pointer),
+        ("nops", ct.c_uint32),
+        ("ops", ct.POINTER(ct.c_uint32)),
+        ("meta", ct.c_char_p),
+        ("type_information", Pointer),
+        ("type_information_size", ct.c_uint32),
+        ("type_mapping", Pointer),
+        ("type_mapping_size", ct.c_uint32),
+        ("restrict_data_representation", ct.c_uint32),
+    ]
+
+
+class SampleInfo(ct.Structure):
+    """dds_sample_info_t: what DDS knows of a sample besides its data."""
+
+    _fields_ = [
+        ("sample_state", ct.c_int),
+        ("view_state", ct.c_int),
+        ("instance_state", ct.c_int),
+        ("valid_data", ct.c_bool),
+        ("source_timestamp", ct.c_int64),
+        ("instance_handle", ct.c_uint64),
+        ("publication_handle", ct.c_uint64),
+        ("disposed_generation_count", ct.c_uint32),
+        ("no_writers_generation_count", ct.c_uint32),
+        ("sample_rank", ct.c_uint32),
+        ("generation_rank", ct.c_uint32),
+        ("absolute_generation_rank", ct.c_uint32),
+    ]
+
+
+class IoVector(ct.Structure):
+    """struct iovec."""
+
+    _fields_ = [("base", ct.c_char_p), ("length", ct.c_size_t)]
+
+
+class Guid(ct.Structure):
+    """dds_guid_t."""
+
+    _fields_ = [("bytes", ct.c_uint8 * 16)]
+
+
+class BuiltinParticipant(ct.Structure):
+    """dds_builtintopic_participant_t: a participant that discovery has found."""
+
+    _fields_ = [("key", Guid), ("qos", Pointer)]
+
+
+class BuiltinEndpoint(ct.Structure):
+    """dds_builtintopic_endpoint_t: a reader or writer that discovery has found."""
+
+    _fields_ = [
+        ("key", Guid),
+        ("participant_key", Guid),
+        ("participant_instance_handle", ct.c_uint64),
+        ("topic_name", ct.c_char_p),
+        ("type_name", ct.c_char_p),
+        ("qos", Pointer),
+    ]
+
+
+def _load() -> tuple[ct.CDLL, ct.PyDLL]:
+    spec = importlib.util.find_spec("cyclonedds")
+    if spec is None or not spec.submodule_search_locations:
+        raise ImportError("Eclipse Cyclone DDS is not installed: pip install 'cyclonedds>=11.0.1,<12'")
+    package = Path(spec.submodule_search_locations[0])
+    places = [package / ".dylibs"] if sys.platform == "darwin" else [package.parent / "cyclonedds.libs"]
+    for place in places:
+        for path in sorted(place.glob("libddsc*")):
+            return ct.CDLL(str(path)), ct.PyDLL(str(path))
+    raise ImportError(f"the C library of Cyclone DDS is not beside its package: no libddsc* in {places[0]}")
+
+
+blocking, quick = _load()
+
+# name: (result, arguments). Everything here may wait or take a lock that another thread holds for long.
+_BLOCKING: dict[str, tuple[Any, list[Any]]] = {
+    "dds_create_domain": (Entity, [ct.c_uint32, ct.c_char_p]),
+    "dds_create_participant": (Entity, [ct.c_uint32, Pointer, Pointer]),
+    "dds_create_publisher": (Entity, [Entity, Pointer, Pointer]),
+    "dds_create_subscriber": (Entity, [Entity, Pointer, Pointer]),
+    "dds_create_topic": (Entity, [Entity, ct.POINTER(TopicDescriptor), ct.c_char_p, Pointer, Pointer]),
+    "dds_create_reader": (Entity, [Entity, Entity, Pointer, Pointer]),
+    "dds_create_writer": (Entity, [Entity, Entity, Pointer, Pointer]),
+    "dds_create_readcondition": (Entity, [Entity, ct.c_uint32]),
+    "dds_create_guardcondition": (Entity, [Entity]),
+    "dds_create_waitset": (Entity, [Entity]),
+    "dds_delete": (ct.c_int32, [Entity]),
+    "dds_waitset_attach": (ct.c_int32, [Entity, Entity, ct.c_ssize_t]),
+    "dds_waitset_detach": (ct.c_int32, [Entity, Entity]),
+    "dds_waitset_wait": (ct.c_int32, [Entity, Pointer, ct.c_size_t, Duration]),
+    "dds_set_guardcondition": (ct.c_int32, [Entity, ct.c_bool]),
+    "dds_take_guardcondition": (ct.c_int32, [Entity, ct.POINTER(ct.c_bool)]),
+    "dds_writecdr": (ct.c_int32, [Entity, Pointer]),
+    "dds_wait_for_acks": (ct.c_int32, [Entity, Duration]),
+    "dds_assert_liveliness": (ct.c_int32, [Entity]),
+    "dds_set_status_mask": (ct.c_int32, [Entity, ct.c_uint32]),
+    "dds_get_status_changes": (ct.c_int32, [Entity, ct.POINTER(ct.c_uint32)]),
+    "dds_read_mask": (ct.c_int32, [Entity, Pointer, Pointer, ct.c_size_t, ct.c_uint32, ct.c_uint32]),
+    "dds_take_mask": (ct.c_int32, [Entity, Pointer, Pointer, ct.c_size_t, ct.c_uint32, ct.c_uint32]),
+    "dds_return_loan": (ct.c_int32, [Entity, Pointer, ct.c_int32]),
+}
+
+_QUICK: dict[str, tuple[Any, list[Any]]] = {
+    "dds_strretcode": (ct.c_char_p, [ct.c_int32]),
+    "dds_takecdr": (ct.c_int32, [Entity, Pointer, ct.c_uint32, Pointer, ct.c_uint32]),
+    "ddsi_serdata_size": (ct.c_uint32, [Pointer]),
+    "ddsi_serdata_to_ser": (None, [Pointer, ct.c_size_t, ct.c_size_t, Pointer]),
+    "ddsi_serdata_unref": (None, [Pointer]),
+    "ddsi_serdata_from_ser_iov": (
+        Pointer,
+        [Pointer, ct.c_int, ct.c_size_t, ct.POINTER(IoVector), ct.c_size_t],
+    ),
+    "dds_get_entity_sertype": (ct.c_int32, [Entity, ct.POINTER(Pointer)]),
+    "dds_get_guid": (ct.c_int32, [Entity, ct.POINTER(Guid)]),
+    "dds_get_instance_handle": (ct.c_int32, [Entity, ct.POINTER(ct.c_uint64)]),
+    "dds_get_matched_publications": (ct.c_int32, [Entity, Pointer, ct.c_size_t]),
+    "dds_get_matched_subscriptions": (ct.c_int32, [Entity, Pointer, ct.c_size_t]),
+    "dds_get_matched_publication_data": (ct.POINTER(BuiltinEndpoint), [Entity, ct.c_uint64]),
+    "dds_get_matched_subscription_data": (ct.POINTER(BuiltinEndpoint), [Entity, ct.c_uint64]),
+    "dds_builtintopic_free_endpoint": (None, [ct.POINTER(BuiltinEndpoint)]),
+    "dds_free": (None, [Pointer]),
+    "dds_create_qos": (Pointer, []),
+    "dds_delete_qos": (None, [Pointer]),
+    "dds_qset_userdata": (None, [Pointer, ct.c_char_p, ct.c_size_t]),
+    "dds_qset_durability": (None, [Pointer, ct.c_int]),
+    "dds_qset_durability_service": (
+        None,
+        [Pointer, Duration, ct.c_int, ct.c_int32, ct.c_int32, ct.c_int32, ct.c_int32],
+    ),
+    "dds_qset_history": (None, [Pointer, ct.c_int, ct.c_int32]),
+    "dds_qset_reliability": (None, [Pointer, ct.c_int, Duration]),
+    "dds_qset_lifespan": (None, [Pointer, Duration]),
+    "dds_qset_deadline": (None, [Pointer, Duration]),
+    "dds_qset_liveliness": (None, [Pointer, ct.c_int, Duration]),
+    "dds_qset_writer_data_lifecycle": (None, [Pointer, ct.c_bool]),
+    "dds_qset_data_representation": (None, [Pointer, ct.c_uint32, ct.POINTER(ct.c_int16)]),
+    "dds_qget_userdata": (ct.c_bool, [Pointer, ct.POINTER(Pointer), ct.POINTER(ct.c_size_t)]),
+    "dds_qget_durability": (ct.c_bool, [Pointer, ct.POINTER(ct.c_int)]),
+    "dds_qget_history": (ct.c_bool, [Pointer, ct.POINTER(ct.c_int), ct.POINTER(ct.c_int32)]),
+    "dds_qget_reliability": (ct.c_bool, [Pointer, ct.POINTER(ct.c_int), ct.POINTER(Duration)]),
+    "dds_qget_lifespan": (ct.c_bool, [Pointer, ct.POINTER(Duration)]),
+    "dds_qget_deadline": (ct.c_bool, [Pointer, ct.POINTER(Duration)]),
+    "dds_qget_liveliness": (ct.c_bool, [Pointer, ct.POINTER(ct.c_int), ct.POINTER(Duration)]),
+}
+
+for _library, _functions in ((blocking, _BLOCKING), (quick, _QUICK)):
+    for _name, (_result, _arguments) in _functions.items():
+        _function = getattr(_library, _name)
+        _function.restype = _result
+        _function.argtypes = _arguments
+
+
+def checked(code: int, what: str) -> int:
+    """Return ``code``, or raise DDSError saying ``what`` failed if it is negative."""
+    if code < 0:
+        raise DDSError(code, what)
+    return code

@@ -1,0 +1,131 @@
+"""Between ROS QoS profiles and DDS QoS, with the choices of rmw_cyclonedds_cpp (facts/discovery.txt)."""
+
+from __future__ import annotations
+
+import ctypes as ct
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from rclpy.duration import Duration
+from rclpy.qos import (
+    DurabilityPolicy,
+    HistoryPolicy,
+    LivelinessPolicy,
+    QoSProfile,
+    ReliabilityPolicy,
+)
+
+from . import library
+from .library import INFINITY, LENGTH_UNLIMITED, quick
+
+_KEEP_LAST, _KEEP_ALL = 0, 1
+_BEST_EFFORT, _RELIABLE = 0, 1
+_VOLATILE, _TRANSIENT_LOCAL = 0, 1
+_AUTOMATIC, _MANUAL_BY_TOPIC = 0, 2
+_XCDR1 = (ct.c_int16 * 1)(0)
+
+
+def _nanoseconds(duration: Duration) -> int:
+    """A ROS duration for DDS: what is unspecified (0) or beyond the range means infinite."""
+    nanoseconds = duration.nanoseconds
+    return nanoseconds if 0 < nanoseconds < INFINITY else INFINITY
+
+
+@contextmanager
+def endpoint_qos(profile: QoSProfile, user_data: str) -> Iterator[int]:
+    """The DDS QoS of a reader or writer, for the length of a ``with``.
+
+    ``user_data`` goes to USER_DATA, where ROS 2 announces type hashes and service identifiers.
+    """
+    qos = quick.dds_create_qos()
+    try:
+        quick.dds_qset_writer_data_lifecycle(qos, False)
+        quick.dds_qset_data_representation(qos, 1, _XCDR1)
+        if profile.history == HistoryPolicy.KEEP_ALL:
+            history = (_KEEP_ALL, LENGTH_UNLIMITED)
+        else:
+            history = (_KEEP_LAST, profile.depth or 1)
+        quick.dds_qset_history(qos, *history)
+        if profile.reliability == ReliabilityPolicy.BEST_EFFORT:
+            quick.dds_qset_reliability(qos, _BEST_EFFORT, 0)
+        else:
+            quick.dds_qset_reliability(qos, _RELIABLE, INFINITY)
+        if profile.durability == DurabilityPolicy.TRANSIENT_LOCAL:
+            quick.dds_qset_durability(qos, _TRANSIENT_LOCAL)
+            quick.dds_qset_durability_service(
+                qos, 0, *history, LENGTH_UNLIMITED, LENGTH_UNLIMITED, LENGTH_UNLIMITED
+            )
+        else:
+            quick.dds_qset_durability(qos, _VOLATILE)
+        quick.dds_qset_lifespan(qos, _nanoseconds(profile.lifespan))
+        quick.dds_qset_deadline(qos, _nanoseconds(profile.deadline))
+        manual = profile.liveliness == LivelinessPolicy.MANUAL_BY_TOPIC
+        lease = _nanoseconds(profile.liveliness_lease_duration)
+        quick.dds_qset_liveliness(qos, _MANUAL_BY_TOPIC if manual else _AUTOMATIC, lease)
+        encoded = user_data.encode()
+        quick.dds_qset_userdata(qos, encoded, len(encoded))
+        yield qos
+    finally:
+        quick.dds_delete_qos(qos)
+
+
+@contextmanager
+def participant_qos(user_data: str) -> Iterator[int]:
+    """The DDS QoS of a participant, for the length of a ``with``."""
+    qos = quick.dds_create_qos()
+    try:
+        encoded = user_data.encode()
+        quick.dds_qset_userdata(qos, encoded, len(encoded))
+        yield qos
+    finally:
+        quick.dds_delete_qos(qos)
+
+
+def user_data(qos: int | None) -> str:
+    """The USER_DATA of a DDS QoS, '' if there is none."""
+    value, size = library.Pointer(), ct.c_size_t()
+    if not qos or not quick.dds_qget_userdata(qos, ct.byref(value), ct.byref(size)) or not value:
+        return ""
+    data = ct.string_at(value, size.value)
+    quick.dds_free(value)
+    return data.decode(errors="replace")
+
+
+def user_data_value(data: str, key: str) -> str:
+    """The value of ``key`` in a USER_DATA of the form ``key=value;key=value;``, '' if it is not there."""
+    for entry in data.split(";"):
+        name, _, value = entry.partition("=")
+        if name == key:
+            return value
+    return ""
+
+
+def profile_of(qos: int | None) -> QoSProfile:
+    """The ROS profile of a discovered endpoint. History is not announced in discovery: it stays UNKNOWN."""
+    kind, duration = ct.c_int(), library.Duration()
+
+    def nanoseconds(getter: str) -> Duration:
+        if not qos or not getattr(quick, getter)(qos, ct.byref(duration)):
+            return Duration(nanoseconds=INFINITY)
+        return Duration(nanoseconds=duration.value)
+
+    reliability, durability = ReliabilityPolicy.BEST_EFFORT, DurabilityPolicy.VOLATILE
+    liveliness, lease = LivelinessPolicy.AUTOMATIC, Duration(nanoseconds=INFINITY)
+    if qos and quick.dds_qget_reliability(qos, ct.byref(kind), ct.byref(duration)):
+        reliability = ReliabilityPolicy.RELIABLE if kind.value else ReliabilityPolicy.BEST_EFFORT
+    if qos and quick.dds_qget_durability(qos, ct.byref(kind)):
+        durability = DurabilityPolicy.TRANSIENT_LOCAL if kind.value else DurabilityPolicy.VOLATILE
+    if qos and quick.dds_qget_liveliness(qos, ct.byref(kind), ct.byref(duration)):
+        manual = kind.value == _MANUAL_BY_TOPIC
+        liveliness = LivelinessPolicy.MANUAL_BY_TOPIC if manual else LivelinessPolicy.AUTOMATIC
+        lease = Duration(nanoseconds=duration.value)
+    return QoSProfile(
+        history=HistoryPolicy.UNKNOWN,
+        depth=0,
+        reliability=reliability,
+        durability=durability,
+        lifespan=nanoseconds("dds_qget_lifespan"),
+        deadline=nanoseconds("dds_qget_deadline"),
+        liveliness=liveliness,
+        liveliness_lease_duration=lease,
+    )

@@ -1,0 +1,359 @@
+"""The ROS graph: which nodes exist and what they publish, subscribe to, serve and call.
+
+DDS knows endpoints; which node they belong to travels on the topic ``ros_discovery_info``, where every process
+keeps its latest ``rmw_dds_common/msg/ParticipantEntitiesInfo`` (facts/wire_samples.json).
+"""
+
+from __future__ import annotations
+
+import struct
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+from rclpy import _names
+from rclpy._dds import Participant, Reader, WaitSet, Writer
+from rclpy._dds.discovery import Discovery, Endpoint
+from rclpy._dds.qos import user_data_value
+from rclpy.exceptions import NodeNameNonExistentError
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+
+if TYPE_CHECKING:
+    from rclpy.node import Node
+
+_TOPIC = "ros_discovery_info"
+_TYPE = "rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_"
+_TYPE_HASH = "RIHS01_91a0593bacdcc50ea9bdcf849a938b128412cc1ea821245c663bcd26f83c295e"
+_WRITER_QOS = QoSProfile(
+    history=HistoryPolicy.KEEP_LAST,
+    depth=1,
+    reliability=ReliabilityPolicy.RELIABLE,
+    durability=DurabilityPolicy.TRANSIENT_LOCAL,
+)
+_READER_QOS = QoSProfile(
+    history=HistoryPolicy.KEEP_ALL,
+    depth=0,
+    reliability=ReliabilityPolicy.RELIABLE,
+    durability=DurabilityPolicy.TRANSIENT_LOCAL,
+)
+
+NamesAndTypes = list[tuple[str, list[str]]]
+
+
+class NodeEntities:
+    """One node of some process: its name and the GUIDs of its readers and writers."""
+
+    __slots__ = ("name", "namespace", "readers", "writers")
+
+    def __init__(self, namespace: str, name: str) -> None:
+        self.namespace = namespace
+        self.name = name
+        self.readers: list[bytes] = []
+        self.writers: list[bytes] = []
+
+
+def encode(gid: bytes, nodes: list[NodeEntities]) -> bytes:
+    """CDR of a ParticipantEntitiesInfo: a participant's GUID and its nodes.
+
+    Written here and not by the message class, whose arrays would cost every process the import of NumPy.
+    """
+    data = bytearray(b"\x00\x01\x00\x00" + gid + struct.pack("<I", len(nodes)))
+
+    def string(text: str) -> None:
+        encoded = text.encode() + b"\0"
+        data.extend(b"\0" * (-len(data) % 4) + struct.pack("<I", len(encoded)) + encoded)
+
+    for node in nodes:
+        string(node.namespace)
+        string(node.name)
+        for gids in (node.readers, node.writers):
+            data.extend(b"\0" * (-len(data) % 4) + struct.pack("<I", len(gids)) + b"".join(gids))
+    return bytes(data)
+
+
+def decode(data: bytes) -> tuple[bytes, list[NodeEntities]]:
+    """A participant's GUID and its nodes from CDR. Raises ValueError if it is malformed."""
+    position = 20
+
+    def number() -> int:
+        nonlocal position
+        position += -position % 4
+        (value,) = struct.unpack_from("<I", data, position)
+        position += 4
+        if value > len(data) - position:
+            raise ValueError("a length beyond the end")
+        return int(value)
+
+    def octets(count: int) -> bytes:
+        nonlocal position
+        if count > len(data) - position:
+            raise ValueError("a length beyond the end")
+        position += count
+        return data[position - count : position]
+
+    if data[:2] != b"\x00\x01" or len(data) < position:
+        raise ValueError("no ParticipantEntitiesInfo")
+    try:
+        nodes = []
+        for _ in range(number()):
+            namespace = octets(number()).rstrip(b"\0").decode()
+            node = NodeEntities(namespace, octets(number()).rstrip(b"\0").decode())
+            node.readers = [octets(16) for _ in range(number())]
+            node.writers = [octets(16) for _ in range(number())]
+            nodes.append(node)
+    except (struct.error, UnicodeDecodeError) as error:
+        raise ValueError(str(error)) from error
+    return data[4:20], nodes
+
+
+class Graph:
+    """A process' view of the graph, and what it tells the others about its own nodes."""
+
+    # As far as an executor is concerned: something to wait for that runs no callback.
+    callback_group = None
+
+    def __init__(self, domain_id: int, enclave: str) -> None:
+        self._lock = threading.RLock()
+        self.participant = Participant(domain_id, f"enclave={enclave};")
+        hash_ = f"typehash={_TYPE_HASH};"
+        self._writer = self.participant.create_writer(_TOPIC, _TYPE, _WRITER_QOS, hash_)
+        self._reader = self.participant.create_reader(_TOPIC, _TYPE, _READER_QOS, hash_)
+        self._handles = (self._reader.condition,)
+        self._own: dict[Node, NodeEntities] = {}
+        self._deferred = 0
+        self._peers: dict[bytes, list[NodeEntities]] = {}
+        self._discovery: Discovery | None = None  # made when somebody asks about the graph
+        self._service_ids = 0
+
+    def close(self) -> None:
+        """Leave the domain."""
+        self.participant.close()
+
+    # What this process tells
+
+    @contextmanager
+    def one_announcement(self) -> Iterator[None]:
+        """Announce all changes within the ``with`` as one."""
+        with self._lock:
+            self._deferred += 1
+        try:
+            yield
+        finally:
+            with self._lock:
+                self._deferred -= 1
+            self._announce()
+
+    def _announce(self) -> None:
+        with self._lock:
+            if not self._deferred:
+                self._writer.write(encode(self.participant.gid, list(self._own.values())))
+
+    def add_node(self, node: Node) -> None:
+        """Announce a node of this process."""
+        with self._lock:
+            self._own[node] = NodeEntities(node.get_namespace(), node.get_name())
+        self._announce()
+
+    def remove_node(self, node: Node) -> None:
+        """Announce that a node is no more."""
+        with self._lock:
+            self._own.pop(node, None)
+        self._announce()
+
+    def _change(self, node: Node, change: Callable[[NodeEntities], None]) -> None:
+        with self._lock:
+            if node in self._own:
+                change(self._own[node])
+        self._announce()
+
+    def create_writer(
+        self, node: Node, topic: str, msg_type: Any, profile: QoSProfile, extra: str = ""
+    ) -> Writer:
+        """A writer of ``msg_type`` that belongs to ``node``; ``extra`` goes to USER_DATA before the hash."""
+        user_data = f"{extra}typehash={msg_type._TYPE_HASH};"
+        writer = self.participant.create_writer(topic, msg_type._DDS_TYPE_NAME, profile, user_data)
+        self._change(node, lambda own: own.writers.append(writer.gid))
+        return writer
+
+    def create_reader(
+        self, node: Node, topic: str, msg_type: Any, profile: QoSProfile, extra: str = ""
+    ) -> Reader:
+        """A reader of ``msg_type`` that belongs to ``node``; ``extra`` goes to USER_DATA before the hash."""
+        user_data = f"{extra}typehash={msg_type._TYPE_HASH};"
+        reader = self.participant.create_reader(topic, msg_type._DDS_TYPE_NAME, profile, user_data)
+        self._change(node, lambda own: own.readers.append(reader.gid))
+        return reader
+
+    def destroy(self, node: Node, *endpoints: Writer | Reader) -> None:
+        """End readers and writers of ``node``."""
+        gone = {endpoint.gid for endpoint in endpoints}
+
+        def remove(own: NodeEntities) -> None:
+            own.readers = [gid for gid in own.readers if gid not in gone]
+            own.writers = [gid for gid in own.writers if gid not in gone]
+
+        self._change(node, remove)
+        for endpoint in endpoints:
+            endpoint.close()
+
+    def next_service_id(self) -> str:
+        """An identifier for the two endpoints of a service or client, unique in the domain."""
+        with self._lock:
+            self._service_ids += 1
+            octets = self.participant.gid[:12] + struct.pack(">I", self._service_ids)
+        return " " + ".".join(f"{octet:x}" for octet in octets)
+
+    # What the others tell
+
+    def _take(self) -> None:
+        """Note what peers have announced."""
+        with self._lock:
+            while (sample := self._reader.take()) is not None:
+                try:
+                    gid, nodes = decode(sample.data)
+                except ValueError:
+                    continue  # not from a ROS 2 process: it has no nodes that could be named
+                self._peers[gid] = nodes
+
+    def _execute(self, taken: Any) -> None:
+        raise AssertionError("the graph runs no callback")
+
+    def _discovered(self) -> Discovery:
+        with self._lock:
+            if self._discovery is None:
+                self._discovery = Discovery(self.participant.handle)
+            return self._discovery
+
+    def wait_for(self, condition: Callable[[], bool], timeout: float | None, alive: Callable[[], bool]) -> bool:
+        """
+        Wait until ``condition`` is true, looking anew whenever the graph changes.
+
+        :param timeout: seconds; ``None`` or negative for ever.
+        :param alive: asked at least ten times a second; the wait ends when it says no.
+        :return: whether the condition came true.
+        """
+        deadline = None if timeout is None or timeout < 0 else time.monotonic() + timeout
+        waitset = WaitSet()
+        try:
+            for handle in (*self._discovered().news, self._reader.condition):
+                waitset.attach(handle, 1)
+            while not condition():
+                remaining = 0.1 if deadline is None else min(0.1, deadline - time.monotonic())
+                if remaining <= 0 or not alive():
+                    return False
+                waitset.wait(int(remaining * 1e9))
+            return True
+        finally:
+            waitset.close()
+
+    def _nodes(self) -> Iterator[tuple[bytes, NodeEntities]]:
+        """Every node that is known, with its participant's GUID."""
+        with self._lock:
+            self._take()
+            alive = self._discovered().participants()
+            self._peers = {gid: nodes for gid, nodes in self._peers.items() if gid in alive}
+            known = {**self._peers, self.participant.gid: list(self._own.values())}
+            for gid, nodes in known.items():
+                for node in nodes:
+                    yield gid, node
+
+    def node_names(self) -> list[tuple[str, str, str]]:
+        """Name, namespace and enclave of every node."""
+        enclaves = self._discovered().participants()
+        return [
+            (node.name, node.namespace, user_data_value(enclaves.get(gid, ""), "enclave") or "/")
+            for gid, node in self._nodes()
+        ]
+
+    def _owner(self, gid: bytes) -> tuple[str, str]:
+        """Name and namespace of the node that has this endpoint, as ROS 2 names what it does not know."""
+        for _, node in self._nodes():
+            if gid in node.readers or gid in node.writers:
+                return node.name, node.namespace
+        return "_NODE_NAME_UNKNOWN_", "_NODE_NAMESPACE_UNKNOWN_"
+
+    def _writers_and_readers(self) -> list[Endpoint]:
+        return self._discovered().writers() + self._discovered().readers()
+
+    def topic_names_and_types(self, no_demangle: bool) -> NamesAndTypes:
+        """Every topic that has a reader or writer, with its types."""
+        return _collect_topics(self._writers_and_readers(), no_demangle)
+
+    def service_names_and_types(self) -> NamesAndTypes:
+        """Every service that has a server or client, with its types."""
+        return _collect_services(self._writers_and_readers())
+
+    def _of_node(self, name: str, namespace: str, kind: str, endpoints: list[Endpoint]) -> list[Endpoint]:
+        gids: set[bytes] = set()
+        found = False
+        for _, node in self._nodes():
+            if (node.name, node.namespace) == (name, namespace):
+                found = True
+                gids.update(getattr(node, kind))
+        if not found:
+            raise NodeNameNonExistentError(f"Cannot find the node {namespace.rstrip('/')}/{name}")
+        return [endpoint for endpoint in endpoints if endpoint.gid in gids]
+
+    def publishers_of_node(self, name: str, namespace: str, no_demangle: bool) -> NamesAndTypes:
+        """The topics that a node publishes."""
+        writers = self._of_node(name, namespace, "writers", self._discovered().writers())
+        return _collect_topics(writers, no_demangle)
+
+    def subscriptions_of_node(self, name: str, namespace: str, no_demangle: bool) -> NamesAndTypes:
+        """The topics that a node subscribes to."""
+        readers = self._of_node(name, namespace, "readers", self._discovered().readers())
+        return _collect_topics(readers, no_demangle)
+
+    def services_of_node(self, name: str, namespace: str) -> NamesAndTypes:
+        """The services that a node serves: it reads their requests."""
+        readers = self._of_node(name, namespace, "readers", self._discovered().readers())
+        return _collect_services([reader for reader in readers if reader.topic.startswith("rq/")])
+
+    def clients_of_node(self, name: str, namespace: str) -> NamesAndTypes:
+        """The services that a node calls: it reads their replies."""
+        readers = self._of_node(name, namespace, "readers", self._discovered().readers())
+        return _collect_services([reader for reader in readers if reader.topic.startswith("rr/")])
+
+    def writers_of(self, dds_topic: str) -> list[tuple[Endpoint, str, str]]:
+        """The writers on a topic, each with its node's name and namespace."""
+        found = self._discovered().writers(lambda topic: topic == dds_topic)
+        return [(endpoint, *self._owner(endpoint.gid)) for endpoint in found]
+
+    def readers_of(self, dds_topic: str) -> list[tuple[Endpoint, str, str]]:
+        """The readers on a topic, each with its node's name and namespace."""
+        found = self._discovered().readers(lambda topic: topic == dds_topic)
+        return [(endpoint, *self._owner(endpoint.gid)) for endpoint in found]
+
+    def count_writers(self, dds_topic: str) -> int:
+        """How many writers a topic has."""
+        return len(self._discovered().writers(lambda topic: topic == dds_topic))
+
+    def count_readers(self, dds_topic: str) -> int:
+        """How many readers a topic has."""
+        return len(self._discovered().readers(lambda topic: topic == dds_topic))
+
+
+def _sorted(found: dict[str, set[str]]) -> NamesAndTypes:
+    return [(name, sorted(types)) for name, types in sorted(found.items())]
+
+
+def _collect_topics(endpoints: list[Endpoint], no_demangle: bool) -> NamesAndTypes:
+    found: dict[str, set[str]] = {}
+    for endpoint in endpoints:
+        if no_demangle:
+            found.setdefault(endpoint.topic, set()).add(endpoint.type_name)
+        elif (name := _names.topic_from_dds(endpoint.topic)) is not None:
+            found.setdefault(name, set()).add(_names.type_from_dds(endpoint.type_name))
+    return _sorted(found)
+
+
+def _collect_services(endpoints: list[Endpoint]) -> NamesAndTypes:
+    found: dict[str, set[str]] = {}
+    for endpoint in endpoints:
+        if (name := _names.service_from_dds(endpoint.topic)) is not None:
+            found.setdefault(name, set()).add(_names.service_type_from_dds(endpoint.type_name))
+    return _sorted(found)
+
+

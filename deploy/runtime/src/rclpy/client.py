@@ -1,0 +1,163 @@
+"""Clients: they call services."""
+
+from __future__ import annotations
+
+import itertools
+import threading
+from types import TracebackType
+from typing import TYPE_CHECKING, Any
+
+from rclpy._bad_input import BadInput
+from rclpy._dds import Writer
+from rclpy._endpoint import ServiceEndpoint
+from rclpy._service_wire import RequestId, server_is_matched, unwrap, wrap
+from rclpy.callback_groups import CallbackGroup
+from rclpy.exceptions import InvalidHandle
+from rclpy.qos import QoSProfile
+from rclpy.task import Future
+
+if TYPE_CHECKING:
+    from rclpy.clock import Clock
+    from rclpy.context import Context
+
+
+class Client:
+    """Calls one service; :meth:`rclpy.node.Node.create_client` makes them."""
+
+    def __init__(
+        self,
+        context: Context,
+        client_impl: ServiceEndpoint,
+        srv_type: Any,
+        srv_name: str,
+        qos_profile: QoSProfile,
+        callback_group: CallbackGroup,
+    ) -> None:
+        self._requests = client_impl.writer
+        self._replies = client_impl.reader
+        self._handles = (self._replies.condition,)
+        self._node = client_impl.node
+        self._service_name = client_impl.name
+        self._destroyed = False
+        self._bad_input = BadInput(self._node, self._service_name)
+        self._sequence_numbers = itertools.count(1)
+        self._pending_requests: dict[int, Future] = {}
+        self._lock = threading.Lock()
+        self.context = context
+        self.srv_type = srv_type
+        self.srv_name = srv_name
+        self.qos_profile = qos_profile
+        self.callback_group = callback_group
+
+    @property
+    def handle(self) -> Writer:
+        """The DDS writer of the requests. Raises InvalidHandle when the client was destroyed."""
+        if self._destroyed:
+            raise InvalidHandle("cannot use a client that was destroyed")
+        return self._requests
+
+    @property
+    def service_name(self) -> str:
+        """The fully qualified, remapped name."""
+        return self._service_name
+
+    def call(self, request: Any, timeout_sec: float | None = None) -> Any:
+        """
+        Call and wait for the reply, at most ``timeout_sec``; ``None`` if it did not come.
+
+        Another thread must spin the node meanwhile: do not call this in a callback.
+
+        :raises TypeError: if ``request`` is not of the service's request type.
+        """
+        event = threading.Event()
+        future = self.call_async(request)
+        future._call_when_complete(event.set)
+        self.context._wake_on_shutdown(event)
+        event.wait(timeout_sec)
+        if not future.done():
+            self.remove_pending_request(future)
+        return future.result()
+
+    def call_async(self, request: Any) -> Future:
+        """
+        Call; the future gets the reply. Cancel it, or remove the pending request, to wait no longer.
+
+        :raises TypeError: if ``request`` is not of the service's request type.
+        """
+        if not isinstance(request, self.srv_type.Request):
+            expected = self.srv_type.Request._TYPE_NAME
+            raise TypeError(f"{self._service_name} is called with {expected}, not {request!r}")
+        data = self.srv_type.Request._serialize(request)
+        future = Future(executor=self._node.executor)
+        with self._lock:
+            number = next(self._sequence_numbers)
+            self._pending_requests[number] = future
+        # Not as a done callback: it would need the executor to run it.
+        future._call_when_complete(lambda: self.remove_pending_request(future))
+        self.handle.write(wrap(RequestId(self._requests.instance_handle, number), data))
+        return future
+
+    def get_pending_request(self, sequence_number: int) -> Future:
+        """The future of a request that has no reply yet. Raises KeyError if there is none."""
+        with self._lock:
+            return self._pending_requests[sequence_number]
+
+    def remove_pending_request(self, future: Future) -> None:
+        """Wait for the reply to this request no longer: its future will not be completed."""
+        with self._lock:
+            for number, pending in list(self._pending_requests.items()):
+                if pending is future:
+                    del self._pending_requests[number]
+
+    def service_is_ready(self) -> bool:
+        """Whether a server would hear a call now, and we its reply."""
+        return server_is_matched(self.handle, self._replies)
+
+    def wait_for_service(self, timeout_sec: float | None = None) -> bool:
+        """Wait until a server is there; ``False`` if that takes longer than ``timeout_sec``."""
+        return self._node._graph.wait_for(self.service_is_ready, timeout_sec, self.context.ok)
+
+    def configure_introspection(
+        self, clock: Clock, service_event_qos_profile: QoSProfile, introspection_state: Any
+    ) -> None:
+        """Not supported: raises NotImplementedError."""
+        raise NotImplementedError("rclpy.client.Client.configure_introspection")
+
+    def destroy(self) -> None:
+        """End it; whoever created it should use :meth:`rclpy.node.Node.destroy_client`."""
+        if not self._destroyed:
+            self._destroyed = True
+            self._node._graph.destroy(self._node, self._requests, self._replies)
+
+    def __enter__(self) -> Client:
+        return self
+
+    def __exit__(
+        self,
+        exc_type: type[BaseException] | None,
+        exc_val: BaseException | None,
+        exc_tb: TracebackType | None,
+    ) -> None:
+        self.destroy()
+
+    # What the executor asks of everything it waits for.
+
+    def _take(self) -> tuple[Future, Any] | None:
+        while not self._destroyed and (sample := self._replies.take()) is not None:
+            try:
+                request_id, data = unwrap(sample.data)
+                if request_id.client != self._requests.instance_handle:
+                    continue  # all clients of a service share one topic: this is another one's reply
+                with self._lock:
+                    future = self._pending_requests.get(request_id.sequence_number)
+                if future is None:
+                    continue  # nobody waits for it any more
+                return future, self.srv_type.Response._deserialize(data)
+            except ValueError as error:
+                self._bad_input.drop(sample, error)
+        return None
+
+    def _execute(self, taken: tuple[Future, Any]) -> None:
+        future, response = taken
+        future._set_executor(self._node.executor)
+        future.set_result(response)

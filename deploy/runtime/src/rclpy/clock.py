@@ -1,0 +1,336 @@
+"""Clocks: system time, steady time, and ROS time, which a simulator may drive.
+
+Source: the ROS 2 design article "Clock and Time".
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from enum import IntEnum
+from types import TracebackType
+from typing import TYPE_CHECKING, Protocol
+
+from rclpy.clock_type import ClockType
+from rclpy.constants import S_TO_NS
+from rclpy.duration import Duration
+from rclpy.exceptions import NotInitializedException
+from rclpy.time import Time
+
+if TYPE_CHECKING:
+    from rclpy.context import Context
+
+__all__ = [
+    "Clock",
+    "ClockChange",
+    "ClockType",
+    "JumpHandle",
+    "JumpThreshold",
+    "ROSClock",
+    "TimeJump",
+    "TimeJumpDictionary",
+]
+
+
+class ClockChange(IntEnum):
+    """What a time jump says about where ROS time comes from."""
+
+    ROS_TIME_NO_CHANGE = 1
+    ROS_TIME_ACTIVATED = 2
+    ROS_TIME_DEACTIVATED = 3
+    SYSTEM_TIME_NO_CHANGE = 4
+
+
+class TimeJumpDictionary(dict[str, int]):
+    """A time jump as rclpy's C layer reports it: ``clock_change`` and ``delta`` [ns]."""
+
+
+class JumpThreshold:
+    """Which time jumps a callback wants to hear of."""
+
+    def __init__(
+        self,
+        *,
+        min_forward: Duration | None,
+        min_backward: Duration | None,
+        on_clock_change: bool = True,
+    ) -> None:
+        """
+        Choose the jumps that count.
+
+        :param min_forward: the shortest jump forward that counts, ``None`` for none; positive.
+        :param min_backward: the shortest jump backward that counts, ``None`` for none; negative.
+        :param on_clock_change: whether a change of the source of time counts.
+        :raises ValueError: if a threshold has the wrong sign, or nothing would count.
+        """
+        if min_forward is not None and min_forward.nanoseconds <= 0:
+            raise ValueError("min_forward must be a positive non-zero duration")
+        if min_backward is not None and min_backward.nanoseconds >= 0:
+            raise ValueError("min_backward must be a negative non-zero duration")
+        if min_forward is None and min_backward is None and not on_clock_change:
+            raise ValueError("At least one jump threshold must be enabled")
+        self.min_forward = min_forward
+        self.min_backward = min_backward
+        self.on_clock_change = on_clock_change
+
+    def is_exceeded_by(self, change: ClockChange, delta: int) -> bool:
+        """Whether a jump by ``delta`` [ns] with this clock change counts."""
+        if change in (ClockChange.ROS_TIME_ACTIVATED, ClockChange.ROS_TIME_DEACTIVATED):
+            return self.on_clock_change
+        forward, backward = self.min_forward, self.min_backward
+        return (forward is not None and delta >= forward.nanoseconds) or (
+            backward is not None and delta <= backward.nanoseconds
+        )
+
+
+class TimeJump:
+    """A time jump that has happened."""
+
+    def __init__(self, clock_change: ClockChange, delta: Duration) -> None:
+        self._clock_change = clock_change
+        self._delta = delta
+
+    @property
+    def clock_change(self) -> ClockChange:
+        """How the source of time changed."""
+        return self._clock_change
+
+    @property
+    def delta(self) -> Duration:
+        """New time minus old time."""
+        return self._delta
+
+
+class JumpHandle:
+    """A registered pair of jump callbacks; ``unregister`` or a ``with`` ends it."""
+
+    def __init__(
+        self,
+        *,
+        clock: Clock,
+        threshold: JumpThreshold,
+        pre_callback: Callable[[], None] | None,
+        post_callback: Callable[[TimeJumpDictionary], None] | None,
+    ) -> None:
+        if pre_callback is None and post_callback is None:
+            raise ValueError("One of pre_callback or post_callback must be callable")
+        if pre_callback is not None and not callable(pre_callback):
+            raise ValueError("pre_callback must be callable if given")
+        if post_callback is not None and not callable(post_callback):
+            raise ValueError("post_callback must be callable if given")
+        self._clock: Clock | None = clock
+        self.threshold = threshold
+        self.pre_callback = pre_callback
+        self.post_callback = post_callback
+        clock.handle.add(self)
+
+    def unregister(self) -> None:
+        """Hear of no more jumps."""
+        if self._clock is not None:
+            self._clock.handle.remove(self)
+            self._clock = None
+
+    def __enter__(self) -> JumpHandle:
+        return self
+
+    def __exit__(
+        self, t: type[BaseException] | None, v: BaseException | None, tb: TracebackType | None
+    ) -> None:
+        self.unregister()
+
+
+class ClockHandle(Protocol):
+    """What a clock reads, and who hears of its jumps."""
+
+    def get_now(self) -> Time: ...
+
+    def add(self, jump_handle: JumpHandle) -> None: ...
+
+    def remove(self, jump_handle: JumpHandle) -> None: ...
+
+
+class _ClockSource:
+    """The one implementation of ClockHandle: reads the machine, or the time a simulator has set."""
+
+    def __init__(self, clock_type: ClockType) -> None:
+        self._type = clock_type
+        self._read = time.monotonic_ns if clock_type == ClockType.STEADY_TIME else time.time_ns
+        self._override: int | None = None  # simulated time [ns] while ROS time is driven from outside
+        self._latest = 0
+        self._jump_handles: list[JumpHandle] = []
+        self._lock = threading.Lock()
+
+    def nanoseconds(self) -> int:
+        override = self._override
+        return self._read() if override is None else override
+
+    def get_now(self) -> Time:
+        return Time._of(self.nanoseconds(), self._type)
+
+    def get_ros_time_override_is_enabled(self) -> bool:
+        return self._override is not None
+
+    def add(self, jump_handle: JumpHandle) -> None:
+        with self._lock:
+            self._jump_handles = [*self._jump_handles, jump_handle]
+
+    def remove(self, jump_handle: JumpHandle) -> None:
+        with self._lock:
+            self._jump_handles = [handle for handle in self._jump_handles if handle is not jump_handle]
+
+    def set_ros_time_override_is_enabled(self, enabled: bool) -> None:
+        if enabled == (self._override is not None):
+            return
+        if enabled:
+            self._change(self._latest, ClockChange.ROS_TIME_ACTIVATED)
+        else:
+            self._change(None, ClockChange.ROS_TIME_DEACTIVATED)
+
+    def set_ros_time_override(self, nanoseconds: int) -> None:
+        self._latest = nanoseconds
+        if self._override is not None and self._override != nanoseconds:
+            self._change(nanoseconds, ClockChange.ROS_TIME_NO_CHANGE)
+
+    def _change(self, override: int | None, change: ClockChange) -> None:
+        delta = (self._read() if override is None else override) - self.nanoseconds()
+        affected = [handle for handle in self._jump_handles if handle.threshold.is_exceeded_by(change, delta)]
+        for handle in affected:
+            if handle.pre_callback is not None:
+                handle.pre_callback()
+        self._override = override
+        jump = TimeJumpDictionary(clock_change=change, delta=delta)
+        for handle in affected:
+            if handle.post_callback is not None:
+                handle.post_callback(jump)
+
+
+class Clock:
+    """A source of time. ``Clock()`` is the system's; ``clock_type`` chooses another."""
+
+    _source: _ClockSource
+    _clock_type: ClockType
+
+    def __new__(cls, *, clock_type: ClockType = ClockType.SYSTEM_TIME) -> Clock:
+        """Create a clock; ROS time makes a :class:`ROSClock`. Raises TypeError for no clock type."""
+        if not isinstance(clock_type, ClockType):
+            raise TypeError("Clock type must be a ClockType enum")
+        self = super().__new__(ROSClock if clock_type == ClockType.ROS_TIME else cls)
+        self._source = _ClockSource(clock_type)
+        self._clock_type = clock_type
+        return self
+
+    @property
+    def clock_type(self) -> ClockType:
+        """Which time this clock tells."""
+        return self._clock_type
+
+    @property
+    def handle(self) -> _ClockSource:
+        """The source behind this clock."""
+        return self._source
+
+    def __repr__(self) -> str:
+        return f"Clock(clock_type={self._clock_type.name})"
+
+    def now(self) -> Time:
+        """The time now."""
+        return self._source.get_now()
+
+    def create_jump_callback(
+        self,
+        threshold: JumpThreshold,
+        *,
+        pre_callback: Callable[[], None] | None = None,
+        post_callback: Callable[[TimeJump], None] | None = None,
+    ) -> JumpHandle:
+        """
+        Call back before and after time jumps.
+
+        The caller keeps the handle; ``post_callback`` is told the jump.
+
+        :raises ValueError: if neither callback is given, or one cannot be called.
+        """
+        if post_callback is not None and not callable(post_callback):
+            raise ValueError("post_callback must be callable if given")
+
+        def report(jump: TimeJumpDictionary) -> None:
+            assert post_callback is not None
+            delta = Duration(nanoseconds=jump["delta"])
+            post_callback(TimeJump(ClockChange(jump["clock_change"]), delta))
+
+        return JumpHandle(
+            clock=self,
+            threshold=threshold,
+            pre_callback=pre_callback,
+            post_callback=None if post_callback is None else report,
+        )
+
+    def sleep_until(self, until: Time, context: Context | None = None) -> bool:
+        """
+        Sleep until this clock says ``until``.
+
+        :return: whether the time came; ``False`` if the context ended, or the source of ROS time changed.
+        :raises ValueError: if ``until`` is of another clock type.
+        :raises NotInitializedException: if the context is not initialized.
+        """
+        if context is None:
+            from rclpy.utilities import get_default_context
+
+            context = get_default_context()
+        if not context.ok():
+            raise NotInitializedException
+        if until.clock_type != self._clock_type:
+            raise ValueError("until's clock type does not match this clock's type")
+        event = threading.Event()
+        source_changed = False
+
+        def on_jump(jump: TimeJump) -> None:
+            nonlocal source_changed
+            changes = (ClockChange.ROS_TIME_ACTIVATED, ClockChange.ROS_TIME_DEACTIVATED)
+            source_changed = source_changed or jump.clock_change in changes
+            event.set()
+
+        step = Duration(nanoseconds=1)
+        threshold = JumpThreshold(min_forward=step, min_backward=Duration(nanoseconds=-1))
+        context._wake_on_shutdown(event)
+        with self.create_jump_callback(threshold, post_callback=on_jump):
+            while not source_changed and context.ok():
+                remaining = until.nanoseconds - self._source.nanoseconds()
+                if remaining <= 0:
+                    return True
+                simulated = self._source.get_ros_time_override_is_enabled()
+                event.wait(None if simulated else remaining / S_TO_NS)
+                event.clear()
+        return False
+
+    def sleep_for(self, rel_time: Duration, context: Context | None = None) -> bool:
+        """Sleep for ``rel_time`` by this clock; see :meth:`sleep_until`."""
+        return self.sleep_until(self.now() + rel_time, context)
+
+
+class ROSClock(Clock):
+    """ROS time: the system's, unless a simulator drives it (``use_sim_time``)."""
+
+    def __new__(cls) -> ROSClock:
+        clock = super().__new__(cls, clock_type=ClockType.ROS_TIME)
+        assert isinstance(clock, ROSClock)
+        return clock
+
+    @property
+    def ros_time_is_active(self) -> bool:
+        """Whether a simulator drives this clock."""
+        return self._source.get_ros_time_override_is_enabled()
+
+    def _set_ros_time_is_active(self, enabled: bool) -> None:
+        self._source.set_ros_time_override_is_enabled(enabled)
+
+    def set_ros_time_override(self, time: Time) -> None:
+        """
+        Set the simulated time.
+
+        :raises TypeError: if ``time`` is no :class:`~rclpy.time.Time`.
+        """
+        if not isinstance(time, Time):
+            raise TypeError("Time must be specified as rclpy.time.Time")
+        self._source.set_ros_time_override(time.nanoseconds)

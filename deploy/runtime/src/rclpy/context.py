@@ -1,0 +1,204 @@
+"""A context: one life of rclpy from ``init`` to ``shutdown``, and the process' place in a DDS domain."""
+
+from __future__ import annotations
+
+import atexit
+import threading
+import weakref
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from types import TracebackType
+from typing import TYPE_CHECKING, Protocol
+
+from rclpy import logging
+from rclpy._arguments import RosArguments, parse
+from rclpy._dds import domain
+from rclpy.exceptions import NotInitializedException
+
+if TYPE_CHECKING:
+    from rclpy._graph import Graph
+    from rclpy.executors import Executor
+    from rclpy.node import Node
+
+g_logging_ref_count = 0
+_logging_lock = threading.Lock()
+
+
+class ContextHandle(Protocol):
+    """What rclpy's C layer keeps of a context."""
+
+    def ok(self) -> bool: ...
+
+    def get_domain_id(self) -> int: ...
+
+    def shutdown(self) -> None: ...
+
+
+class Context(AbstractContextManager["Context"]):
+    """
+    Holds what nodes share: arguments, domain, and whether rclpy runs.
+
+    Usable in a ``with``, which shuts it down at its end.
+    """
+
+    def __init__(self) -> None:
+        self._lock = threading.RLock()
+        self._initialized = False
+        self._valid = False
+        self._logging = False
+        self._domain_id = 0
+        self._arguments = parse(None)
+        self._callbacks: list[Callable[[], None]] = []
+        self._nodes: weakref.WeakSet[Node] = weakref.WeakSet()
+        self._executors: weakref.WeakSet[Executor] = weakref.WeakSet()
+        self._events: weakref.WeakSet[threading.Event] = weakref.WeakSet()
+        self._graph: Graph | None = None
+
+    @property
+    def handle(self) -> Context:
+        """The context itself. Raises NotInitializedException before ``init``."""
+        if not self._initialized:
+            raise NotInitializedException("Context.init() must be called first")
+        return self
+
+    def init(
+        self,
+        args: list[str] | None = None,
+        *,
+        initialize_logging: bool = True,
+        domain_id: int | None = None,
+    ) -> None:
+        """
+        Begin.
+
+        :param args: command line arguments, ``sys.argv`` if ``None``; those after ``--ros-args`` count.
+        :param domain_id: DDS domain, by default the one that ``ROS_DOMAIN_ID`` names.
+        :raises RuntimeError: if the context was initialized already, or an argument cannot be understood.
+        """
+        with self._lock:
+            if self._initialized:
+                raise RuntimeError("Context.init() must only be called once")
+            if domain_id is not None and domain_id < 0:
+                raise RuntimeError(f"domain id ({domain_id}) should not be lower than zero.")
+            self._arguments = parse(args)
+            self._domain_id = domain.domain_id_from_environment() if domain_id is None else domain_id
+            domain.configuration()  # a mistake in the environment is best told at once
+            self._initialized = self._valid = True
+            if initialize_logging:
+                self._initialize_logging()
+
+    def _initialize_logging(self) -> None:
+        global g_logging_ref_count
+        with _logging_lock:
+            logging._apply_arguments(self._arguments)
+            g_logging_ref_count += 1
+        self._logging = True
+
+    @property
+    def arguments(self) -> RosArguments:
+        """The ``--ros-args`` given to :meth:`init`."""
+        return self._arguments
+
+    def ok(self) -> bool:
+        """Whether the context runs: after ``init``, before ``shutdown``."""
+        return self._valid
+
+    def get_domain_id(self) -> int:
+        """The DDS domain."""
+        return self.handle._domain_id
+
+    def on_shutdown(self, callback: Callable[[], None]) -> None:
+        """Call ``callback`` at shutdown; a bound method does not keep its object alive."""
+        if not callable(callback):
+            raise TypeError("callback should be callable, got {}", type(callback))
+        with self._lock:
+            if not self._valid:
+                callback()
+            elif hasattr(callback, "__self__") and not isinstance(callback.__self__, type):
+                reference = weakref.WeakMethod(callback)
+                self._callbacks.append(lambda: (method := reference()) and method())
+            else:
+                self._callbacks.append(callback)
+
+    def shutdown(self) -> None:
+        """
+        End: everybody who waits is woken, and nothing can be waited for any more.
+
+        :raises RuntimeError: if the context does not run.
+        """
+        if not self._end():
+            raise RuntimeError("Context must be initialized before it can be shutdown")
+
+    def try_shutdown(self) -> None:
+        """End, unless that has happened already."""
+        self._end()
+
+    def destroy(self) -> None:
+        """End, and leave the DDS domain although nodes may still exist."""
+        self._end()
+        self._leave_domain()
+
+    def _end(self) -> bool:
+        with self._lock:
+            if not self._valid:
+                return False
+            self._valid = False
+            callbacks, self._callbacks = self._callbacks, []
+        for event in list(self._events):
+            event.set()
+        for executor in list(self._executors):
+            executor.wake()
+        for callback in callbacks:
+            callback()
+        if self._logging:
+            global g_logging_ref_count
+            with _logging_lock:
+                g_logging_ref_count -= 1
+        if not self._nodes:
+            self._leave_domain()
+        return True
+
+    def __enter__(self) -> Context:
+        """Enter a ``with``; :func:`rclpy.init` has initialized the context already."""
+        return self
+
+    def __exit__(
+        self,
+        exc_type: type[BaseException] | None,
+        exc_val: BaseException | None,
+        exc_tb: TracebackType | None,
+    ) -> None:
+        self.try_shutdown()
+
+    # For nodes and executors.
+
+    def _wake_on_shutdown(self, event: threading.Event) -> None:
+        self._events.add(event)
+        if not self._valid:
+            event.set()
+
+    def _join_domain(self, node: Node) -> Graph:
+        """Note a node, and let the first one take the process into the DDS domain."""
+        from rclpy._graph import Graph
+
+        with self._lock:
+            if not self._valid:
+                raise NotInitializedException("cannot create node")
+            if self._graph is None:
+                self._graph = Graph(self._domain_id, self._arguments.enclave)
+                atexit.register(self._leave_domain)
+            self._nodes.add(node)
+            return self._graph
+
+    def _forget(self, node: Node) -> None:
+        with self._lock:
+            self._nodes.discard(node)
+            if not self._nodes and not self._valid:
+                self._leave_domain()
+
+    def _leave_domain(self) -> None:
+        with self._lock:
+            graph, self._graph = self._graph, None
+            if graph is not None:
+                atexit.unregister(self._leave_domain)
+                graph.close()

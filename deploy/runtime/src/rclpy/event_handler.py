@@ -1,0 +1,347 @@
+"""QoS events: deadlines missed, liveliness lost and found, incompatible QoS, messages lost, matches."""
+
+from __future__ import annotations
+
+import inspect
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import IntEnum
+from types import TracebackType
+from typing import Any
+
+from rclpy import logging
+from rclpy._dds import Reader, Writer, status
+from rclpy.callback_groups import CallbackGroup
+from rclpy.exceptions import UnsupportedEventTypeError
+from rclpy.qos import QoSPolicyKind, qos_policy_name_from_kind
+from rclpy.waitable import NumberOfEntities, Waitable
+
+
+class QoSPublisherEventType(IntEnum):
+    """The events of a publisher."""
+
+    RCL_PUBLISHER_OFFERED_DEADLINE_MISSED = 0
+    RCL_PUBLISHER_LIVELINESS_LOST = 1
+    RCL_PUBLISHER_OFFERED_INCOMPATIBLE_QOS = 2
+    RCL_PUBLISHER_INCOMPATIBLE_TYPE = 3
+    RCL_PUBLISHER_MATCHED = 4
+
+
+class QoSSubscriptionEventType(IntEnum):
+    """The events of a subscription."""
+
+    RCL_SUBSCRIPTION_REQUESTED_DEADLINE_MISSED = 0
+    RCL_SUBSCRIPTION_LIVELINESS_CHANGED = 1
+    RCL_SUBSCRIPTION_REQUESTED_INCOMPATIBLE_QOS = 2
+    RCL_SUBSCRIPTION_MESSAGE_LOST = 3
+    RCL_SUBSCRIPTION_INCOMPATIBLE_TYPE = 4
+    RCL_SUBSCRIPTION_MATCHED = 5
+
+
+@dataclass
+class _Count:
+    """A count since creation, and its change since it was last reported."""
+
+    total_count: int
+    total_count_change: int
+
+
+class QoSRequestedDeadlineMissedInfo(_Count):
+    """How often a subscription waited in vain for a message within its deadline."""
+
+
+class QoSOfferedDeadlineMissedInfo(_Count):
+    """How often a publisher did not publish within its deadline."""
+
+
+class QoSLivelinessLostInfo(_Count):
+    """How often a publisher failed to show that it lives."""
+
+
+class QoSMessageLostInfo(_Count):
+    """How many messages were lost on the way to a subscription."""
+
+
+class IncompatibleTypeInfo(_Count):
+    """How many endpoints have another type under the same topic name."""
+
+
+@dataclass
+class QoSLivelinessChangedInfo:
+    """How many matched publishers live, and how many do not."""
+
+    alive_count: int
+    not_alive_count: int
+    alive_count_change: int
+    not_alive_count_change: int
+
+
+@dataclass
+class _Incompatible(_Count):
+    last_policy_kind: QoSPolicyKind
+
+
+class QoSOfferedIncompatibleQoSInfo(_Incompatible):
+    """How many subscriptions request what a publisher does not offer, and the policy that differed last."""
+
+
+class QoSRequestedIncompatibleQoSInfo(_Incompatible):
+    """How many publishers do not offer what a subscription requests, and the policy that differed last."""
+
+
+@dataclass
+class _Matched(_Count):
+    current_count: int
+    current_count_change: int
+
+
+class QoSPublisherMatchedInfo(_Matched):
+    """How many subscriptions are matched, and ever were."""
+
+
+class QoSSubscriptionMatchedInfo(_Matched):
+    """How many publishers are matched, and ever were."""
+
+
+_POLICY_KINDS = {
+    2: QoSPolicyKind.DURABILITY,
+    4: QoSPolicyKind.DEADLINE,
+    8: QoSPolicyKind.LIVELINESS,
+    11: QoSPolicyKind.RELIABILITY,
+    13: QoSPolicyKind.HISTORY,
+    21: QoSPolicyKind.LIFESPAN,
+}
+
+# The DDS status that tells of an event, and what the callback gets. Types are not compared by DDS here.
+_PUBLISHER_EVENTS: dict[int, tuple[str, Callable[..., Any]]] = {
+    QoSPublisherEventType.RCL_PUBLISHER_OFFERED_DEADLINE_MISSED: (
+        "offered_deadline_missed",
+        QoSOfferedDeadlineMissedInfo,
+    ),
+    QoSPublisherEventType.RCL_PUBLISHER_LIVELINESS_LOST: ("liveliness_lost", QoSLivelinessLostInfo),
+    QoSPublisherEventType.RCL_PUBLISHER_OFFERED_INCOMPATIBLE_QOS: (
+        "offered_incompatible_qos",
+        QoSOfferedIncompatibleQoSInfo,
+    ),
+    QoSPublisherEventType.RCL_PUBLISHER_MATCHED: ("publication_matched", QoSPublisherMatchedInfo),
+}
+_SUBSCRIPTION_EVENTS: dict[int, tuple[str, Callable[..., Any]]] = {
+    QoSSubscriptionEventType.RCL_SUBSCRIPTION_REQUESTED_DEADLINE_MISSED: (
+        "requested_deadline_missed",
+        QoSRequestedDeadlineMissedInfo,
+    ),
+    QoSSubscriptionEventType.RCL_SUBSCRIPTION_LIVELINESS_CHANGED: (
+        "liveliness_changed",
+        QoSLivelinessChangedInfo,
+    ),
+    QoSSubscriptionEventType.RCL_SUBSCRIPTION_REQUESTED_INCOMPATIBLE_QOS: (
+        "requested_incompatible_qos",
+        QoSRequestedIncompatibleQoSInfo,
+    ),
+    QoSSubscriptionEventType.RCL_SUBSCRIPTION_MESSAGE_LOST: ("sample_lost", QoSMessageLostInfo),
+    QoSSubscriptionEventType.RCL_SUBSCRIPTION_MATCHED: ("subscription_matched", QoSSubscriptionMatchedInfo),
+}
+
+
+def _info(make: Callable[..., Any], found: Any) -> Any:
+    """What a callback gets, from the C structure of a DDS status."""
+    values = {name: getattr(found, name) for name, _ in found._fields_ if not name.startswith("last_")}
+    if hasattr(found, "last_policy_id"):
+        values["last_policy_kind"] = _POLICY_KINDS.get(found.last_policy_id, QoSPolicyKind.INVALID)
+    return make(**values)
+
+
+class EventHandler(Waitable):
+    """Calls back when one kind of event happens to a publisher or subscription."""
+
+    def __init__(
+        self,
+        *,
+        callback_group: CallbackGroup,
+        callback: Callable[[Any], Any],
+        event_type: IntEnum,
+        parent_impl: Writer | Reader,
+    ) -> None:
+        """
+        Create a handler; publishers and subscriptions make theirs from their event callbacks.
+
+        :raises UnsupportedEventTypeError: if the middleware cannot tell of such events.
+        """
+        super().__init__(callback_group)
+        events = _PUBLISHER_EVENTS if isinstance(event_type, QoSPublisherEventType) else _SUBSCRIPTION_EVENTS
+        if event_type not in events:
+            raise UnsupportedEventTypeError(f"Cyclone DDS cannot report {event_type.name}")
+        self.callback = callback
+        self.event_type = event_type
+        self._status, self._make_info = events[event_type]
+        self._parent = parent_impl
+        self._destroyed = False
+
+    def destroy(self) -> None:
+        """Call back no more."""
+        self._destroyed = True
+
+    def __enter__(self) -> EventHandler:
+        return self
+
+    def __exit__(
+        self, t: type[BaseException] | None, v: BaseException | None, tb: TracebackType | None
+    ) -> None:
+        self.destroy()
+
+    def get_num_entities(self) -> NumberOfEntities:
+        """One event."""
+        return NumberOfEntities(num_events=1)
+
+    def take_data(self) -> Any:
+        """What happened since it was last asked for, ``None`` if nothing did."""
+        found = None if self._destroyed else status.changed(self._parent.handle, self._status)
+        return None if found is None else _info(self._make_info, found)
+
+
+class QoSEventHandler(EventHandler):
+    """The name that :class:`EventHandler` had before ROS 2 Iron."""
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        warnings.warn("QoSEventHandler is deprecated: use EventHandler instead", stacklevel=2)
+        super().__init__(*args, **kwargs)
+
+
+def _handlers(
+    callbacks: dict[IntEnum, Callable[[Any], Any] | None],
+    callback_group: CallbackGroup,
+    parent: Writer | Reader,
+) -> list[EventHandler]:
+    handlers = [
+        EventHandler(
+            callback_group=callback_group, callback=callback, event_type=event, parent_impl=parent
+        )
+        for event, callback in callbacks.items()
+        if callback is not None
+    ]
+    status.watch(parent.handle, [handler._status for handler in handlers])
+    return handlers
+
+
+_LOGGER = "rclpy.event_handler"
+
+
+def _warn_of_incompatible_qos(text: str, topic_name: str) -> Callable[[Any], None]:
+    def warn(info: _Incompatible) -> None:
+        policy = qos_policy_name_from_kind(info.last_policy_kind)
+        logging.get_logger(_LOGGER).warning(f"{text.format(topic_name)} Last incompatible policy: {policy}")
+
+    return warn
+
+
+class SubscriptionEventCallbacks:
+    """What to call when something happens to a subscription."""
+
+    def __init__(
+        self,
+        *,
+        deadline: Callable[[QoSRequestedDeadlineMissedInfo], None] | None = None,
+        incompatible_qos: Callable[[QoSRequestedIncompatibleQoSInfo], None] | None = None,
+        liveliness: Callable[[QoSLivelinessChangedInfo], None] | None = None,
+        message_lost: Callable[[QoSMessageLostInfo], None] | None = None,
+        incompatible_type: Callable[[IncompatibleTypeInfo], None] | None = None,
+        matched: Callable[[QoSSubscriptionMatchedInfo], None] | None = None,
+        use_default_callbacks: bool = True,
+    ) -> None:
+        """Choose the callbacks; by default, incompatible QoS is logged as a warning."""
+        self.deadline = deadline
+        self.incompatible_qos = incompatible_qos
+        self.liveliness = liveliness
+        self.message_lost = message_lost
+        self.incompatible_type = incompatible_type
+        self.matched = matched
+        self.use_default_callbacks = use_default_callbacks
+
+    def create_event_handlers(
+        self, callback_group: CallbackGroup, subscription: Reader, topic_name: str
+    ) -> list[EventHandler]:
+        """The handlers of one subscription."""
+        incompatible_qos = self.incompatible_qos
+        if incompatible_qos is None and self.use_default_callbacks:
+            text = "New publisher on topic '{}' offers incompatible QoS: none of its messages will be received."
+            incompatible_qos = _warn_of_incompatible_qos(text, topic_name)
+        kind = QoSSubscriptionEventType
+        return _handlers(
+            {
+                kind.RCL_SUBSCRIPTION_REQUESTED_DEADLINE_MISSED: self.deadline,
+                kind.RCL_SUBSCRIPTION_REQUESTED_INCOMPATIBLE_QOS: incompatible_qos,
+                kind.RCL_SUBSCRIPTION_LIVELINESS_CHANGED: self.liveliness,
+                kind.RCL_SUBSCRIPTION_MESSAGE_LOST: self.message_lost,
+                kind.RCL_SUBSCRIPTION_INCOMPATIBLE_TYPE: self.incompatible_type,
+                kind.RCL_SUBSCRIPTION_MATCHED: self.matched,
+            },
+            callback_group,
+            subscription,
+        )
+
+
+class PublisherEventCallbacks:
+    """What to call when something happens to a publisher."""
+
+    def __init__(
+        self,
+        *,
+        deadline: Callable[[QoSOfferedDeadlineMissedInfo], None] | None = None,
+        liveliness: Callable[[QoSLivelinessLostInfo], None] | None = None,
+        incompatible_qos: Callable[[QoSOfferedIncompatibleQoSInfo], None] | None = None,
+        incompatible_type: Callable[[IncompatibleTypeInfo], None] | None = None,
+        matched: Callable[[QoSPublisherMatchedInfo], None] | None = None,
+        use_default_callbacks: bool = True,
+    ) -> None:
+        """Choose the callbacks; by default, incompatible QoS is logged as a warning."""
+        self.deadline = deadline
+        self.liveliness = liveliness
+        self.incompatible_qos = incompatible_qos
+        self.incompatible_type = incompatible_type
+        self.matched = matched
+        self.use_default_callbacks = use_default_callbacks
+
+    def create_event_handlers(
+        self, callback_group: CallbackGroup, publisher: Writer, topic_name: str
+    ) -> list[EventHandler]:
+        """The handlers of one publisher."""
+        incompatible_qos = self.incompatible_qos
+        if incompatible_qos is None and self.use_default_callbacks:
+            text = "New subscription on topic '{}' requests incompatible QoS: no messages will be sent to it."
+            incompatible_qos = _warn_of_incompatible_qos(text, topic_name)
+        kind = QoSPublisherEventType
+        return _handlers(
+            {
+                kind.RCL_PUBLISHER_OFFERED_DEADLINE_MISSED: self.deadline,
+                kind.RCL_PUBLISHER_LIVELINESS_LOST: self.liveliness,
+                kind.RCL_PUBLISHER_OFFERED_INCOMPATIBLE_QOS: incompatible_qos,
+                kind.RCL_PUBLISHER_INCOMPATIBLE_TYPE: self.incompatible_type,
+                kind.RCL_PUBLISHER_MATCHED: self.matched,
+            },
+            callback_group,
+            publisher,
+        )
+
+
+class EndpointEvents:
+    """All events of one publisher or subscription, as the executor waits for them: on one DDS entity."""
+
+    def __init__(self, handlers: list[EventHandler], parent: Writer | Reader) -> None:
+        self._handlers = handlers
+        self._handles = (parent.handle,)
+        self.callback_group = handlers[0].callback_group
+
+    def _take(self) -> list[tuple[EventHandler, Any]] | None:
+        happened = [(handler, data) for handler in self._handlers if (data := handler.take_data()) is not None]
+        return happened or None
+
+    def _execute(self, taken: list[tuple[EventHandler, Any]]) -> Any:
+        results = [handler.callback(data) for handler, data in taken]
+        coroutines = [result for result in results if inspect.iscoroutine(result)]
+        return _await_all(coroutines) if coroutines else None
+
+
+async def _await_all(coroutines: list[Any]) -> None:
+    for coroutine in coroutines:
+        await coroutine

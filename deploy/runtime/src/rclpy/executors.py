@@ -1,0 +1,507 @@
+"""Executors: they wait for what happens to nodes and run the callbacks.
+
+An executor waits in a DDS wait set, with the interpreter lock released, on one condition per reader and on one
+guard condition by which everything else wakes it: timers that changed, tasks, guard conditions, entities that
+came or went. So nothing polls, and a change from any thread is seen at once. The wait set belongs to the
+spinning thread alone: other threads only leave word and wake it.
+"""
+
+from __future__ import annotations
+
+import inspect
+import os
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Coroutine
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import AbstractContextManager
+from types import CoroutineType, TracebackType
+from typing import TYPE_CHECKING, Any, Protocol
+
+from rclpy import signals
+from rclpy._dds import INFINITY, GuardCondition, WaitSet
+from rclpy.callback_groups import CallbackGroup
+from rclpy.constants import S_TO_NS
+from rclpy.exceptions import NotInitializedException
+from rclpy.task import Future, Task
+from rclpy.utilities import get_default_context
+
+if TYPE_CHECKING:
+    from rclpy.context import Context
+    from rclpy.node import Node
+    from rclpy.timer import Timer
+
+# After this many messages of one reader in a row the others get their turn, and the timers theirs.
+_MESSAGES_A_TURN = 8
+_WAKE = 0  # the wait set's token of the guard condition
+
+
+class TimeoutException(Exception):
+    """Signal that nothing became ready in time."""
+
+
+class ShutdownException(Exception):
+    """Signal that the executor was shut down."""
+
+
+class ExternalShutdownException(Exception):
+    """Context has been shutdown."""
+
+    def __init__(self, *args: object) -> None:
+        super().__init__(*(args or ("the context was shut down from outside: by a signal or another thread",)))
+
+
+class ConditionReachedException(Exception):
+    """Future has been completed."""
+
+
+class TimeoutObject:
+    """A timeout that many calls share."""
+
+    def __init__(self, timeout: float) -> None:
+        self._deadline = time.monotonic() + timeout if timeout >= 0 else None
+
+    @property
+    def timeout(self) -> float:
+        """Seconds that remain, never negative; -1 for no end."""
+        return -1.0 if self._deadline is None else max(0.0, self._deadline - time.monotonic())
+
+
+class _Entity(Protocol):
+    """What an executor waits for and runs: a subscription, timer, service, client, guard or event."""
+
+    callback_group: CallbackGroup | None
+
+    def _take(self) -> Any: ...
+
+    def _execute(self, taken: Any) -> Any: ...
+
+
+async def await_or_execute(callback: Callable[..., Any] | Coroutine[Any, Any, Any], *args: Any) -> Any:
+    """Call ``callback``; await what it returns if it is a coroutine function."""
+    if inspect.iscoroutinefunction(callback):
+        return await callback(*args)
+    assert callable(callback)
+    return callback(*args)
+
+
+class Executor(AbstractContextManager["Executor"]):
+    """Waits for work of its nodes. What runs it, and on which thread, is up to the subclasses."""
+
+    def __init__(self, *, context: Context | None = None) -> None:
+        """Create an executor of ``context``'s nodes. Raises NotInitializedException if it does not run."""
+        super().__init__()
+        self._context = get_default_context() if context is None else context
+        if not self._context.ok():
+            raise NotInitializedException
+        self._nodes: list[Node] = []
+        self._nodes_lock = threading.RLock()
+        self._tasks: deque[Task] = deque()
+        self._is_shutdown = False
+        self._closed = False
+        self._working = 0  # spins and callbacks under way
+        self._idle = threading.Condition()
+
+        self._guard = GuardCondition()
+        self._waitset = WaitSet()
+        self._waitset.attach(self._guard.handle, _WAKE)
+        self._spinning_thread: int | None = None
+        self._callback_thread: int | None = None  # the spinning thread, while it runs a callback itself
+        # The rest is the spinning thread's own, but for the two flags by which others leave word.
+        self._entities_changed = True
+        self._groups_changed = False
+        self._timers: list[Timer] = []
+        self._guards: list[Any] = []
+        self._attached: dict[int, tuple[_Entity, int]] = {}  # token -> entity, DDS handle
+        self._blocked: dict[int, tuple[_Entity, int]] = {}  # the same, while their callback group is busy
+        self._tokens: dict[int, int] = {}  # DDS handle -> token
+        self._last_token = _WAKE
+        self._ready: deque[tuple[_Entity, int]] = deque()  # entity, how many more messages this turn
+        self._context._executors.add(self)
+        signals._watch(self)
+
+    @property
+    def context(self) -> Context:
+        """The context whose nodes it runs."""
+        return self._context
+
+    # Nodes
+
+    def add_node(self, node: Node) -> bool:
+        """Run ``node``'s callbacks from now on. ``False`` if that is so already."""
+        with self._nodes_lock:
+            if node in self._nodes:
+                return False
+            if node.executor is not None:
+                node.executor.remove_node(node)
+            self._nodes.append(node)
+        node._set_executor(self)
+        self._entities_have_changed()
+        return True
+
+    def remove_node(self, node: Node) -> None:
+        """Run ``node``'s callbacks no longer."""
+        with self._nodes_lock:
+            if node not in self._nodes:
+                return
+            self._nodes.remove(node)
+        node._set_executor(None)
+        self._entities_have_changed()
+
+    def get_nodes(self) -> list[Node]:
+        """The nodes whose callbacks run here."""
+        with self._nodes_lock:
+            return list(self._nodes)
+
+    def _entities_have_changed(self) -> None:
+        self._entities_changed = True
+        self._wake_if_waiting()
+
+    # Tasks
+
+    def create_task(
+        self, callback: Callable[..., Any] | Coroutine[Any, Any, Any], *args: Any, **kwargs: Any
+    ) -> Task:
+        """Run a function or coroutine on this executor; the returned future gets its result."""
+        task = Task(callback, args, kwargs, executor=self)
+        self._schedule(task)
+        return task
+
+    def _schedule(self, task: Task) -> None:
+        self._tasks.append(task)
+        self._wake_if_waiting()
+
+    def _run_task(self, task: Task) -> None:
+        task()
+        if task.done() or task.cancelled():
+            return
+        awaited = task._awaited
+        if awaited is None:
+            self._schedule(task)
+        else:
+            awaited._call_when_complete(lambda: self._schedule(task))
+
+    # Spinning
+
+    def wake(self) -> None:
+        """Let the spinning thread look anew; from any thread."""
+        if not self._is_shutdown:
+            self._guard.trigger()
+
+    def _wake_if_waiting(self) -> None:
+        """Wake, unless this is said in a callback on the spinning thread, which looks anew anyway."""
+        if threading.get_ident() != self._callback_thread:
+            self.wake()
+
+    def spin(self) -> None:
+        """Run callbacks until the context, or this executor, is shut down."""
+        while self._context.ok() and not self._is_shutdown:
+            self.spin_once()
+
+    def spin_once(self, timeout_sec: float | None = None) -> None:
+        """Run one callback, waiting at most ``timeout_sec`` for it (``None`` or negative: for ever)."""
+        self._spin_once(timeout_sec, None)
+
+    def spin_until_future_complete(self, future: Future, timeout_sec: float | None = None) -> None:
+        """Run callbacks until ``future`` is done or cancelled, but no longer than ``timeout_sec``."""
+        future._call_when_complete(self.wake)
+        timeout = TimeoutObject(-1 if timeout_sec is None else timeout_sec)
+        while self._context.ok() and not self._is_shutdown:
+            if _complete(future) or timeout.timeout == 0:
+                return
+            self._spin_once(timeout, lambda: _complete(future))
+
+    def spin_once_until_future_complete(
+        self, future: Future, timeout_sec: float | TimeoutObject | None = None
+    ) -> None:
+        """Run one callback, unless ``future`` is or gets done before one is ready."""
+        future._call_when_complete(self.wake)
+        self._spin_once(timeout_sec, lambda: _complete(future))
+
+    def _spin_once(
+        self, timeout: float | TimeoutObject | None, condition: Callable[[], bool] | None
+    ) -> None:
+        """Run one callback, unless the time is over or the condition true before one is ready."""
+        raise NotImplementedError
+
+    def wait_for_ready_callbacks(
+        self,
+        timeout_sec: float | TimeoutObject | None = None,
+        nodes: list[Node] | None = None,
+        condition: Callable[[], bool] = lambda: False,
+    ) -> tuple[Task, Any, Node | None]:
+        """
+        Wait for a callback and return it as a task, with its entity and node.
+
+        :raises TimeoutException, ShutdownException, ExternalShutdownException, ConditionReachedException:
+            if there is none.
+        """
+        entity, taken = self._next(timeout_sec, condition)
+        node = next((node for node in self.get_nodes() if entity in node._entities()), None)
+        return Task(self._run, (entity, taken), executor=self), entity, node
+
+    def can_execute(self, entity: Any) -> bool:
+        """Whether ``entity``'s callback group would let it run now."""
+        return entity.callback_group is None or bool(entity.callback_group.can_execute(entity))
+
+    def _next(
+        self, timeout_sec: float | TimeoutObject | None, condition: Callable[[], bool] | None = None
+    ) -> tuple[Any, Any]:
+        """Wait for work: an entity and what was taken from it; for a task, the task and ``None``."""
+        timeout = timeout_sec.timeout if isinstance(timeout_sec, TimeoutObject) else timeout_sec
+        deadline = None
+        if timeout is not None and timeout >= 0:
+            deadline = time.monotonic_ns() + int(timeout * S_TO_NS)
+        waited = False
+        while True:
+            if not self._context.ok():
+                raise ExternalShutdownException
+            if self._is_shutdown:
+                raise ShutdownException
+            if condition is not None and condition():
+                raise ConditionReachedException
+            if self._entities_changed:
+                self._update_entities()
+            if self._groups_changed:
+                self._unblock()
+            while self._ready:
+                entity, turns = self._ready.popleft()
+                if entity.__class__ is Task:
+                    return entity, None
+                group = entity.callback_group
+                if group is not None and not group.beginning_execution(entity):
+                    self._block(entity)
+                    continue
+                taken = entity._take()
+                if taken is None:
+                    if group is not None:
+                        group.ending_execution(entity)
+                    continue
+                if turns:
+                    self._ready.appendleft((entity, turns - 1))
+                return entity, taken
+            if waited and deadline is not None and time.monotonic_ns() >= deadline:
+                raise TimeoutException
+            self._collect(deadline)
+            waited = True
+
+    def _collect(self, deadline: int | None) -> None:
+        """Wait until something is ready, ``deadline`` is over or somebody wakes us; note what is ready."""
+        timeout = INFINITY if deadline is None else max(0, deadline - time.monotonic_ns())
+        while self._tasks:
+            timeout = 0
+            self._ready.append((self._tasks.popleft(), 0))
+        for timer in self._timers:
+            remaining = timer._remaining()
+            if remaining <= 0 and self.can_execute(timer):
+                timeout = 0
+                self._ready.append((timer, 0))
+            elif 0 < remaining < timeout:
+                timeout = remaining
+        for guard in self._guards:
+            if guard.is_ready() and self.can_execute(guard):
+                timeout = 0
+                self._ready.append((guard, 0))
+        for token in self._waitset.wait(timeout):
+            if token == _WAKE:
+                self._guard.take()
+            elif token in self._attached:
+                self._ready.append((self._attached[token][0], _MESSAGES_A_TURN - 1))
+
+    # What is waited for
+
+    def _update_entities(self) -> None:
+        """Bring the wait set up to the entities that the nodes have now."""
+        self._entities_changed = False  # first: what changes from now on is seen in the next round
+        self._timers, self._guards = [], []
+        wanted: dict[int, _Entity] = {}
+        for node in self.get_nodes():
+            self._timers.extend(node.timers)
+            self._guards.extend(node.guards)
+            for entity in node._waitables():
+                for handle in entity._handles:
+                    wanted[handle] = entity
+        for handle in [handle for handle in self._tokens if handle not in wanted]:
+            token = self._tokens.pop(handle)
+            if self._attached.pop(token, None) is not None:
+                self._waitset.detach(handle)
+            self._blocked.pop(token, None)
+        for handle, entity in wanted.items():
+            if handle not in self._tokens:
+                self._last_token += 1
+                if self._waitset.attach(handle, self._last_token):
+                    self._tokens[handle] = self._last_token
+                    self._attached[self._last_token] = (entity, handle)
+
+    def _block(self, entity: _Entity) -> None:
+        """Do not wait for an entity whose callback group is busy: its data would end every wait at once."""
+        for token, (attached, handle) in list(self._attached.items()):
+            if attached is entity:
+                del self._attached[token]
+                self._waitset.detach(handle)
+                self._blocked[token] = (entity, handle)
+        self._groups_changed = self._groups_changed or self.can_execute(entity)
+
+    def _unblock(self) -> None:
+        """Wait again for those whose callback group is free again."""
+        self._groups_changed = False
+        for token, (entity, handle) in list(self._blocked.items()):
+            if self.can_execute(entity):
+                del self._blocked[token]
+                if self._waitset.attach(handle, token):
+                    self._attached[token] = (entity, handle)
+
+    # Running
+
+    def _run(self, entity: Any, taken: Any) -> None:
+        """Run what :meth:`_next` returned; raises what its callback raises."""
+        if entity.__class__ is Task:
+            self._run_task(entity)
+            _raise_exception_of(entity)
+            return
+        try:
+            result = entity._execute(taken)
+        except BaseException:
+            self._ended(entity)
+            raise
+        if result.__class__ is CoroutineType:
+            task = Task(result, executor=self)
+            task._call_when_complete(lambda: self._ended(entity))
+            self._run_task(task)
+            _raise_exception_of(task)
+        else:
+            self._ended(entity)
+
+    def _ended(self, entity: _Entity) -> None:
+        if entity.callback_group is not None:
+            entity.callback_group.ending_execution(entity)
+            if self._blocked:
+                self._groups_changed = True
+
+    def _begin_spin(self) -> None:
+        with self._idle:
+            self._working += 1
+        self._spinning_thread = threading.get_ident()
+
+    def _end_spin(self) -> None:
+        self._spinning_thread = self._callback_thread = None
+        self._end_work()
+
+    def _end_work(self) -> None:
+        with self._idle:
+            self._working -= 1
+            if not self._working:
+                self._idle.notify_all()
+
+    def shutdown(self, timeout_sec: float | None = None) -> bool:
+        """
+        Stop, and wait for callbacks that run on other threads.
+
+        :return: whether they ended within ``timeout_sec`` (``None``: however long it takes).
+        """
+        if not self._is_shutdown:
+            self._guard.trigger()
+            self._is_shutdown = True
+        # A callback, or a signal handler, on the spinning thread cannot wait for itself to end.
+        if threading.get_ident() != self._spinning_thread:
+            with self._idle:
+                if not self._idle.wait_for(lambda: not self._working, timeout_sec):
+                    return False
+        if not self._closed:
+            self._closed = True
+            for node in self.get_nodes():
+                self.remove_node(node)
+            self._context._executors.discard(self)
+            self._waitset.close()
+            self._guard.close()
+        return True
+
+    def __enter__(self) -> Executor:
+        return self
+
+    def __exit__(
+        self,
+        exc_type: type[BaseException] | None,
+        exc_val: BaseException | None,
+        exc_tb: TracebackType | None,
+    ) -> None:
+        self.shutdown()
+
+
+def _complete(future: Future) -> bool:
+    return future.done() or future.cancelled()
+
+
+def _raise_exception_of(task: Task) -> None:
+    if task.done() and task.exception() is not None:
+        task.result()
+
+
+class SingleThreadedExecutor(Executor):
+    """Runs all callbacks on the thread that spins."""
+
+    def _spin_once(
+        self, timeout: float | TimeoutObject | None, condition: Callable[[], bool] | None
+    ) -> None:
+        self._begin_spin()
+        try:
+            try:
+                entity, taken = self._next(timeout, condition)
+            except (TimeoutException, ShutdownException, ConditionReachedException):
+                return
+            self._callback_thread = self._spinning_thread
+            self._run(entity, taken)
+        finally:
+            self._end_spin()
+
+
+class MultiThreadedExecutor(Executor):
+    """Runs callbacks on a pool of threads, as far as their callback groups let them run in parallel."""
+
+    def __init__(self, num_threads: int | None = None, *, context: Context | None = None) -> None:
+        """
+        Create an executor with ``num_threads`` threads, by default one per processor and at least two.
+
+        :raises ValueError: if ``num_threads`` is less than one.
+        """
+        if num_threads is not None and num_threads < 1:
+            raise ValueError("a MultiThreadedExecutor needs at least one thread")
+        super().__init__(context=context)
+        threads = num_threads or max(2, os.cpu_count() or 2)
+        self._pool = ThreadPoolExecutor(threads, thread_name_prefix="rclpy-executor")
+        self._errors: deque[BaseException] = deque()
+
+    def _spin_once(
+        self, timeout: float | TimeoutObject | None, condition: Callable[[], bool] | None
+    ) -> None:
+        self._begin_spin()
+        try:
+            entity, taken = self._next(
+                timeout, lambda: bool(self._errors) or (condition is not None and condition())
+            )
+            with self._idle:
+                self._working += 1
+            self._pool.submit(self._run_in_pool, entity, taken)
+        except (TimeoutException, ShutdownException, ConditionReachedException):
+            pass
+        finally:
+            self._end_spin()
+        if self._errors:
+            raise self._errors.popleft()
+
+    def _run_in_pool(self, entity: Any, taken: Any) -> None:
+        try:
+            self._run(entity, taken)
+        except BaseException as error:
+            self._errors.append(error)
+        finally:
+            # The spinning thread may be waiting without this entity's callback group, or for an error.
+            self.wake()
+            self._end_work()
+
+    def shutdown(self, timeout_sec: float | None = None) -> bool:
+        """Stop, and wait for the callbacks that run; see :meth:`Executor.shutdown`."""
+        ended = super().shutdown(timeout_sec)
+        self._pool.shutdown(wait=False)
+        return ended

@@ -1,0 +1,631 @@
+"""Nodes: what takes part in the ROS graph."""
+
+from __future__ import annotations
+
+import weakref
+from collections.abc import Callable, Iterator
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from rcl_interfaces.msg import Log, ParameterEvent
+
+from rclpy import _names
+from rclpy._arguments import parse
+from rclpy._endpoint import PublisherEndpoint, ServiceEndpoint, SubscriptionEndpoint
+from rclpy._node_graph import NodeGraph
+from rclpy._node_parameters import NodeParameters
+from rclpy.callback_groups import CallbackGroup, MutuallyExclusiveCallbackGroup
+from rclpy.client import Client
+from rclpy.clock import Clock, ROSClock
+from rclpy.constants import S_TO_NS
+from rclpy.duration import Duration
+from rclpy.event_handler import (
+    EndpointEvents,
+    PublisherEventCallbacks,
+    SubscriptionEventCallbacks,
+)
+from rclpy.exceptions import InvalidHandle, NoTypeSupportImportedException, NotInitializedException
+from rclpy.expand_topic_name import expand_topic_name
+from rclpy.guard_condition import GuardCondition
+from rclpy.impl import _logging_output
+from rclpy.impl.rcutils_logger import RcutilsLogger
+from rclpy.logging import get_logger
+from rclpy.logging_service import LoggingService
+from rclpy.parameter import PARAMETER_SEPARATOR_STRING, Parameter
+from rclpy.parameter_service import ParameterService
+from rclpy.publisher import Publisher
+from rclpy.qos import (
+    DurabilityPolicy,
+    QoSProfile,
+    qos_profile_parameter_events,
+    qos_profile_services_default,
+)
+from rclpy.qos_overriding_options import QoSOverridingOptions, _declare_qos_parameters
+from rclpy.service import Service
+from rclpy.subscription import Subscription
+from rclpy.time_source import TimeSource
+from rclpy.timer import Rate, Timer
+from rclpy.type_description_service import TypeDescriptionService
+from rclpy.utilities import get_default_context
+from rclpy.validate_full_topic_name import validate_full_topic_name
+from rclpy.validate_namespace import validate_namespace
+from rclpy.validate_node_name import validate_node_name
+from rclpy.validate_topic_name import validate_topic_name
+from rclpy.waitable import Waitable
+
+if TYPE_CHECKING:
+    from rclpy.context import Context
+    from rclpy.executors import Executor
+
+__all__ = [
+    "HIDDEN_NODE_PREFIX",
+    "PARAMETER_SEPARATOR_STRING",
+    "S_TO_NS",
+    "Node",
+    "qos_profile_parameter_events",
+    "qos_profile_services_default",
+]
+
+HIDDEN_NODE_PREFIX = "_"
+
+# rmw/qos_profiles.h's counterpart in rcl: rcl_qos_profile_rosout_default.
+_ROSOUT_QOS = QoSProfile(
+    depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL, lifespan=Duration(seconds=10)
+)
+
+_Entity = TypeVar("_Entity")
+
+
+class Node(NodeParameters, NodeGraph):
+    """A named participant in the ROS graph, with its publishers, subscriptions, services and timers."""
+
+    def __init__(
+        self,
+        node_name: str,
+        *,
+        context: Context | None = None,
+        cli_args: list[str] | None = None,
+        namespace: str | None = None,
+        use_global_arguments: bool = True,
+        enable_rosout: bool = True,
+        start_parameter_services: bool = True,
+        parameter_overrides: list[Parameter] | None = None,
+        allow_undeclared_parameters: bool = False,
+        automatically_declare_parameters_from_overrides: bool = False,
+        enable_logger_service: bool = False,
+    ) -> None:
+        """
+        Create a node.
+
+        :param node_name: its name, unless remapped (``__node``).
+        :param context: what it belongs to; the default context if ``None``.
+        :param cli_args: ROS arguments for this node only; those of the process count as well.
+        :param namespace: its namespace, unless remapped (``__ns``).
+        :param use_global_arguments: whether the arguments of the process count.
+        :param enable_rosout: whether its log messages are published on ``/rosout``.
+        :param start_parameter_services: whether others can get and set its parameters.
+        :param parameter_overrides: values that win over those of parameter files and arguments.
+        :param allow_undeclared_parameters: whether parameters need not be declared.
+        :param automatically_declare_parameters_from_overrides: whether overrides declare parameters.
+        :param enable_logger_service: whether others can get and set its logger levels.
+        :raises NotInitializedException: if the context is not initialized.
+        :raises InvalidNodeNameException, InvalidNamespaceException: if a name is invalid.
+        """
+        self._context = get_default_context() if context is None else context
+        if not self._context.ok():
+            raise NotInitializedException("cannot create node")
+        validate_node_name(node_name)
+        namespace = "/" + (namespace or "").lstrip("/")
+        validate_namespace(namespace)
+        process_arguments = self._context.arguments if use_global_arguments else parse([])
+        own_arguments = parse(["--ros-args", *cli_args] if cli_args and "--ros-args" not in cli_args else cli_args or [])
+        self._arguments = own_arguments.before(process_arguments)
+        self._name, self._namespace = self._arguments.node_name(node_name, namespace)
+        self._fully_qualified_name = f"{self._namespace.rstrip('/')}/{self._name}"
+        self._logger = get_logger(self._fully_qualified_name.lstrip("/").replace("/", "."))
+        self._clock = ROSClock()
+        self._executor: weakref.ref[Executor] | None = None
+        self._destroyed = False
+        self._publishers: list[Publisher] = []
+        self._subscriptions: list[Subscription] = []
+        self._services: list[Service] = []
+        self._clients: list[Client] = []
+        self._timers: list[Timer] = []
+        self._guards: list[GuardCondition] = []
+        self._rates: dict[Rate, Timer] = {}
+        self._events: dict[Publisher | Subscription, EndpointEvents] = {}
+        self._default_callback_group = MutuallyExclusiveCallbackGroup()
+
+        overrides = self._arguments.parameter_overrides(self._fully_qualified_name)
+        overrides.update({parameter.name: parameter for parameter in parameter_overrides or []})
+        self._init_parameters(overrides, allow_undeclared=allow_undeclared_parameters)
+
+        self._graph = self._context._join_domain(self)
+        with self._graph.one_announcement():
+            self._graph.add_node(self)
+            self._rosout_publisher: Publisher | None = None
+            if enable_rosout and self._arguments.rosout_logs:
+                self._rosout_publisher = self.create_publisher(Log, "/rosout", _ROSOUT_QOS)
+                _logging_output.add_rosout_publisher(self._logger.name, self._publish_log)
+            self._parameter_event_publisher = self.create_publisher(
+                ParameterEvent, "/parameter_events", qos_profile_parameter_events
+            )
+            if automatically_declare_parameters_from_overrides:
+                self._declare_overrides()
+            self._time_source = TimeSource(node=self)
+            self._time_source.attach_clock(self._clock)
+            if start_parameter_services:
+                self._parameter_service = ParameterService(self)
+            if enable_logger_service:
+                self._logger_service = LoggingService(self)
+            self._type_description_service = TypeDescriptionService(self)
+
+    # Who it is
+
+    @property
+    def context(self) -> Context:
+        """The context it belongs to."""
+        return self._context
+
+    @property
+    def handle(self) -> Node:
+        """The node itself. Raises InvalidHandle when it was destroyed."""
+        if self._destroyed:
+            raise InvalidHandle("cannot use a node that was destroyed")
+        return self
+
+    @property
+    def default_callback_group(self) -> CallbackGroup:
+        """The group of everything that is created without one: its callbacks run one at a time."""
+        return self._default_callback_group
+
+    def get_name(self) -> str:
+        """Return its name."""
+        return self._name
+
+    def get_namespace(self) -> str:
+        """Return its namespace."""
+        return self._namespace
+
+    def get_fully_qualified_name(self) -> str:
+        """Return its namespace and name."""
+        return self._fully_qualified_name
+
+    def get_clock(self) -> Clock:
+        """Return its clock, which tells ROS time."""
+        return self._clock
+
+    def get_logger(self) -> RcutilsLogger:
+        """Return its logger."""
+        return self._logger
+
+    # Who runs it
+
+    @property
+    def executor(self) -> Executor | None:
+        """The executor that runs its callbacks, if there is one."""
+        return None if self._executor is None else self._executor()
+
+    @executor.setter
+    def executor(self, new_executor: Executor | None) -> None:
+        current = self.executor
+        if current is new_executor:
+            return
+        if current is not None:
+            current.remove_node(self)
+        if new_executor is not None:
+            new_executor.add_node(self)
+
+    def _set_executor(self, executor: Executor | None) -> None:
+        self._executor = None if executor is None else weakref.ref(executor)
+
+    def _wake_executor(self) -> None:
+        executor = self.executor
+        if executor is not None:
+            executor._wake_if_waiting()
+
+    def _entities_have_changed(self) -> None:
+        executor = self.executor
+        if executor is not None:
+            executor._entities_have_changed()
+
+    def _waitables(self) -> list[Any]:
+        """What an executor waits for in DDS."""
+        return [
+            self._graph,
+            *list(self._subscriptions),
+            *list(self._services),
+            *list(self._clients),
+            *list(self._events.values()),
+        ]
+
+    def _entities(self) -> list[Any]:
+        """Everything that runs a callback."""
+        return [*self._waitables()[1:], *list(self._timers), *list(self._guards)]
+
+    # What it has
+
+    @property
+    def publishers(self) -> Iterator[Publisher]:
+        """Its publishers."""
+        yield from list(self._publishers)
+
+    @property
+    def subscriptions(self) -> Iterator[Subscription]:
+        """Its subscriptions."""
+        yield from list(self._subscriptions)
+
+    @property
+    def clients(self) -> Iterator[Client]:
+        """Its clients."""
+        yield from list(self._clients)
+
+    @property
+    def services(self) -> Iterator[Service]:
+        """Its services."""
+        yield from list(self._services)
+
+    @property
+    def timers(self) -> Iterator[Timer]:
+        """Its timers."""
+        yield from list(self._timers)
+
+    @property
+    def guards(self) -> Iterator[GuardCondition]:
+        """Its guard conditions."""
+        yield from list(self._guards)
+
+    @property
+    def waitables(self) -> Iterator[Waitable]:
+        """The QoS event handlers of its publishers and subscriptions."""
+        for owner in (*self.publishers, *self.subscriptions):
+            yield from owner.event_handlers
+
+    def add_waitable(self, waitable: Waitable) -> None:
+        """Not supported: raises NotImplementedError."""
+        raise NotImplementedError("rclpy.node.Node.add_waitable")
+
+    def remove_waitable(self, waitable: Waitable) -> None:
+        """Not supported: raises NotImplementedError."""
+        raise NotImplementedError("rclpy.node.Node.remove_waitable")
+
+    # Names
+
+    def resolve_topic_name(self, topic: str, *, only_expand: bool = False) -> str:
+        """Return the fully qualified name of a topic, remapped unless ``only_expand``."""
+        validate_topic_name(topic)
+        name = expand_topic_name(topic, self._name, self._namespace)
+        validate_full_topic_name(name)
+        return name if only_expand else self._arguments.remap_topic(name, self._name, self._namespace)
+
+    def resolve_service_name(self, service: str, *, only_expand: bool = False) -> str:
+        """Return the fully qualified name of a service, remapped unless ``only_expand``."""
+        validate_topic_name(service, is_service=True)
+        name = expand_topic_name(service, self._name, self._namespace)
+        validate_full_topic_name(name, is_service=True)
+        return name if only_expand else self._arguments.remap_service(name, self._name, self._namespace)
+
+    # Creating
+
+    def create_publisher(
+        self,
+        msg_type: Any,
+        topic: str,
+        qos_profile: QoSProfile | int,
+        *,
+        callback_group: CallbackGroup | None = None,
+        event_callbacks: PublisherEventCallbacks | None = None,
+        qos_overriding_options: QoSOverridingOptions | None = None,
+        publisher_class: type[Publisher] = Publisher,
+    ) -> Publisher:
+        """
+        Create a publisher.
+
+        :param qos_profile: the QoS it offers, or just the depth of its history.
+        :param callback_group: the group of its event callbacks.
+        :param qos_overriding_options: which policies parameters may override.
+        :raises InvalidTopicNameException: if the topic's name is invalid.
+        """
+        profile, name = self._endpoint_options(
+            Publisher, msg_type, topic, qos_profile, qos_overriding_options
+        )
+        dds_name = _names.topic_to_dds(name, avoid_conventions=profile.avoid_ros_namespace_conventions)
+        writer = self.handle._graph.create_writer(self, dds_name, msg_type, profile)
+        publisher = publisher_class(
+            PublisherEndpoint(self, name, writer),
+            msg_type,
+            topic,
+            profile,
+            event_callbacks=event_callbacks or PublisherEventCallbacks(),
+            callback_group=callback_group or self._default_callback_group,
+        )
+        if publisher.event_handlers:
+            self._events[publisher] = EndpointEvents(publisher.event_handlers, writer)
+        self._add(self._publishers, publisher)
+        return publisher
+
+    def create_subscription(
+        self,
+        msg_type: Any,
+        topic: str,
+        callback: Callable[..., Any],
+        qos_profile: QoSProfile | int,
+        *,
+        callback_group: CallbackGroup | None = None,
+        event_callbacks: SubscriptionEventCallbacks | None = None,
+        qos_overriding_options: QoSOverridingOptions | None = None,
+        raw: bool = False,
+    ) -> Subscription:
+        """
+        Create a subscription.
+
+        :param callback: is called with each message, and with its info if it takes two arguments.
+        :param qos_profile: the QoS it requests, or just the depth of its history.
+        :param callback_group: the group of its callback and event callbacks.
+        :param qos_overriding_options: which policies parameters may override.
+        :param raw: whether to call back with serialized messages (``bytes``).
+        :raises InvalidTopicNameException: if the topic's name is invalid.
+        """
+        profile, name = self._endpoint_options(
+            Subscription, msg_type, topic, qos_profile, qos_overriding_options
+        )
+        dds_name = _names.topic_to_dds(name, avoid_conventions=profile.avoid_ros_namespace_conventions)
+        reader = self.handle._graph.create_reader(self, dds_name, msg_type, profile)
+        group = callback_group or self._default_callback_group
+        try:
+            subscription = Subscription(
+                SubscriptionEndpoint(self, name, reader),
+                msg_type,
+                topic,
+                callback,
+                group,
+                profile,
+                raw,
+                event_callbacks or SubscriptionEventCallbacks(),
+            )
+        except Exception:
+            self._graph.destroy(self, reader)
+            raise
+        group.add_entity(subscription)
+        if subscription.event_handlers:
+            self._events[subscription] = EndpointEvents(subscription.event_handlers, reader)
+        self._add(self._subscriptions, subscription)
+        return subscription
+
+    def _endpoint_options(
+        self,
+        kind: type[Publisher] | type[Subscription],
+        msg_type: Any,
+        topic: str,
+        qos_profile: QoSProfile | int,
+        overriding: QoSOverridingOptions | None,
+    ) -> tuple[QoSProfile, str]:
+        """The profile, with its overrides, and the fully qualified name of a new endpoint's topic."""
+        if not hasattr(msg_type, "_DDS_TYPE_NAME"):
+            raise NoTypeSupportImportedException
+        if isinstance(qos_profile, QoSProfile):
+            profile = qos_profile
+        elif isinstance(qos_profile, int):
+            if qos_profile < 0:
+                raise ValueError("history depth must be greater than or equal to zero")
+            profile = QoSProfile(depth=qos_profile)
+        else:
+            raise TypeError("Expected QoSProfile or int, but received {!r}".format(type(qos_profile)))
+        name = self.resolve_topic_name(topic)
+        if overriding is not None:
+            _declare_qos_parameters(kind, self, name, profile, overriding)
+        return profile, name
+
+    def create_service(
+        self,
+        srv_type: Any,
+        srv_name: str,
+        callback: Callable[[Any, Any], Any],
+        *,
+        qos_profile: QoSProfile = qos_profile_services_default,
+        callback_group: CallbackGroup | None = None,
+    ) -> Service:
+        """
+        Create a service.
+
+        :param callback: gets a request and an empty response, and returns the response.
+        :raises InvalidServiceNameException: if its name is invalid.
+        """
+        group = callback_group or self._default_callback_group
+        endpoint = self._service_endpoint(srv_type, srv_name, qos_profile, is_server=True)
+        service = Service(endpoint, srv_type, srv_name, callback, group, qos_profile)
+        group.add_entity(service)
+        self._add(self._services, service)
+        return service
+
+    def create_client(
+        self,
+        srv_type: Any,
+        srv_name: str,
+        *,
+        qos_profile: QoSProfile = qos_profile_services_default,
+        callback_group: CallbackGroup | None = None,
+    ) -> Client:
+        """
+        Create a client of a service.
+
+        :raises InvalidServiceNameException: if the service's name is invalid.
+        """
+        group = callback_group or self._default_callback_group
+        endpoint = self._service_endpoint(srv_type, srv_name, qos_profile, is_server=False)
+        client = Client(self._context, endpoint, srv_type, srv_name, qos_profile, group)
+        group.add_entity(client)
+        self._add(self._clients, client)
+        return client
+
+    def _service_endpoint(
+        self, srv_type: Any, srv_name: str, profile: QoSProfile, *, is_server: bool
+    ) -> ServiceEndpoint:
+        if not hasattr(srv_type, "Request"):
+            raise NoTypeSupportImportedException
+        graph = self.handle._graph
+        name = self.resolve_service_name(srv_name)
+        identity = f"{'serviceid' if is_server else 'clientid'}={graph.next_service_id()};"
+        requests = (_names.request_to_dds(name), srv_type.Request, profile, identity)
+        replies = (_names.reply_to_dds(name), srv_type.Response, profile, identity)
+        with graph.one_announcement():
+            writer = graph.create_writer(self, *(replies if is_server else requests))
+            reader = graph.create_reader(self, *(requests if is_server else replies))
+        return ServiceEndpoint(self, name, writer, reader)
+
+    def create_timer(
+        self,
+        timer_period_sec: float,
+        callback: Callable[[], Any],
+        callback_group: CallbackGroup | None = None,
+        clock: Clock | None = None,
+        autostart: bool = True,
+    ) -> Timer:
+        """
+        Create a timer.
+
+        :param timer_period_sec: period [s].
+        :param clock: the clock it runs by; the node's if ``None``.
+        :param autostart: whether it runs at once, or waits for :meth:`rclpy.timer.Timer.reset`.
+        """
+        group = callback_group or self._default_callback_group
+        timer = Timer(
+            callback,
+            group,
+            int(float(timer_period_sec) * S_TO_NS),
+            clock or self._clock,
+            context=self._context,
+            autostart=autostart,
+        )
+        timer._on_change = self._wake_executor
+        group.add_entity(timer)
+        self._add(self._timers, timer)
+        return timer
+
+    def create_guard_condition(
+        self, callback: Callable[[], Any], callback_group: CallbackGroup | None = None
+    ) -> GuardCondition:
+        """Create a guard condition, whose callback runs after each trigger."""
+        group = callback_group or self._default_callback_group
+        guard = GuardCondition(callback, group, context=self._context)
+        guard._on_change = self._wake_executor
+        group.add_entity(guard)
+        self._add(self._guards, guard)
+        return guard
+
+    def create_rate(self, frequency: float, clock: Clock | None = None) -> Rate:
+        """
+        Create a rate, by which a thread that does not spin the node can sleep.
+
+        :param frequency: how often a second; more than 0.
+        :raises ValueError: if the frequency is not more than 0.
+        """
+        if frequency <= 0:
+            raise ValueError("frequency must be > 0")
+        # A group of its own: no callback of the node may keep the rate from waking its sleepers.
+        group = MutuallyExclusiveCallbackGroup()
+        timer = self.create_timer(1.0 / frequency, lambda: None, group, clock)
+        rate = Rate(timer, context=self._context)
+        self._rates[rate] = timer
+        return rate
+
+    def _add(self, entities: list[_Entity], entity: _Entity) -> None:
+        entities.append(entity)
+        self._entities_have_changed()
+
+    # Destroying
+
+    def _destroy(self, entities: list[Any], entity: Any) -> bool:
+        try:
+            entities.remove(entity)
+        except ValueError:
+            return False
+        self._events.pop(entity, None)
+        entity.destroy()
+        self._entities_have_changed()
+        return True
+
+    def destroy_publisher(self, publisher: Publisher) -> bool:
+        """End a publisher; ``False`` if it is none of this node's."""
+        return self._destroy(self._publishers, publisher)
+
+    def destroy_subscription(self, subscription: Subscription) -> bool:
+        """End a subscription; ``False`` if it is none of this node's."""
+        return self._destroy(self._subscriptions, subscription)
+
+    def destroy_client(self, client: Client) -> bool:
+        """End a client; ``False`` if it is none of this node's."""
+        return self._destroy(self._clients, client)
+
+    def destroy_service(self, service: Service) -> bool:
+        """End a service; ``False`` if it is none of this node's."""
+        return self._destroy(self._services, service)
+
+    def destroy_timer(self, timer: Timer) -> bool:
+        """End a timer; ``False`` if it is none of this node's."""
+        return self._destroy(self._timers, timer)
+
+    def destroy_guard_condition(self, guard: GuardCondition) -> bool:
+        """End a guard condition; ``False`` if it is none of this node's."""
+        return self._destroy(self._guards, guard)
+
+    def destroy_rate(self, rate: Rate) -> bool:
+        """End a rate and wake who sleeps by it; ``False`` if it is none of this node's."""
+        timer = self._rates.pop(rate, None)
+        if timer is None:
+            return False
+        rate.destroy()
+        return self.destroy_timer(timer)
+
+    def destroy_node(self) -> None:
+        """End the node and everything it has. Nothing of it may be used afterwards."""
+        if self._destroyed:
+            return
+        executor = self.executor
+        if executor is not None:
+            executor.remove_node(self)
+        for rate in list(self._rates):
+            self.destroy_rate(rate)
+        with self._graph.one_announcement():
+            if self._rosout_publisher is not None:
+                _logging_output.remove_rosout_publisher(self._publish_log)
+            self._destroyed = True
+            for entities in (
+                self._publishers,
+                self._subscriptions,
+                self._services,
+                self._clients,
+                self._timers,
+                self._guards,
+            ):
+                for entity in list(entities):
+                    self._destroy(entities, entity)  # type: ignore[arg-type]
+            self._graph.remove_node(self)
+        self._context._forget(self)
+
+    def __enter__(self) -> Node:
+        return self
+
+    def __exit__(
+        self,
+        exc_type: type[BaseException] | None,
+        exc_val: BaseException | None,
+        exc_tb: TracebackType | None,
+    ) -> None:
+        self.destroy_node()
+
+    # What it tells the world of itself
+
+    def _publish_parameter_event(self, event: ParameterEvent) -> None:
+        self._parameter_event_publisher.publish(event)
+
+    def _publish_log(self, record: _logging_output.LogRecord) -> None:
+        publisher = self._rosout_publisher
+        if publisher is None or self._destroyed or not self._context.ok():
+            return
+        message = Log()
+        message.stamp.sec, message.stamp.nanosec = divmod(record.stamp, S_TO_NS)
+        message.level = record.level
+        message.name, message.msg = record.name, record.message
+        message.file, message.function, message.line = record.file, record.function, record.line
+        publisher.publish(message)

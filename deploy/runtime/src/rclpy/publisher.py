@@ -1,0 +1,104 @@
+"""Publishers."""
+
+from __future__ import annotations
+
+from types import TracebackType
+from typing import Any
+
+from rclpy._dds import Writer
+from rclpy._endpoint import PublisherEndpoint
+from rclpy.callback_groups import CallbackGroup
+from rclpy.duration import Duration
+from rclpy.event_handler import EventHandler, PublisherEventCallbacks
+from rclpy.exceptions import InvalidHandle, RCLError
+from rclpy.qos import QoSProfile
+
+
+class Publisher:
+    """Publishes messages of one type on one topic; :meth:`rclpy.node.Node.create_publisher` makes them."""
+
+    def __init__(
+        self,
+        publisher_impl: PublisherEndpoint,
+        msg_type: Any,
+        topic: str,
+        qos_profile: QoSProfile,
+        event_callbacks: PublisherEventCallbacks,
+        callback_group: CallbackGroup,
+    ) -> None:
+        self._writer = publisher_impl.writer
+        self._node = publisher_impl.node
+        self._context = publisher_impl.node.context
+        self._topic_name = publisher_impl.name
+        self._destroyed = False
+        self._serialize = msg_type._serialize
+        self.msg_type = msg_type
+        self.topic = topic
+        self.qos_profile = qos_profile
+        self.event_handlers: list[EventHandler] = event_callbacks.create_event_handlers(
+            callback_group, publisher_impl.writer, publisher_impl.name
+        )
+
+    @property
+    def handle(self) -> Writer:
+        """The DDS writer. Raises InvalidHandle when the publisher was destroyed."""
+        if self._destroyed:
+            raise InvalidHandle("cannot use a publisher that was destroyed")
+        return self._writer
+
+    @property
+    def topic_name(self) -> str:
+        """The fully qualified, remapped topic."""
+        return self._topic_name
+
+    def publish(self, msg: Any) -> None:
+        """
+        Send a message, or one that is serialized already (``bytes``).
+
+        :raises TypeError: if ``msg`` is not of the publisher's type, or a field has a wrong type.
+        :raises ValueError: if a field has a value that its type cannot have.
+        :raises RCLError: if the context was shut down.
+        """
+        if self._destroyed:
+            raise InvalidHandle("cannot publish: the publisher was destroyed")
+        if not self._context._valid:
+            raise RCLError(f"cannot publish on {self._topic_name}: the context was shut down")
+        if msg.__class__ is self.msg_type or isinstance(msg, self.msg_type):
+            self._writer.write(self._serialize(msg))
+        elif isinstance(msg, bytes):
+            self._writer.write(msg)
+        else:
+            expected = self.msg_type._TYPE_NAME
+            raise TypeError(f"Expected {expected} on {self._topic_name}, got {type(msg).__name__}: {msg!r}")
+
+    def get_subscription_count(self) -> int:
+        """How many subscriptions receive what is published here."""
+        return self.handle.matched()
+
+    def assert_liveliness(self) -> None:
+        """Say that this publisher lives, where liveliness is MANUAL_BY_TOPIC."""
+        self.handle.assert_liveliness()
+
+    def wait_for_all_acked(self, timeout: Duration = Duration(seconds=-1)) -> bool:  # noqa: B008
+        """Whether all reliable subscriptions have everything, waiting at most ``timeout`` (negative: no end)."""
+        nanoseconds = timeout.nanoseconds
+        return self.handle.wait_for_acks(nanoseconds if nanoseconds >= 0 else 2**63 - 1)
+
+    def destroy(self) -> None:
+        """End it; whoever created it should use :meth:`rclpy.node.Node.destroy_publisher`."""
+        if not self._destroyed:
+            self._destroyed = True
+            for handler in self.event_handlers:
+                handler.destroy()
+            self._node._graph.destroy(self._node, self._writer)
+
+    def __enter__(self) -> Publisher:
+        return self
+
+    def __exit__(
+        self,
+        exc_type: type[BaseException] | None,
+        exc_val: BaseException | None,
+        exc_tb: TracebackType | None,
+    ) -> None:
+        self.destroy()

@@ -1,0 +1,140 @@
+"""Services: they answer requests."""
+
+from __future__ import annotations
+
+import inspect
+import threading
+import time
+from collections.abc import Callable, Coroutine
+from types import TracebackType
+from typing import TYPE_CHECKING, Any
+
+from rclpy._bad_input import BadInput
+from rclpy._dds import Reader
+from rclpy._endpoint import ServiceEndpoint
+from rclpy._service_wire import RequestId, client_is_matched, unwrap, wrap
+from rclpy.callback_groups import CallbackGroup
+from rclpy.exceptions import InvalidHandle
+from rclpy.qos import QoSProfile
+
+if TYPE_CHECKING:
+    from rclpy.clock import Clock
+
+# A client may be heard before discovery has told us of its reader: so long a reply waits for it [s].
+_PATIENCE = 0.1
+
+
+class Service:
+    """Answers requests by its callback; :meth:`rclpy.node.Node.create_service` makes them."""
+
+    def __init__(
+        self,
+        service_impl: ServiceEndpoint,
+        srv_type: Any,
+        srv_name: str,
+        callback: Callable[[Any, Any], Any],
+        callback_group: CallbackGroup,
+        qos_profile: QoSProfile,
+    ) -> None:
+        self._replies = service_impl.writer
+        self._requests = service_impl.reader
+        self._handles = (self._requests.condition,)
+        self._node = service_impl.node
+        self._service_name = service_impl.name
+        self._destroyed = False
+        self._bad_input = BadInput(self._node, self._service_name)
+        self._known_clients: set[int] = set()
+        self._lock = threading.Lock()
+        self.srv_type = srv_type
+        self.srv_name = srv_name
+        self.callback = callback
+        self.callback_group = callback_group
+        self.qos_profile = qos_profile
+
+    @property
+    def handle(self) -> Reader:
+        """The DDS reader of the requests. Raises InvalidHandle when the service was destroyed."""
+        if self._destroyed:
+            raise InvalidHandle("cannot use a service that was destroyed")
+        return self._requests
+
+    @property
+    def service_name(self) -> str:
+        """The fully qualified, remapped name."""
+        return self._service_name
+
+    def send_response(self, response: Any, header: RequestId) -> None:
+        """
+        Answer the request that ``header`` names.
+
+        :raises TypeError: if ``response`` is not of the service's response type.
+        """
+        if not isinstance(response, self.srv_type.Response):
+            expected = self.srv_type.Response._TYPE_NAME
+            raise TypeError(f"{self._service_name} must answer with {expected}, not {response!r}")
+        data = wrap(header, self.srv_type.Response._serialize(response))
+        self._wait_for_client(header.publication_handle)
+        if not self._destroyed:
+            self._replies.write(data)
+
+    def _wait_for_client(self, publication_handle: int) -> None:
+        with self._lock:
+            if publication_handle in self._known_clients:
+                return
+        deadline = time.monotonic() + _PATIENCE
+        matched = client_is_matched(self._requests, self._replies, publication_handle)
+        while matched is False and time.monotonic() < deadline:
+            time.sleep(0.001)
+            matched = client_is_matched(self._requests, self._replies, publication_handle)
+        if matched:
+            with self._lock:
+                if len(self._known_clients) >= 1000:  # most of them have gone long since
+                    self._known_clients.clear()
+                self._known_clients.add(publication_handle)
+
+    def configure_introspection(
+        self, clock: Clock, service_event_qos_profile: QoSProfile, introspection_state: Any
+    ) -> None:
+        """Not supported: raises NotImplementedError."""
+        raise NotImplementedError("rclpy.service.Service.configure_introspection")
+
+    def destroy(self) -> None:
+        """End it; whoever created it should use :meth:`rclpy.node.Node.destroy_service`."""
+        if not self._destroyed:
+            self._destroyed = True
+            self._node._graph.destroy(self._node, self._requests, self._replies)
+
+    def __enter__(self) -> Service:
+        return self
+
+    def __exit__(
+        self,
+        exc_type: type[BaseException] | None,
+        exc_val: BaseException | None,
+        exc_tb: TracebackType | None,
+    ) -> None:
+        self.destroy()
+
+    # What the executor asks of everything it waits for.
+
+    def _take(self) -> tuple[Any, RequestId] | None:
+        while not self._destroyed and (sample := self._requests.take()) is not None:
+            try:
+                request_id, data = unwrap(sample.data)
+                request = self.srv_type.Request._deserialize(data)
+            except ValueError as error:
+                self._bad_input.drop(sample, error)
+                continue
+            return request, request_id._replace(publication_handle=sample.publication_handle)
+        return None
+
+    def _execute(self, taken: tuple[Any, RequestId]) -> Coroutine[Any, Any, None] | None:
+        request, request_id = taken
+        response = self.callback(request, self.srv_type.Response())
+        if inspect.iscoroutine(response):
+            return self._answer(response, request_id)
+        self.send_response(response, request_id)
+        return None
+
+    async def _answer(self, response: Coroutine[Any, Any, Any], request_id: RequestId) -> None:
+        self.send_response(await response, request_id)

@@ -1,0 +1,145 @@
+"""Subscriptions."""
+
+from __future__ import annotations
+
+import inspect
+import time
+from collections.abc import Callable
+from enum import Enum
+from types import TracebackType
+from typing import Any
+
+from rclpy._bad_input import BadInput
+from rclpy._dds import Reader
+from rclpy._endpoint import SubscriptionEndpoint
+from rclpy.callback_groups import CallbackGroup
+from rclpy.event_handler import EventHandler, SubscriptionEventCallbacks
+from rclpy.exceptions import InvalidHandle
+from rclpy.qos import QoSProfile
+
+
+class Subscription:
+    """Calls back with each message of a topic; :meth:`rclpy.node.Node.create_subscription` makes them."""
+
+    class CallbackType(Enum):
+        """What the callback is called with."""
+
+        MessageOnly = 0
+        WithMessageInfo = 1
+
+    def __init__(
+        self,
+        subscription_impl: SubscriptionEndpoint,
+        msg_type: Any,
+        topic: str,
+        callback: Callable[..., Any],
+        callback_group: CallbackGroup,
+        qos_profile: QoSProfile,
+        raw: bool,
+        event_callbacks: SubscriptionEventCallbacks,
+    ) -> None:
+        self._reader = subscription_impl.reader
+        self._handles = (self._reader.condition,)
+        self._node = subscription_impl.node
+        self._topic_name = subscription_impl.name
+        self._destroyed = False
+        self._deserialize = msg_type._deserialize
+        self._bad_input = BadInput(self._node, self._topic_name)
+        self.callback = callback
+        self.callback_group = callback_group
+        self.msg_type = msg_type
+        self.topic = topic
+        self.qos_profile = qos_profile
+        self.raw = raw
+        self.event_handlers: list[EventHandler] = event_callbacks.create_event_handlers(
+            callback_group, self._reader, self._topic_name
+        )
+
+    @property
+    def handle(self) -> Reader:
+        """The DDS reader. Raises InvalidHandle when the subscription was destroyed."""
+        if self._destroyed:
+            raise InvalidHandle("cannot use a subscription that was destroyed")
+        return self._reader
+
+    @property
+    def topic_name(self) -> str:
+        """The fully qualified, remapped topic."""
+        return self._topic_name
+
+    @property
+    def callback(self) -> Callable[..., Any]:
+        """What is called with each message, and with its info as a second argument if it takes two."""
+        return self._callback
+
+    @callback.setter
+    def callback(self, value: Callable[..., Any]) -> None:
+        self._callback = value
+        self._callback_type = _callback_type(value)
+
+    def get_publisher_count(self) -> int:
+        """How many publishers this subscription receives from."""
+        return self.handle.matched()
+
+    def destroy(self) -> None:
+        """End it; whoever created it should use :meth:`rclpy.node.Node.destroy_subscription`."""
+        if not self._destroyed:
+            self._destroyed = True
+            for handler in self.event_handlers:
+                handler.destroy()
+            self._node._graph.destroy(self._node, self._reader)
+
+    def __enter__(self) -> Subscription:
+        return self
+
+    def __exit__(
+        self,
+        exc_type: type[BaseException] | None,
+        exc_val: BaseException | None,
+        exc_tb: TracebackType | None,
+    ) -> None:
+        self.destroy()
+
+    # What the executor asks of everything it waits for.
+
+    def _take(self) -> tuple[Any, ...] | None:
+        """The arguments of the next call of the callback; malformed messages are dropped and reported."""
+        while not self._destroyed and (sample := self._reader.take()) is not None:
+            try:
+                message = sample.data if self.raw else self._deserialize(sample.data)
+            except ValueError as error:
+                self._bad_input.drop(sample, error)
+                continue
+            if self._callback_type is Subscription.CallbackType.MessageOnly:
+                return (message,)
+            info = {
+                "source_timestamp": sample.source_timestamp,
+                "received_timestamp": time.time_ns(),
+                "publication_sequence_number": None,
+                "reception_sequence_number": None,
+            }
+            return (message, info)
+        return None
+
+    def _execute(self, taken: tuple[Any, ...]) -> Any:
+        return self._callback(*taken)
+
+
+def _callback_type(callback: Callable[..., Any]) -> Subscription.CallbackType:
+    """How a callback wants to be called. Raises RuntimeError if neither one nor two arguments fit."""
+    try:
+        signature = inspect.signature(callback)
+    except (ValueError, TypeError):  # a builtin, such as list.append, does not say
+        return Subscription.CallbackType.MessageOnly
+    for arguments, kind in (
+        ((object(),), Subscription.CallbackType.MessageOnly),
+        ((object(), object()), Subscription.CallbackType.WithMessageInfo),
+    ):
+        try:
+            signature.bind(*arguments)
+            return kind
+        except TypeError:
+            continue
+    raise RuntimeError(
+        f"a subscription's callback takes a message, or a message and its info: not {callback!r}"
+    )

@@ -1,0 +1,194 @@
+"""Timers, and rates that sleep by them."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from rclpy._dds import INFINITY
+from rclpy.callback_groups import CallbackGroup
+from rclpy.clock import Clock, ClockChange, JumpThreshold, TimeJump
+from rclpy.clock_type import ClockType
+from rclpy.duration import Duration
+from rclpy.exceptions import InvalidHandle, ROSInterruptException
+from rclpy.utilities import get_default_context
+
+if TYPE_CHECKING:
+    from rclpy.context import Context
+
+TimerCallbackType = Callable[[], Any]
+
+
+class Timer:
+    """Calls back once a period by its clock. The periods do not drift; missed ones are skipped."""
+
+    def __init__(
+        self,
+        callback: TimerCallbackType,
+        callback_group: CallbackGroup,
+        timer_period_ns: int,
+        clock: Clock,
+        *,
+        context: Context | None = None,
+        autostart: bool = True,
+    ) -> None:
+        """
+        Create a timer; :meth:`rclpy.node.Node.create_timer` is the usual way.
+
+        :param timer_period_ns: period [ns], not negative.
+        :param autostart: whether it runs at once, or waits for :meth:`reset`.
+        """
+        if timer_period_ns < 0:
+            raise ValueError("timer period must not be negative")
+        self.callback = callback
+        self.callback_group = callback_group
+        self._context = get_default_context() if context is None else context
+        self._clock = clock
+        self._source = clock.handle
+        self._period = int(timer_period_ns)
+        self._last_call = self._source.nanoseconds()
+        self._next_call = self._last_call + self._period
+        self._canceled = not autostart
+        self._destroyed = False
+        # Who waits for this timer hears through this that the wait has become another one.
+        self._on_change: Callable[[], None] = lambda: None
+        self._jump_handle = None
+        if clock.clock_type == ClockType.ROS_TIME:
+            self._jump_handle = clock.create_jump_callback(
+                JumpThreshold(
+                    min_forward=Duration(nanoseconds=1), min_backward=Duration(nanoseconds=-1)
+                ),
+                post_callback=self._time_has_jumped,
+            )
+
+    def _time_has_jumped(self, jump: TimeJump) -> None:
+        now = self._source.nanoseconds()
+        if jump.clock_change in (ClockChange.ROS_TIME_ACTIVATED, ClockChange.ROS_TIME_DEACTIVATED):
+            # Another scale of time: what remained of the period still remains.
+            self._next_call += jump.delta.nanoseconds
+            self._last_call += jump.delta.nanoseconds
+        elif now < self._last_call:
+            self._last_call = now
+            self._next_call = now + self._period
+        self._on_change()
+
+    @property
+    def handle(self) -> Timer:
+        """The timer itself. Raises InvalidHandle when it was destroyed."""
+        if self._destroyed:
+            raise InvalidHandle("cannot use a timer that was destroyed")
+        return self
+
+    @property
+    def clock(self) -> Clock:
+        """The clock it runs by."""
+        return self._clock
+
+    @property
+    def timer_period_ns(self) -> int:
+        """The period [ns]. A new one counts from the next call on."""
+        return self.handle._period
+
+    @timer_period_ns.setter
+    def timer_period_ns(self, value: int) -> None:
+        self.handle._period = int(value)
+        self._on_change()
+
+    def is_ready(self) -> bool:
+        """Whether it should be called now."""
+        return not self.handle._canceled and self._source.nanoseconds() >= self._next_call
+
+    def is_canceled(self) -> bool:
+        """Whether it rests."""
+        return self.handle._canceled
+
+    def cancel(self) -> None:
+        """Rest until :meth:`reset`."""
+        self.handle._canceled = True
+
+    def reset(self) -> None:
+        """Start a new period now."""
+        self.handle._next_call = self._source.nanoseconds() + self._period
+        self._canceled = False
+        self._on_change()
+
+    def time_since_last_call(self) -> int:
+        """Nanoseconds since the last call, or since the creation."""
+        return self._source.nanoseconds() - self.handle._last_call
+
+    def time_until_next_call(self) -> int | None:
+        """Nanoseconds until the next call, negative if it is overdue, ``None`` if canceled."""
+        return None if self.handle._canceled else self._next_call - self._source.nanoseconds()
+
+    def destroy(self) -> None:
+        """End it; whoever created it should use :meth:`rclpy.node.Node.destroy_timer`."""
+        self._destroyed = True
+        if self._jump_handle is not None:
+            self._jump_handle.unregister()
+
+    # What the executor asks of everything it waits for.
+
+    def _remaining(self) -> int:
+        """Nanoseconds to wait for it; for ever while it rests, or while its time is a simulator's."""
+        if self._canceled or self._destroyed:
+            return INFINITY
+        remaining = self._next_call - self._source.nanoseconds()
+        return INFINITY if remaining > 0 and self._source.get_ros_time_override_is_enabled() else remaining
+
+    def _take(self) -> tuple[()] | None:
+        if self._destroyed or self._canceled:
+            return None
+        now = self._source.nanoseconds()
+        if now < self._next_call:
+            return None
+        self._last_call = now
+        self._next_call += self._period
+        if self._next_call < now:
+            behind = now - self._next_call
+            self._next_call = now if not self._period else now + self._period - behind % self._period
+        return ()
+
+    def _execute(self, taken: tuple[()]) -> Any:
+        return self.callback()
+
+
+class Rate:
+    """Sleeps at a rate, in a thread other than the one that spins the node."""
+
+    def __init__(self, timer: Timer, *, context: Context) -> None:
+        """Create a rate on a timer; :meth:`rclpy.node.Node.create_rate` is the usual way."""
+        self._timer = timer
+        self._clock = timer.clock
+        self._context = context
+        self._ticks = threading.Condition()
+        self._tick = 0
+        self._is_destroyed = False
+        timer.callback = self._wake
+        context.on_shutdown(self._end)
+
+    def _wake(self) -> None:
+        with self._ticks:
+            self._tick += 1
+            self._ticks.notify_all()
+
+    def _end(self) -> None:
+        with self._ticks:
+            self._is_destroyed = True
+            self._ticks.notify_all()
+
+    def destroy(self) -> None:
+        """Wake whoever sleeps, for the last time."""
+        self._end()
+
+    def sleep(self) -> None:
+        """
+        Sleep until the next tick.
+
+        :raises ROSInterruptException: if the context is shut down, or the rate destroyed, meanwhile.
+        """
+        with self._ticks:
+            tick = self._tick
+            self._ticks.wait_for(lambda: self._tick != tick or self._is_destroyed)
+            if self._tick == tick:
+                raise ROSInterruptException

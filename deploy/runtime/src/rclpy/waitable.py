@@ -1,0 +1,54 @@
+"""The base class of things that rclpy's executors can wait for. Applications cannot add their own here."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rclpy.callback_groups import CallbackGroup
+
+
+class NumberOfEntities:
+    """How many entities of which kind a waitable brings into a wait set."""
+
+    def __init__(
+        self,
+        num_subs: int = 0,
+        num_gcs: int = 0,
+        num_timers: int = 0,
+        num_clients: int = 0,
+        num_services: int = 0,
+        num_events: int = 0,
+    ) -> None:
+        self.num_subscriptions = num_subs
+        self.num_guard_conditions = num_gcs
+        self.num_timers = num_timers
+        self.num_clients = num_clients
+        self.num_services = num_services
+        self.num_events = num_events
+
+
+class Waitable:
+    """Something an executor waits for. This runtime's wait sets are not rcl's: see ``Node.add_waitable``."""
+
+    def __init__(self, callback_group: CallbackGroup) -> None:
+        self.callback_group: CallbackGroup | None = callback_group
+
+    def is_ready(self, wait_set: Any) -> bool:
+        """Not supported: raises NotImplementedError."""
+        raise NotImplementedError("rclpy.waitable.Waitable.is_ready")
+
+    def take_data(self) -> Any:
+        """Not supported: raises NotImplementedError."""
+        raise NotImplementedError("rclpy.waitable.Waitable.take_data")
+
+    async def execute(self, taken_data: Any) -> None:
+        """Not supported: raises NotImplementedError."""
+        raise NotImplementedError("rclpy.waitable.Waitable.execute")
+
+    def get_num_entities(self) -> NumberOfEntities:
+        """Not supported: raises NotImplementedError."""
+        raise NotImplementedError("rclpy.waitable.Waitable.get_num_entities")
+
+    def add_to_wait_set(self, wait_set: Any) -> None:
+        """Not supported: raises NotImplementedError."""
+        raise NotImplementedError("rclpy.waitable.Waitable.add_to_wait_set")
