@@ -1,0 +1,44 @@
+# The commands of reactive-arm; `make` alone lists them. Each sets up .venv first where that is still to be done.
+
+PYTHON ?=
+SCENARIO ?= demo
+TESTS ?= tests
+SHELL := /bin/sh
+MAKEFLAGS += --no-print-directory
+PY := .venv/bin/python
+
+.PHONY: help setup run start stop status logs console test check
+
+help:
+	@echo "make run      start the system, show it in this terminal, stop it with Ctrl-C"
+	@echo "make start    start it in the background          (run, start: SCENARIO=demo, listing_5_9 or a file)"
+	@echo "make console  attach this terminal to it"
+	@echo "make status   its services: state, pid, uptime, restarts, last output"
+	@echo "make logs     follow their logs"
+	@echo "make stop     stop it"
+	@echo "make test     run the tests                       (TESTS=tests/component for a part)"
+	@echo "make check    ruff, mypy, shellcheck, yamllint"
+	@echo "make setup    only set up .venv                   (PYTHON= chooses the interpreter, 3.11 to 3.13)"
+
+setup:
+	@deploy/setup.sh "$(PYTHON)"
+
+run start: setup
+	@$(PY) -m deploy.launcher $@ "$(SCENARIO)"
+
+console: setup
+	@$(PY) -m deploy.launcher $@
+
+# These do without a set-up: they only look at what runs, or end it.
+stop status logs:
+	@if test -x $(PY); then exec $(PY) -m deploy.launcher $@; else echo "Nothing runs: .venv is not set up."; fi
+
+test: setup
+	@$(PY) -m pytest "$(TESTS)"
+
+check: setup
+	@$(PY) -m ruff check .
+	@$(PY) -m ruff format --check --quiet .
+	@$(PY) -m mypy
+	@.venv/bin/shellcheck deploy/setup.sh .ci/run
+	@$(PY) -m yamllint --strict deploy

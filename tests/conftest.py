@@ -1,0 +1,92 @@
+"""What every test may rely on: a DDS domain of its own on loopback, and that nothing is left behind."""
+
+from __future__ import annotations
+
+import os
+import random
+import socket
+import time
+import uuid
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+import pytest
+
+MARK = f"REACTIVE_ARM_TESTS={uuid.uuid4()}"
+DISCOVERY_RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
+
+
+def pytest_configure() -> None:
+    """Mark everything that the tests start, and keep its DDS traffic on loopback."""
+    name, _, value = MARK.partition("=")
+    os.environ[name] = value
+    os.environ[DISCOVERY_RANGE] = "LOCALHOST"
+
+
+@contextmanager
+def reserved_domain() -> Iterator[int]:
+    """A ROS_DOMAIN_ID that nobody uses, kept from other test runs on this host until it is given back."""
+    with ExitStack() as stack:
+        for domain in random.sample(range(30, 102), 72):
+            # An abstract unix socket has one owner, and the kernel takes it back from a killed one.
+            owner = stack.enter_context(socket.socket(socket.AF_UNIX))
+            try:
+                owner.bind(f"\0reactive-arm-test-domain-{domain}")
+            except OSError:
+                continue
+            if not _has_participants(domain):
+                yield domain
+                return
+    raise RuntimeError("no free ROS_DOMAIN_ID on this host")
+
+
+def _has_participants(domain: int) -> bool:
+    """Whether somebody listens on the domain's ports for discovery (RTPS 9.6.1)."""
+    for offset in (0, 10):
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+            try:
+                probe.bind(("", 7400 + 250 * domain + offset))
+            except OSError:
+                return True
+    return False
+
+
+@pytest.fixture
+def domain_id(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
+    """A free ROS_DOMAIN_ID, in the environment too."""
+    with reserved_domain() as domain:
+        monkeypatch.setenv("ROS_DOMAIN_ID", str(domain))
+        yield domain
+
+
+@pytest.fixture(scope="module")
+def module_domain_id() -> Iterator[int]:
+    """A free ROS_DOMAIN_ID for what the tests of a module share; the environment stays as it is."""
+    with reserved_domain() as domain:
+        yield domain
+
+
+def _left_behind() -> dict[int, str]:
+    """The live processes that the tests started, also where their parents are gone."""
+    found = {}
+    for entry in Path("/proc").iterdir():
+        if entry.name.isdigit() and int(entry.name) != os.getpid():
+            try:
+                if MARK.encode() in (entry / "environ").read_bytes().split(b"\0"):
+                    found[int(entry.name)] = (entry / "cmdline").read_bytes().replace(b"\0", b" ").decode()
+            except OSError:
+                continue
+    return found
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _no_process_stays_behind() -> Iterator[None]:
+    before = _left_behind()
+    yield
+    deadline = time.monotonic() + 5.0
+    while (left := {pid: command for pid, command in _left_behind().items() if pid not in before}) and (
+        time.monotonic() < deadline
+    ):
+        time.sleep(0.02)
+    assert not left, f"processes stay behind: {left}"
