@@ -1,8 +1,8 @@
 """
 The command line of a ROS 2 process: what stands between `--ros-args` and `--`.
 
-The grammar is that of docs.ros.org, "Passing ROS arguments to nodes via the command-line". The parameters
-come from `-p` and from the files of `--params-file`: see `_parameter_files`.
+The grammar is that of docs.ros.org, "Passing ROS arguments to nodes via the command-line". For the values of
+`-p` see `_parameter_values`, for the files of `--params-file` `_parameter_files`.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import re
 import sys
 from dataclasses import dataclass, field, replace
 
-from rclpy._parameter_files import NodeParameters, ParameterFileError, parse_value, read_parameter_file
+from rclpy._parameter_values import NodeParameters, parse_value
 from rclpy.exceptions import RCLInvalidROSArgsError, UnknownROSArgsError
 from rclpy.expand_topic_name import expand_topic_name
 from rclpy.impl.logging_severity import LoggingSeverity
@@ -23,7 +23,9 @@ _NAME = rf"(?:~/|/)?{_TOKEN}(?:/{_TOKEN})*"
 _NODE_PREFIX = rf"(?:(?P<node>{_TOKEN}):)?"
 _RENAME_NODE = re.compile(rf"{_NODE_PREFIX}__(?:node|name):=(?P<to>{_TOKEN})")
 _MOVE_NODE = re.compile(rf"{_NODE_PREFIX}__ns:=(?P<to>/(?:{_TOKEN}(?:/{_TOKEN})*)?)")
-_REMAP = re.compile(rf"{_NODE_PREFIX}(?P<kind>rostopic://|rosservice://)?(?P<from>{_NAME}):=(?P<to>{_NAME})")
+_NO_NODE = "(?!__(?:node|name|ns):)"
+_KIND = "(?P<kind>rostopic://|rosservice://)?"
+_REMAP = re.compile(rf"{_NODE_PREFIX}{_KIND}{_NO_NODE}(?P<from>{_NAME}):=(?P<to>{_NAME})")
 _PARAMETER_NAME = rf"(?:{_TOKEN}|/)+(?:\.(?:{_TOKEN}|/)+)*"
 _PARAMETER = re.compile(rf"{_NODE_PREFIX}(?P<name>{_PARAMETER_NAME}):=(?P<value>.+)", re.DOTALL)
 _ALL_NODES = "/**"
@@ -220,6 +222,9 @@ class _Parser:
         self._parameters.setdefault(rule["node"] or _ALL_NODES, {})[name] = parameter
 
     def _parameter_file(self, flag: str, value: str) -> None:
+        # Here, since a YAML parser takes time to import.
+        from rclpy._parameter_files import ParameterFileError, read_parameter_file
+
         try:
             nodes = read_parameter_file(value)
         except ParameterFileError as error:

@@ -145,7 +145,7 @@ class NodeParameters:
         if result.successful:
             return
         if result.reason.startswith("Wrong parameter type"):
-            raise InvalidParameterTypeException(parameter, Parameter.Type(descriptor.type).name)
+            raise InvalidParameterTypeException(parameter, Parameter.Type(descriptor.type))
         raise InvalidParameterValueException(parameter.name, parameter.value, result.reason)
 
     def undeclare_parameter(self, name: str) -> None:

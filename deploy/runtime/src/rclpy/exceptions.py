@@ -126,7 +126,7 @@ class InvalidParameterTypeException(ParameterException):
     def __init__(self, desired_parameter: Parameter, expected_type: Parameter.Type) -> None:
         super().__init__(
             f"Trying to set parameter '{desired_parameter.name}' to '{desired_parameter.value}' of type "
-            f"'{desired_parameter.type_.name}', expecting type '{expected_type}'",
+            f"'{desired_parameter.type_.name}', expecting type '{expected_type.name}'",
             desired_parameter.name,
         )
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rclpy.impl import _logging_levels, _logging_output, rcutils_logger
@@ -11,6 +10,8 @@ from rclpy.impl.logging_severity import LoggingSeverity
 from rclpy.impl.rcutils_logger import RcutilsLogger
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from rclpy._arguments import RosArguments
 
 _root_logger = RcutilsLogger()
@@ -82,6 +83,8 @@ def get_logging_severity_from_string(log_severity: str) -> LoggingSeverity:
 
 def get_logging_directory() -> Path:
     """Return the directory for log files: `$ROS_LOG_DIR`, else `$ROS_HOME/log`, else `~/.ros/log`."""
+    from pathlib import Path
+
     directory = os.environ.get("ROS_LOG_DIR") or os.path.join(os.environ.get("ROS_HOME") or "~/.ros", "log")
     return Path(directory).expanduser()
 
