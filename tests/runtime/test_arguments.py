@@ -128,6 +128,10 @@ def test_a_nodes_own_rules_and_parameters_come_before_those_of_its_process() -> 
     assert values(arguments, "/n") == {"x": 2, "y": 1}
 
 
+def test_the_outputs_of_a_process_are_not_a_nodes_business() -> None:
+    assert not ros("-e", "/mine").before(ros("--disable-rosout-logs")).rosout_logs
+
+
 # Parameters
 
 

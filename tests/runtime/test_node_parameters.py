@@ -6,6 +6,7 @@ import warnings
 from typing import Any
 
 import pytest
+
 from rcl_interfaces.msg import (
     FloatingPointRange,
     IntegerRange,
@@ -14,7 +15,6 @@ from rcl_interfaces.msg import (
     ParameterValue,
     SetParametersResult,
 )
-
 from rclpy._node_parameters import NodeParameters
 from rclpy.clock import ROSClock
 from rclpy.exceptions import (

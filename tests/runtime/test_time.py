@@ -5,9 +5,9 @@ from __future__ import annotations
 import operator
 from typing import Any
 
-import builtin_interfaces.msg
 import pytest
 
+import builtin_interfaces.msg
 from rclpy.clock_type import ClockType
 from rclpy.constants import S_TO_NS
 from rclpy.duration import Duration, Infinite

@@ -67,10 +67,10 @@ class RosArguments:
         """
         Return the arguments of a node that has some of its own and obeys those of its process (`fallback`).
 
-        The node's own remaps are tried first, its own parameters win.
+        The node's own remaps are tried first, its own parameters win; all else is the process' business.
         """
         return replace(
-            self, remaps=self.remaps + fallback.remaps, parameters=fallback.parameters + self.parameters
+            fallback, remaps=self.remaps + fallback.remaps, parameters=fallback.parameters + self.parameters
         )
 
     def node_name(self, name: str, namespace: str) -> tuple[str, str]:

@@ -47,7 +47,7 @@ class Context(AbstractContextManager["Context"]):
         self._valid = False
         self._logging = False
         self._domain_id = 0
-        self._arguments = parse(None)
+        self._arguments = RosArguments()
         self._callbacks: list[Callable[[], None]] = []
         self._nodes: weakref.WeakSet[Node] = weakref.WeakSet()
         self._executors: weakref.WeakSet[Executor] = weakref.WeakSet()

@@ -1,0 +1,106 @@
+"""What is known of endpoints, type hashes, and messages as bytes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from rclpy.duration import Infinite
+from rclpy.exceptions import NoTypeSupportImportedException
+from rclpy.qos import QoSPresetProfiles, QoSProfile
+from rclpy.serialization import deserialize_message, serialize_message
+from rclpy.topic_endpoint_info import TopicEndpointInfo, TopicEndpointTypeEnum
+from rclpy.type_hash import TypeHash
+from std_msgs.msg import Float64, String
+
+HASH = "RIHS01_" + "0123456789abcdef" * 4
+
+
+def test_an_endpoint_of_which_nothing_is_known_says_so() -> None:
+    info = TopicEndpointInfo()
+    assert (info.node_name, info.node_namespace, info.topic_type, info.endpoint_gid) == ("", "", "", [])
+    assert info.endpoint_type is TopicEndpointTypeEnum.INVALID
+    assert info.qos_profile == QoSPresetProfiles.UNKNOWN.value
+    assert str(info.topic_type_hash) == "INVALID"
+
+
+def test_an_endpoint_reads_as_in_rclpy() -> None:
+    info = TopicEndpointInfo(
+        node_name="talker",
+        node_namespace="/ns",
+        topic_type="std_msgs/msg/String",
+        topic_type_hash={"version": 1, "value": bytes.fromhex("0123456789abcdef" * 4)},
+        endpoint_type=1,
+        endpoint_gid=[1, 255],
+        qos_profile={"depth": 7, "lifespan": Infinite},
+    )
+    assert str(info) == (
+        "Node name: talker\n"
+        "Node namespace: /ns\n"
+        "Topic type: std_msgs/msg/String\n"
+        f"Topic type hash: {HASH}\n"
+        "Endpoint type: PUBLISHER\n"
+        "GID: 01.ff\n"
+        "QoS profile:\n"
+        "  Reliability: RELIABLE\n"
+        "  History (Depth): KEEP_LAST (7)\n"
+        "  Durability: VOLATILE\n"
+        "  Lifespan: Infinite\n"
+        "  Deadline: 0 nanoseconds\n"
+        "  Liveliness: SYSTEM_DEFAULT\n"
+        "  Liveliness lease duration: 0 nanoseconds"
+    )
+    info.qos_profile = QoSProfile(history=2)
+    assert "History (Depth): KEEP_ALL\n" in str(info)
+
+
+def test_endpoints_with_equal_properties_are_equal() -> None:
+    assert TopicEndpointInfo(node_name="a") == TopicEndpointInfo(node_name="a")
+    assert TopicEndpointInfo(node_name="a") != TopicEndpointInfo(node_name="b")
+    assert TopicEndpointInfo() != "endpoint"
+
+
+@pytest.mark.parametrize(
+    "properties",
+    [
+        {"node_name": 1},
+        {"topic_type_hash": "RIHS01"},
+        {"endpoint_type": "PUBLISHER"},
+        {"endpoint_gid": ["a"]},
+        {"qos_profile": 10},
+        {"colour": "red"},
+    ],
+)
+def test_a_property_of_a_wrong_type_or_name_is_an_error(properties: dict[str, Any]) -> None:
+    with pytest.raises(AssertionError, match=r"must be|Invalid arguments"):
+        TopicEndpointInfo(**properties)
+
+
+def test_a_type_hash_is_written_and_read() -> None:
+    assert str(TypeHash._parse(HASH)) == HASH
+    assert TypeHash._parse(HASH) == TypeHash(1, bytes.fromhex("0123456789abcdef" * 4))
+    assert TypeHash() != TypeHash(version=1)
+
+
+@pytest.mark.parametrize(
+    "text", ["", "RIHS01", "RIHS01_00", "RIHSxx_" + "0" * 64, "RIHS01_" + "g" * 64, HASH[1:]]
+)
+def test_what_is_no_type_hash_is_the_unknown_one(text: str) -> None:
+    assert TypeHash._parse(text) == TypeHash()
+    assert str(TypeHash._parse(text)) == "INVALID"
+
+
+def test_a_message_becomes_bytes_and_back() -> None:
+    data = serialize_message(String(data="hello"))
+    assert data[:4] == b"\x00\x01\x00\x00"
+    assert deserialize_message(data, String) == String(data="hello")
+    with pytest.raises(ValueError, match=r".+"):
+        deserialize_message(data[:5], Float64)
+
+
+def test_what_is_no_message_does_not_become_bytes() -> None:
+    with pytest.raises(NoTypeSupportImportedException):
+        serialize_message("hello")
+    with pytest.raises(NoTypeSupportImportedException):
+        deserialize_message(b"", str)
