@@ -55,3 +55,14 @@ def test_using_rclpy_too_early_or_too_late_says_so() -> None:
 )
 def test_errors_can_be_caught_by_their_bases(error: type[Exception], base: type[Exception]) -> None:
     assert issubclass(error, base)
+
+
+def test_the_errors_of_the_c_extension_are_where_code_looks_for_them() -> None:
+    from rclpy._rclpy_pybind11 import InvalidHandle, RCLError
+    from rclpy.impl.implementation_singleton import rclpy_implementation
+
+    assert RCLError is exceptions.RCLError
+    assert rclpy_implementation.InvalidHandle is InvalidHandle is exceptions.InvalidHandle
+    with pytest.raises(NotImplementedError, match=r"_rclpy_pybind11\.WaitSet"):
+        _ = rclpy_implementation.WaitSet
+    assert not hasattr(rclpy_implementation, "__path__")
