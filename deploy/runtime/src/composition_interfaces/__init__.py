@@ -1,0 +1,1 @@
+"""Interfaces of composition_interfaces, as in ROS 2 Jazzy."""

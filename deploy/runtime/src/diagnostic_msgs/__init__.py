@@ -1,0 +1,1 @@
+"""Interfaces of diagnostic_msgs, as in ROS 2 Jazzy."""

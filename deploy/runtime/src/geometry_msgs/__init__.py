@@ -1,0 +1,1 @@
+"""Interfaces of geometry_msgs, as in ROS 2 Jazzy."""

@@ -1,0 +1,1 @@
+"""Interfaces of lifecycle_msgs, as in ROS 2 Jazzy."""

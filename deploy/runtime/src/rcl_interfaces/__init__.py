@@ -1,0 +1,1 @@
+"""Interfaces of rcl_interfaces, as in ROS 2 Jazzy."""

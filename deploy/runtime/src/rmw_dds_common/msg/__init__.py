@@ -1,0 +1,5 @@
+"""Messages of rmw_dds_common, as in ROS 2 Jazzy."""
+
+from rosidl_runtime_embedded import interfaces
+
+__getattr__, __dir__ = interfaces(__name__)

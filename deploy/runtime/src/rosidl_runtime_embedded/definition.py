@@ -1,0 +1,293 @@
+"""What a ``.msg`` or ``.srv`` file says: fields, constants and default values of a type.
+
+Source of the format: the ROS 2 interface definition language (docs.ros.org, "Interfaces"), in the reading of
+``rosidl_adapter`` of Jazzy. Types bear their IDL names from here on (``double``, ``octet``, ``sequence<string>``), as
+they do in ``get_fields_and_field_types()``.
+"""
+
+from __future__ import annotations
+
+import re
+from keyword import iskeyword
+from typing import TYPE_CHECKING, NamedTuple
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+Literal = bool | int | float | str
+"""One value in a definition file."""
+
+_IDL_NAMES = {
+    "bool": "boolean",
+    "byte": "octet",
+    "char": "uint8",
+    "float32": "float",
+    "float64": "double",
+    **{f"{sign}int{bits}": f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)},
+    "string": "string",
+    "wstring": "wstring",
+}
+
+_TYPE = re.compile(r"(?P<base>[A-Za-z][\w/]*)(?:<=(?P<bound>\d+))?(?P<array>\[(?P<upper><=)?(?P<size>\d*)\])?")
+_NAME = re.compile(r"[a-z](?:_?[a-z0-9]+)*")
+_CONSTANT_NAME = re.compile(r"[A-Z](?:[A-Z0-9_]?[A-Z0-9]+)*")
+_TYPE_NAME = re.compile(r"[A-Z][A-Za-z0-9]*")
+_QUOTED = re.compile(r"""'(?:\\.|[^'\\])*'|"(?:\\.|[^"\\])*\"""")
+
+
+class InvalidDefinition(ImportError):
+    """A definition file that is not one. The text is a single line: file, line and reason."""
+
+
+class FieldType(NamedTuple):
+    """The type of a field: a base type, alone, in an array of fixed size or in a sequence."""
+
+    base: str
+    """IDL name of a primitive, or the full name of a message (``std_msgs/msg/Header``)."""
+    string_bound: int = 0
+    """Most characters of a string; 0 is unbounded."""
+    array_size: int = 0
+    """Elements of a fixed array; 0 if it is none."""
+    is_sequence: bool = False
+    sequence_bound: int = 0
+    """Most elements of a sequence; 0 is unbounded."""
+
+    @property
+    def is_message(self) -> bool:
+        """Whether the base type is another message."""
+        return "/" in self.base
+
+    @property
+    def is_plural(self) -> bool:
+        """Whether it is an array or a sequence."""
+        return self.is_sequence or self.array_size > 0
+
+    def __str__(self) -> str:
+        """Name of the type as in ``get_fields_and_field_types()``."""
+        name = self.base
+        if self.is_message:
+            package, _, name = name.split("/")
+            name = f"{package}/{name}"
+        elif self.string_bound:
+            name = f"{name}<{self.string_bound}>"
+        if self.array_size:
+            return f"{name}[{self.array_size}]"
+        if self.sequence_bound:
+            return f"sequence<{name}, {self.sequence_bound}>"
+        return f"sequence<{name}>" if self.is_sequence else name
+
+
+class Field(NamedTuple):
+    """A member of a message."""
+
+    name: str
+    type: FieldType
+    default: Literal | tuple[Literal, ...] | None = None
+    """Value that the definition gives; None where it gives none."""
+
+
+class Constant(NamedTuple):
+    """A named value of a message type."""
+
+    name: str
+    type: str
+    value: Literal
+
+
+class MessageDefinition(NamedTuple):
+    """A message type."""
+
+    name: str
+    """Full name, for example ``std_msgs/msg/Header``."""
+    fields: tuple[Field, ...]
+    constants: tuple[Constant, ...] = ()
+
+    @property
+    def members(self) -> tuple[Field, ...]:
+        """The fields as IDL, CDR and type hashes see them: there no struct is empty."""
+        return self.fields or (Field("structure_needs_at_least_one_member", FieldType("uint8")),)
+
+
+class ServiceDefinition(NamedTuple):
+    """A service type."""
+
+    name: str
+    """Full name, for example ``std_srvs/srv/Trigger``."""
+    request: MessageDefinition
+    response: MessageDefinition
+
+    @property
+    def event(self) -> MessageDefinition:
+        """What service introspection publishes of a call."""
+        return MessageDefinition(
+            f"{self.name}_Event",
+            (
+                Field("info", FieldType("service_msgs/msg/ServiceEventInfo")),
+                Field("request", FieldType(self.request.name, is_sequence=True, sequence_bound=1)),
+                Field("response", FieldType(self.response.name, is_sequence=True, sequence_bound=1)),
+            ),
+        )
+
+
+def parse_message(name: str, text: str, source: str, is_defined: Callable[[str], bool]) -> MessageDefinition:
+    """Read a ``.msg`` file. Raises InvalidDefinition.
+
+    ``source`` is the file's name for errors; ``is_defined`` tells whether a message exists, by its full name.
+    """
+    return _parse(name, text.splitlines(), source, 1, is_defined)
+
+
+def parse_service(name: str, text: str, source: str, is_defined: Callable[[str], bool]) -> ServiceDefinition:
+    """Read a ``.srv`` file; arguments and errors as of parse_message."""
+    lines = text.splitlines()
+    separators = [number for number, line in enumerate(lines) if line.strip() == "---"]
+    if len(separators) != 1:
+        line = separators[1] + 1 if separators else max(len(lines), 1)
+        raise InvalidDefinition(f"{source}:{line}: a service has exactly one line '---', not {len(separators)}")
+    split = separators[0]
+    return ServiceDefinition(
+        name,
+        _parse(f"{name}_Request", lines[:split], source, 1, is_defined),
+        _parse(f"{name}_Response", lines[split + 1 :], source, split + 2, is_defined),
+    )
+
+
+def _parse(
+    name: str, lines: list[str], source: str, first_line: int, is_defined: Callable[[str], bool]
+) -> MessageDefinition:
+    package = name.partition("/")[0]
+    fields: dict[str, Field] = {}
+    constants: dict[str, Constant] = {}
+    for number, raw in enumerate(lines, first_line):
+        line = raw.partition("#")[0].replace("\t", " ").strip()
+        if not line:
+            continue
+        try:
+            type_, _, rest = line.partition(" ")
+            field, _, default = rest.strip().partition(" ")
+            if "=" in rest:
+                constant = _parse_constant(type_, rest)
+                if constant.name in constants:
+                    raise ValueError(f"constant '{constant.name}' is defined twice")
+                constants[constant.name] = constant
+            else:
+                if field in fields:
+                    raise ValueError(f"field '{field}' is defined twice")
+                fields[field] = _parse_field(type_, field, default.strip(), package)
+                base = fields[field].type.base
+                if "/" in base and not is_defined(base):
+                    raise ValueError(f"unknown type '{type_}': there is no definition of {base}")
+        except ValueError as error:
+            raise InvalidDefinition(f"{source}:{number}: {error}") from None
+    return MessageDefinition(name, tuple(fields.values()), tuple(constants.values()))
+
+
+def _parse_field(type_name: str, name: str, default: str, package: str) -> Field:
+    type_ = _parse_type(type_name, package)
+    if not _NAME.fullmatch(name):
+        raise ValueError(f"'{name}' is no field name: lower case letters, digits and single underscores make one")
+    if iskeyword(name):
+        raise ValueError(f"a field cannot be called '{name}', a keyword of Python")
+    if not default:
+        return Field(name, type_)
+    if type_.is_message:
+        raise ValueError(f"field '{name}' is a message and can have no default value")
+    if not type_.is_plural:
+        return Field(name, type_, _parse_value(type_.base, default, type_.string_bound))
+    values = tuple(_parse_value(type_.base, value, type_.string_bound) for value in _split(default))
+    most = type_.array_size or type_.sequence_bound
+    if len(values) > most > 0 or len(values) < type_.array_size:
+        raise ValueError(f"{len(values)} default values are given for '{name}', which is {type_}")
+    return Field(name, type_, values)
+
+
+def _parse_constant(type_name: str, rest: str) -> Constant:
+    name, _, value = (part.strip() for part in rest.partition("="))
+    if type_name not in _IDL_NAMES:
+        raise ValueError(f"a constant cannot have the type '{type_name}': it must be a primitive or a string")
+    if not _CONSTANT_NAME.fullmatch(name):
+        raise ValueError(f"'{name}' is no constant name: upper case letters, digits and single underscores make one")
+    return Constant(name, _IDL_NAMES[type_name], _parse_value(_IDL_NAMES[type_name], value))
+
+
+def _parse_type(text: str, package: str) -> FieldType:
+    match = _TYPE.fullmatch(text)
+    if not match:
+        raise ValueError(f"'{text}' is no type")
+    base, string_bound, size = match["base"], int(match["bound"] or 0), int(match["size"] or 0)
+    if (match["bound"] and not string_bound) or (match["size"] and not size):
+        raise ValueError(f"the bound in '{text}' must be greater than 0")
+    if match["bound"] and base not in ("string", "wstring"):
+        raise ValueError(f"'{text}': only strings are bounded so, sequences are written {base}[<={string_bound}]")
+    if match["upper"] and not size:
+        raise ValueError(f"the bound in '{text}' is missing")
+    if base not in _IDL_NAMES:
+        base = _message_name(base, package)
+    sequence = bool(match["array"]) and (bool(match["upper"]) or not size)
+    return FieldType(
+        _IDL_NAMES.get(base, base),
+        string_bound,
+        array_size=0 if sequence else size,
+        is_sequence=sequence,
+        sequence_bound=size if sequence else 0,
+    )
+
+
+def _message_name(text: str, package: str) -> str:
+    parts = text.split("/")
+    if len(parts) == 1:
+        parts.insert(0, package)
+    if len(parts) != 2 or not _NAME.fullmatch(parts[0]) or not _TYPE_NAME.fullmatch(parts[1]):
+        raise ValueError(f"unknown type '{text}'")
+    return f"{parts[0]}/msg/{parts[1]}"
+
+
+def _parse_value(type_: str, text: str, string_bound: int = 0) -> Literal:
+    if type_ in ("string", "wstring"):
+        value = _unquote(text)
+        if len(value) > string_bound > 0:
+            raise ValueError(f"{text} is longer than {string_bound} characters")
+        return value
+    if type_ == "boolean":
+        if text.lower() not in ("true", "false", "0", "1"):
+            raise ValueError(f"'{text}' is no bool: it must be true, false, 1 or 0")
+        return text.lower() in ("true", "1")
+    try:
+        if type_ in ("float", "double"):
+            return float(text)
+        number = int(text) if text.lstrip("+-").isdecimal() else int(text, 0)
+    except ValueError:
+        raise ValueError(f"'{text}' is no {type_}") from None
+    low, high = integer_range(type_)
+    if not low <= number <= high:
+        raise ValueError(f"{text} is no {type_}: it must be in [{low}, {high}]")
+    return number
+
+
+def integer_range(type_: str) -> tuple[int, int]:
+    """Smallest and greatest value of an IDL integer type or of an octet."""
+    if type_ == "octet":
+        return 0, 255
+    bits = int(type_.lstrip("uint"))
+    return (0, (1 << bits) - 1) if type_[0] == "u" else (-(1 << bits - 1), (1 << bits - 1) - 1)
+
+
+def _unquote(text: str) -> str:
+    for quote in "\"'":
+        if len(text) > 1 and text[0] == text[-1] == quote:
+            if not _QUOTED.fullmatch(text):
+                raise ValueError(f"the quotes inside of {text} must be escaped")
+            return text[1:-1].replace("\\" + quote, quote)
+    return text
+
+
+def _split(text: str) -> list[str]:
+    """Elements of an array value ``[a, "b, c", d]``."""
+    if not (text.startswith("[") and text.endswith("]")):
+        raise ValueError(f"the default value of an array is written in brackets, not {text}")
+    inner = text[1:-1].strip()
+    if not inner:
+        return []
+    elements = re.findall(rf"\s*({_QUOTED.pattern}|[^,]*?)\s*(?:,|$)", inner + ",")
+    return elements[:-1] if elements and not elements[-1] else elements
+

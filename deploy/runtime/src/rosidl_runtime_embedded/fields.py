@@ -1,0 +1,128 @@
+"""What a field of a message holds in Python: its values at first, and how numeric arrays and sequences are kept.
+
+As in rclpy: a sequence of numbers is an ``array.array``, an array of numbers a ``numpy.ndarray``, everything else plural a
+list, an octet ``bytes`` of length 1. NumPy takes as long to import as all the rest of a node, so an array stays an
+``array.array`` until somebody looks at it.
+"""
+
+from __future__ import annotations
+
+from array import array
+from math import isinf
+from operator import attrgetter
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from .definition import Field, Literal
+
+ARRAY_CODES = {
+    "int8": "b",
+    "uint8": "B",
+    "int16": "h",
+    "uint16": "H",
+    "int32": "i",
+    "uint32": "I",
+    "int64": "q",
+    "uint64": "Q",
+    "float": "f",
+    "double": "d",
+}
+"""Type codes of ``array`` and ``struct`` by the IDL name of a number."""
+
+_SAME_NUMBERS = {"q": "ql", "Q": "QL"}
+"""Type codes that mean the same as one of ours: NumPy says long where we say long long."""
+
+_ZEROS: dict[str, Any] = {
+    **dict.fromkeys(ARRAY_CODES, 0),
+    "float": 0.0,
+    "double": 0.0,
+    "boolean": False,
+    "octet": b"\0",
+    "string": "",
+    "wstring": "",
+}
+
+
+def is_numeric(field: Field) -> bool:
+    """Whether the field is an array or a sequence of numbers."""
+    return field.type.is_plural and field.type.base in ARRAY_CODES
+
+
+def slot_of(field: Field) -> str:
+    """Name of the slot that holds the field's value."""
+    return f"_{field.name}" if is_numeric(field) else field.name
+
+
+def python_value(base: str, value: Literal) -> Any:
+    """A constant or default value as the Python value of its IDL type."""
+    return bytes((int(value),)) if base == "octet" else value
+
+
+def initial_value(field: Field, message_class: Callable[[str], type]) -> tuple[Any, bool]:
+    """Value of the field in a new message, and whether it is a factory that makes the value."""
+    type_ = field.type
+    if type_.is_message:
+        if type_.is_sequence:
+            return list, True
+        cls = message_class(type_.base)
+        return ((lambda: [cls() for _ in range(type_.array_size)]) if type_.array_size else cls), True
+    if not type_.is_plural:
+        return _ZEROS[type_.base] if field.default is None else python_value(type_.base, field.default), False
+    if isinstance(field.default, tuple):
+        values = [python_value(type_.base, value) for value in field.default]
+    else:
+        values = [_ZEROS[type_.base]] * type_.array_size
+    if is_numeric(field):
+        template = array(ARRAY_CODES[type_.base], values)
+        return (lambda: template[:]), True
+    return values.copy, True
+
+
+def numeric_field(type_name: str, field: Field) -> property:
+    """Property of an array or a sequence of numbers: what is assigned is converted, or refused with a reason."""
+    slot, type_ = slot_of(field), field.type
+    code, size, bound = ARRAY_CODES[type_.base], type_.array_size, type_.sequence_bound
+
+    def get_array(self: object) -> Any:
+        value = getattr(self, slot)
+        if isinstance(value, array):
+            import numpy
+
+            value = numpy.frombuffer(value, numpy.dtype(code))
+            setattr(self, slot, value)
+        return value
+
+    def set_numbers(self: object, value: Any) -> None:
+        try:
+            numbers = _to_array(code, value)
+            if (size and len(numbers) != size) or len(numbers) > bound > 0:
+                raise ValueError(f"it has {len(numbers)} elements")
+        except (TypeError, ValueError, OverflowError) as error:
+            kind = TypeError if isinstance(error, TypeError) else ValueError
+            raise kind(f"{type_name}: field '{field.name}' must be {type_}, not {value!r:.100}: {error}") from None
+        setattr(self, slot, numbers)
+
+    return property(get_array if size else attrgetter(slot), set_numbers)
+
+
+def _to_array(code: str, value: Any) -> array[Any]:
+    if isinstance(value, array) and value.typecode == code:
+        return value
+    try:
+        view = memoryview(value)
+    except TypeError:
+        pass
+    else:
+        if view.ndim != 1:
+            raise TypeError(f"it has {view.ndim} dimensions")
+        if view.format in _SAME_NUMBERS.get(code, code):
+            return array(code, view.tobytes())
+    numbers = array(code, value)
+    if code == "f":
+        # array makes infinities of what is too great for a float
+        infinite = [number for number, given in zip(numbers, value, strict=True) if isinf(number) and not isinf(given)]
+        if infinite:
+            raise OverflowError("it has elements out of range")
+    return numbers

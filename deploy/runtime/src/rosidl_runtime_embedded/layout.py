@@ -1,0 +1,67 @@
+"""How values lie in XCDR1: sizes, alignment, and the ``struct`` formats of runs of values.
+
+Source: DDS-XTypes 1.3, 7.4.1 (plain CDR, version 1). A sample begins with a header of 4 bytes; alignment counts from behind
+it. All samples of ROS 2 Jazzy are little endian on the machines that Cyclone DDS is distributed for.
+"""
+
+from __future__ import annotations
+
+from struct import Struct
+from typing import TYPE_CHECKING, NamedTuple
+
+from .fields import ARRAY_CODES
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from .definition import Field, MessageDefinition
+
+HEADER_SIZE = 4
+LITTLE_ENDIAN_CDR = 0x0100
+"""First two bytes of the header, 00 01, as a little-endian number. The other two are options and without a meaning here."""
+
+CODES = {**ARRAY_CODES, "boolean": "?", "octet": "c"}
+"""Codes of ``struct`` by IDL primitive."""
+SIZES = {base: Struct(f"={code}").size for base, code in CODES.items()}
+"""Bytes of an IDL primitive; it is aligned to as many."""
+
+
+class Item(NamedTuple):
+    """A value of fixed size in a run."""
+
+    format: str
+    """Its ``struct`` format."""
+    size: int
+    alignment: int = 1
+    value: str = ""
+    """Python expression of the value to write, or name that gets the value read; none for padding."""
+
+
+def run_format(run: list[Item], position: int) -> tuple[str, int]:
+    """``struct`` format of a run that begins at a position (header included), and the position behind it."""
+    parts = ["<"]
+    for item in run:
+        padding = (HEADER_SIZE - position) % item.alignment
+        if padding:
+            parts.append(f"{padding}x")
+        parts.append(item.format)
+        position += padding + item.size
+    return "".join(parts), position
+
+
+def run_alignment(run: list[Item]) -> int:
+    """Greatest alignment in a run: at positions that are equal modulo this, a run has the same format."""
+    return max(item.alignment for item in run)
+
+
+def smallest_size(definition: MessageDefinition, define: Callable[[str], MessageDefinition]) -> int:
+    """Fewest bytes of a message on the wire, without padding; ``define`` finds the definition of a nested message."""
+    return sum(_smallest_field(field, define) for field in definition.members)
+
+
+def _smallest_field(field: Field, define: Callable[[str], MessageDefinition]) -> int:
+    type_ = field.type
+    if type_.is_sequence:
+        return 4
+    element = smallest_size(define(type_.base), define) if type_.is_message else SIZES.get(type_.base, 4)
+    return element * (type_.array_size or 1)

@@ -1,0 +1,150 @@
+"""Message classes, in the shape that ``rosidl_generator_py`` of Jazzy gives them."""
+
+from __future__ import annotations
+
+from array import array
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from .fields import initial_value, is_numeric, numeric_field, python_value, slot_of
+from .packages import message_class
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from typing_extensions import Self
+
+    from .definition import MessageDefinition
+
+
+class _OnFirstUse:
+    """A member of a message class that is made when it is first asked for.
+
+    A process imports many types and uses few; compiling the code of one takes longer than using it a hundred times.
+    """
+
+    def __init__(self, make: Callable[[type[Message]], Any]) -> None:
+        self._make = make
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self._name = name
+
+    def __get__(self, instance: object, owner: type[Message]) -> Any:
+        setattr(owner, self._name, self._make(owner))
+        return getattr(owner if instance is None else instance, self._name)
+
+
+def _make_constructor(cls: type[Message]) -> Callable[..., None]:
+    """Compile ``__init__``: a keyword for each field, with the field's initial value as default."""
+    names: dict[str, Any] = {"unset": object()}
+    parameters, body = [], []
+    for field in cls._DEFINITION.fields:
+        name, initial = field.name, f"initial_{field.name}"
+        names[initial], is_factory = initial_value(field, message_class)
+        if is_factory:
+            parameters.append(f"{name}=unset")
+            body.append(f"if {name} is unset: self.{slot_of(field)} = {initial}()\n else: self.{name} = {name}")
+        else:
+            parameters.append(f"{name}={initial}")
+            body.append(f"self.{name} = {name}")
+    arguments = ", ".join(["self", "*", *parameters] if parameters else ["self"])
+    exec(f"def __init__({arguments}):\n " + "\n ".join(body or ["pass"]), names)
+    constructor: Callable[..., None] = names["__init__"]
+    constructor.__qualname__ = f"{cls.__name__}.__init__"
+    return constructor
+
+
+def _make_serializer(cls: type[Message]) -> Any:
+    from .serializer import make_serializer
+
+    return staticmethod(make_serializer(cls))
+
+
+def _make_deserializer(cls: type[Message]) -> Any:
+    from .deserializer import make_deserializer
+
+    return staticmethod(make_deserializer(cls))
+
+
+def _make_type_hash(cls: type[Message]) -> str:
+    from .type_description import type_hash
+
+    return type_hash(cls._TYPE_NAME)
+
+
+class Message:
+    """Base of all message classes.
+
+    Fields are checked when a message is serialized, that is at publish, as rclpy of Jazzy does by default; numeric
+    arrays and sequences already when they are assigned, since they are converted then.
+    """
+
+    __slots__ = ()
+    _DEFINITION: ClassVar[MessageDefinition]
+    _TYPE_NAME: ClassVar[str]
+    """``std_msgs/msg/Float64``"""
+    _DDS_TYPE_NAME: ClassVar[str]
+    """``std_msgs::msg::dds_::Float64_``"""
+    _fields_and_field_types: ClassVar[dict[str, str]]
+
+    if TYPE_CHECKING:
+        _TYPE_HASH: ClassVar[str]
+        """``RIHS01_…``"""
+
+        @staticmethod
+        def _serialize(message: Any) -> bytes:
+            """Little-endian XCDR1 with its header. Raises TypeError or ValueError naming type, field and value."""
+
+        @classmethod
+        def _deserialize(cls, data: bytes) -> Self:
+            """Message from little-endian XCDR1 with its header. Raises ValueError for anything else."""
+    else:
+        __init__ = _OnFirstUse(_make_constructor)
+        _serialize = _OnFirstUse(_make_serializer)
+        _deserialize = _OnFirstUse(_make_deserializer)
+        _TYPE_HASH = _OnFirstUse(_make_type_hash)
+
+    @classmethod
+    def get_fields_and_field_types(cls) -> dict[str, str]:
+        """Names of the fields and of their types, in order."""
+        return dict(cls._fields_and_field_types)
+
+    def __repr__(self) -> str:
+        """Text as rclpy's: an ``array.array`` looks like a list."""
+        values = ((name, getattr(self, name)) for name in self._fields_and_field_types)
+        fields = (f"{name}={value.tolist() if isinstance(value, array) else value!r}" for name, value in values)
+        return f"{self.__module__}.{type(self).__name__}({', '.join(fields)})"
+
+    def __eq__(self, other: object) -> bool:
+        """Whether both are of one type and have equal fields."""
+        if not isinstance(other, self.__class__):
+            return False
+        for name in self._fields_and_field_types:
+            equal = getattr(self, name) == getattr(other, name)
+            if not (equal if isinstance(equal, bool) else equal.all()):
+                return False
+        return True
+
+    __hash__ = None  # type: ignore[assignment]
+
+
+def make_message_class(definition: MessageDefinition) -> type[Message]:
+    """Make the class of a message type."""
+    package, kind, name = definition.name.split("/")
+    namespace: dict[str, Any] = {
+        "__module__": f"{package}.{kind}",
+        "__doc__": f"Message {definition.name}.",
+        "__slots__": tuple(slot_of(field) for field in definition.fields),
+        "_DEFINITION": definition,
+        "_TYPE_NAME": definition.name,
+        "_DDS_TYPE_NAME": f"{package}::{kind}::dds_::{name}_",
+        "_fields_and_field_types": {field.name: str(field.type) for field in definition.fields},
+    }
+    for field in definition.fields:
+        if is_numeric(field):
+            namespace[field.name] = numeric_field(definition.name, field)
+        if field.default is not None:
+            initial, is_factory = initial_value(field, message_class)
+            namespace[f"{field.name.upper()}__DEFAULT"] = initial() if is_factory else initial
+    for constant in definition.constants:
+        namespace[constant.name] = python_value(constant.type, constant.value)
+    return type(name, (Message,), namespace)

@@ -1,0 +1,161 @@
+"""Where definitions lie, and how they become importable packages.
+
+A message package is a directory with ``msg/*.msg`` and ``srv/*.srv`` in it. The packages of this distribution lie beside
+this one; those of a user in ``<prefix>/share/<package>`` for a prefix of ``AMENT_PREFIX_PATH``. The former win.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from functools import cache
+from importlib.machinery import ModuleSpec
+from typing import TYPE_CHECKING, Any
+
+from .definition import InvalidDefinition, MessageDefinition, ServiceDefinition, parse_message, parse_service
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+    from types import ModuleType
+
+    from .message import Message
+    from .service import Service
+
+_SHIPPED = os.path.dirname(os.path.dirname(__file__))
+_KINDS = ("msg", "srv")
+_SERVICE_PARTS = ("Request", "Response", "Event")
+
+
+def _directories(package: str) -> Iterator[str]:
+    yield os.path.join(_SHIPPED, package)
+    for prefix in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep):
+        if prefix:
+            yield os.path.join(prefix, "share", package)
+
+
+def _file(name: str) -> str | None:
+    package, kind, type_name = name.split("/")
+    paths = (os.path.join(directory, kind, f"{type_name}.{kind}") for directory in _directories(package))
+    return next(filter(os.path.isfile, paths), None)
+
+
+def interface_names(package: str, kind: str) -> list[str]:
+    """Names of all messages (kind ``msg``) or services (``srv``) that a package defines, sorted."""
+    directories = filter(os.path.isdir, (os.path.join(directory, kind) for directory in _directories(package)))
+    files = {file for directory in directories for file in os.listdir(directory)}
+    return sorted(file.removesuffix(f".{kind}") for file in files if file.endswith(f".{kind}"))
+
+
+def definition_source(name: str) -> tuple[str, str]:
+    """File and text that define ``<package>/<msg or srv>/<Name>``. Raises LookupError if there is none."""
+    path = _file(name)
+    if path is None:
+        raise LookupError(f"there is no definition of {name}")
+    with open(path, encoding="utf-8") as file:
+        try:
+            return path, file.read()
+        except UnicodeDecodeError as error:
+            raise InvalidDefinition(f"{path}:1: the file is not UTF-8: {error}") from None
+
+
+def _is_defined(name: str) -> bool:
+    return _file(name) is not None
+
+
+@cache
+def service_definition(name: str) -> ServiceDefinition:
+    """Definition of a service by its full name. Raises LookupError or InvalidDefinition."""
+    path, text = definition_source(name)
+    return parse_service(name, text, path, _is_defined)
+
+
+@cache
+def message_definition(name: str) -> MessageDefinition:
+    """Definition of a message, or of a part of a service, by its full name. Raises LookupError or InvalidDefinition."""
+    if "/srv/" in name:
+        service, _, part = name.rpartition("_")
+        if part not in _SERVICE_PARTS:
+            raise LookupError(f"{name} is no message")
+        definition: MessageDefinition = getattr(service_definition(service), part.lower())
+        return definition
+    path, text = definition_source(name)
+    return parse_message(name, text, path, _is_defined)
+
+
+_messages: dict[str, type[Message]] = {}
+_services: dict[str, type[Service]] = {}
+
+
+def message_class(name: str) -> type[Message]:
+    """Class of a message, or of a part of a service, by its full name. Raises LookupError or InvalidDefinition."""
+    from .message import make_message_class
+
+    if name not in _messages:
+        # setdefault: of two threads that get here at once, both must see one class
+        _messages.setdefault(name, make_message_class(message_definition(name)))
+    return _messages[name]
+
+
+def service_class(name: str) -> type[Service]:
+    """Class of a service by its full name. Raises LookupError or InvalidDefinition."""
+    from .service import make_service_class
+
+    if name not in _services:
+        _services.setdefault(name, make_service_class(service_definition(name)))
+    return _services[name]
+
+
+def interfaces(module_name: str) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
+    """``__getattr__`` and ``__dir__`` of a module ``<package>.msg`` or ``<package>.srv``."""
+    package, kind = module_name.split(".")
+
+    def names() -> list[str]:
+        names = interface_names(package, kind)
+        if kind == "srv":
+            names += [f"{name}_{part}" for name in names for part in _SERVICE_PARTS]
+        return sorted(names)
+
+    def get(name: str) -> Any:
+        if name == "__all__":
+            return names()
+        try:
+            if name[:1].isupper():
+                part_of_service = kind == "srv" and name.rpartition("_")[2] in _SERVICE_PARTS
+                make = service_class if kind == "srv" and not part_of_service else message_class
+                value = make(f"{package}/{kind}/{name}")
+                setattr(sys.modules[module_name], name, value)
+                return value
+        except LookupError:
+            pass
+        raise AttributeError(f"module '{module_name}' has no attribute '{name}'")
+
+    return get, names
+
+
+class UserPackages:
+    """Meta path finder and loader of the message packages in AMENT_PREFIX_PATH."""
+
+    @staticmethod
+    def find_spec(name: str, path: Sequence[str] | None = None, target: ModuleType | None = None) -> ModuleSpec | None:
+        """Spec of ``<package>``, ``<package>.msg`` or ``<package>.srv``; None if that is no message package."""
+        package, _, kind = name.partition(".")
+        if kind not in ("", *_KINDS) or not any(interface_names(package, k) for k in ([kind] if kind else _KINDS)):
+            return None
+        spec = ModuleSpec(name, UserPackages, origin=f"definitions of {package}", is_package=not kind)  # type: ignore[arg-type]
+        return spec
+
+    @staticmethod
+    def create_module(spec: ModuleSpec) -> None:
+        """Leave the creation to the import system."""
+
+    @staticmethod
+    def exec_module(module: ModuleType) -> None:
+        """Give the module its classes."""
+        if "." in module.__name__:
+            module.__getattr__, module.__dir__ = interfaces(module.__name__)  # type: ignore[method-assign]
+
+
+def install() -> None:
+    """Make the packages in AMENT_PREFIX_PATH importable. Everything else that Python finds comes before them."""
+    if UserPackages not in sys.meta_path:
+        sys.meta_path.append(UserPackages)

@@ -1,0 +1,100 @@
+"""Why a message cannot be serialized: the slow, exact check behind the fast ones."""
+
+from __future__ import annotations
+
+from collections import UserList, UserString
+from collections.abc import Sequence, Set
+from struct import Struct
+from typing import TYPE_CHECKING, Any
+
+from .definition import integer_range
+from .fields import is_numeric
+from .packages import message_class
+
+if TYPE_CHECKING:
+    from .definition import FieldType
+    from .message import Message
+
+
+def validate(message: object, cls: type[Message]) -> None:
+    """Raise TypeError or ValueError, naming type, field and value, if the message is not a valid one of the class."""
+    if not isinstance(message, cls):
+        raise TypeError(f"a {cls._TYPE_NAME} is expected, not {message!r:.100}")
+    _message(message, cls, cls._TYPE_NAME, "")
+
+
+def _message(message: Message, cls: type[Message], top: str, path: str) -> None:
+    for field in cls._DEFINITION.fields:
+        where = f"{path}{field.name}"
+        try:
+            value = getattr(message, field.name)
+        except AttributeError:
+            raise TypeError(f"{top}: field '{where}' is not set") from None
+        if is_numeric(field):
+            # the property has converted it, but an array.array can be changed afterwards
+            if len(value) > field.type.sequence_bound > 0:
+                raise _wrong(ValueError, top, where, field.type, value)
+        elif field.type.is_plural:
+            _list(value, field.type, top, where)
+        else:
+            _single(value, field.type, top, where)
+
+
+def _wrong(kind: type[Exception], top: str, where: str, type_: FieldType, value: object, reason: str = "") -> Exception:
+    return kind(f"{top}: field '{where}' must be {type_}, not {value!r:.100}{reason and ': ' + reason}")
+
+
+def _list(value: Any, type_: FieldType, top: str, where: str) -> None:
+    if not isinstance(value, (Sequence, Set, UserList)) or isinstance(value, (str, UserString)):
+        raise _wrong(TypeError, top, where, type_, value, "it is no list")
+    if (type_.array_size and len(value) != type_.array_size) or len(value) > type_.sequence_bound > 0:
+        raise _wrong(ValueError, top, where, type_, value, f"it has {len(value)} elements")
+    element_type = type_._replace(array_size=0, is_sequence=False, sequence_bound=0)
+    for number, element in enumerate(value):
+        _single(element, element_type, top, f"{where}[{number}]")
+
+
+def _single(value: Any, type_: FieldType, top: str, where: str) -> None:
+    base = type_.base
+    if type_.is_message:
+        cls = message_class(base)
+        if not isinstance(value, cls):
+            raise _wrong(TypeError, top, where, type_, value)
+        _message(value, cls, top, f"{where}.")
+    elif base in ("string", "wstring"):
+        _string(value, type_, top, where)
+    elif base == "boolean":
+        if not isinstance(value, bool):
+            raise _wrong(TypeError, top, where, type_, value)
+    elif base == "octet":
+        if not isinstance(value, bytes):
+            raise _wrong(TypeError, top, where, type_, value)
+        if len(value) != 1:
+            raise _wrong(ValueError, top, where, type_, value, "it must have length 1")
+    elif base in ("float", "double"):
+        if not isinstance(value, float):
+            raise _wrong(TypeError, top, where, type_, value)
+        if base == "float":
+            try:
+                Struct("f").pack(value)
+            except OverflowError:
+                raise _wrong(ValueError, top, where, type_, value, "it is out of range") from None
+    else:
+        if not isinstance(value, int):
+            raise _wrong(TypeError, top, where, type_, value)
+        low, high = integer_range(base)
+        if not low <= value <= high:
+            raise _wrong(ValueError, top, where, type_, value, f"it must be in [{low}, {high}]")
+
+
+def _string(value: Any, type_: FieldType, top: str, where: str) -> None:
+    if not isinstance(value, str):
+        raise _wrong(TypeError, top, where, type_, value)
+    if len(value) > type_.string_bound > 0:
+        raise _wrong(ValueError, top, where, type_, value, f"it has {len(value)} characters")
+    if type_.base == "string" and "\0" in value:
+        raise _wrong(ValueError, top, where, type_, value, "it contains a NUL")
+    try:
+        value.encode()
+    except UnicodeEncodeError as error:
+        raise _wrong(ValueError, top, where, type_, value, str(error)) from None

@@ -1,0 +1,1 @@
+"""Interfaces of service_msgs, as in ROS 2 Jazzy."""

@@ -1,0 +1,1 @@
+"""Interfaces of statistics_msgs, as in ROS 2 Jazzy."""

@@ -1,0 +1,1 @@
+"""Interfaces of std_msgs, as in ROS 2 Jazzy."""

@@ -1,0 +1,1 @@
+"""Interfaces of std_srvs, as in ROS 2 Jazzy."""
