@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-
 import rclpy.logging
 from rclpy._arguments import RosArguments, parse, remove_ros_args
 from rclpy.exceptions import RCLInvalidROSArgsError, UnknownROSArgsError

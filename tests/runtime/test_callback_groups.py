@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import pytest
-
 from rclpy.callback_groups import CallbackGroup, MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
 
 

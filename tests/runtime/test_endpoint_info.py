@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-
 from rclpy.duration import Infinite
 from rclpy.exceptions import NoTypeSupportImportedException
 from rclpy.qos import QoSPresetProfiles, QoSProfile

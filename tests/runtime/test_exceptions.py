@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import pytest
-
 from rclpy import exceptions
 from rclpy.parameter import Parameter
 

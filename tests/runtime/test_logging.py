@@ -8,7 +8,6 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-
 import rclpy.logging
 from rclpy.clock import ROSClock
 from rclpy.impl import _logging_output

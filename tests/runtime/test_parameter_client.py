@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-
 from rcl_interfaces.msg import Parameter as ParameterMsg
 from rcl_interfaces.msg import ParameterEvent, ParameterValue
 from rclpy.parameter import Parameter
@@ -174,7 +173,8 @@ def test_a_callback_is_called_for_its_parameter_of_its_node_only(
 
 def test_a_node_in_the_root_namespace_resolves_names_there() -> None:
     node = Node("/")
-    handler, values = handler_of(node), []
+    handler = handler_of(node)
+    values: list[ParameterMsg] = []
     handler.add_parameter_callback("a", "other", values.append)
     node.subscriptions[0][1](event("/other", a=1))
     assert len(values) == 1
@@ -191,7 +191,8 @@ def test_the_last_callback_added_is_called_first_and_those_for_events_last(node:
 
 
 def test_a_removed_callback_is_not_called_and_cannot_be_removed_again(node: Node) -> None:
-    handler, calls = handler_of(node), []
+    handler = handler_of(node)
+    calls: list[object] = []
     parameter_handle = handler.add_parameter_callback("a", "other", calls.append)
     event_handle = handler.add_parameter_event_callback(calls.append)
     handler.remove_parameter_callback(parameter_handle)

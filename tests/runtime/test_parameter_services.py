@@ -6,7 +6,6 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-
 import rclpy.logging
 from rcl_interfaces.msg import LoggerLevel, ParameterDescriptor, ParameterType, ParameterValue
 from rcl_interfaces.msg import Parameter as ParameterMsg

@@ -6,7 +6,6 @@ import json
 from pathlib import Path
 
 import pytest
-
 from rclpy import qos
 from rclpy.duration import Duration
 from rclpy.qos import (

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-
 from rcl_interfaces.msg import SetParametersResult
 from rclpy._node_parameters import NodeParameters
 from rclpy.clock import ROSClock

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
+from typing import Any
 
 import pytest
-
 import rclpy.logging
 from builtin_interfaces.msg import Time as TimeMsg
 from rcl_interfaces.msg import SetParametersResult
@@ -149,11 +149,12 @@ def test_a_message_that_does_not_come_is_waited_for_so_long(make_node: Callable[
 
 
 def test_waiting_ends_with_the_context(make_node: Callable[..., Node], context: Context) -> None:
-    node, result = make_node(), []
+    node = make_node()
+    result: list[tuple[bool, Any]] = []
     thread = threading.Thread(target=lambda: result.append(wait_for_message(String, node, "silence")))
     thread.start()
-    while not list(node.subscriptions):
-        pass
+    while thread.is_alive() and not list(node.subscriptions):
+        thread.join(0.001)
     context.shutdown()
     thread.join(10)
     assert result == [(False, None)]
@@ -163,7 +164,8 @@ def test_a_callback_of_the_node_may_wait_for_a_message(
     make_node: Callable[..., Node], executor: object, spin_until: Callable[..., None]
 ) -> None:
     make_node("talker").create_publisher(String, "chatter", LATCHED).publish(String(data="hello"))
-    node, results = make_node(), []
+    node = make_node()
+    results: list[tuple[bool, Any]] = []
 
     def wait() -> None:
         timer.cancel()

@@ -110,7 +110,7 @@ class NodeParameters:
     def declare_parameters(
         self,
         namespace: str,
-        parameters: list[tuple[str] | tuple[str, Parameter.Type] | tuple[str, Any, ParameterDescriptor]],
+        parameters: list[tuple[str] | tuple[str, Any] | tuple[str, Any, ParameterDescriptor]],
         ignore_override: bool = False,
     ) -> list[Parameter]:
         """

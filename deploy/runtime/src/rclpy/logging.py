@@ -9,6 +9,20 @@ from rclpy.impl import _logging_levels, _logging_output, rcutils_logger
 from rclpy.impl.logging_severity import LoggingSeverity
 from rclpy.impl.rcutils_logger import RcutilsLogger
 
+__all__ = [
+    "LoggingSeverity",
+    "RcutilsLogger",
+    "clear_config",
+    "get_logger",
+    "get_logger_effective_level",
+    "get_logger_level",
+    "get_logging_directory",
+    "get_logging_severity_from_string",
+    "initialize",
+    "set_logger_level",
+    "shutdown",
+]
+
 if TYPE_CHECKING:
     from pathlib import Path
 

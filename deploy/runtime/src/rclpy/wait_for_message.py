@@ -56,6 +56,7 @@ class _NodeWithOnly:
     timers = ()
     guards = ()
     executor = None
+    _entities_version = 0
 
     def __init__(self, subscription: Subscription) -> None:
         self._subscription = subscription
