@@ -1,4 +1,4 @@
-"""Message and service types of the embedded runtime: classes, codecs, hashes and descriptions, from definition files."""
+"""Message and service types of the embedded runtime: classes, codecs and hashes from definition files."""
 
 from .definition import InvalidDefinition
 from .message import Message

@@ -1,8 +1,8 @@
 """What a ``.msg`` or ``.srv`` file says: fields, constants and default values of a type.
 
 Source of the format: the ROS 2 interface definition language (docs.ros.org, "Interfaces"), in the reading of
-``rosidl_adapter`` of Jazzy. Types bear their IDL names from here on (``double``, ``octet``, ``sequence<string>``), as
-they do in ``get_fields_and_field_types()``.
+``rosidl_adapter`` of Jazzy. Types bear their IDL names from here on (``double``, ``octet``,
+``sequence<string>``), as they do in ``get_fields_and_field_types()``.
 """
 
 from __future__ import annotations
@@ -28,7 +28,9 @@ _IDL_NAMES = {
     "wstring": "wstring",
 }
 
-_TYPE = re.compile(r"(?P<base>[A-Za-z][\w/]*)(?:<=(?P<bound>\d+))?(?P<array>\[(?P<upper><=)?(?P<size>\d*)\])?")
+_TYPE = re.compile(
+    r"(?P<base>[A-Za-z][\w/]*)(?:<=(?P<bound>\d+))?(?P<array>\[(?P<upper><=)?(?P<size>\d*)\])?"
+)
 _NAME = re.compile(r"[a-z](?:_?[a-z0-9]+)*")
 _CONSTANT_NAME = re.compile(r"[A-Z](?:[A-Z0-9_]?[A-Z0-9]+)*")
 _TYPE_NAME = re.compile(r"[A-Z][A-Za-z0-9]*")
@@ -143,7 +145,9 @@ def parse_service(name: str, text: str, source: str, is_defined: Callable[[str],
     separators = [number for number, line in enumerate(lines) if line.strip() == "---"]
     if len(separators) != 1:
         line = separators[1] + 1 if separators else max(len(lines), 1)
-        raise InvalidDefinition(f"{source}:{line}: a service has exactly one line '---', not {len(separators)}")
+        raise InvalidDefinition(
+            f"{source}:{line}: a service has exactly one line '---', not {len(separators)}"
+        )
     split = separators[0]
     return ServiceDefinition(
         name,
@@ -185,7 +189,9 @@ def _parse(
 def _parse_field(type_name: str, name: str, default: str, package: str) -> Field:
     type_ = _parse_type(type_name, package)
     if not _NAME.fullmatch(name):
-        raise ValueError(f"'{name}' is no field name: lower case letters, digits and single underscores make one")
+        raise ValueError(
+            f"'{name}' is no field name: lower case letters, digits and single underscores make one"
+        )
     if iskeyword(name):
         raise ValueError(f"a field cannot be called '{name}', a keyword of Python")
     if not default:
@@ -206,7 +212,9 @@ def _parse_constant(type_name: str, rest: str) -> Constant:
     if type_name not in _IDL_NAMES:
         raise ValueError(f"a constant cannot have the type '{type_name}': it must be a primitive or a string")
     if not _CONSTANT_NAME.fullmatch(name):
-        raise ValueError(f"'{name}' is no constant name: upper case letters, digits and single underscores make one")
+        raise ValueError(
+            f"'{name}' is no constant name: upper case letters, digits and single underscores make one"
+        )
     return Constant(name, _IDL_NAMES[type_name], _parse_value(_IDL_NAMES[type_name], value))
 
 
@@ -218,7 +226,9 @@ def _parse_type(text: str, package: str) -> FieldType:
     if (match["bound"] and not string_bound) or (match["size"] and not size):
         raise ValueError(f"the bound in '{text}' must be greater than 0")
     if match["bound"] and base not in ("string", "wstring"):
-        raise ValueError(f"'{text}': only strings are bounded so, sequences are written {base}[<={string_bound}]")
+        raise ValueError(
+            f"'{text}': only strings are bounded so, sequences are written {base}[<={string_bound}]"
+        )
     if match["upper"] and not size:
         raise ValueError(f"the bound in '{text}' is missing")
     if base not in _IDL_NAMES:
@@ -290,4 +300,3 @@ def _split(text: str) -> list[str]:
         return []
     elements = re.findall(rf"\s*({_QUOTED.pattern}|[^,]*?)\s*(?:,|$)", inner + ",")
     return elements[:-1] if elements and not elements[-1] else elements
-

@@ -1,7 +1,7 @@
 """Code that reads a message type from little-endian XCDR1, made and compiled per type.
 
-The counterpart of :mod:`.serializer`. A sample comes from anywhere: nothing is allocated or repeated on the word of a count
-that the sample is too short for, and whatever is malformed raises ValueError.
+The counterpart of :mod:`.serializer`. A sample comes from anywhere: nothing is allocated or repeated on the
+word of a count that the sample is too short for, and whatever is malformed raises ValueError.
 """
 
 from __future__ import annotations
@@ -12,7 +12,16 @@ from struct import error as struct_error
 from typing import TYPE_CHECKING, Any
 
 from .fields import ARRAY_CODES, slot_of
-from .layout import CODES, HEADER_SIZE, LITTLE_ENDIAN_CDR, SIZES, Item, run_alignment, run_format, smallest_size
+from .layout import (
+    CODES,
+    HEADER_SIZE,
+    LITTLE_ENDIAN_CDR,
+    SIZES,
+    Item,
+    run_alignment,
+    run_format,
+    smallest_size,
+)
 from .packages import message_class, message_definition
 
 if TYPE_CHECKING:
@@ -23,7 +32,7 @@ if TYPE_CHECKING:
 
 
 def make_deserializer(cls: type[Message]) -> Callable[[bytes], Message]:
-    """Function from bytes to a message of the class; raises ValueError, and nothing else, if they are not one."""
+    """Function from bytes to a message of the class; for all else it raises ValueError and nothing else."""
     return _Generator(cls).compile()
 
 
@@ -60,7 +69,7 @@ class _Generator:
         self._names: dict[str, Any] = {
             "cls": cls,
             "array": array,
-            "bools": _bools,
+            "booleans": _bools,
             "error": struct_error,
             "malformed": _malformed,
             "new": object.__new__,
@@ -77,7 +86,9 @@ class _Generator:
 
     def compile(self) -> Callable[[bytes], Message]:
         self._run.append(Item("H2x", HEADER_SIZE, 1, "h"))
-        self._after.append(f"if h != {LITTLE_ENDIAN_CDR}: raise ValueError('its header is not that of little-endian CDR')")
+        self._after.append(
+            f"if h != {LITTLE_ENDIAN_CDR}: raise ValueError('its header is not that of little-endian CDR')"
+        )
         result = self._message(self._cls, self._cls._DEFINITION)
         self._flush()
         code = [
@@ -159,19 +170,25 @@ class _Generator:
 
     def _plain_elements(self, target: str, type_: FieldType) -> None:
         """Read an array or a sequence whose elements lie one after the other without anything in between."""
-        make = {"boolean": "bools(", "octet": "octets("}.get(type_.base) or f"array('{ARRAY_CODES[type_.base]}', "
-        size = SIZES[type_.base]
+        code, size = ARRAY_CODES.get(type_.base), SIZES[type_.base]
         if type_.array_size:
             data = self._variable()
             self._run.append(Item(f"{size * type_.array_size}s", size * type_.array_size, size, data))
-            self._after.append(f"{target} = {make}{data})")
+            make = f"array('{code}', {data})" if code else f"{type_.base}s({data})"
+            self._after.append(f"{target} = {make}")
             return
-        count = self._count(type_, 1)
+        count = self._count(type_)
         if size > 4:
             self._emit(f"if {count}: p += {HEADER_SIZE} - p & {size - 1}")
         self._emit(f"q = p + {count} * {size}")
         self._emit("if q > end: raise ValueError('it is too short')")
-        self._emit(f"{target} = {make}data[p:q])")
+        if code:
+            # through a view: a copy of an image costs more than all the rest
+            numbers = self._variable()
+            self._emit(f"{target} = {numbers} = array('{code}')")
+            self._emit(f"{numbers}.frombytes(memoryview(data)[p:q])")
+        else:
+            self._emit(f"{target} = {type_.base}s(data[p:q])")
         self._emit("p = q")
 
     def _list(self, target: str, type_: FieldType) -> None:
@@ -179,8 +196,10 @@ class _Generator:
             self._flush_to_variable()
             count = str(type_.array_size)
         else:
-            smallest = smallest_size(message_definition(type_.base), message_definition) if type_.is_message else 4
-            count = self._count(type_, smallest)
+            smallest = smallest_size(message_definition(type_.base)) if type_.is_message else 4
+            count = self._count(type_)
+            # before the loop: what a sample claims is not believed for longer than it is
+            self._emit(f"if {count} * {smallest} > end - p: raise ValueError('it is too short')")
         elements, element = self._variable(), self._variable()
         self._emit(f"{elements} = []")
         self._emit(f"for _ in range({count}):")
@@ -191,14 +210,13 @@ class _Generator:
         self._indent -= 1
         self._emit(f"{target} = {elements}")
 
-    def _count(self, type_: FieldType, smallest: int) -> str:
-        """Read the number of elements of a sequence, each of which takes a number of bytes at least."""
+    def _count(self, type_: FieldType) -> str:
+        """Read the number of elements of a sequence; the variable that has it."""
         count = self._variable()
         self._run.append(Item("I", 4, 4, count))
         self._flush_to_variable()
         if type_.sequence_bound:
             self._emit(f"if {count} > {type_.sequence_bound}: raise ValueError('a sequence is too long')")
-        self._emit(f"if {count} * {smallest} > end - p: raise ValueError('it is too short')")
         return count
 
     def _flush_to_variable(self) -> None:
@@ -215,13 +233,16 @@ class _Generator:
             if self._position is None:
                 alignment = run_alignment(self._run)
                 formats = (run_format(self._run, position) for position in range(alignment))
-                table = [(Struct(format_).unpack_from, end - start) for start, (format_, end) in enumerate(formats)]
+                table = [
+                    (Struct(format_).unpack_from, end - start) for start, (format_, end) in enumerate(formats)
+                ]
                 self._emit(f"u, s = {self._name(tuple(table))}[p & {alignment - 1}]")
                 self._emit(f"{values and f'{values}= '}u(data, p)")
                 self._emit("p += s")
             else:
                 format_, end = run_format(self._run, self._position)
-                self._emit(f"{values and f'{values}= '}{self._name(Struct(format_).unpack_from)}(data, {self._position})")
+                unpack = self._name(Struct(format_).unpack_from)
+                self._emit(f"{values and f'{values}= '}{unpack}(data, {self._position})")
                 self._position = end
             self._run.clear()
         for line in self._after:

@@ -1,8 +1,8 @@
-"""What a field of a message holds in Python: its values at first, and how numeric arrays and sequences are kept.
+"""What a field holds in Python: its first value, and how arrays and sequences of numbers are kept.
 
-As in rclpy: a sequence of numbers is an ``array.array``, an array of numbers a ``numpy.ndarray``, everything else plural a
-list, an octet ``bytes`` of length 1. NumPy takes as long to import as all the rest of a node, so an array stays an
-``array.array`` until somebody looks at it.
+As in rclpy: a sequence of numbers is an ``array.array``, an array of numbers a ``numpy.ndarray``, everything
+else plural a list, an octet ``bytes`` of length 1. NumPy takes as long to import as all the rest of a node,
+so an array stays an ``array.array`` until somebody looks at it.
 """
 
 from __future__ import annotations
@@ -55,8 +55,10 @@ def slot_of(field: Field) -> str:
     return f"_{field.name}" if is_numeric(field) else field.name
 
 
-def python_value(base: str, value: Literal) -> Any:
-    """A constant or default value as the Python value of its IDL type."""
+def python_value(base: str, value: Literal | tuple[Literal, ...]) -> Any:
+    """A constant or default value, or a list of them, as Python values of their IDL type."""
+    if isinstance(value, tuple):
+        return [python_value(base, element) for element in value]
     return bytes((int(value),)) if base == "octet" else value
 
 
@@ -70,10 +72,10 @@ def initial_value(field: Field, message_class: Callable[[str], type]) -> tuple[A
         return ((lambda: [cls() for _ in range(type_.array_size)]) if type_.array_size else cls), True
     if not type_.is_plural:
         return _ZEROS[type_.base] if field.default is None else python_value(type_.base, field.default), False
-    if isinstance(field.default, tuple):
-        values = [python_value(type_.base, value) for value in field.default]
-    else:
+    if field.default is None:
         values = [_ZEROS[type_.base]] * type_.array_size
+    else:
+        values = python_value(type_.base, field.default)
     if is_numeric(field):
         template = array(ARRAY_CODES[type_.base], values)
         return (lambda: template[:]), True
@@ -81,7 +83,7 @@ def initial_value(field: Field, message_class: Callable[[str], type]) -> tuple[A
 
 
 def numeric_field(type_name: str, field: Field) -> property:
-    """Property of an array or a sequence of numbers: what is assigned is converted, or refused with a reason."""
+    """Property of an array or sequence of numbers: what is assigned is converted or refused with a reason."""
     slot, type_ = slot_of(field), field.type
     code, size, bound = ARRAY_CODES[type_.base], type_.array_size, type_.sequence_bound
 
@@ -101,7 +103,9 @@ def numeric_field(type_name: str, field: Field) -> property:
                 raise ValueError(f"it has {len(numbers)} elements")
         except (TypeError, ValueError, OverflowError) as error:
             kind = TypeError if isinstance(error, TypeError) else ValueError
-            raise kind(f"{type_name}: field '{field.name}' must be {type_}, not {value!r:.100}: {error}") from None
+            raise kind(
+                f"{type_name}: field '{field.name}' must be {type_}, not {value!r:.100}: {error}"
+            ) from None
         setattr(self, slot, numbers)
 
     return property(get_array if size else attrgetter(slot), set_numbers)
@@ -122,7 +126,9 @@ def _to_array(code: str, value: Any) -> array[Any]:
     numbers = array(code, value)
     if code == "f":
         # array makes infinities of what is too great for a float
-        infinite = [number for number, given in zip(numbers, value, strict=True) if isinf(number) and not isinf(given)]
+        infinite = [
+            number for number, given in zip(numbers, value, strict=True) if isinf(number) and not isinf(given)
+        ]
         if infinite:
             raise OverflowError("it has elements out of range")
     return numbers

@@ -1,7 +1,8 @@
 """How values lie in XCDR1: sizes, alignment, and the ``struct`` formats of runs of values.
 
-Source: DDS-XTypes 1.3, 7.4.1 (plain CDR, version 1). A sample begins with a header of 4 bytes; alignment counts from behind
-it. All samples of ROS 2 Jazzy are little endian on the machines that Cyclone DDS is distributed for.
+Source: DDS-XTypes 1.3, 7.4.1 (plain CDR, version 1). A sample begins with a header of 4 bytes; alignment
+counts from behind it. All samples of ROS 2 Jazzy are little endian on the machines that Cyclone DDS is
+distributed for.
 """
 
 from __future__ import annotations
@@ -10,15 +11,14 @@ from struct import Struct
 from typing import TYPE_CHECKING, NamedTuple
 
 from .fields import ARRAY_CODES
+from .packages import message_definition
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from .definition import Field, MessageDefinition
 
 HEADER_SIZE = 4
 LITTLE_ENDIAN_CDR = 0x0100
-"""First two bytes of the header, 00 01, as a little-endian number. The other two are options and without a meaning here."""
+"""First two bytes of the header, 00 01, as a little-endian number. The other two mean nothing here."""
 
 CODES = {**ARRAY_CODES, "boolean": "?", "octet": "c"}
 """Codes of ``struct`` by IDL primitive."""
@@ -54,14 +54,14 @@ def run_alignment(run: list[Item]) -> int:
     return max(item.alignment for item in run)
 
 
-def smallest_size(definition: MessageDefinition, define: Callable[[str], MessageDefinition]) -> int:
-    """Fewest bytes of a message on the wire, without padding; ``define`` finds the definition of a nested message."""
-    return sum(_smallest_field(field, define) for field in definition.members)
+def smallest_size(definition: MessageDefinition) -> int:
+    """Fewest bytes that a message takes on the wire, without padding."""
+    return sum(_smallest_field(field) for field in definition.members)
 
 
-def _smallest_field(field: Field, define: Callable[[str], MessageDefinition]) -> int:
+def _smallest_field(field: Field) -> int:
     type_ = field.type
     if type_.is_sequence:
         return 4
-    element = smallest_size(define(type_.base), define) if type_.is_message else SIZES.get(type_.base, 4)
+    element = smallest_size(message_definition(type_.base)) if type_.is_message else SIZES.get(type_.base, 4)
     return element * (type_.array_size or 1)

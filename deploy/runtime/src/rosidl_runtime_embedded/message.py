@@ -10,8 +10,7 @@ from .packages import message_class
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-
-    from typing_extensions import Self
+    from typing import Self
 
     from .definition import MessageDefinition
 
@@ -19,7 +18,7 @@ if TYPE_CHECKING:
 class _OnFirstUse:
     """A member of a message class that is made when it is first asked for.
 
-    A process imports many types and uses few; compiling the code of one takes longer than using it a hundred times.
+    A process imports many types and uses few: compiling the code of one takes as long as a hundred uses.
     """
 
     def __init__(self, make: Callable[[type[Message]], Any]) -> None:
@@ -42,7 +41,9 @@ def _make_constructor(cls: type[Message]) -> Callable[..., None]:
         names[initial], is_factory = initial_value(field, message_class)
         if is_factory:
             parameters.append(f"{name}=unset")
-            body.append(f"if {name} is unset: self.{slot_of(field)} = {initial}()\n else: self.{name} = {name}")
+            body.append(
+                f"if {name} is unset: self.{slot_of(field)} = {initial}()\n else: self.{name} = {name}"
+            )
         else:
             parameters.append(f"{name}={initial}")
             body.append(f"self.{name} = {name}")
@@ -74,8 +75,8 @@ def _make_type_hash(cls: type[Message]) -> str:
 class Message:
     """Base of all message classes.
 
-    Fields are checked when a message is serialized, that is at publish, as rclpy of Jazzy does by default; numeric
-    arrays and sequences already when they are assigned, since they are converted then.
+    As in rclpy of Jazzy by default, fields are checked when a message is serialized, that is at publish. Arrays
+    and sequences of numbers are checked when they are assigned, since they are converted then.
     """
 
     __slots__ = ()
@@ -92,7 +93,7 @@ class Message:
 
         @staticmethod
         def _serialize(message: Any) -> bytes:
-            """Little-endian XCDR1 with its header. Raises TypeError or ValueError naming type, field and value."""
+            """Little-endian XCDR1. Raises TypeError or ValueError naming type, field and value."""
 
         @classmethod
         def _deserialize(cls, data: bytes) -> Self:
@@ -111,7 +112,9 @@ class Message:
     def __repr__(self) -> str:
         """Text as rclpy's: an ``array.array`` looks like a list."""
         values = ((name, getattr(self, name)) for name in self._fields_and_field_types)
-        fields = (f"{name}={value.tolist() if isinstance(value, array) else value!r}" for name, value in values)
+        fields = (
+            f"{name}={value.tolist() if isinstance(value, array) else value!r}" for name, value in values
+        )
         return f"{self.__module__}.{type(self).__name__}({', '.join(fields)})"
 
     def __eq__(self, other: object) -> bool:

@@ -1,7 +1,8 @@
 """Where definitions lie, and how they become importable packages.
 
-A message package is a directory with ``msg/*.msg`` and ``srv/*.srv`` in it. The packages of this distribution lie beside
-this one; those of a user in ``<prefix>/share/<package>`` for a prefix of ``AMENT_PREFIX_PATH``. The former win.
+A message package is a directory with ``msg/*.msg`` and ``srv/*.srv`` in it. The packages of this distribution
+lie beside this one; those of a user in ``<prefix>/share/<package>`` for a prefix of ``AMENT_PREFIX_PATH``.
+The former win.
 """
 
 from __future__ import annotations
@@ -10,19 +11,20 @@ import os
 import sys
 from functools import cache
 from importlib.machinery import ModuleSpec
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from .definition import InvalidDefinition, MessageDefinition, ServiceDefinition, parse_message, parse_service
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
+    from importlib.abc import Loader
     from types import ModuleType
 
     from .message import Message
     from .service import Service
 
 _SHIPPED = os.path.dirname(os.path.dirname(__file__))
-_KINDS = ("msg", "srv")
+_KINDS = ["msg", "srv"]
 _SERVICE_PARTS = ("Request", "Response", "Event")
 
 
@@ -41,7 +43,9 @@ def _file(name: str) -> str | None:
 
 def interface_names(package: str, kind: str) -> list[str]:
     """Names of all messages (kind ``msg``) or services (``srv``) that a package defines, sorted."""
-    directories = filter(os.path.isdir, (os.path.join(directory, kind) for directory in _directories(package)))
+    directories = filter(
+        os.path.isdir, (os.path.join(directory, kind) for directory in _directories(package))
+    )
     files = {file for directory in directories for file in os.listdir(directory)}
     return sorted(file.removesuffix(f".{kind}") for file in files if file.endswith(f".{kind}"))
 
@@ -71,7 +75,7 @@ def service_definition(name: str) -> ServiceDefinition:
 
 @cache
 def message_definition(name: str) -> MessageDefinition:
-    """Definition of a message, or of a part of a service, by its full name. Raises LookupError or InvalidDefinition."""
+    """Definition of a message or a service's part by full name. Raises LookupError or InvalidDefinition."""
     if "/srv/" in name:
         service, _, part = name.rpartition("_")
         if part not in _SERVICE_PARTS:
@@ -87,7 +91,7 @@ _services: dict[str, type[Service]] = {}
 
 
 def message_class(name: str) -> type[Message]:
-    """Class of a message, or of a part of a service, by its full name. Raises LookupError or InvalidDefinition."""
+    """Class of a message or a service's part by full name. Raises LookupError or InvalidDefinition."""
     from .message import make_message_class
 
     if name not in _messages:
@@ -132,30 +136,29 @@ def interfaces(module_name: str) -> tuple[Callable[[str], Any], Callable[[], lis
     return get, names
 
 
-class UserPackages:
+class _UserPackages:
     """Meta path finder and loader of the message packages in AMENT_PREFIX_PATH."""
 
-    @staticmethod
-    def find_spec(name: str, path: Sequence[str] | None = None, target: ModuleType | None = None) -> ModuleSpec | None:
-        """Spec of ``<package>``, ``<package>.msg`` or ``<package>.srv``; None if that is no message package."""
+    def find_spec(
+        self, name: str, path: Sequence[str] | None = None, target: ModuleType | None = None
+    ) -> ModuleSpec | None:
+        """Spec of ``<package>``, ``<package>.msg`` or ``<package>.srv``; None if it is no message package."""
         package, _, kind = name.partition(".")
-        if kind not in ("", *_KINDS) or not any(interface_names(package, k) for k in ([kind] if kind else _KINDS)):
+        kinds = [kind] if kind in _KINDS else [] if kind else _KINDS
+        if not any(interface_names(package, kind) for kind in kinds):
             return None
-        spec = ModuleSpec(name, UserPackages, origin=f"definitions of {package}", is_package=not kind)  # type: ignore[arg-type]
-        return spec
+        return ModuleSpec(name, cast("Loader", self), origin=f"definitions of {package}", is_package=not kind)
 
-    @staticmethod
-    def create_module(spec: ModuleSpec) -> None:
+    def create_module(self, spec: ModuleSpec) -> None:
         """Leave the creation to the import system."""
 
-    @staticmethod
-    def exec_module(module: ModuleType) -> None:
+    def exec_module(self, module: ModuleType) -> None:
         """Give the module its classes."""
         if "." in module.__name__:
-            module.__getattr__, module.__dir__ = interfaces(module.__name__)  # type: ignore[method-assign]
+            vars(module)["__getattr__"], vars(module)["__dir__"] = interfaces(module.__name__)
 
 
 def install() -> None:
-    """Make the packages in AMENT_PREFIX_PATH importable. Everything else that Python finds comes before them."""
-    if UserPackages not in sys.meta_path:
-        sys.meta_path.append(UserPackages)
+    """Make the packages in AMENT_PREFIX_PATH importable, after everything else that Python finds."""
+    if not any(isinstance(finder, _UserPackages) for finder in sys.meta_path):
+        sys.meta_path.append(_UserPackages())

@@ -1,9 +1,9 @@
 """Code that writes a message type as little-endian XCDR1, made and compiled per type.
 
-The generated function reads every field once, checks types on the way, and packs each run of values of fixed size with one
-``struct`` call. Behind a string or a sequence the padding within a run depends on where it begins: such a run has a
-table of packers, indexed by the position modulo its alignment. What looks wrong is left to :mod:`.validation`, which
-knows the reason.
+The generated function reads every field once, checks types on the way, and packs each run of values of fixed
+size with one ``struct`` call. Behind a string or a sequence the padding within a run depends on where it
+begins: such a run has a table of packers, indexed by the position modulo its alignment. What looks wrong is
+left to :mod:`.validation`, which knows the reason.
 """
 
 from __future__ import annotations
@@ -24,19 +24,31 @@ if TYPE_CHECKING:
     from .definition import Field, FieldType, MessageDefinition
     from .message import Message
 
-_PYTHON_TYPES = {"boolean": "bool", "octet": "bytes", "float": "float", "double": "float", "string": "str", "wstring": "str"}
+_PYTHON_TYPES = {
+    "boolean": "bool",
+    "octet": "bytes",
+    "float": "float",
+    "double": "float",
+    "string": "str",
+    "wstring": "str",
+}
 _NUL = Item("x", 1)
 
 
 def make_serializer(cls: type[Message]) -> Callable[[Any], bytes]:
-    """Function from a message of the class to its bytes; raises TypeError or ValueError naming type, field and value."""
+    """Function from a message to its bytes; raises TypeError or ValueError naming type, field and value."""
     return _Generator(cls).compile()
 
 
 class _Generator:
     def __init__(self, cls: type[Message]) -> None:
         self._cls = cls
-        self._names: dict[str, Any] = {"array": array, "validate": validate, "error": struct_error, "cls": cls}
+        self._names: dict[str, Any] = {
+            "array": array,
+            "validate": validate,
+            "error": struct_error,
+            "cls": cls,
+        }
         self._lines: list[str] = []
         self._indent = 2
         self._variables = 0

@@ -38,5 +38,9 @@ def make_service_class(definition: ServiceDefinition) -> type[Service]:
     """Make the class of a service type."""
     package, kind, name = definition.name.split("/")
     parts = {part: message_class(f"{definition.name}_{part}") for part in ("Request", "Response", "Event")}
-    namespace = {"__module__": f"{package}.{kind}", "__doc__": f"Service {definition.name}.", "_TYPE_NAME": definition.name}
+    namespace = {
+        "__module__": f"{package}.{kind}",
+        "__doc__": f"Service {definition.name}.",
+        "_TYPE_NAME": definition.name,
+    }
     return type(name, (Service,), {**namespace, **parts})

@@ -43,7 +43,9 @@ def _individual(name: str) -> MessageDefinition:
 
 
 def _field_type(type_: FieldType) -> dict[str, Any]:
-    type_id = _NESTED if type_.is_message else _TYPE_IDS[type_.base] + (_BOUNDED_TEXT if type_.string_bound else 0)
+    type_id = (
+        _NESTED if type_.is_message else _TYPE_IDS[type_.base] + (_BOUNDED_TEXT if type_.string_bound else 0)
+    )
     if type_.array_size:
         type_id += _ARRAY
     elif type_.is_sequence:
@@ -83,7 +85,7 @@ def _describe_all(name: str) -> tuple[dict[str, Any], list[dict[str, Any]]]:
 
 
 def type_hash(name: str) -> str:
-    """RIHS01 hash of a message or service by its full name: SHA-256 of its description as JSON, without defaults."""
+    """RIHS01 hash of a message or service by full name: SHA-256 of its description in JSON, no defaults."""
     description, referenced = _describe_all(name)
     for struct in (description, *referenced):
         for field in struct["fields"]:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def validate(message: object, cls: type[Message]) -> None:
-    """Raise TypeError or ValueError, naming type, field and value, if the message is not a valid one of the class."""
+    """Raise TypeError or ValueError, naming type, field and value, if it is no valid message of the class."""
     if not isinstance(message, cls):
         raise TypeError(f"a {cls._TYPE_NAME} is expected, not {message!r:.100}")
     _message(message, cls, cls._TYPE_NAME, "")
@@ -40,7 +40,9 @@ def _message(message: Message, cls: type[Message], top: str, path: str) -> None:
             _single(value, field.type, top, where)
 
 
-def _wrong(kind: type[Exception], top: str, where: str, type_: FieldType, value: object, reason: str = "") -> Exception:
+def _wrong(
+    kind: type[Exception], top: str, where: str, type_: FieldType, value: object, reason: str = ""
+) -> Exception:
     return kind(f"{top}: field '{where}' must be {type_}, not {value!r:.100}{reason and ': ' + reason}")
 
 

@@ -1,0 +1,122 @@
+"""Services of lifecycle_msgs. Made by rosidl_runtime_embedded.stubs."""
+
+import lifecycle_msgs.msg
+import service_msgs.msg
+from rosidl_runtime_embedded import Message, Service
+
+class ChangeState_Request(Message):
+    transition: lifecycle_msgs.msg.Transition
+    def __init__(
+        self,
+        *,
+        transition: lifecycle_msgs.msg.Transition = ...,
+    ) -> None: ...
+
+class ChangeState_Response(Message):
+    success: bool
+    def __init__(
+        self,
+        *,
+        success: bool = ...,
+    ) -> None: ...
+
+class ChangeState_Event(Message):
+    info: service_msgs.msg.ServiceEventInfo
+    request: list[ChangeState_Request]
+    response: list[ChangeState_Response]
+    def __init__(
+        self,
+        *,
+        info: service_msgs.msg.ServiceEventInfo = ...,
+        request: list[ChangeState_Request] = ...,
+        response: list[ChangeState_Response] = ...,
+    ) -> None: ...
+
+class ChangeState(Service):
+    Request = ChangeState_Request
+    Response = ChangeState_Response
+    Event = ChangeState_Event
+
+class GetAvailableStates_Request(Message):
+    def __init__(self) -> None: ...
+
+class GetAvailableStates_Response(Message):
+    available_states: list[lifecycle_msgs.msg.State]
+    def __init__(
+        self,
+        *,
+        available_states: list[lifecycle_msgs.msg.State] = ...,
+    ) -> None: ...
+
+class GetAvailableStates_Event(Message):
+    info: service_msgs.msg.ServiceEventInfo
+    request: list[GetAvailableStates_Request]
+    response: list[GetAvailableStates_Response]
+    def __init__(
+        self,
+        *,
+        info: service_msgs.msg.ServiceEventInfo = ...,
+        request: list[GetAvailableStates_Request] = ...,
+        response: list[GetAvailableStates_Response] = ...,
+    ) -> None: ...
+
+class GetAvailableStates(Service):
+    Request = GetAvailableStates_Request
+    Response = GetAvailableStates_Response
+    Event = GetAvailableStates_Event
+
+class GetAvailableTransitions_Request(Message):
+    def __init__(self) -> None: ...
+
+class GetAvailableTransitions_Response(Message):
+    available_transitions: list[lifecycle_msgs.msg.TransitionDescription]
+    def __init__(
+        self,
+        *,
+        available_transitions: list[lifecycle_msgs.msg.TransitionDescription] = ...,
+    ) -> None: ...
+
+class GetAvailableTransitions_Event(Message):
+    info: service_msgs.msg.ServiceEventInfo
+    request: list[GetAvailableTransitions_Request]
+    response: list[GetAvailableTransitions_Response]
+    def __init__(
+        self,
+        *,
+        info: service_msgs.msg.ServiceEventInfo = ...,
+        request: list[GetAvailableTransitions_Request] = ...,
+        response: list[GetAvailableTransitions_Response] = ...,
+    ) -> None: ...
+
+class GetAvailableTransitions(Service):
+    Request = GetAvailableTransitions_Request
+    Response = GetAvailableTransitions_Response
+    Event = GetAvailableTransitions_Event
+
+class GetState_Request(Message):
+    def __init__(self) -> None: ...
+
+class GetState_Response(Message):
+    current_state: lifecycle_msgs.msg.State
+    def __init__(
+        self,
+        *,
+        current_state: lifecycle_msgs.msg.State = ...,
+    ) -> None: ...
+
+class GetState_Event(Message):
+    info: service_msgs.msg.ServiceEventInfo
+    request: list[GetState_Request]
+    response: list[GetState_Response]
+    def __init__(
+        self,
+        *,
+        info: service_msgs.msg.ServiceEventInfo = ...,
+        request: list[GetState_Request] = ...,
+        response: list[GetState_Response] = ...,
+    ) -> None: ...
+
+class GetState(Service):
+    Request = GetState_Request
+    Response = GetState_Response
+    Event = GetState_Event

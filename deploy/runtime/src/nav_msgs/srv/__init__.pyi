@@ -1,0 +1,148 @@
+"""Services of nav_msgs. Made by rosidl_runtime_embedded.stubs."""
+
+from typing import Final
+
+import geometry_msgs.msg
+import nav_msgs.msg
+import service_msgs.msg
+from rosidl_runtime_embedded import Message, Service
+
+class GetMap_Request(Message):
+    def __init__(self) -> None: ...
+
+class GetMap_Response(Message):
+    map: nav_msgs.msg.OccupancyGrid
+    def __init__(
+        self,
+        *,
+        map: nav_msgs.msg.OccupancyGrid = ...,
+    ) -> None: ...
+
+class GetMap_Event(Message):
+    info: service_msgs.msg.ServiceEventInfo
+    request: list[GetMap_Request]
+    response: list[GetMap_Response]
+    def __init__(
+        self,
+        *,
+        info: service_msgs.msg.ServiceEventInfo = ...,
+        request: list[GetMap_Request] = ...,
+        response: list[GetMap_Response] = ...,
+    ) -> None: ...
+
+class GetMap(Service):
+    Request = GetMap_Request
+    Response = GetMap_Response
+    Event = GetMap_Event
+
+class GetPlan_Request(Message):
+    start: geometry_msgs.msg.PoseStamped
+    goal: geometry_msgs.msg.PoseStamped
+    tolerance: float
+    def __init__(
+        self,
+        *,
+        start: geometry_msgs.msg.PoseStamped = ...,
+        goal: geometry_msgs.msg.PoseStamped = ...,
+        tolerance: float = ...,
+    ) -> None: ...
+
+class GetPlan_Response(Message):
+    plan: nav_msgs.msg.Path
+    def __init__(
+        self,
+        *,
+        plan: nav_msgs.msg.Path = ...,
+    ) -> None: ...
+
+class GetPlan_Event(Message):
+    info: service_msgs.msg.ServiceEventInfo
+    request: list[GetPlan_Request]
+    response: list[GetPlan_Response]
+    def __init__(
+        self,
+        *,
+        info: service_msgs.msg.ServiceEventInfo = ...,
+        request: list[GetPlan_Request] = ...,
+        response: list[GetPlan_Response] = ...,
+    ) -> None: ...
+
+class GetPlan(Service):
+    Request = GetPlan_Request
+    Response = GetPlan_Response
+    Event = GetPlan_Event
+
+class LoadMap_Request(Message):
+    map_url: str
+    def __init__(
+        self,
+        *,
+        map_url: str = ...,
+    ) -> None: ...
+
+class LoadMap_Response(Message):
+    map: nav_msgs.msg.OccupancyGrid
+    result: int
+    RESULT_SUCCESS: Final = 0
+    RESULT_MAP_DOES_NOT_EXIST: Final = 1
+    RESULT_INVALID_MAP_DATA: Final = 2
+    RESULT_INVALID_MAP_METADATA: Final = 3
+    RESULT_UNDEFINED_FAILURE: Final = 255
+    def __init__(
+        self,
+        *,
+        map: nav_msgs.msg.OccupancyGrid = ...,
+        result: int = ...,
+    ) -> None: ...
+
+class LoadMap_Event(Message):
+    info: service_msgs.msg.ServiceEventInfo
+    request: list[LoadMap_Request]
+    response: list[LoadMap_Response]
+    def __init__(
+        self,
+        *,
+        info: service_msgs.msg.ServiceEventInfo = ...,
+        request: list[LoadMap_Request] = ...,
+        response: list[LoadMap_Response] = ...,
+    ) -> None: ...
+
+class LoadMap(Service):
+    Request = LoadMap_Request
+    Response = LoadMap_Response
+    Event = LoadMap_Event
+
+class SetMap_Request(Message):
+    map: nav_msgs.msg.OccupancyGrid
+    initial_pose: geometry_msgs.msg.PoseWithCovarianceStamped
+    def __init__(
+        self,
+        *,
+        map: nav_msgs.msg.OccupancyGrid = ...,
+        initial_pose: geometry_msgs.msg.PoseWithCovarianceStamped = ...,
+    ) -> None: ...
+
+class SetMap_Response(Message):
+    success: bool
+    def __init__(
+        self,
+        *,
+        success: bool = ...,
+    ) -> None: ...
+
+class SetMap_Event(Message):
+    info: service_msgs.msg.ServiceEventInfo
+    request: list[SetMap_Request]
+    response: list[SetMap_Response]
+    def __init__(
+        self,
+        *,
+        info: service_msgs.msg.ServiceEventInfo = ...,
+        request: list[SetMap_Request] = ...,
+        response: list[SetMap_Response] = ...,
+    ) -> None: ...
+
+class SetMap(Service):
+    Request = SetMap_Request
+    Response = SetMap_Response
+    Event = SetMap_Event

@@ -1,0 +1,279 @@
+"""Services of rcl_interfaces. Made by rosidl_runtime_embedded.stubs."""
+
+from array import array
+from collections.abc import Iterable
+from typing import Final
+
+import rcl_interfaces.msg
+import service_msgs.msg
+from rosidl_runtime_embedded import Message, Service
+
+class DescribeParameters_Request(Message):
+    names: list[str]
+    def __init__(
+        self,
+        *,
+        names: list[str] = ...,
+    ) -> None: ...
+
+class DescribeParameters_Response(Message):
+    descriptors: list[rcl_interfaces.msg.ParameterDescriptor]
+    def __init__(
+        self,
+        *,
+        descriptors: list[rcl_interfaces.msg.ParameterDescriptor] = ...,
+    ) -> None: ...
+
+class DescribeParameters_Event(Message):
+    info: service_msgs.msg.ServiceEventInfo
+    request: list[DescribeParameters_Request]
+    response: list[DescribeParameters_Response]
+    def __init__(
+        self,
+        *,
+        info: service_msgs.msg.ServiceEventInfo = ...,
+        request: list[DescribeParameters_Request] = ...,
+        response: list[DescribeParameters_Response] = ...,
+    ) -> None: ...
+
+class DescribeParameters(Service):
+    Request = DescribeParameters_Request
+    Response = DescribeParameters_Response
+    Event = DescribeParameters_Event
+
+class GetLoggerLevels_Request(Message):
+    names: list[str]
+    def __init__(
+        self,
+        *,
+        names: list[str] = ...,
+    ) -> None: ...
+
+class GetLoggerLevels_Response(Message):
+    levels: list[rcl_interfaces.msg.LoggerLevel]
+    def __init__(
+        self,
+        *,
+        levels: list[rcl_interfaces.msg.LoggerLevel] = ...,
+    ) -> None: ...
+
+class GetLoggerLevels_Event(Message):
+    info: service_msgs.msg.ServiceEventInfo
+    request: list[GetLoggerLevels_Request]
+    response: list[GetLoggerLevels_Response]
+    def __init__(
+        self,
+        *,
+        info: service_msgs.msg.ServiceEventInfo = ...,
+        request: list[GetLoggerLevels_Request] = ...,
+        response: list[GetLoggerLevels_Response] = ...,
+    ) -> None: ...
+
+class GetLoggerLevels(Service):
+    Request = GetLoggerLevels_Request
+    Response = GetLoggerLevels_Response
+    Event = GetLoggerLevels_Event
+
+class GetParameterTypes_Request(Message):
+    names: list[str]
+    def __init__(
+        self,
+        *,
+        names: list[str] = ...,
+    ) -> None: ...
+
+class GetParameterTypes_Response(Message):
+    @property
+    def types(self) -> array[int]: ...
+    @types.setter
+    def types(self, value: Iterable[int]) -> None: ...
+    def __init__(
+        self,
+        *,
+        types: Iterable[int] = ...,
+    ) -> None: ...
+
+class GetParameterTypes_Event(Message):
+    info: service_msgs.msg.ServiceEventInfo
+    request: list[GetParameterTypes_Request]
+    response: list[GetParameterTypes_Response]
+    def __init__(
+        self,
+        *,
+        info: service_msgs.msg.ServiceEventInfo = ...,
+        request: list[GetParameterTypes_Request] = ...,
+        response: list[GetParameterTypes_Response] = ...,
+    ) -> None: ...
+
+class GetParameterTypes(Service):
+    Request = GetParameterTypes_Request
+    Response = GetParameterTypes_Response
+    Event = GetParameterTypes_Event
+
+class GetParameters_Request(Message):
+    names: list[str]
+    def __init__(
+        self,
+        *,
+        names: list[str] = ...,
+    ) -> None: ...
+
+class GetParameters_Response(Message):
+    values: list[rcl_interfaces.msg.ParameterValue]
+    def __init__(
+        self,
+        *,
+        values: list[rcl_interfaces.msg.ParameterValue] = ...,
+    ) -> None: ...
+
+class GetParameters_Event(Message):
+    info: service_msgs.msg.ServiceEventInfo
+    request: list[GetParameters_Request]
+    response: list[GetParameters_Response]
+    def __init__(
+        self,
+        *,
+        info: service_msgs.msg.ServiceEventInfo = ...,
+        request: list[GetParameters_Request] = ...,
+        response: list[GetParameters_Response] = ...,
+    ) -> None: ...
+
+class GetParameters(Service):
+    Request = GetParameters_Request
+    Response = GetParameters_Response
+    Event = GetParameters_Event
+
+class ListParameters_Request(Message):
+    prefixes: list[str]
+    depth: int
+    DEPTH_RECURSIVE: Final = 0
+    def __init__(
+        self,
+        *,
+        prefixes: list[str] = ...,
+        depth: int = ...,
+    ) -> None: ...
+
+class ListParameters_Response(Message):
+    result: rcl_interfaces.msg.ListParametersResult
+    def __init__(
+        self,
+        *,
+        result: rcl_interfaces.msg.ListParametersResult = ...,
+    ) -> None: ...
+
+class ListParameters_Event(Message):
+    info: service_msgs.msg.ServiceEventInfo
+    request: list[ListParameters_Request]
+    response: list[ListParameters_Response]
+    def __init__(
+        self,
+        *,
+        info: service_msgs.msg.ServiceEventInfo = ...,
+        request: list[ListParameters_Request] = ...,
+        response: list[ListParameters_Response] = ...,
+    ) -> None: ...
+
+class ListParameters(Service):
+    Request = ListParameters_Request
+    Response = ListParameters_Response
+    Event = ListParameters_Event
+
+class SetLoggerLevels_Request(Message):
+    levels: list[rcl_interfaces.msg.LoggerLevel]
+    def __init__(
+        self,
+        *,
+        levels: list[rcl_interfaces.msg.LoggerLevel] = ...,
+    ) -> None: ...
+
+class SetLoggerLevels_Response(Message):
+    results: list[rcl_interfaces.msg.SetLoggerLevelsResult]
+    def __init__(
+        self,
+        *,
+        results: list[rcl_interfaces.msg.SetLoggerLevelsResult] = ...,
+    ) -> None: ...
+
+class SetLoggerLevels_Event(Message):
+    info: service_msgs.msg.ServiceEventInfo
+    request: list[SetLoggerLevels_Request]
+    response: list[SetLoggerLevels_Response]
+    def __init__(
+        self,
+        *,
+        info: service_msgs.msg.ServiceEventInfo = ...,
+        request: list[SetLoggerLevels_Request] = ...,
+        response: list[SetLoggerLevels_Response] = ...,
+    ) -> None: ...
+
+class SetLoggerLevels(Service):
+    Request = SetLoggerLevels_Request
+    Response = SetLoggerLevels_Response
+    Event = SetLoggerLevels_Event
+
+class SetParameters_Request(Message):
+    parameters: list[rcl_interfaces.msg.Parameter]
+    def __init__(
+        self,
+        *,
+        parameters: list[rcl_interfaces.msg.Parameter] = ...,
+    ) -> None: ...
+
+class SetParameters_Response(Message):
+    results: list[rcl_interfaces.msg.SetParametersResult]
+    def __init__(
+        self,
+        *,
+        results: list[rcl_interfaces.msg.SetParametersResult] = ...,
+    ) -> None: ...
+
+class SetParameters_Event(Message):
+    info: service_msgs.msg.ServiceEventInfo
+    request: list[SetParameters_Request]
+    response: list[SetParameters_Response]
+    def __init__(
+        self,
+        *,
+        info: service_msgs.msg.ServiceEventInfo = ...,
+        request: list[SetParameters_Request] = ...,
+        response: list[SetParameters_Response] = ...,
+    ) -> None: ...
+
+class SetParameters(Service):
+    Request = SetParameters_Request
+    Response = SetParameters_Response
+    Event = SetParameters_Event
+
+class SetParametersAtomically_Request(Message):
+    parameters: list[rcl_interfaces.msg.Parameter]
+    def __init__(
+        self,
+        *,
+        parameters: list[rcl_interfaces.msg.Parameter] = ...,
+    ) -> None: ...
+
+class SetParametersAtomically_Response(Message):
+    result: rcl_interfaces.msg.SetParametersResult
+    def __init__(
+        self,
+        *,
+        result: rcl_interfaces.msg.SetParametersResult = ...,
+    ) -> None: ...
+
+class SetParametersAtomically_Event(Message):
+    info: service_msgs.msg.ServiceEventInfo
+    request: list[SetParametersAtomically_Request]
+    response: list[SetParametersAtomically_Response]
+    def __init__(
+        self,
+        *,
+        info: service_msgs.msg.ServiceEventInfo = ...,
+        request: list[SetParametersAtomically_Request] = ...,
+        response: list[SetParametersAtomically_Response] = ...,
+    ) -> None: ...
+
+class SetParametersAtomically(Service):
+    Request = SetParametersAtomically_Request
+    Response = SetParametersAtomically_Response
+    Event = SetParametersAtomically_Event

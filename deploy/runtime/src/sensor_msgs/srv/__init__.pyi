@@ -1,0 +1,40 @@
+"""Services of sensor_msgs. Made by rosidl_runtime_embedded.stubs."""
+
+import sensor_msgs.msg
+import service_msgs.msg
+from rosidl_runtime_embedded import Message, Service
+
+class SetCameraInfo_Request(Message):
+    camera_info: sensor_msgs.msg.CameraInfo
+    def __init__(
+        self,
+        *,
+        camera_info: sensor_msgs.msg.CameraInfo = ...,
+    ) -> None: ...
+
+class SetCameraInfo_Response(Message):
+    success: bool
+    status_message: str
+    def __init__(
+        self,
+        *,
+        success: bool = ...,
+        status_message: str = ...,
+    ) -> None: ...
+
+class SetCameraInfo_Event(Message):
+    info: service_msgs.msg.ServiceEventInfo
+    request: list[SetCameraInfo_Request]
+    response: list[SetCameraInfo_Response]
+    def __init__(
+        self,
+        *,
+        info: service_msgs.msg.ServiceEventInfo = ...,
+        request: list[SetCameraInfo_Request] = ...,
+        response: list[SetCameraInfo_Response] = ...,
+    ) -> None: ...
+
+class SetCameraInfo(Service):
+    Request = SetCameraInfo_Request
+    Response = SetCameraInfo_Response
+    Event = SetCameraInfo_Event

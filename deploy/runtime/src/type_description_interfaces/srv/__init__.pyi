@@ -1,0 +1,50 @@
+"""Services of type_description_interfaces. Made by rosidl_runtime_embedded.stubs."""
+
+import service_msgs.msg
+import type_description_interfaces.msg
+from rosidl_runtime_embedded import Message, Service
+
+class GetTypeDescription_Request(Message):
+    type_name: str
+    type_hash: str
+    include_type_sources: bool
+    def __init__(
+        self,
+        *,
+        type_name: str = ...,
+        type_hash: str = ...,
+        include_type_sources: bool = ...,
+    ) -> None: ...
+
+class GetTypeDescription_Response(Message):
+    successful: bool
+    failure_reason: str
+    type_description: type_description_interfaces.msg.TypeDescription
+    type_sources: list[type_description_interfaces.msg.TypeSource]
+    extra_information: list[type_description_interfaces.msg.KeyValue]
+    def __init__(
+        self,
+        *,
+        successful: bool = ...,
+        failure_reason: str = ...,
+        type_description: type_description_interfaces.msg.TypeDescription = ...,
+        type_sources: list[type_description_interfaces.msg.TypeSource] = ...,
+        extra_information: list[type_description_interfaces.msg.KeyValue] = ...,
+    ) -> None: ...
+
+class GetTypeDescription_Event(Message):
+    info: service_msgs.msg.ServiceEventInfo
+    request: list[GetTypeDescription_Request]
+    response: list[GetTypeDescription_Response]
+    def __init__(
+        self,
+        *,
+        info: service_msgs.msg.ServiceEventInfo = ...,
+        request: list[GetTypeDescription_Request] = ...,
+        response: list[GetTypeDescription_Response] = ...,
+    ) -> None: ...
+
+class GetTypeDescription(Service):
+    Request = GetTypeDescription_Request
+    Response = GetTypeDescription_Response
+    Event = GetTypeDescription_Event
