@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import warnings
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from rcl_interfaces.msg import (
     ListParametersResult,
@@ -184,8 +184,7 @@ class NodeParameters:
         :raises ParameterNotDeclaredException: if it is not declared and must be.
         """
         if self.has_parameter(name):
-            number: Parameter.Type = self._parameters[name].type_.value
-            return number
+            return cast("Parameter.Type", self._parameters[name].type_.value)
         if self._allow_undeclared_parameters:
             return Parameter.Type.NOT_SET
         raise ParameterNotDeclaredException(name)

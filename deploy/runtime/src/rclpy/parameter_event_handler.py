@@ -59,7 +59,9 @@ class ParameterEventHandler:
                 for_events = list(self.event_callbacks)
             for (parameter_name, node_name), handles in by_parameter:
                 parameter = ParameterEventHandler.get_parameter_from_event(event, parameter_name, node_name)
-                for handle in handles if parameter is not None else ():
+                if parameter is None:
+                    continue
+                for handle in handles:
                     with handle.mutex:
                         handle.callback(parameter)
             for event_handle in for_events:

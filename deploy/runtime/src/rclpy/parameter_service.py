@@ -65,7 +65,7 @@ class ParameterService:
         self, request: GetParameterTypes.Request, response: GetParameterTypes.Response
     ) -> GetParameterTypes.Response:
         try:
-            types = self._node().get_parameter_types(list(request.names))
+            types: list[Any] = list(self._node().get_parameter_types(list(request.names)))
         except ParameterNotDeclaredException:
             types = []
         # An undeclared parameter has an enumeration's member as its type, all others a number.
