@@ -26,11 +26,8 @@ setup:
 run start: setup
 	@$(PY) -m deploy.launcher $@ "$(SCENARIO)"
 
-console: setup
-	@$(PY) -m deploy.launcher $@
-
-# These do without a set-up: they only look at what runs, or end it.
-stop status logs:
+# These do without a set-up: what they look at, or end, runs already.
+console status logs stop:
 	@if test -x $(PY); then exec $(PY) -m deploy.launcher $@; else echo "Nothing runs: .venv is not set up."; fi
 
 test: setup

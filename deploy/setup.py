@@ -1,8 +1,9 @@
 """Brings .venv up to date: what the system needs, what its tests need and, without ROS 2, deploy/runtime.
 
-Runs on the bare interpreter, before anything is installed. A stamp in .venv tells what it was made from; a
-.venv without the right stamp – older requirements, another interpreter, ROS 2 sourced since, an interrupted
-set-up – is made anew, so that no half of an installation ever counts as one.
+Runs on the bare interpreter, before anything is installed. Stamps in .venv tell what it was made from; where
+the right one is missing (older requirements, another interpreter, ROS 2 sourced since, an interrupted set-up)
+it is made anew, so that half an installation never counts as one. deploy/runtime has a stamp of its own: who works on it
+waits a second.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
@@ -26,8 +27,10 @@ ROOT = Path(__file__).resolve().parent.parent
 VENV = ROOT / ".venv"
 PYTHON = VENV / "bin" / "python"
 STAMP = VENV / "made-from"
+RUNTIME_STAMP = VENV / "made-from-runtime"
 LOG = VENV / "setup.log"
 REQUIREMENTS = ROOT / "deploy" / "requirements"
+PIP = [str(PYTHON), "-m", "pip", "install", "--no-deps", "--no-input", "--progress-bar=off"]
 RUNTIME = ROOT / "deploy" / "runtime"
 
 
@@ -41,11 +44,17 @@ def main() -> int:
         signal.signal(number, _interrupt)
     try:
         with _alone():
+            began = time.monotonic()
             ros = system_rclpy()
-            stamp = fingerprint(ros)
-            if not STAMP.exists() or STAMP.read_text() != stamp:
-                make(ros)
-                STAMP.write_text(stamp)
+            with _stamped(STAMP, fingerprint(ros)) as venv_missing:
+                if venv_missing:
+                    make(ros)
+            if not ros:
+                with _stamped(RUNTIME_STAMP, fingerprint_of_runtime()) as runtime_missing:
+                    if runtime_missing:
+                        install_runtime()
+            if venv_missing:
+                print(f"Set up in {time.monotonic() - began:.0f} s.", flush=True)
     except SetupError as error:
         print(error, file=sys.stderr)
         return 1
@@ -63,18 +72,40 @@ def system_rclpy() -> str:
 
 
 def fingerprint(ros: str) -> str:
-    """What .venv is made from, as a digest."""
-    sources = [*sorted(REQUIREMENTS.glob("*.txt")), RUNTIME / "pyproject.toml", Path(__file__)]
-    digest = hashlib.sha256(repr((sys.version, sys.executable, str(VENV), ros)).encode())
-    for source in sources:
-        digest.update(source.read_bytes())
+    """What .venv is made from, as a digest; `ros` is the system's rclpy."""
+    sources = [*sorted(REQUIREMENTS.glob("*.txt")), Path(__file__)]
+    return _digest(sources, sys.version, os.path.realpath(sys.executable), str(VENV), ros)
+
+
+def fingerprint_of_runtime() -> str:
+    """All that deploy/runtime consists of, as a digest."""
+    sources = (path for path in RUNTIME.rglob("*") if path.is_file() and "__pycache__" not in path.parts)
+    return _digest(sorted(sources))
+
+
+def _digest(files: Iterable[Path], *words: str) -> str:
+    digest = hashlib.sha256(repr(words).encode())
+    for file in files:
+        content = file.read_bytes()
+        digest.update(f"{file.relative_to(ROOT)} {len(content)} ".encode())
+        digest.update(content)
     return digest.hexdigest()
+
+
+@contextmanager
+def _stamped(stamp: Path, fingerprint: str) -> Iterator[bool]:
+    """Tell whether something has to be made; it has been once the block has ended well."""
+    missing = not stamp.exists() or stamp.read_text() != fingerprint
+    if missing:
+        stamp.unlink(missing_ok=True)
+    yield missing
+    if missing:
+        stamp.write_text(fingerprint)
 
 
 def make(ros: str) -> None:
     """Make .venv from nothing; with ROS 2 (the file of its rclpy) it sees the system's packages."""
-    if processes.of_system(processes.run_directory()):
-        raise SetupError("A system runs from this .venv, which has to be made anew: `make stop` first")
+    _refuse_while_running()
     if ros:
         check = subprocess.run([sys.executable, "-c", "import rclpy"], capture_output=True, text=True)
         if check.returncode:
@@ -85,17 +116,26 @@ def make(ros: str) -> None:
             )
     version = ".".join(map(str, sys.version_info[:3]))
     print(f"Setting up .venv with Python {version}, once; this takes about half a minute.", flush=True)
-    started = time.monotonic()
     venv = [sys.executable, "-m", "venv", "--clear", *(["--system-site-packages"] if ros else []), str(VENV)]
     _step("a virtual environment", venv, log=None)
-    pip = [str(PYTHON), "-m", "pip", "install", "--no-deps", "--progress-bar=off", "--no-input"]
     files = ["system.txt", "develop.txt", *([] if ros else ["runtime.txt"])]
-    _step("packages from PyPI", pip + [word for name in files for word in ("-r", str(REQUIREMENTS / name))])
+    _step(
+        "packages from PyPI", [*PIP, *(word for name in files for word in ("-r", str(REQUIREMENTS / name)))]
+    )
     if ros:
-        print(f"  ROS 2: {Path(ros).parent}")
-    else:
-        _step("deploy/runtime, as there is no ROS 2 here", [*pip, "--no-build-isolation", "-e", str(RUNTIME)])
-    print(f"Set up in {time.monotonic() - started:.0f} s.", flush=True)
+        print(f"  rclpy of ROS 2: {Path(ros).parent}")
+
+
+def install_runtime() -> None:
+    """Install deploy/runtime into .venv, or install it again."""
+    _refuse_while_running()
+    command = [*PIP, "--no-build-isolation", "--force-reinstall", str(RUNTIME)]
+    _step("deploy/runtime, as this machine has no ROS 2", command)
+
+
+def _refuse_while_running() -> None:
+    if processes.of_system(processes.run_directory()):
+        raise SetupError("A system runs from this .venv, which has to be changed: `make stop` first")
 
 
 def _step(title: str, command: list[str], log: Path | None = LOG) -> None:

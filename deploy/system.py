@@ -48,6 +48,7 @@ class System:
 
     def __init__(self, run: Path | None = None) -> None:
         self.run = run or processes.run_directory()
+        self._supervisor: int | None = None  # a pidfd
 
     @property
     def logs(self) -> Path:
@@ -59,43 +60,55 @@ class System:
         """The ROS parameter file of all services, written at each start."""
         return self.run / "parameters.yaml"
 
+    def members(self) -> list[processes.Process]:
+        """The live processes of the system, also those that a dead supervisord left behind."""
+        return processes.of_system(self.run)
+
     def supervisor(self) -> int | None:
         """The pid of the running supervisord."""
-        return next((process.pid for process in processes.of_system(self.run) if not process.program), None)
-
-    def services(self) -> dict[str, list[int]]:
-        """The pids of the live services by program, also of those that a dead supervisord left behind."""
-        found: dict[str, list[int]] = {}
-        for process in processes.of_system(self.run):
-            if process.program:
-                found.setdefault(process.program, []).append(process.pid)
-        return found
+        return next((process.pid for process in self.members() if not process.program), None)
 
     def environment(self) -> dict[str, str]:
         """The environment that the running system was started with; empty when none runs."""
-        pid = self.supervisor()
-        return processes.environment_of(pid) if pid else {}
+        return next((processes.environment_of(process.pid) for process in self.members()), {})
 
-    def start(self, parameters: Mapping[str, object]) -> subprocess.Popen[bytes]:
+    def start(self, parameters: Mapping[str, object]) -> None:
         """Start supervisord with its programs, all with these parameters (content of a ROS parameter file).
 
-        What a killed supervisord left behind is ended first: no service ever lives twice. Returns the process
-        of supervisord as soon as it answers. Raises DeploymentError when a system runs already.
+        What a killed supervisord left behind is ended first: no service ever lives twice. Returns as soon as
+        supervisord answers. Raises DeploymentError when a system runs already.
         """
         with self._alone():
             if pid := self.supervisor():
                 raise DeploymentError(f"Already running: supervisord has pid {pid} and works in {self.run}")
-            processes.end(self.run, [process.pid for process in processes.of_system(self.run)], SERVICE_GRACE)
-            self.logs.mkdir(parents=True, exist_ok=True)
+            self.logs.mkdir(exist_ok=True)
             self.run.chmod(0o700)
             self.parameters.write_text(yaml.safe_dump(dict(parameters), sort_keys=False))
-            return self._start_supervisor()
+            self._start_supervisor()
+
+    def start_again(self) -> bool:
+        """Start it as it was, after supervisord died; whether that was right: its end may have been meant."""
+        with self._alone():
+            if not self.parameters.exists():  # `stop` takes them away
+                return False
+            self._start_supervisor()
+            return True
+
+    def supervisor_has_ended(self) -> bool:
+        """Whether the supervisord has ended that was started here, or that ran when this was first asked."""
+        if self._supervisor is None:
+            pid = self.supervisor()
+            if pid is None:
+                return True
+            self._supervisor = os.pidfd_open(pid)
+        return not processes.await_end([self._supervisor], 0.0)
 
     def stop(self) -> None:
         """End every process of the system, with supervisord's help or without."""
         with self._alone():
+            self.parameters.unlink(missing_ok=True)
             if pid := self.supervisor():
-                handles = processes.open_handles(self.run, [p.pid for p in processes.of_system(self.run)])
+                handles = processes.open_handles(self.run, [p.pid for p in self.members()])
                 try:
                     self._call(pid, "supervisor.shutdown", timeout=SUPERVISOR_GRACE)
                     processes.await_end(handles, SUPERVISOR_GRACE)
@@ -103,14 +116,7 @@ class System:
                     pass  # hung or just dying: then without its help
                 finally:
                     processes.close(handles)
-            for _ in range(3):
-                left = processes.of_system(self.run)
-                # supervisord first, as it would start anew what ends.
-                processes.end(self.run, [process.pid for process in left if not process.program], 0.0)
-                processes.end(self.run, [process.pid for process in left if process.program], SERVICE_GRACE)
-                if not left:
-                    return
-        raise DeploymentError(f"These processes do not end: {[process.pid for process in left]}")
+            self._end_members()
 
     def programs(self) -> list[Program]:
         """All programs as supervisord sees them. Raises DeploymentError when it does not answer."""
@@ -133,15 +139,19 @@ class System:
             for row in rows
         ]
 
-    def restart_program(self, name: str) -> None:
-        """Stop one program and start it again."""
-        pid = self.supervisor()
-        if pid is None:
-            raise DeploymentError(f"Nothing is supervised in {self.run}")
-        self._call(pid, "supervisor.stopProcess", f"arm:{name}")
-        self._call(pid, "supervisor.startProcess", f"arm:{name}", False)
+    def _end_members(self) -> None:
+        """End what lives, without supervisord's help."""
+        for _ in range(3):  # what is just being forked shows only in the next round
+            left = self.members()
+            if not left:
+                return
+            # supervisord first: it would start anew what ends.
+            processes.end(self.run, [process.pid for process in left if not process.program], 0.0)
+            processes.end(self.run, [process.pid for process in left if process.program], SERVICE_GRACE)
+        raise DeploymentError(f"These processes do not end: {[process.pid for process in left]}")
 
-    def _start_supervisor(self) -> subprocess.Popen[bytes]:
+    def _start_supervisor(self) -> None:
+        self._end_members()
         environment = dict(os.environ)
         environment[processes.MARK] = str(self.run)
         environment["PYTHONUNBUFFERED"] = "1"
@@ -163,7 +173,8 @@ class System:
         while process.poll() is None and time.monotonic() < deadline:
             try:
                 self._call(process.pid, "supervisor.getState")
-                return process
+                self._supervisor = os.pidfd_open(process.pid)
+                return
             except (OSError, http.client.HTTPException, xmlrpc.client.Error):
                 time.sleep(0.02)
         process.kill()

@@ -1,0 +1,54 @@
+"""The health of the services as they report it on /diagnostics, 1 Hz each."""
+
+from __future__ import annotations
+
+import time
+from typing import NamedTuple
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rclpy.node import Node
+
+from interfaces import topics
+
+
+class Health(NamedTuple):
+    """What a service said of itself last."""
+
+    heard: float
+    """when, on the monotonic clock [s]"""
+    pid: int
+    ok: bool
+    reason: str
+    """in words, where it is not"""
+    since_output: float | None
+    """[s] that its last output was old then; None before the first"""
+
+
+class HealthMonitor:
+    """Listens to /diagnostics: the latest health of each service, by program."""
+
+    def __init__(self, node: Node) -> None:
+        self.latest: dict[str, Health] = {}
+        topic = topics.DIAGNOSTICS
+        node.create_subscription(topic.type, topic.name, self._on_message, topic.qos)
+
+    def forget(self) -> None:
+        """Begin anew: what was heard is of a system that is gone."""
+        self.latest.clear()
+
+    def _on_message(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            values = {pair.key: pair.value for pair in status.values}
+            if "pid" in values and "published" in values:
+                self.latest[status.name.rpartition("/")[2]] = _health(status, values)
+
+
+def _health(status: DiagnosticStatus, values: dict[str, str]) -> Health:
+    since_output = values.get("seconds_since_output", "")
+    return Health(
+        heard=time.monotonic(),
+        pid=int(values["pid"]),
+        ok=status.level == DiagnosticStatus.OK,
+        reason=status.message,
+        since_output=float(since_output) if since_output else None,
+    )

@@ -1,0 +1,230 @@
+"""The commands behind `make run`, `start`, `console`, `status`, `logs` and `stop`."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import signal
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from types import FrameType
+from typing import TYPE_CHECKING
+
+from deploy.system import DeploymentError, Program, System
+
+if TYPE_CHECKING:
+    from deploy.member import Member
+
+START_LIMIT = 60.0  # s until all services have to report their health
+STATUS_LIMIT = 1.5  # s that they have when they are up: they report at 1 Hz
+LOG_LINES = 15  # of a service that does not start
+
+
+class Interrupted(Exception):
+    """Ctrl-C, SIGTERM, or the terminal was closed."""
+
+
+class Interruption:
+    """Notes that a signal asks for the end; `check` raises where that is convenient.
+
+    A signal in the middle of a start must not leave half of it undone, nor a second Ctrl-C interrupt the stop
+    that the first one began.
+    """
+
+    def __init__(self) -> None:
+        self._noted = False
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            signal.signal(number, self._note)
+        signal.signal(
+            signal.SIGTTIN, signal.SIG_IGN
+        )  # reading in the background fails instead of stopping us
+
+    def check(self) -> None:
+        """Raise Interrupted if the end was asked for."""
+        if self._noted:
+            raise Interrupted
+
+    def _note(self, number: int, frame: FrameType | None) -> None:
+        self._noted = True
+
+
+# rclpy takes most of a second to load: each command loads it when it is sure to need it.
+
+
+def run(system: System, scenario: str, interruption: Interruption) -> None:
+    """Run the system in this terminal until the end is asked for."""
+    with _started(system, scenario, interruption) as (member, epoch):
+        _show(system, member, epoch, interruption, owner=True)
+    _stop(system)
+
+
+def start(system: System, scenario: str, interruption: Interruption) -> None:
+    """Start the system in the background; returns when all services are up."""
+    with _started(system, scenario, interruption):
+        print("It runs in the background: make console, make status, make logs, make stop.")
+
+
+def console(system: System, interruption: Interruption) -> None:
+    """Show a running system in this terminal."""
+    from deploy.member import Member
+    from deploy.parameters import epoch_of
+
+    if not _adopt_environment(system):
+        raise DeploymentError("Nothing runs: make start")
+    with Member() as member:
+        _show(system, member, epoch_of(system), interruption)
+
+
+def status(system: System, interruption: Interruption) -> None:
+    """Print a table of the services."""
+    from deploy.member import Member
+    from deploy.status import table
+
+    if not _adopt_environment(system):
+        print("Nothing runs.")
+        return
+    programs = system.programs()
+    running = [program for program in programs if program.pid]
+    deadline = time.monotonic() + STATUS_LIMIT
+    with Member() as member:
+        while not all(_reports(program, member) for program in running) and time.monotonic() < deadline:
+            interruption.check()
+            member.spin_once()
+        print(table(programs, member.health))
+
+
+def logs(system: System) -> None:
+    """Follow the logs of all services, until Ctrl-C."""
+    files = sorted(str(path.relative_to(system.run)) for path in system.logs.glob("*.log"))
+    if not files:
+        raise DeploymentError("There are no logs yet: make start")
+    os.chdir(system.run)
+    os.execvp("tail", ["tail", "-n", "10", "-F", *files])
+
+
+@contextmanager
+def _started(system: System, scenario: str, interruption: Interruption) -> Iterator[tuple[Member, float]]:
+    """Start the system and wait until all services are up; stop it when that, or what follows, fails."""
+    from deploy import parameters
+    from deploy.member import Member
+
+    began = time.monotonic()
+    given = parameters.of_scenario(scenario)
+    interruption.check()
+    system.start(given)
+    try:
+        domain = os.environ.get("ROS_DOMAIN_ID") or "0"
+        print(f"Starting the services, scenario {scenario}, ROS domain {domain} ...", flush=True)
+        with Member() as member:
+            _await_services(system, member, interruption)
+            print(f"All services are up after {time.monotonic() - began:.1f} s.", flush=True)
+            yield member, parameters.epoch_of(system)
+    except BaseException:
+        _stop(system)
+        raise
+
+
+def _await_services(system: System, member: Member, interruption: Interruption) -> None:
+    """Wait until every service has reported its health."""
+    deadline = time.monotonic() + START_LIMIT
+    while missing := [program for program in system.programs() if not _reports(program, member)]:
+        for program in missing:
+            if program.state in ("BACKOFF", "FATAL") or program.restarts > 1:
+                lines = (system.logs / f"{program.name}.log").read_text(errors="replace").splitlines()
+                raise DeploymentError("\n".join([f"{program.name} does not start:", *lines[-LOG_LINES:]]))
+        if time.monotonic() > deadline:
+            names = ", ".join(program.name for program in missing)
+            raise DeploymentError(f"No sign of life from {names}; see make logs")
+        look_again = time.monotonic() + 0.2
+        while time.monotonic() < look_again:
+            interruption.check()
+            member.spin_once()
+
+
+def _reports(program: Program, member: Member) -> bool:
+    """Whether this very process, not one of another system in the domain, has reported its health."""
+    return program.name in member.health and member.health[program.name].pid == program.pid
+
+
+def _show(
+    system: System, member: Member, epoch: float, interruption: Interruption, *, owner: bool = False
+) -> None:
+    """Be the operator's terminal until the end; the owner of the system revives a killed supervisord."""
+    from deploy.console import HELP, Console
+
+    console = Console(member.node, epoch)
+    print(HELP, flush=True)
+    while not console.has_quit:
+        interruption.check()
+        member.spin_once()
+        console.read_commands()
+        if system.supervisor_has_ended():
+            if not owner or not system.start_again():
+                print("The system has ended.", flush=True)
+                return
+            print("supervisord was killed: everything has been started anew.", flush=True)
+
+
+def _stop(system: System) -> None:
+    """Stop the system and say so, as far as there still is somebody to tell."""
+    count = len(system.members())
+    with suppress(OSError):
+        print(f"Stopping {count} processes ..." if count else "Nothing runs.", flush=True)
+    system.stop()
+    with suppress(OSError):
+        print("All have ended." if count else "", end="\n" if count else "", flush=True)
+
+
+def _adopt_environment(system: System) -> bool:
+    """Look where the running system communicates, whatever the environment here; whether one runs."""
+    environment = system.environment()
+    for name in (*os.environ, *environment):
+        if name.startswith(("ROS_", "RMW_", "CYCLONEDDS_", "FASTRTPS_", "FASTDDS_")):
+            os.environ.pop(name, None)
+            if name in environment:
+                os.environ[name] = environment[name]
+    return bool(environment)
+
+
+def main(arguments: list[str]) -> int:
+    """Obey one command; the exit code."""
+    parser = argparse.ArgumentParser(prog="launcher")
+    commands = parser.add_subparsers(dest="command", required=True)
+    for name in ("run", "start"):
+        commands.add_parser(name).add_argument("scenario")
+    for name in ("console", "status", "logs", "stop"):
+        commands.add_parser(name)
+    options = parser.parse_args(arguments)
+
+    os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    system = System()
+    interruption = Interruption()
+    try:
+        match options.command:
+            case "run":
+                run(system, options.scenario, interruption)
+            case "start":
+                start(system, options.scenario, interruption)
+            case "console":
+                console(system, interruption)
+            case "status":
+                status(system, interruption)
+            case "logs":
+                logs(system)
+            case "stop":
+                _stop(system)
+    except Interrupted:
+        return 0
+    except DeploymentError as error:
+        print(error, file=sys.stderr)
+        return 1
+    except BrokenPipeError:  # nobody reads our output any more, as in `make run | head`
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
