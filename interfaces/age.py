@@ -1,0 +1,69 @@
+"""How old a message is, by the clock of its stamp: the time of day.
+
+DDS source times and the stamps of the contract are of that clock, even while ROS time is simulated. It may be
+set, and differ between hosts; where safety depends on an age, only the age at arrival is taken from it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from datetime import UTC, datetime, timedelta
+from typing import Any
+
+from builtin_interfaces.msg import Time
+from reactivex import Observable
+from reactivex.operators._timestamp import Timestamp
+
+__all__ = ["Timestamp", "fresh", "from_message", "from_nanoseconds", "now", "to_message", "to_nanoseconds"]
+
+_EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
+_MICROSECOND = timedelta(microseconds=1)
+
+
+def now() -> datetime:
+    """Return the time of day."""
+    return datetime.now(UTC)
+
+
+def from_nanoseconds(nanoseconds: int) -> datetime:
+    """Convert nanoseconds since 1970, rounding down to microseconds."""
+    return _EPOCH + timedelta(microseconds=nanoseconds // 1000)
+
+
+def to_nanoseconds(time: datetime) -> int:
+    """Convert to nanoseconds since 1970."""
+    return (time - _EPOCH) // _MICROSECOND * 1000
+
+
+def from_message(stamp: Time) -> datetime:
+    """Convert a ROS time, rounding down to microseconds."""
+    return from_nanoseconds(stamp.sec * 10**9 + stamp.nanosec)
+
+
+def to_message(time: datetime) -> Time:
+    """Convert to a ROS time."""
+    seconds, nanoseconds = divmod(to_nanoseconds(time), 10**9)
+    return Time(sec=seconds, nanosec=nanoseconds)
+
+
+def fresh(
+    items: Observable[Timestamp[Any]],
+    *,
+    lifespan: float,
+    now: Callable[[], datetime] = now,
+    dropped: Callable[[str], None] = lambda why: None,
+) -> Observable[Timestamp[Any]]:
+    """
+    Emit the items whose source time is now, give or take ``lifespan`` [s]: none that waited in a queue.
+
+    :param dropped: is told of the others, why they are not emitted.
+    """
+
+    def is_fresh(item: Timestamp[Any]) -> bool:
+        age = (now() - item.timestamp).total_seconds()
+        if abs(age) <= lifespan:
+            return True
+        dropped(f"it is {age:.3f} s old" if age > 0 else f"its clock is {-age:.3f} s ahead of ours")
+        return False
+
+    return items.filter(is_fresh)

@@ -1,0 +1,216 @@
+"""Topics as observables, observables as topics (thesis chapter 4).
+
+A :class:`ReactiveNode` is a node like any other that can also hand out observables, as in Listings 4.3 to
+4.5::
+
+    node = ReactiveNode("node_name")
+    observable = node.create_observable(String, "topic")
+    observable.subscribe(print, scheduler=node.scheduler)
+"""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from collections.abc import Callable
+from typing import Any
+
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile
+from rclpy.subscription import Subscription
+from reactivex import Observable, abc
+from reactivex.disposable import Disposable
+
+from interfaces import age
+from interfaces.age import Timestamp
+from interfaces.scheduler import NodeScheduler
+
+
+class ReactiveNode(Node):
+    """A node whose topics and parameters are observables, and which publishes observables."""
+
+    def __init__(self, node_name: str, **options: Any) -> None:
+        """Create a node; the options are those of :class:`rclpy.node.Node`."""
+        super().__init__(node_name, **options)
+        self._readers: set[_SharedReader] = set()
+        self._sinks: set[Disposable] = set()
+        self._ended = False
+        self.scheduler = NodeScheduler(self)
+        """Schedules on the executor and clock of this node; for ``observable.subscribe(…, scheduler=…)``."""
+
+    def create_observable(
+        self,
+        msg_type: Any,
+        topic: str,
+        qos_profile: QoSProfile | int = 10,
+        *,
+        timestamped: bool = False,
+        **options: Any,
+    ) -> Observable[Any]:
+        """
+        Return the messages of a topic as an observable, cold and shared (thesis 4.3).
+
+        Nothing is on the network before the first observer subscribes. All observers share one DDS reader,
+        the last one that leaves ends it, and the next one gets another. A further observer of a
+        transient-local topic first gets what the reader has kept, like the observer of a reader of its own.
+        When the node ends, the observable completes. Subscribing and disposing are safe on any thread, also
+        inside a callback.
+
+        :param timestamped: whether items are :class:`Timestamp` s, that hold a message and its DDS source
+        time,
+            instead of messages.
+        :param options: further arguments of :meth:`rclpy.node.Node.create_subscription`.
+        """
+
+        def create_reader(callback: Callable[..., None]) -> Subscription:
+            return self.create_subscription(msg_type, topic, callback, qos_profile, **options)
+
+        return Observable(_SharedReader(self, create_reader, _retained(qos_profile), timestamped).subscribe)
+
+    def create_parameter_observable(self, name: str) -> Observable[Any]:
+        """Return the values of a declared parameter: the present one at once, then each that is set."""
+
+        def subscribe(
+            observer: abc.ObserverBase[Any], scheduler: abc.SchedulerBase | None = None
+        ) -> abc.DisposableBase:
+            def changed(parameters: list[Parameter]) -> None:
+                for parameter in parameters:
+                    if parameter.name == name:
+                        observer.on_next(parameter.value)
+
+            observer.on_next(self.get_parameter(name).value)
+            self.add_post_set_parameters_callback(changed)
+            return Disposable(lambda: self.remove_post_set_parameters_callback(changed))
+
+        return Observable(subscribe)
+
+    def publish_observable(
+        self, observable: Observable[Any], msg_type: Any, topic: str, qos_profile: QoSProfile | int = 10
+    ) -> abc.DisposableBase:
+        """
+        Publish every message of an observable, until the returned disposable is disposed or the node ends.
+
+        The publisher exists from now on: peers need time to discover it, so one that is created with the
+        first message loses it. An error of the observable, or a message of another type, ends the spinning of
+        the node: it is raised there, once.
+        """
+        publisher = self.create_publisher(msg_type, topic, qos_profile)
+        subscription = observable.do_action(publisher.publish).subscribe(
+            on_error=self.fail, scheduler=self.scheduler
+        )
+
+        def end() -> None:
+            subscription.dispose()
+            self.destroy_publisher(publisher)
+            self._sinks.remove(sink)
+
+        sink = Disposable(end)
+        self._sinks.add(sink)
+        return sink
+
+    def fail(self, error: Exception) -> None:
+        """Raise an error where it cannot be lost: out of the spinning of this node."""
+
+        def throw(*_: Any) -> None:
+            raise error
+
+        self.scheduler.schedule(throw)
+
+    def destroy_node(self) -> None:
+        """End the node; its observables complete first."""
+        if not self._ended:
+            self._ended = True
+            for reader in list(self._readers):
+                reader.complete()
+            for sink in list(self._sinks):
+                sink.dispose()
+            self.scheduler.dispose()
+        super().destroy_node()
+
+
+def _retained(qos_profile: QoSProfile | int) -> deque[Any] | None:
+    """Return a place for the samples that a reader keeps for late observers, ``None`` if it keeps none."""
+    if isinstance(qos_profile, int) or qos_profile.durability != DurabilityPolicy.TRANSIENT_LOCAL:
+        return None
+    return deque(maxlen=None if qos_profile.history == HistoryPolicy.KEEP_ALL else qos_profile.depth)
+
+
+class _SharedReader:
+    """The one DDS reader behind an observable, while somebody observes it."""
+
+    def __init__(
+        self,
+        node: ReactiveNode,
+        create: Callable[[Callable[..., None]], Subscription],
+        retained: deque[Any] | None,
+        timestamped: bool,
+    ) -> None:
+        self._node = node
+        self._create = create
+        self._retained = retained
+        self._callback = self._receive_with_info if timestamped else self._receive
+        self._lock = threading.RLock()
+        self._subscription: Subscription | None = None
+        self._members: list[abc.ObserverBase[Any]] = []
+        self._listening: tuple[
+            abc.ObserverBase[Any], ...
+        ] = ()  # replaced, never changed: read without the lock
+
+    def subscribe(
+        self, observer: abc.ObserverBase[Any], scheduler: abc.SchedulerBase | None = None
+    ) -> abc.DisposableBase:
+        with self._lock:
+            if self._node._ended:
+                observer.on_completed()
+                return Disposable()
+            self._members.append(observer)
+            if self._subscription is None:
+                self._listening = (observer,)
+                try:
+                    self._subscription = self._create(self._callback)
+                except Exception:
+                    self._members, self._listening = [], ()
+                    raise
+                self._node._readers.add(self)
+            elif self._retained is None:
+                self._listening += (observer,)
+            else:  # on the executor's thread, so that no message slips between the retained ones and the next
+                self._node.scheduler.schedule(lambda *_: self._join(observer))
+        return Disposable(lambda: self._leave(observer))
+
+    def _join(self, observer: abc.ObserverBase[Any]) -> None:
+        with self._lock:
+            if self._subscription is None or not any(member is observer for member in self._members):
+                return
+            self._listening += (observer,)
+            # What a publisher has published dies with it.
+            alive = self._subscription.get_publisher_count() > 0
+            retained = tuple(self._retained) if self._retained and alive else ()
+        for item in retained:
+            observer.on_next(item)
+
+    def _receive(self, item: Any) -> None:
+        if self._retained is not None:
+            self._retained.append(item)
+        for observer in self._listening:
+            observer.on_next(item)
+
+    def _receive_with_info(self, message: Any, info: Any) -> None:
+        self._receive(Timestamp(message, age.from_nanoseconds(info["source_timestamp"])))
+
+    def _leave(self, observer: abc.ObserverBase[Any]) -> None:
+        with self._lock:
+            self._members = [member for member in self._members if member is not observer]
+            self._listening = tuple(member for member in self._listening if member is not observer)
+            if self._members or self._subscription is None:
+                return
+            subscription, self._subscription = self._subscription, None
+            if self._retained is not None:
+                self._retained.clear()
+            self._node._readers.discard(self)
+            self._node.destroy_subscription(subscription)
+
+    def complete(self) -> None:
+        for observer in list(self._members):
+            observer.on_completed()

@@ -1,0 +1,189 @@
+"""The contract: every topic of the system, once.
+
+Names are relative, so a whole arm lives under a namespace (``__ns:=/arm1``); units are SI and radians (REP
+103). A service takes name, type and QoS of its topics from these rows, the README shows :func:`markdown`, and
+:attr:`Topic.fault` says which messages are none: they are dropped at the edge of a service, counted and
+reported.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import PointStamped
+from rclpy.duration import Duration
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from std_msgs.msg import Bool, Float64, Header, String
+
+TURN_ON, TURN_OFF = "turn_on", "turn_off"
+ON, OFF = "on", "off"
+FRAME = "base"
+
+
+@dataclass(frozen=True)
+class Topic:
+    """A row of the contract."""
+
+    name: str
+    type: Any
+    qos: QoSProfile
+    unit: str
+    publishers: tuple[str, ...]
+    """The nodes that publish it."""
+    meaning: str
+    fault: Callable[[Any], str] = lambda message: ""
+    """What is wrong with a message, in words; empty for a good one."""
+
+    @property
+    def type_name(self) -> str:
+        """The type as ROS 2 names it, for example ``std_msgs/msg/Float64``."""
+        package, kind = self.type.__module__.split(".")[:2]
+        return f"{package}/{kind}/{self.type.__name__}"
+
+
+def _not_finite(message: Any) -> str:
+    return "" if math.isfinite(message.data) else f"{message.data} is not finite"
+
+
+def _not_a_length(message: Any) -> str:
+    return _not_finite(message) or ("" if message.data >= 0 else f"{message.data} is negative")
+
+
+def _not_a_position(message: Any) -> str:
+    x, y = message.point.x, message.point.y
+    return "" if math.isfinite(x) and math.isfinite(y) else f"({x}, {y}) is not finite"
+
+
+def _not_pressed(message: Any) -> str:
+    return "" if message.data else "a released switch is no sign of life"
+
+
+def _not_one_of(*known: str) -> Callable[[Any], str]:
+    return lambda message: "" if message.data in known else f"{message.data[:40]!r} is unknown"
+
+
+def _qos(
+    depth: int,
+    *,
+    reliable: bool = True,
+    latched: bool = False,
+    lifespan: float | None = None,
+) -> QoSProfile:
+    """``latched``: a late or restarted reader gets the last ``depth`` messages at once; ``lifespan`` [s]."""
+    return QoSProfile(
+        depth=depth,
+        reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
+        lifespan=Duration() if lifespan is None else Duration(seconds=lifespan),
+    )
+
+
+_STATE = _qos(1, latched=True)
+_EVENTS = _qos(10)
+
+L1 = Topic("l1", Float64, _STATE, "m", ("config_l1",), "length of the first link", _not_a_length)
+L2 = Topic("l2", Float64, _STATE, "m", ("config_l2",), "length of the second link", _not_a_length)
+THETA1 = Topic("theta1", Float64, _STATE, "rad", ("config_theta1",), "angle of the first joint", _not_finite)
+THETA2 = Topic("theta2", Float64, _STATE, "rad", ("config_theta2",), "angle of the second joint", _not_finite)
+EFFECTOR_POSITION = Topic(
+    "effector/position",
+    PointStamped,
+    _STATE,
+    "m",
+    ("kinematics",),
+    f"x, y in frame `{FRAME}`; `header.stamp` is the time of emittance",
+    _not_a_position,
+)
+EFFECTOR_SPEED = Topic(
+    "effector/speed", Float64, _EVENTS, "m/s", ("velocity",), "never negative", _not_a_length
+)
+OPERATOR_HEARTBEAT = Topic(
+    "operator_heartbeat",
+    Bool,
+    _qos(1, reliable=False, lifespan=0.5),
+    "",
+    ("dead_mans_switch",),
+    "`true` while the switch is pressed, 20 Hz or much faster. `false`, or one that waited in a queue, "
+    "is no sign of life",
+    _not_pressed,
+)
+OPERATOR_PRESENCE = Topic(
+    "operator_presence",
+    Header,
+    _qos(1, lifespan=1.0),
+    "",
+    ("operator_watchdog",),
+    "the operator was seen alive; `stamp` is the source time of that heartbeat. At most 2 Hz",
+)
+ENGINES = Topic(
+    "engines",
+    String,
+    _EVENTS,
+    "",
+    ("operator_watchdog", "dead_mans_switch", "console"),
+    f"command `{TURN_OFF}` or `{TURN_ON}`",
+    _not_one_of(TURN_OFF, TURN_ON),
+)
+ENGINES_STATE = Topic(
+    "engines/state",
+    String,
+    _STATE,
+    "",
+    ("engine_controller",),
+    f"`{ON}` or `{OFF}`, on every change and at 1 Hz",
+    _not_one_of(ON, OFF),
+)
+DIAGNOSTICS = Topic("/diagnostics", DiagnosticArray, _EVENTS, "", ("every service",), "1 Hz health")
+
+CONTRACT = (
+    L1,
+    L2,
+    THETA1,
+    THETA2,
+    EFFECTOR_POSITION,
+    EFFECTOR_SPEED,
+    OPERATOR_HEARTBEAT,
+    OPERATOR_PRESENCE,
+    ENGINES,
+    ENGINES_STATE,
+    DIAGNOSTICS,
+)
+CONFIGURATION = {topic.name: topic for topic in (L1, L2, THETA1, THETA2)}
+"""The four sources of the manipulator's configuration, by topic name (thesis 5.2.1)."""
+
+
+def is_latched(qos: QoSProfile) -> bool:
+    """Whether a late reader gets what was published before."""
+    return bool(qos.durability == DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+def _describe(qos: QoSProfile) -> str:
+    parts = [
+        "reliable" if qos.reliability == ReliabilityPolicy.RELIABLE else "best effort",
+        "transient local" if is_latched(qos) else "volatile",
+        f"last {qos.depth}",
+    ]
+    if qos.lifespan.nanoseconds:
+        seconds = qos.lifespan.nanoseconds / 1e9
+        parts.append(f"lifespan {seconds:g} s" if seconds >= 1 else f"lifespan {seconds * 1000:g} ms")
+    return ", ".join(parts)
+
+
+def markdown() -> str:
+    """Return the contract as the table that the README shows."""
+    lines = ["| topic | type | QoS | unit | published by | meaning |", "|---|---|---|---|---|---|"]
+    for topic in CONTRACT:
+        row = (
+            f"`{topic.name}`",
+            topic.type_name.replace("/msg", ""),
+            _describe(topic.qos),
+            topic.unit,
+            ", ".join(topic.publishers),
+            topic.meaning,
+        )
+        lines.append(f"| {' | '.join(row)} |")
+    return "\n".join(lines) + "\n"

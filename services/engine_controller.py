@@ -1,0 +1,106 @@
+"""Whether the engines run: a latch that fails safe.
+
+User story (ours): as a robot operator, I find the engines off unless I was there and turned them on, and have
+been seen ever since, whatever dies.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from datetime import datetime, timedelta
+
+import reactivex as rx
+from reactivex import Observable
+from std_msgs.msg import String
+
+from interfaces import age, service
+from interfaces.age import Timestamp
+from interfaces.service import ServiceNode
+from interfaces.topics import ENGINES, ENGINES_STATE, OFF, ON, OPERATOR_PRESENCE, TURN_OFF, TURN_ON
+
+
+def last_seen(presences: Observable[datetime], now: Callable[[], datetime]) -> Observable[datetime]:
+    """
+    Emit when the operator was seen last, by the scheduler's clock, which nobody sets.
+
+    A presence is as old as its stamp says when it arrives, and ages by the scheduler's clock from then on.
+    One from the future, or of before the last one, counts for nothing.
+    """
+    arrivals = presences.timestamp().map(lambda presence: (presence.timestamp, now() - presence.value))
+    past = arrivals.filter(lambda arrival: arrival[1] >= timedelta(0))
+    return past.map(lambda arrival: arrival[0] - arrival[1]).scan(max)
+
+
+def engine_state(
+    commands: Observable[Timestamp[str]],
+    presences: Observable[datetime],
+    *,
+    presence: float = 1.0,
+    absence: float = 10.0,
+    repeat: float = 1.0,
+    now: Callable[[], datetime] = age.now,
+    refused: Callable[[str], None] = lambda why: None,
+) -> Observable[str]:
+    """
+    Emit ``on`` or ``off``, on every change and every ``repeat`` [s]; the first is ``off``.
+
+    :param commands: ``turn_on`` and ``turn_off``, with their source times.
+    :param presences: the stamps of the operator's presences.
+    :param presence: ``turn_on`` is obeyed if it and the last sight of the operator are no older [s].
+    :param absence: when nobody was seen for so long [s] the engines turn off.
+    :param now: the clock of source times and stamps.
+    :param refused: is told why a ``turn_on`` is not obeyed.
+    """
+
+    def obey(request: tuple[Timestamp[Timestamp[str]], datetime | None]) -> str | None:
+        arrived, seen = request
+        command = arrived.value
+        if command.value == TURN_OFF:
+            return OFF
+        waited = abs(now() - command.timestamp).total_seconds()
+        unseen = (arrived.timestamp - seen).total_seconds() if seen else math.inf
+        if waited <= presence and unseen <= presence:
+            return ON
+        late = waited > presence
+        refused(
+            f"{TURN_ON} refused: "
+            + (f"{waited:.3f} s old" if late else f"no operator seen for {unseen:.3f} s")
+        )
+        return None
+
+    def latch(seen: Observable[datetime]) -> Observable[str]:
+        obeyed = commands.timestamp().with_latest_from(seen.start_with(None)).map(obey).filter(bool)
+        abandoned = seen.switch_map(lambda at: rx.timer(at + timedelta(seconds=absence))).map(lambda _: OFF)
+        return rx.merge(obeyed, abandoned)
+
+    def repeated(states: Observable[str]) -> Observable[str]:
+        return states.merge(states.switch_map(lambda state: rx.interval(repeat).map(lambda _: state)))
+
+    return last_seen(presences, now).publish(latch).start_with(OFF).distinct_until_changed().publish(repeated)
+
+
+def wire(node: ServiceNode) -> None:
+    """Connect the recipe with its topics."""
+    presence = node.declare("presence", 1.0, (0.1, 10.0), "turn_on needs an operator seen within [s]")
+    absence = node.declare("absence", 10.0, (1.0, 60.0), "off when no operator was seen for [s]")
+    repeat = node.declare("repeat", 1.0, (0.1, 10.0), "the state is repeated this often [s]")
+
+    states = engine_state(
+        node.observe(ENGINES, timestamped=True).map(lambda item: Timestamp(item.value.data, item.timestamp)),
+        node.observe(OPERATOR_PRESENCE).map(lambda header: age.from_message(header.stamp)),
+        presence=presence,
+        absence=absence,
+        repeat=repeat,
+        refused=lambda why: node.remark(ENGINES.name, why),
+    )
+    node.publish(ENGINES_STATE, states.map(lambda state: String(data=state)))
+
+
+def main() -> None:
+    """Run the service."""
+    service.run("engine_controller", wire)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,63 @@
+"""Where the effector is.
+
+User story (thesis 5.1): as a robot operator, I am able to observe the most recent position of the robot's
+effector, a pair of its x and y coordinates.
+"""
+
+from __future__ import annotations
+
+import math
+
+import reactivex as rx
+from geometry_msgs.msg import Point, PointStamped
+from reactivex import Observable
+from std_msgs.msg import Header
+
+from interfaces import service
+from interfaces.service import ServiceNode
+from interfaces.topics import EFFECTOR_POSITION, FRAME, L1, L2, THETA1, THETA2
+
+
+def forward_kinematics(l1: float, l2: float, theta1: float, theta2: float) -> tuple[float, float]:
+    """
+    Return the position x, y [m] of the effector (thesis equation 5.1).
+
+    :param l1, l2: lengths of the links [m].
+    :param theta1, theta2: angles of the joints [rad], the second relative to the first link.
+    """
+    heading = theta1 + theta2
+    if math.isinf(heading):  # of angles beyond 8e307 rad
+        return math.nan, math.nan
+    x = l1 * math.cos(theta1) + l2 * math.cos(heading)
+    y = l1 * math.sin(theta1) + l2 * math.sin(heading)
+    return x, y
+
+
+def effector_position(
+    l1: Observable[float], l2: Observable[float], theta1: Observable[float], theta2: Observable[float]
+) -> Observable[tuple[float, float]]:
+    """Emit the position on every change of any parameter, once all four are known (thesis 5.2.1)."""
+    return rx.combine_latest(l1, l2, theta1, theta2).starmap(forward_kinematics)
+
+
+def wire(node: ServiceNode) -> None:
+    """Connect the recipe with its topics."""
+
+    def message(position: tuple[float, float]) -> PointStamped:
+        x, y = position
+        header = Header(stamp=node.get_clock().now().to_msg(), frame_id=FRAME)
+        return PointStamped(header=header, point=Point(x=x, y=y))
+
+    l1, l2, theta1, theta2 = (
+        node.observe(topic).map(lambda message: message.data) for topic in (L1, L2, THETA1, THETA2)
+    )
+    node.publish(EFFECTOR_POSITION, effector_position(l1, l2, theta1, theta2).map(message))
+
+
+def main() -> None:
+    """Run the service."""
+    service.run("kinematics", wire)
+
+
+if __name__ == "__main__":
+    main()

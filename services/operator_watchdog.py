@@ -1,0 +1,98 @@
+"""Whether the operator is alive.
+
+User story (thesis 5.1): as a robot operator, I am able to turn off the engines when the operator becomes
+incapacitated, that is, releases the dead man's switch 3 times for longer than 3 seconds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import reactivex as rx
+from reactivex import Observable
+from reactivex.subject import Subject
+from std_msgs.msg import Header, String
+
+from interfaces import age, service
+from interfaces.age import Timestamp
+from interfaces.service import ServiceNode
+from interfaces.topics import ENGINES, OPERATOR_HEARTBEAT, OPERATOR_PRESENCE, TURN_OFF
+
+Heartbeat = Timestamp[Any]
+"""A heartbeat and its source time."""
+
+
+def operator_activity(
+    heartbeats: Observable[Heartbeat],
+    *,
+    received: Callable[[Heartbeat], None] = lambda heartbeat: None,
+    alive: Callable[[Heartbeat], None] = lambda heartbeat: None,
+    missed: Callable[[Exception], None] = lambda error: None,
+    sampling: float = 0.5,
+    silence: float = 3.0,
+    strikes: int = 3,
+) -> Observable[Any]:
+    """Emit nothing; end in an error at the last of ``strikes`` silences of ``silence`` [s] (Listing 5.7)."""
+    return (
+        heartbeats.do_action(received)  # Received signal from operator
+        .sample(sampling)
+        .timeout(silence)
+        .do_action(alive, missed)  # Operator is alive; Not received signal from operator...
+        .ignore_elements()
+        .retry(strikes)
+    )
+
+
+def operator_incapacitated(
+    heartbeats: Observable[Heartbeat], *, repeat: float = 0.5, **activity: Any
+) -> Observable[str]:
+    """
+    Emit ``turn_off`` when the operator is incapacitated (Listing 5.8), and every ``repeat`` [s] until the return.
+
+    The first heartbeat then is "Operator is alive", and new strikes begin.
+
+    :param activity: see :func:`operator_activity`.
+    """
+
+    def watch(heartbeats: Observable[Heartbeat]) -> Observable[str]:
+        back = heartbeats.do_action(activity.get("alive"))
+        away = rx.timer(0.0, repeat).map(lambda _: TURN_OFF).take_until(back)
+        return operator_activity(heartbeats, **activity).catch(lambda *_: away).repeat()
+
+    return heartbeats.publish(watch)
+
+
+def wire(node: ServiceNode) -> None:
+    """Connect the recipe with its topics."""
+    lifespan = node.declare("lifespan", 0.5, (0.01, 10.0), "an older heartbeat is no sign of life [s]")
+    sampling = node.declare("sampling", 0.5, (0.01, 10.0), "the operator is alive at most this often [s]")
+    silence = node.declare("silence", 3.0, (0.1, 60.0), "so long a silence is a strike [s]")
+    strikes = node.declare("strikes", 3, (1, 100), "the strike that turns the engines off")
+    repeat = node.declare("repeat", 0.5, (0.05, 10.0), "turn_off is repeated this often [s]")
+
+    presences: Subject[Heartbeat] = Subject()
+    commands = operator_incapacitated(
+        age.fresh(
+            node.observe(OPERATOR_HEARTBEAT, timestamped=True),
+            lifespan=lifespan,
+            dropped=lambda why: node.drop(OPERATOR_HEARTBEAT.name, why),
+        ),
+        alive=presences.on_next,
+        missed=lambda _: node.get_logger().warning("Not received signal from operator..."),
+        sampling=sampling,
+        silence=silence,
+        strikes=strikes,
+        repeat=repeat,
+    )
+    node.publish(OPERATOR_PRESENCE, presences.map(lambda seen: Header(stamp=age.to_message(seen.timestamp))))
+    node.publish(ENGINES, commands.map(lambda command: String(data=command)))
+
+
+def main() -> None:
+    """Run the service."""
+    service.run("operator_watchdog", wire)
+
+
+if __name__ == "__main__":
+    main()
