@@ -226,7 +226,9 @@ class Graph:
                 self._discovery = Discovery(self.participant.handle)
             return self._discovery
 
-    def wait_for(self, condition: Callable[[], bool], timeout: float | None, alive: Callable[[], bool]) -> bool:
+    def wait_for(
+        self, condition: Callable[[], bool], timeout: float | None, alive: Callable[[], bool]
+    ) -> bool:
         """
         Wait until ``condition`` is true, looking anew whenever the graph changes.
 
@@ -355,5 +357,3 @@ def _collect_services(endpoints: list[Endpoint]) -> NamesAndTypes:
         if (name := _names.service_from_dds(endpoint.topic)) is not None:
             found.setdefault(name, set()).add(_names.service_type_from_dds(endpoint.type_name))
     return _sorted(found)
-
-

@@ -214,9 +214,7 @@ def _handlers(
     parent: Writer | Reader,
 ) -> list[EventHandler]:
     handlers = [
-        EventHandler(
-            callback_group=callback_group, callback=callback, event_type=event, parent_impl=parent
-        )
+        EventHandler(callback_group=callback_group, callback=callback, event_type=event, parent_impl=parent)
         for event, callback in callbacks.items()
         if callback is not None
     ]
@@ -264,7 +262,9 @@ class SubscriptionEventCallbacks:
         """The handlers of one subscription."""
         incompatible_qos = self.incompatible_qos
         if incompatible_qos is None and self.use_default_callbacks:
-            text = "New publisher on topic '{}' offers incompatible QoS: none of its messages will be received."
+            text = (
+                "New publisher on topic '{}' offers incompatible QoS: none of its messages will be received."
+            )
             incompatible_qos = _warn_of_incompatible_qos(text, topic_name)
         kind = QoSSubscriptionEventType
         return _handlers(
@@ -333,7 +333,9 @@ class EndpointEvents:
         self.callback_group = handlers[0].callback_group
 
     def _take(self) -> list[tuple[EventHandler, Any]] | None:
-        happened = [(handler, data) for handler in self._handlers if (data := handler.take_data()) is not None]
+        happened = [
+            (handler, data) for handler in self._handlers if (data := handler.take_data()) is not None
+        ]
         return happened or None
 
     def _execute(self, taken: list[tuple[EventHandler, Any]]) -> Any:

@@ -49,7 +49,9 @@ class ExternalShutdownException(Exception):
     """Context has been shutdown."""
 
     def __init__(self, *args: object) -> None:
-        super().__init__(*(args or ("the context was shut down from outside: by a signal or another thread",)))
+        super().__init__(
+            *(args or ("the context was shut down from outside: by a signal or another thread",))
+        )
 
 
 class ConditionReachedException(Exception):
@@ -111,6 +113,7 @@ class Executor(AbstractContextManager["Executor"]):
         # The rest is the spinning thread's own, but for the two flags by which others leave word.
         self._entities_changed = True
         self._groups_changed = False
+        self._seen: list[tuple[Node, int]] = []  # the nodes, and the version of their entities, waited for
         self._timers: list[Timer] = []
         self._guards: list[Any] = []
         self._attached: dict[int, tuple[_Entity, int]] = {}  # token -> entity, DDS handle
@@ -219,9 +222,7 @@ class Executor(AbstractContextManager["Executor"]):
         future._call_when_complete(self.wake)
         self._spin_once(timeout_sec, lambda: _complete(future))
 
-    def _spin_once(
-        self, timeout: float | TimeoutObject | None, condition: Callable[[], bool] | None
-    ) -> None:
+    def _spin_once(self, timeout: float | TimeoutObject | None, condition: Callable[[], bool] | None) -> None:
         """Run one callback, unless the time is over or the condition true before one is ready."""
         raise NotImplementedError
 
@@ -292,13 +293,9 @@ class Executor(AbstractContextManager["Executor"]):
         while self._tasks:
             timeout = 0
             self._ready.append((self._tasks.popleft(), 0))
-        for timer in self._timers:
-            remaining = timer._remaining()
-            if remaining <= 0 and self.can_execute(timer):
-                timeout = 0
-                self._ready.append((timer, 0))
-            elif 0 < remaining < timeout:
-                timeout = remaining
+        next_timer = self._collect_timers()
+        if next_timer < timeout:
+            timeout = next_timer
         for guard in self._guards:
             if guard.is_ready() and self.can_execute(guard):
                 timeout = 0
@@ -308,15 +305,35 @@ class Executor(AbstractContextManager["Executor"]):
                 self._guard.take()
             elif token in self._attached:
                 self._ready.append((self._attached[token][0], _MESSAGES_A_TURN - 1))
+        if 0 < next_timer == timeout:
+            self._collect_timers()  # it is time for one of them, unless something else woke us
+
+    def _collect_timers(self) -> int:
+        """Note the timers that are due; return the time [ns] until the next one is, 0 if any is."""
+        wait = INFINITY
+        for timer in self._timers:
+            remaining = timer._remaining()
+            if remaining <= 0:
+                if self.can_execute(timer):
+                    wait = 0
+                    self._ready.append((timer, 0))
+            elif remaining < wait:
+                wait = remaining
+        return wait
 
     # What is waited for
 
     def _update_entities(self) -> None:
         """Bring the wait set up to the entities that the nodes have now."""
         self._entities_changed = False  # first: what changes from now on is seen in the next round
+        nodes = self.get_nodes()
+        seen = [(node, node._entities_version) for node in nodes]
+        if seen == self._seen:
+            return  # rclpy.spin_once() adds and removes its node with every call
+        self._seen = seen
         self._timers, self._guards = [], []
         wanted: dict[int, _Entity] = {}
-        for node in self.get_nodes():
+        for node in nodes:
             self._timers.extend(node.timers)
             self._guards.extend(node.guards)
             for entity in node._waitables():
@@ -401,8 +418,8 @@ class Executor(AbstractContextManager["Executor"]):
         :return: whether they ended within ``timeout_sec`` (``None``: however long it takes).
         """
         if not self._is_shutdown:
-            self._guard.trigger()
             self._is_shutdown = True
+            self._guard.trigger()
         # A callback, or a signal handler, on the spinning thread cannot wait for itself to end.
         if threading.get_ident() != self._spinning_thread:
             with self._idle:
@@ -441,9 +458,7 @@ def _raise_exception_of(task: Task) -> None:
 class SingleThreadedExecutor(Executor):
     """Runs all callbacks on the thread that spins."""
 
-    def _spin_once(
-        self, timeout: float | TimeoutObject | None, condition: Callable[[], bool] | None
-    ) -> None:
+    def _spin_once(self, timeout: float | TimeoutObject | None, condition: Callable[[], bool] | None) -> None:
         self._begin_spin()
         try:
             try:
@@ -472,9 +487,7 @@ class MultiThreadedExecutor(Executor):
         self._pool = ThreadPoolExecutor(threads, thread_name_prefix="rclpy-executor")
         self._errors: deque[BaseException] = deque()
 
-    def _spin_once(
-        self, timeout: float | TimeoutObject | None, condition: Callable[[], bool] | None
-    ) -> None:
+    def _spin_once(self, timeout: float | TimeoutObject | None, condition: Callable[[], bool] | None) -> None:
         self._begin_spin()
         try:
             entity, taken = self._next(

@@ -8,7 +8,6 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from rcl_interfaces.msg import Log, ParameterEvent
-
 from rclpy import _names
 from rclpy._arguments import parse
 from rclpy._endpoint import PublisherEndpoint, ServiceEndpoint, SubscriptionEndpoint
@@ -24,7 +23,7 @@ from rclpy.event_handler import (
     PublisherEventCallbacks,
     SubscriptionEventCallbacks,
 )
-from rclpy.exceptions import InvalidHandle, NoTypeSupportImportedException, NotInitializedException
+from rclpy.exceptions import InvalidHandle, NotInitializedException, NoTypeSupportImportedException
 from rclpy.expand_topic_name import expand_topic_name
 from rclpy.guard_condition import GuardCondition
 from rclpy.impl import _logging_output
@@ -118,7 +117,9 @@ class Node(NodeParameters, NodeGraph):
         namespace = "/" + (namespace or "").lstrip("/")
         validate_namespace(namespace)
         process_arguments = self._context.arguments if use_global_arguments else parse([])
-        own_arguments = parse(["--ros-args", *cli_args] if cli_args and "--ros-args" not in cli_args else cli_args or [])
+        own_arguments = parse(
+            ["--ros-args", *cli_args] if cli_args and "--ros-args" not in cli_args else cli_args or []
+        )
         self._arguments = own_arguments.before(process_arguments)
         self._name, self._namespace = self._arguments.node_name(node_name, namespace)
         self._fully_qualified_name = f"{self._namespace.rstrip('/')}/{self._name}"
@@ -134,6 +135,7 @@ class Node(NodeParameters, NodeGraph):
         self._guards: list[GuardCondition] = []
         self._rates: dict[Rate, Timer] = {}
         self._events: dict[Publisher | Subscription, EndpointEvents] = {}
+        self._entities_version = 0
         self._default_callback_group = MutuallyExclusiveCallbackGroup()
 
         overrides = self._arguments.parameter_overrides(self._fully_qualified_name)
@@ -225,6 +227,7 @@ class Node(NodeParameters, NodeGraph):
             executor._wake_if_waiting()
 
     def _entities_have_changed(self) -> None:
+        self._entities_version += 1
         executor = self.executor
         if executor is not None:
             executor._entities_have_changed()
@@ -410,7 +413,7 @@ class Node(NodeParameters, NodeGraph):
                 raise ValueError("history depth must be greater than or equal to zero")
             profile = QoSProfile(depth=qos_profile)
         else:
-            raise TypeError("Expected QoSProfile or int, but received {!r}".format(type(qos_profile)))
+            raise TypeError(f"Expected QoSProfile or int, but received {type(qos_profile)!r}")
         name = self.resolve_topic_name(topic)
         if overriding is not None:
             _declare_qos_parameters(kind, self, name, profile, overriding)

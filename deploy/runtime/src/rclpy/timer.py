@@ -56,9 +56,7 @@ class Timer:
         self._jump_handle = None
         if clock.clock_type == ClockType.ROS_TIME:
             self._jump_handle = clock.create_jump_callback(
-                JumpThreshold(
-                    min_forward=Duration(nanoseconds=1), min_backward=Duration(nanoseconds=-1)
-                ),
+                JumpThreshold(min_forward=Duration(nanoseconds=1), min_backward=Duration(nanoseconds=-1)),
                 post_callback=self._time_has_jumped,
             )
 

@@ -27,6 +27,8 @@ _NOT_READ = 0x7E  # ANY_STATE without the sample state "read"
 _ALIVE = 16
 _NOT_ALIVE = 3 | 12 | 32 | 64  # any sample and view state, instance disposed or without writers
 _INITIAL_CAPACITY = 64
+# Our own readers below: Cyclone lists them here, but announces them to nobody.
+_BUILTIN = b"org::eclipse::cyclonedds::builtin::"
 
 
 @dataclass(frozen=True)
@@ -103,7 +105,7 @@ class Discovery:
         return _endpoints(self._readers, wanted)
 
 
-def endpoint(found: BuiltinEndpoint) -> Endpoint:
+def _endpoint(found: BuiltinEndpoint) -> Endpoint:
     """A built-in topic's sample as an object of its own."""
     return Endpoint(
         gid=bytes(found.key.bytes),
@@ -117,5 +119,7 @@ def endpoint(found: BuiltinEndpoint) -> Endpoint:
 
 def _endpoints(reader: _BuiltinReader, wanted: Callable[[str], bool]) -> list[Endpoint]:
     return [
-        endpoint(found) for found in reader.alive() if wanted(found.topic_name.decode(errors="replace"))
+        _endpoint(found)
+        for found in reader.alive()
+        if not found.type_name.startswith(_BUILTIN) and wanted(found.topic_name.decode(errors="replace"))
     ]

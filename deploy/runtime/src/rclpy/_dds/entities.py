@@ -83,9 +83,7 @@ class Participant:
         domain.leave(self.domain_id)
 
     def _topic(self, name: str, type_name: str) -> int:
-        descriptor = TopicDescriptor(
-            size=1, align=1, typename=type_name.encode(), nops=2, ops=_OPAQUE
-        )
+        descriptor = TopicDescriptor(size=1, align=1, typename=type_name.encode(), nops=2, ops=_OPAQUE)
         handle = blocking.dds_create_topic(self.handle, ct.byref(descriptor), name.encode(), None, None)
         return checked(handle, f"cannot create topic {name} of type {type_name}")
 

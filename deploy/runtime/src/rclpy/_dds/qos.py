@@ -101,8 +101,8 @@ def user_data_value(data: str, key: str) -> str:
 
 
 def profile_of(qos: int | None) -> QoSProfile:
-    """The ROS profile of a discovered endpoint. History is not announced in discovery: it stays UNKNOWN."""
-    kind, duration = ct.c_int(), library.Duration()
+    """The ROS profile of a discovered endpoint; history is UNKNOWN where its vendor does not announce it."""
+    kind, depth, duration = ct.c_int(), ct.c_int32(), library.Duration()
 
     def nanoseconds(getter: str) -> Duration:
         if not qos or not getattr(quick, getter)(qos, ct.byref(duration)):
@@ -111,6 +111,9 @@ def profile_of(qos: int | None) -> QoSProfile:
 
     reliability, durability = ReliabilityPolicy.BEST_EFFORT, DurabilityPolicy.VOLATILE
     liveliness, lease = LivelinessPolicy.AUTOMATIC, Duration(nanoseconds=INFINITY)
+    history = HistoryPolicy.UNKNOWN
+    if qos and quick.dds_qget_history(qos, ct.byref(kind), ct.byref(depth)):
+        history = HistoryPolicy.KEEP_ALL if kind.value == _KEEP_ALL else HistoryPolicy.KEEP_LAST
     if qos and quick.dds_qget_reliability(qos, ct.byref(kind), ct.byref(duration)):
         reliability = ReliabilityPolicy.RELIABLE if kind.value else ReliabilityPolicy.BEST_EFFORT
     if qos and quick.dds_qget_durability(qos, ct.byref(kind)):
@@ -120,8 +123,8 @@ def profile_of(qos: int | None) -> QoSProfile:
         liveliness = LivelinessPolicy.MANUAL_BY_TOPIC if manual else LivelinessPolicy.AUTOMATIC
         lease = Duration(nanoseconds=duration.value)
     return QoSProfile(
-        history=HistoryPolicy.UNKNOWN,
-        depth=0,
+        history=history,
+        depth=max(0, depth.value),
         reliability=reliability,
         durability=durability,
         lifespan=nanoseconds("dds_qget_lifespan"),

@@ -1,0 +1,340 @@
+"""Executors: what runs, in which order, on which thread, and who wakes whom."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+
+import pytest
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
+from rclpy.clock import Clock, ClockType
+from rclpy.context import Context
+from rclpy.executors import (
+    ExternalShutdownException,
+    MultiThreadedExecutor,
+    SingleThreadedExecutor,
+)
+from rclpy.node import Node
+from rclpy.task import Future
+from std_msgs.msg import Float64
+
+MakeNode = Callable[..., Node]
+SpinUntil = Callable[..., None]
+STEADY = Clock(clock_type=ClockType.STEADY_TIME)
+
+
+def test_a_subscription_gets_what_a_publisher_of_the_same_process_publishes(
+    make_node: MakeNode, executor: SingleThreadedExecutor, spin_until: SpinUntil
+) -> None:
+    node = make_node()
+    executor.add_node(node)
+    received: list[float] = []
+    publisher = node.create_publisher(Float64, "x", 10)
+    node.create_subscription(Float64, "x", lambda message: received.append(message.data), 10)
+    for number in range(5):
+        publisher.publish(Float64(data=float(number)))
+    spin_until(lambda: len(received) == 5)
+    assert received == [0.0, 1.0, 2.0, 3.0, 4.0]
+
+
+def test_spin_once_returns_after_its_timeout_when_nothing_happens(executor: SingleThreadedExecutor) -> None:
+    before = STEADY.now()
+    executor.spin_once(timeout_sec=0.05)
+    assert (STEADY.now() - before).nanoseconds >= 50_000_000
+
+
+def test_spin_once_with_timeout_zero_runs_what_is_ready(
+    make_node: MakeNode, executor: SingleThreadedExecutor
+) -> None:
+    node = make_node()
+    executor.add_node(node)
+    triggered: list[bool] = []
+    node.create_guard_condition(lambda: triggered.append(True)).trigger()
+    executor.spin_once(timeout_sec=0)
+    assert triggered == [True]
+
+
+def test_an_exception_in_a_callback_comes_out_of_spin_once(
+    make_node: MakeNode, executor: SingleThreadedExecutor
+) -> None:
+    node = make_node()
+    executor.add_node(node)
+
+    def fail() -> None:
+        raise ZeroDivisionError("planted")
+
+    node.create_guard_condition(fail).trigger()
+    with pytest.raises(ZeroDivisionError, match="planted"):
+        executor.spin_once(timeout_sec=5)
+
+
+def test_an_exception_in_a_coroutine_callback_comes_out_of_spinning(
+    make_node: MakeNode, executor: SingleThreadedExecutor, spin_until: SpinUntil
+) -> None:
+    node = make_node()
+    executor.add_node(node)
+
+    async def fail() -> None:
+        raise ZeroDivisionError("planted")
+
+    node.create_guard_condition(fail).trigger()
+    with pytest.raises(ZeroDivisionError, match="planted"):
+        spin_until(lambda: False)
+
+
+def test_a_callback_may_await_a_future_that_another_callback_completes(
+    make_node: MakeNode, executor: SingleThreadedExecutor, spin_until: SpinUntil
+) -> None:
+    node = make_node()
+    executor.add_node(node)
+    future: Future = Future()
+    results: list[int] = []
+
+    async def wait() -> None:
+        results.append(await future)
+
+    node.create_guard_condition(wait).trigger()
+    # The waiting coroutine holds the default group: what completes it needs one of its own.
+    other = MutuallyExclusiveCallbackGroup()
+    node.create_timer(0.02, lambda: future.done() or future.set_result(42), other)
+    spin_until(lambda: results)
+    assert results == [42]
+
+
+def test_while_a_coroutine_holds_its_group_nothing_else_of_the_group_runs(
+    make_node: MakeNode, executor: SingleThreadedExecutor, spin_until: SpinUntil
+) -> None:
+    node = make_node()
+    executor.add_node(node)
+    future: Future = Future()
+    events: list[str] = []
+
+    async def wait() -> None:
+        events.append("begin")
+        await future
+        events.append("end")
+
+    node.create_subscription(Float64, "x", lambda message: events.append("message"), 10)
+    publisher = node.create_publisher(Float64, "x", 10)
+    node.create_guard_condition(wait).trigger()
+    spin_until(lambda: events == ["begin"])
+    publisher.publish(Float64())
+    ticks: list[bool] = []
+    node.create_timer(0.01, lambda: ticks.append(True), ReentrantCallbackGroup())
+    spin_until(lambda: len(ticks) >= 3)
+    assert events == ["begin"]
+    future.set_result(None)
+    spin_until(lambda: len(events) == 3)
+    assert events == ["begin", "end", "message"]
+
+
+def test_a_task_runs_and_its_future_gets_the_result(executor: SingleThreadedExecutor) -> None:
+    task = executor.create_task(lambda left, right: left + right, 20, 22)
+    executor.spin_until_future_complete(task, timeout_sec=5)
+    assert task.result() == 42
+
+
+def test_a_future_completed_on_another_thread_ends_spinning_at_once(
+    executor: SingleThreadedExecutor,
+) -> None:
+    future: Future = Future()
+    threading.Timer(0.05, lambda: future.set_result("done")).start()
+    before = STEADY.now()
+    executor.spin_until_future_complete(future, timeout_sec=20)
+    assert future.result() == "done"
+    assert (STEADY.now() - before).nanoseconds < 10_000_000_000
+
+
+def test_spin_until_future_complete_gives_up_after_its_timeout(executor: SingleThreadedExecutor) -> None:
+    future: Future = Future()
+    executor.spin_until_future_complete(future, timeout_sec=0.05)
+    assert not future.done()
+
+
+def test_an_entity_created_on_another_thread_while_the_executor_waits_is_seen_at_once(
+    make_node: MakeNode, executor: SingleThreadedExecutor
+) -> None:
+    node = make_node()
+    executor.add_node(node)
+    called = threading.Event()
+    spinning = threading.Thread(target=executor.spin_once)  # waits for ever: nothing is there yet
+    spinning.start()
+    node.create_timer(0.0, called.set)
+    spinning.join(10)
+    assert called.is_set()
+
+
+def test_a_subscription_destroyed_in_its_own_callback_is_not_called_again(
+    make_node: MakeNode, executor: SingleThreadedExecutor, spin_until: SpinUntil
+) -> None:
+    node = make_node()
+    executor.add_node(node)
+    received: list[float] = []
+
+    def once(message: Float64) -> None:
+        received.append(message.data)
+        node.destroy_subscription(subscription)
+
+    subscription = node.create_subscription(Float64, "x", once, 10)
+    publisher = node.create_publisher(Float64, "x", 10)
+    for number in range(3):
+        publisher.publish(Float64(data=float(number)))
+    spin_until(lambda: received)
+    ticks: list[bool] = []
+    node.create_timer(0.01, lambda: ticks.append(True))
+    spin_until(lambda: len(ticks) >= 3)
+    assert received == [0.0]
+
+
+def test_a_flooded_subscription_does_not_starve_a_timer(
+    make_node: MakeNode, executor: SingleThreadedExecutor, spin_until: SpinUntil
+) -> None:
+    node = make_node()
+    executor.add_node(node)
+    publisher = node.create_publisher(Float64, "x", 10)
+    received = 0
+
+    def feed_itself(message: Float64) -> None:
+        nonlocal received
+        received += 1
+        publisher.publish(message)  # there is always a next message
+
+    node.create_subscription(Float64, "x", feed_itself, 10)
+    ticks: list[int] = []
+    node.create_timer(0.001, lambda: ticks.append(received))
+    publisher.publish(Float64())
+    spin_until(lambda: len(ticks) >= 20)
+    assert received > len(ticks)
+
+
+def test_shutting_the_context_down_on_another_thread_ends_spinning_with_external_shutdown(
+    context: Context, executor: SingleThreadedExecutor
+) -> None:
+    threading.Timer(0.05, context.shutdown).start()
+    with pytest.raises(ExternalShutdownException):
+        executor.spin_once()
+
+
+def test_shutting_the_executor_down_on_another_thread_ends_spinning(
+    executor: SingleThreadedExecutor,
+) -> None:
+    threading.Timer(0.05, executor.shutdown).start()
+    executor.spin()
+
+
+def test_a_callback_may_shut_its_executor_down(
+    make_node: MakeNode, context: Context, executor: SingleThreadedExecutor
+) -> None:
+    node = make_node()
+    executor.add_node(node)
+    node.create_guard_condition(lambda: executor.shutdown()).trigger()
+    executor.spin()
+    assert executor.get_nodes() == []
+
+
+def test_a_node_moves_to_the_executor_that_it_is_added_to_last(
+    make_node: MakeNode, context: Context, executor: SingleThreadedExecutor
+) -> None:
+    node = make_node()
+    with SingleThreadedExecutor(context=context) as other:
+        assert executor.add_node(node)
+        assert not executor.add_node(node)
+        other.add_node(node)
+        assert executor.get_nodes() == []
+        assert node.executor is other
+    assert node.executor is None
+
+
+def test_a_reentrant_group_lets_callbacks_overlap_on_a_multi_threaded_executor(
+    make_node: MakeNode, context: Context
+) -> None:
+    node = make_node()
+    meeting = threading.Barrier(2)
+    group = ReentrantCallbackGroup()
+    first = node.create_guard_condition(lambda: meeting.wait(10), group)
+    second = node.create_guard_condition(lambda: meeting.wait(10), group)
+    with MultiThreadedExecutor(2, context=context) as executor:
+        executor.add_node(node)
+        first.trigger()
+        second.trigger()
+        executor.spin_once(timeout_sec=5)
+        executor.spin_once(timeout_sec=5)
+        executor.shutdown()
+    assert not meeting.broken
+
+
+def test_a_mutually_exclusive_group_never_overlaps_on_a_multi_threaded_executor(
+    make_node: MakeNode, context: Context
+) -> None:
+    node = make_node()
+    running = threading.Lock()
+    calls: list[bool] = []
+    done: Future = Future()
+
+    def callback(message: Float64) -> None:
+        calls.append(running.acquire(blocking=False))
+        running.release()
+        if len(calls) == 200:
+            done.set_result(None)
+
+    for _ in range(4):
+        node.create_subscription(Float64, "x", callback, 100)
+    publisher = node.create_publisher(Float64, "x", 100)
+    for _ in range(50):
+        publisher.publish(Float64())
+    with MultiThreadedExecutor(4, context=context) as executor:
+        executor.add_node(node)
+        executor.spin_until_future_complete(done, timeout_sec=20)
+    assert calls == [True] * 200
+
+
+def test_an_exception_on_a_pool_thread_comes_out_of_spinning(make_node: MakeNode, context: Context) -> None:
+    node = make_node()
+
+    def fail() -> None:
+        raise ZeroDivisionError("planted")
+
+    node.create_guard_condition(fail).trigger()
+    with MultiThreadedExecutor(2, context=context) as executor:
+        executor.add_node(node)
+        with pytest.raises(ZeroDivisionError, match="planted"):
+            executor.spin()
+
+
+def test_a_thousand_entities_come_and_go_under_traffic_and_nothing_is_left(
+    make_node: MakeNode, context: Context, executor: SingleThreadedExecutor
+) -> None:
+    node = make_node()
+    executor.add_node(node)
+    publisher = node.create_publisher(Float64, "x", 10)
+    spinning = threading.Thread(target=executor.spin)
+    spinning.start()
+    before = threading.active_count()
+    failures: list[BaseException] = []
+
+    def churn() -> None:
+        try:
+            for _ in range(125):
+                subscription = node.create_subscription(Float64, "x", lambda message: None, 10)
+                timer = node.create_timer(0.001, lambda: None)
+                publisher.publish(Float64())
+                extra = node.create_publisher(Float64, "y", 10)
+                node.destroy_timer(timer)
+                node.destroy_subscription(subscription)
+                node.destroy_publisher(extra)
+        except BaseException as error:
+            failures.append(error)
+
+    threads = [threading.Thread(target=churn) for _ in range(8)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    executor.shutdown()
+    spinning.join(10)
+    assert not failures
+    assert list(node.subscriptions) == []
+    assert list(node.timers) == []
+    assert node.count_subscribers("x") == 0
+    assert node.count_publishers("y") == 0
+    assert threading.active_count() <= before
