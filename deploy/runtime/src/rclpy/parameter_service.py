@@ -45,7 +45,7 @@ class ParameterService:
         self, request: DescribeParameters.Request, response: DescribeParameters.Response
     ) -> DescribeParameters.Response:
         try:
-            response.descriptors = self._node().describe_parameters(list(request.names))
+            response.descriptors = self._get_node().describe_parameters(list(request.names))
         except ParameterNotDeclaredException:
             # All or nothing: with some missing, the others could not be told apart.
             response.descriptors = []
@@ -55,7 +55,7 @@ class ParameterService:
         self, request: GetParameters.Request, response: GetParameters.Response
     ) -> GetParameters.Response:
         try:
-            parameters = self._node().get_parameters(list(request.names))
+            parameters = self._get_node().get_parameters(list(request.names))
         except (ParameterNotDeclaredException, ParameterUninitializedException):
             parameters = []
         response.values = [parameter.get_parameter_value() for parameter in parameters]
@@ -65,7 +65,7 @@ class ParameterService:
         self, request: GetParameterTypes.Request, response: GetParameterTypes.Response
     ) -> GetParameterTypes.Response:
         try:
-            types: list[Any] = list(self._node().get_parameter_types(list(request.names)))
+            types: list[Any] = list(self._get_node().get_parameter_types(list(request.names)))
         except ParameterNotDeclaredException:
             types = []
         # An undeclared parameter has an enumeration's member as its type, all others a number.
@@ -76,7 +76,7 @@ class ParameterService:
         self, request: ListParameters.Request, response: ListParameters.Response
     ) -> ListParameters.Response:
         try:
-            response.result = self._node().list_parameters(list(request.prefixes), request.depth)
+            response.result = self._get_node().list_parameters(list(request.prefixes), request.depth)
         except (TypeError, ValueError):
             response.result = ListParametersResult()
         return response
@@ -101,11 +101,11 @@ class ParameterService:
             # A type that is none.
             return SetParametersResult(successful=False, reason=str(error))
         try:
-            return self._node().set_parameters_atomically(parameters)
+            return self._get_node().set_parameters_atomically(parameters)
         except ParameterNotDeclaredException as error:
             return SetParametersResult(successful=False, reason=str(error))
 
-    def _node(self) -> Node:
+    def _get_node(self) -> Node:
         node = self._node_weak_ref()
         if node is None:
             raise ReferenceError("Expected valid node weak reference")

@@ -117,7 +117,7 @@ def _declare_qos_parameters(
         name = f"{prefix}.{policy}"
         descriptor = ParameterDescriptor(description=f"{policy} {owner}", read_only=True)
         try:
-            value = node.declare_parameter(name, _to_parameter(qos, policy), descriptor).value
+            value = node.declare_parameter(name, _get_qos_policy_parameter(qos, kind), descriptor).value
         except ParameterAlreadyDeclaredException:
             value = node.get_parameter(name).value
         setattr(qos, policy, _from_parameter(kind, value))
@@ -138,9 +138,9 @@ def _entity_name(entity_type: type[Publisher] | type[Subscription]) -> str:
     raise TypeError("Argument `entity_type` should be a subclass of Publisher or Subscription")
 
 
-def _to_parameter(qos: QoSProfile, policy: str) -> str | int | bool:
+def _get_qos_policy_parameter(qos: QoSProfile, policy: QoSPolicyKind) -> str | int | bool:
     """Return a policy's value as its parameter has it: enumerations by name, durations in nanoseconds."""
-    value = getattr(qos, policy)
+    value = getattr(qos, policy.name.lower())
     if isinstance(value, QoSPolicyEnum):
         if value.short_key == "unknown":
             raise ValueError("User provided QoS profile is invalid")
@@ -154,7 +154,7 @@ def _to_parameter(qos: QoSProfile, policy: str) -> str | int | bool:
 def _from_parameter(
     kind: QoSPolicyKind, value: str | int | bool
 ) -> QoSPolicyEnum | Duration | int | bool | str:
-    """Undo `_to_parameter`."""
+    """Undo `_get_qos_policy_parameter`."""
     if kind in _ENUMS:
         try:
             return _ENUMS[kind][str(value).upper()]

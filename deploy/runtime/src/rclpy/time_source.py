@@ -81,7 +81,7 @@ class TimeSource:
 
     def detach_node(self) -> None:
         """Follow the node no longer."""
-        node = self._node()
+        node = self._get_node()
         self._unsubscribe()
         if node is not None:
             node.remove_on_set_parameters_callback(self._check)
@@ -105,7 +105,7 @@ class TimeSource:
         try:
             time = Time.from_msg(msg.clock)
         except ValueError as error:
-            if node := self._node():
+            if node := self._get_node():
                 node.get_logger().warning(f"dropped a message on {CLOCK_TOPIC}: {error}", once=True)
             return
         # Clocks that are attached later start with it.
@@ -114,7 +114,7 @@ class TimeSource:
             clock.set_ros_time_override(time)
 
     def _subscribe(self) -> None:
-        node = self._node()
+        node = self._get_node()
         if node is None or self._clock_sub is not None:
             return
         from rosgraph_msgs.msg import Clock
@@ -129,7 +129,7 @@ class TimeSource:
         )
 
     def _unsubscribe(self) -> None:
-        node = self._node()
+        node = self._get_node()
         if node is not None and self._clock_sub is not None:
             node.destroy_subscription(self._clock_sub)
         self._clock_sub = None
@@ -139,7 +139,7 @@ class TimeSource:
         for parameter in parameters:
             if parameter.name == USE_SIM_TIME_NAME and parameter.type_ is not Parameter.Type.BOOL:
                 reason = f"{USE_SIM_TIME_NAME} parameter set to something besides a bool"
-                if node := self._node():
+                if node := self._get_node():
                     node.get_logger().error(reason)
                 return SetParametersResult(successful=False, reason=reason)
         return SetParametersResult(successful=True)
@@ -150,5 +150,5 @@ class TimeSource:
             if parameter.name == USE_SIM_TIME_NAME:
                 self.ros_time_is_active = parameter.value
 
-    def _node(self) -> Node | None:
+    def _get_node(self) -> Node | None:
         return None if self._node_weak_ref is None else self._node_weak_ref()

@@ -44,7 +44,8 @@ class _Filters:
         self.severity = severity
         self.name = name
         self.options = options
-        self._last: int | None = None
+        # As in rclpy, a clock that begins at zero has just logged.
+        self._last = 0 if options.get("throttle_time_source_type") else -sys.maxsize
         self._skipped = False
         self._logged = False
         clock = options.get("throttle_time_source_type")
@@ -76,7 +77,7 @@ class _Filters:
             clock = options.get("throttle_time_source_type")
             # Steady by default: setting the wall clock neither opens nor closes the valve.
             now = time.monotonic_ns() if clock is None else clock.now().nanoseconds
-            if self._last is not None and now < self._last + duration * 1e9:
+            if now < self._last + duration * 1e9:
                 return False
             self._last = now
         if options.get("skip_first") and not self._skipped:
