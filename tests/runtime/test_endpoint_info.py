@@ -10,8 +10,11 @@ from rclpy.exceptions import NoTypeSupportImportedException
 from rclpy.qos import QoSPresetProfiles, QoSProfile
 from rclpy.serialization import deserialize_message, serialize_message
 from rclpy.topic_endpoint_info import TopicEndpointInfo, TopicEndpointTypeEnum
+from rclpy.topic_or_service_is_hidden import topic_or_service_is_hidden
 from rclpy.type_hash import TypeHash
+from rclpy.type_support import check_for_type_support, check_is_valid_msg_type, check_is_valid_srv_type
 from std_msgs.msg import Float64, String
+from std_srvs.srv import Trigger
 
 HASH = "RIHS01_" + "0123456789abcdef" * 4
 
@@ -103,3 +106,25 @@ def test_what_is_no_message_does_not_become_bytes() -> None:
         serialize_message("hello")
     with pytest.raises(NoTypeSupportImportedException):
         deserialize_message(b"", str)
+
+
+def test_a_type_is_one_of_messages_or_of_services() -> None:
+    check_is_valid_msg_type(String)
+    check_is_valid_srv_type(Trigger)
+    for check in (check_for_type_support, check_is_valid_msg_type, check_is_valid_srv_type):
+        with pytest.raises(NoTypeSupportImportedException):
+            check(str)
+    with pytest.raises(RuntimeError, match="might be a service"):
+        check_is_valid_msg_type(Trigger)
+    with pytest.raises(RuntimeError, match="might be a message"):
+        check_is_valid_srv_type(String)
+    with pytest.raises(RuntimeError, match="might be a service"):
+        deserialize_message(b"", Trigger)
+
+
+@pytest.mark.parametrize(
+    ("name", "hidden"),
+    [("/chatter", False), ("/a/_b/c", True), ("_a", True), ("/a_b/c_", False), ("", False)],
+)
+def test_a_name_with_a_token_that_begins_with_an_underscore_is_hidden(name: str, hidden: bool) -> None:
+    assert topic_or_service_is_hidden(name) is hidden

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, TypeVar
 
-from rclpy.exceptions import NoTypeSupportImportedException
+from rclpy.type_support import check_is_valid_msg_type
 
 _Message = TypeVar("_Message")
 
@@ -16,10 +16,9 @@ def serialize_message(message: Any) -> bytes:
     :raises NoTypeSupportImportedException: if it is no message.
     :raises TypeError, ValueError: if a field has a value that it cannot have.
     """
-    serialize = getattr(type(message), "_serialize", None)
-    if serialize is None:
-        raise NoTypeSupportImportedException
-    data: bytes = serialize(message)
+    message_type: Any = type(message)
+    check_is_valid_msg_type(message_type)
+    data: bytes = message_type._serialize(message)
     return data
 
 
@@ -27,11 +26,11 @@ def deserialize_message(serialized_message: bytes, message_type: type[_Message])
     """
     Return the message that `serialize_message` turned into these bytes.
 
-    :raises NoTypeSupportImportedException: if `message_type` is no message type.
+    :raises NoTypeSupportImportedException: if `message_type` is no type of messages or services.
+    :raises RuntimeError: if it is a type of services.
     :raises ValueError: if the bytes are no message of that type.
     """
-    deserialize = getattr(message_type, "_deserialize", None)
-    if deserialize is None:
-        raise NoTypeSupportImportedException
-    message: _Message = deserialize(serialized_message)
+    type_: Any = message_type
+    check_is_valid_msg_type(type_)
+    message: _Message = type_._deserialize(serialized_message)
     return message

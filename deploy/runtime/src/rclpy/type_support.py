@@ -1,0 +1,45 @@
+"""Checks that a class is what a topic or service needs as its type."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rclpy.exceptions import NoTypeSupportImportedException
+
+
+def check_for_type_support(msg_or_srv_type: Any) -> None:
+    """
+    Check that a class is a message or service type.
+
+    :raises NoTypeSupportImportedException: if it is none.
+    """
+    if not hasattr(msg_or_srv_type, "_TYPE_NAME"):
+        raise NoTypeSupportImportedException
+
+
+def check_is_valid_msg_type(msg_type: Any) -> None:
+    """
+    Check that a class is a message type.
+
+    :raises NoTypeSupportImportedException: if it is no type at all.
+    :raises RuntimeError: if it is a service type.
+    """
+    check_for_type_support(msg_type)
+    if not hasattr(msg_type, "_serialize"):
+        raise RuntimeError(
+            f"The message type provided is not valid ({msg_type}), this might be a service or action"
+        )
+
+
+def check_is_valid_srv_type(srv_type: Any) -> None:
+    """
+    Check that a class is a service type.
+
+    :raises NoTypeSupportImportedException: if it is no type at all.
+    :raises RuntimeError: if it is a message type.
+    """
+    check_for_type_support(srv_type)
+    if not hasattr(srv_type, "Request"):
+        raise RuntimeError(
+            f"The service type provided is not valid ({srv_type}), this might be a message or action"
+        )
