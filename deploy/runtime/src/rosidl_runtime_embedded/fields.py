@@ -10,6 +10,7 @@ from __future__ import annotations
 from array import array
 from math import isinf
 from operator import attrgetter
+from reprlib import Repr
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -43,6 +44,15 @@ _ZEROS: dict[str, Any] = {
     "string": "",
     "wstring": "",
 }
+
+
+_repr = Repr()
+_repr.maxstring = _repr.maxother = 100
+
+
+def shown(value: object) -> str:
+    """A value in the single line of an error, however great it is."""
+    return " ".join(_repr.repr(value).split())
 
 
 def is_numeric(field: Field) -> bool:
@@ -104,7 +114,7 @@ def numeric_field(type_name: str, field: Field) -> property:
         except (TypeError, ValueError, OverflowError) as error:
             kind = TypeError if isinstance(error, TypeError) else ValueError
             raise kind(
-                f"{type_name}: field '{field.name}' must be {type_}, not {value!r:.100}: {error}"
+                f"{type_name}: field '{field.name}' must be {type_}, not {shown(value)}: {error}"
             ) from None
         setattr(self, slot, numbers)
 

@@ -75,7 +75,7 @@ def _make_type_hash(cls: type[Message]) -> str:
 class Message:
     """Base of all message classes.
 
-    As in rclpy of Jazzy by default, fields are checked when a message is serialized, that is at publish. Arrays
+    As in rclpy of Jazzy by default, fields are checked when a message is serialized: at publish. Arrays
     and sequences of numbers are checked when they are assigned, since they are converted then.
     """
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar, NoReturn
+from typing import TYPE_CHECKING, ClassVar
 
 from .packages import message_class
 
@@ -30,7 +30,7 @@ class Service:
     _TYPE_HASH: ClassVar[str] = _TypeHash()  # type: ignore[assignment]
     """``RIHS01_…``"""
 
-    def __init__(self) -> NoReturn:
+    def __init__(self) -> None:
         raise NotImplementedError("Service classes can not be instantiated")
 
 

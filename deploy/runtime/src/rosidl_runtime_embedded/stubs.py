@@ -41,7 +41,7 @@ def stub(package: str, kind: str) -> str:
             continue
         service = service_definition(f"{package}/srv/{name}")
         classes += map(_message, (service.request, service.response, service.event))
-        parts = (f"    {part} = {name}_{part}" for part in ("Request", "Response", "Event"))
+        parts = (f"    {part}: TypeAlias = {name}_{part}" for part in ("Request", "Response", "Event"))
         classes.append("\n".join([f"class {name}(Service):", *parts]))
     if not classes:
         return ""
@@ -54,12 +54,15 @@ def _imports(body: str, module: str) -> list[str]:
     standard = {
         "array[": "from array import array",
         "Iterable[": "from collections.abc import Iterable",
-        ": Final": "from typing import Final",
     }
+    typing = [name for name in ("Final", "TypeAlias") if f": {name} =" in body]
     others = sorted({other for other in re.findall(r"\b(\w+\.msg)\.", body) if other != module})
     bases = ", ".join(base for base in ("Message", "Service") if f"({base})" in body)
+    imports = [line for use, line in standard.items() if use in body]
+    if typing:
+        imports.append(f"from typing import {', '.join(typing)}")
     sections = [
-        [line for use, line in standard.items() if use in body],
+        imports,
         ["import numpy", "from numpy.typing import NDArray"] if "NDArray[" in body else [],
         [*(f"import {other}" for other in others), f"from rosidl_runtime_embedded import {bases}"],
     ]

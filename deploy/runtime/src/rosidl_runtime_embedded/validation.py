@@ -8,7 +8,7 @@ from struct import Struct
 from typing import TYPE_CHECKING, Any
 
 from .definition import integer_range
-from .fields import is_numeric
+from .fields import is_numeric, shown
 from .packages import message_class
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 def validate(message: object, cls: type[Message]) -> None:
     """Raise TypeError or ValueError, naming type, field and value, if it is no valid message of the class."""
     if not isinstance(message, cls):
-        raise TypeError(f"a {cls._TYPE_NAME} is expected, not {message!r:.100}")
+        raise TypeError(f"a {cls._TYPE_NAME} is expected, not {shown(message)}")
     _message(message, cls, cls._TYPE_NAME, "")
 
 
@@ -43,7 +43,7 @@ def _message(message: Message, cls: type[Message], top: str, path: str) -> None:
 def _wrong(
     kind: type[Exception], top: str, where: str, type_: FieldType, value: object, reason: str = ""
 ) -> Exception:
-    return kind(f"{top}: field '{where}' must be {type_}, not {value!r:.100}{reason and ': ' + reason}")
+    return kind(f"{top}: field '{where}' must be {type_}, not {shown(value)}{reason and ': ' + reason}")
 
 
 def _list(value: Any, type_: FieldType, top: str, where: str) -> None:
@@ -78,7 +78,7 @@ def _single(value: Any, type_: FieldType, top: str, where: str) -> None:
             raise _wrong(TypeError, top, where, type_, value)
         if base == "float":
             try:
-                Struct("f").pack(value)
+                Struct("<f").pack(value)
             except OverflowError:
                 raise _wrong(ValueError, top, where, type_, value, "it is out of range") from None
     else:

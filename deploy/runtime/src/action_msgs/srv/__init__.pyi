@@ -1,6 +1,6 @@
 """Services of action_msgs. Made by rosidl_runtime_embedded.stubs."""
 
-from typing import Final
+from typing import Final, TypeAlias
 
 import action_msgs.msg
 import service_msgs.msg
@@ -41,6 +41,6 @@ class CancelGoal_Event(Message):
     ) -> None: ...
 
 class CancelGoal(Service):
-    Request = CancelGoal_Request
-    Response = CancelGoal_Response
-    Event = CancelGoal_Event
+    Request: TypeAlias = CancelGoal_Request
+    Response: TypeAlias = CancelGoal_Response
+    Event: TypeAlias = CancelGoal_Event

@@ -2,6 +2,7 @@
 
 from array import array
 from collections.abc import Iterable
+from typing import TypeAlias
 
 import rcl_interfaces.msg
 import service_msgs.msg
@@ -36,9 +37,9 @@ class ListNodes_Event(Message):
     ) -> None: ...
 
 class ListNodes(Service):
-    Request = ListNodes_Request
-    Response = ListNodes_Response
-    Event = ListNodes_Event
+    Request: TypeAlias = ListNodes_Request
+    Response: TypeAlias = ListNodes_Response
+    Event: TypeAlias = ListNodes_Event
 
 class LoadNode_Request(Message):
     package_name: str
@@ -89,9 +90,9 @@ class LoadNode_Event(Message):
     ) -> None: ...
 
 class LoadNode(Service):
-    Request = LoadNode_Request
-    Response = LoadNode_Response
-    Event = LoadNode_Event
+    Request: TypeAlias = LoadNode_Request
+    Response: TypeAlias = LoadNode_Response
+    Event: TypeAlias = LoadNode_Event
 
 class UnloadNode_Request(Message):
     unique_id: int
@@ -124,6 +125,6 @@ class UnloadNode_Event(Message):
     ) -> None: ...
 
 class UnloadNode(Service):
-    Request = UnloadNode_Request
-    Response = UnloadNode_Response
-    Event = UnloadNode_Event
+    Request: TypeAlias = UnloadNode_Request
+    Response: TypeAlias = UnloadNode_Response
+    Event: TypeAlias = UnloadNode_Event

@@ -1,5 +1,7 @@
 """Services of diagnostic_msgs. Made by rosidl_runtime_embedded.stubs."""
 
+from typing import TypeAlias
+
 import diagnostic_msgs.msg
 import service_msgs.msg
 from rosidl_runtime_embedded import Message, Service
@@ -35,9 +37,9 @@ class AddDiagnostics_Event(Message):
     ) -> None: ...
 
 class AddDiagnostics(Service):
-    Request = AddDiagnostics_Request
-    Response = AddDiagnostics_Response
-    Event = AddDiagnostics_Event
+    Request: TypeAlias = AddDiagnostics_Request
+    Response: TypeAlias = AddDiagnostics_Response
+    Event: TypeAlias = AddDiagnostics_Event
 
 class SelfTest_Request(Message):
     def __init__(self) -> None: ...
@@ -67,6 +69,6 @@ class SelfTest_Event(Message):
     ) -> None: ...
 
 class SelfTest(Service):
-    Request = SelfTest_Request
-    Response = SelfTest_Response
-    Event = SelfTest_Event
+    Request: TypeAlias = SelfTest_Request
+    Response: TypeAlias = SelfTest_Response
+    Event: TypeAlias = SelfTest_Event

@@ -1,5 +1,7 @@
 """Services of lifecycle_msgs. Made by rosidl_runtime_embedded.stubs."""
 
+from typing import TypeAlias
+
 import lifecycle_msgs.msg
 import service_msgs.msg
 from rosidl_runtime_embedded import Message, Service
@@ -33,9 +35,9 @@ class ChangeState_Event(Message):
     ) -> None: ...
 
 class ChangeState(Service):
-    Request = ChangeState_Request
-    Response = ChangeState_Response
-    Event = ChangeState_Event
+    Request: TypeAlias = ChangeState_Request
+    Response: TypeAlias = ChangeState_Response
+    Event: TypeAlias = ChangeState_Event
 
 class GetAvailableStates_Request(Message):
     def __init__(self) -> None: ...
@@ -61,9 +63,9 @@ class GetAvailableStates_Event(Message):
     ) -> None: ...
 
 class GetAvailableStates(Service):
-    Request = GetAvailableStates_Request
-    Response = GetAvailableStates_Response
-    Event = GetAvailableStates_Event
+    Request: TypeAlias = GetAvailableStates_Request
+    Response: TypeAlias = GetAvailableStates_Response
+    Event: TypeAlias = GetAvailableStates_Event
 
 class GetAvailableTransitions_Request(Message):
     def __init__(self) -> None: ...
@@ -89,9 +91,9 @@ class GetAvailableTransitions_Event(Message):
     ) -> None: ...
 
 class GetAvailableTransitions(Service):
-    Request = GetAvailableTransitions_Request
-    Response = GetAvailableTransitions_Response
-    Event = GetAvailableTransitions_Event
+    Request: TypeAlias = GetAvailableTransitions_Request
+    Response: TypeAlias = GetAvailableTransitions_Response
+    Event: TypeAlias = GetAvailableTransitions_Event
 
 class GetState_Request(Message):
     def __init__(self) -> None: ...
@@ -117,6 +119,6 @@ class GetState_Event(Message):
     ) -> None: ...
 
 class GetState(Service):
-    Request = GetState_Request
-    Response = GetState_Response
-    Event = GetState_Event
+    Request: TypeAlias = GetState_Request
+    Response: TypeAlias = GetState_Response
+    Event: TypeAlias = GetState_Event

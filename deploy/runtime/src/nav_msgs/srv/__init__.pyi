@@ -1,6 +1,6 @@
 """Services of nav_msgs. Made by rosidl_runtime_embedded.stubs."""
 
-from typing import Final
+from typing import Final, TypeAlias
 
 import geometry_msgs.msg
 import nav_msgs.msg
@@ -31,9 +31,9 @@ class GetMap_Event(Message):
     ) -> None: ...
 
 class GetMap(Service):
-    Request = GetMap_Request
-    Response = GetMap_Response
-    Event = GetMap_Event
+    Request: TypeAlias = GetMap_Request
+    Response: TypeAlias = GetMap_Response
+    Event: TypeAlias = GetMap_Event
 
 class GetPlan_Request(Message):
     start: geometry_msgs.msg.PoseStamped
@@ -68,9 +68,9 @@ class GetPlan_Event(Message):
     ) -> None: ...
 
 class GetPlan(Service):
-    Request = GetPlan_Request
-    Response = GetPlan_Response
-    Event = GetPlan_Event
+    Request: TypeAlias = GetPlan_Request
+    Response: TypeAlias = GetPlan_Response
+    Event: TypeAlias = GetPlan_Event
 
 class LoadMap_Request(Message):
     map_url: str
@@ -108,9 +108,9 @@ class LoadMap_Event(Message):
     ) -> None: ...
 
 class LoadMap(Service):
-    Request = LoadMap_Request
-    Response = LoadMap_Response
-    Event = LoadMap_Event
+    Request: TypeAlias = LoadMap_Request
+    Response: TypeAlias = LoadMap_Response
+    Event: TypeAlias = LoadMap_Event
 
 class SetMap_Request(Message):
     map: nav_msgs.msg.OccupancyGrid
@@ -143,6 +143,6 @@ class SetMap_Event(Message):
     ) -> None: ...
 
 class SetMap(Service):
-    Request = SetMap_Request
-    Response = SetMap_Response
-    Event = SetMap_Event
+    Request: TypeAlias = SetMap_Request
+    Response: TypeAlias = SetMap_Response
+    Event: TypeAlias = SetMap_Event

@@ -2,7 +2,7 @@
 
 from array import array
 from collections.abc import Iterable
-from typing import Final
+from typing import Final, TypeAlias
 
 import rcl_interfaces.msg
 import service_msgs.msg
@@ -37,9 +37,9 @@ class DescribeParameters_Event(Message):
     ) -> None: ...
 
 class DescribeParameters(Service):
-    Request = DescribeParameters_Request
-    Response = DescribeParameters_Response
-    Event = DescribeParameters_Event
+    Request: TypeAlias = DescribeParameters_Request
+    Response: TypeAlias = DescribeParameters_Response
+    Event: TypeAlias = DescribeParameters_Event
 
 class GetLoggerLevels_Request(Message):
     names: list[str]
@@ -70,9 +70,9 @@ class GetLoggerLevels_Event(Message):
     ) -> None: ...
 
 class GetLoggerLevels(Service):
-    Request = GetLoggerLevels_Request
-    Response = GetLoggerLevels_Response
-    Event = GetLoggerLevels_Event
+    Request: TypeAlias = GetLoggerLevels_Request
+    Response: TypeAlias = GetLoggerLevels_Response
+    Event: TypeAlias = GetLoggerLevels_Event
 
 class GetParameterTypes_Request(Message):
     names: list[str]
@@ -106,9 +106,9 @@ class GetParameterTypes_Event(Message):
     ) -> None: ...
 
 class GetParameterTypes(Service):
-    Request = GetParameterTypes_Request
-    Response = GetParameterTypes_Response
-    Event = GetParameterTypes_Event
+    Request: TypeAlias = GetParameterTypes_Request
+    Response: TypeAlias = GetParameterTypes_Response
+    Event: TypeAlias = GetParameterTypes_Event
 
 class GetParameters_Request(Message):
     names: list[str]
@@ -139,9 +139,9 @@ class GetParameters_Event(Message):
     ) -> None: ...
 
 class GetParameters(Service):
-    Request = GetParameters_Request
-    Response = GetParameters_Response
-    Event = GetParameters_Event
+    Request: TypeAlias = GetParameters_Request
+    Response: TypeAlias = GetParameters_Response
+    Event: TypeAlias = GetParameters_Event
 
 class ListParameters_Request(Message):
     prefixes: list[str]
@@ -175,9 +175,9 @@ class ListParameters_Event(Message):
     ) -> None: ...
 
 class ListParameters(Service):
-    Request = ListParameters_Request
-    Response = ListParameters_Response
-    Event = ListParameters_Event
+    Request: TypeAlias = ListParameters_Request
+    Response: TypeAlias = ListParameters_Response
+    Event: TypeAlias = ListParameters_Event
 
 class SetLoggerLevels_Request(Message):
     levels: list[rcl_interfaces.msg.LoggerLevel]
@@ -208,9 +208,9 @@ class SetLoggerLevels_Event(Message):
     ) -> None: ...
 
 class SetLoggerLevels(Service):
-    Request = SetLoggerLevels_Request
-    Response = SetLoggerLevels_Response
-    Event = SetLoggerLevels_Event
+    Request: TypeAlias = SetLoggerLevels_Request
+    Response: TypeAlias = SetLoggerLevels_Response
+    Event: TypeAlias = SetLoggerLevels_Event
 
 class SetParameters_Request(Message):
     parameters: list[rcl_interfaces.msg.Parameter]
@@ -241,9 +241,9 @@ class SetParameters_Event(Message):
     ) -> None: ...
 
 class SetParameters(Service):
-    Request = SetParameters_Request
-    Response = SetParameters_Response
-    Event = SetParameters_Event
+    Request: TypeAlias = SetParameters_Request
+    Response: TypeAlias = SetParameters_Response
+    Event: TypeAlias = SetParameters_Event
 
 class SetParametersAtomically_Request(Message):
     parameters: list[rcl_interfaces.msg.Parameter]
@@ -274,6 +274,6 @@ class SetParametersAtomically_Event(Message):
     ) -> None: ...
 
 class SetParametersAtomically(Service):
-    Request = SetParametersAtomically_Request
-    Response = SetParametersAtomically_Response
-    Event = SetParametersAtomically_Event
+    Request: TypeAlias = SetParametersAtomically_Request
+    Response: TypeAlias = SetParametersAtomically_Response
+    Event: TypeAlias = SetParametersAtomically_Event

@@ -1,5 +1,7 @@
 """Services of sensor_msgs. Made by rosidl_runtime_embedded.stubs."""
 
+from typing import TypeAlias
+
 import sensor_msgs.msg
 import service_msgs.msg
 from rosidl_runtime_embedded import Message, Service
@@ -35,6 +37,6 @@ class SetCameraInfo_Event(Message):
     ) -> None: ...
 
 class SetCameraInfo(Service):
-    Request = SetCameraInfo_Request
-    Response = SetCameraInfo_Response
-    Event = SetCameraInfo_Event
+    Request: TypeAlias = SetCameraInfo_Request
+    Response: TypeAlias = SetCameraInfo_Response
+    Event: TypeAlias = SetCameraInfo_Event

@@ -1,5 +1,7 @@
 """Services of std_srvs. Made by rosidl_runtime_embedded.stubs."""
 
+from typing import TypeAlias
+
 import service_msgs.msg
 from rosidl_runtime_embedded import Message, Service
 
@@ -22,9 +24,9 @@ class Empty_Event(Message):
     ) -> None: ...
 
 class Empty(Service):
-    Request = Empty_Request
-    Response = Empty_Response
-    Event = Empty_Event
+    Request: TypeAlias = Empty_Request
+    Response: TypeAlias = Empty_Response
+    Event: TypeAlias = Empty_Event
 
 class SetBool_Request(Message):
     data: bool
@@ -57,9 +59,9 @@ class SetBool_Event(Message):
     ) -> None: ...
 
 class SetBool(Service):
-    Request = SetBool_Request
-    Response = SetBool_Response
-    Event = SetBool_Event
+    Request: TypeAlias = SetBool_Request
+    Response: TypeAlias = SetBool_Response
+    Event: TypeAlias = SetBool_Event
 
 class Trigger_Request(Message):
     def __init__(self) -> None: ...
@@ -87,6 +89,6 @@ class Trigger_Event(Message):
     ) -> None: ...
 
 class Trigger(Service):
-    Request = Trigger_Request
-    Response = Trigger_Response
-    Event = Trigger_Event
+    Request: TypeAlias = Trigger_Request
+    Response: TypeAlias = Trigger_Response
+    Event: TypeAlias = Trigger_Event

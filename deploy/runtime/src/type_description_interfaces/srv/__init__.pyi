@@ -1,5 +1,7 @@
 """Services of type_description_interfaces. Made by rosidl_runtime_embedded.stubs."""
 
+from typing import TypeAlias
+
 import service_msgs.msg
 import type_description_interfaces.msg
 from rosidl_runtime_embedded import Message, Service
@@ -45,6 +47,6 @@ class GetTypeDescription_Event(Message):
     ) -> None: ...
 
 class GetTypeDescription(Service):
-    Request = GetTypeDescription_Request
-    Response = GetTypeDescription_Response
-    Event = GetTypeDescription_Event
+    Request: TypeAlias = GetTypeDescription_Request
+    Response: TypeAlias = GetTypeDescription_Response
+    Event: TypeAlias = GetTypeDescription_Event

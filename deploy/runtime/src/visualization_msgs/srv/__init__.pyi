@@ -1,5 +1,7 @@
 """Services of visualization_msgs. Made by rosidl_runtime_embedded.stubs."""
 
+from typing import TypeAlias
+
 import service_msgs.msg
 import visualization_msgs.msg
 from rosidl_runtime_embedded import Message, Service
@@ -30,6 +32,6 @@ class GetInteractiveMarkers_Event(Message):
     ) -> None: ...
 
 class GetInteractiveMarkers(Service):
-    Request = GetInteractiveMarkers_Request
-    Response = GetInteractiveMarkers_Response
-    Event = GetInteractiveMarkers_Event
+    Request: TypeAlias = GetInteractiveMarkers_Request
+    Response: TypeAlias = GetInteractiveMarkers_Response
+    Event: TypeAlias = GetInteractiveMarkers_Event
