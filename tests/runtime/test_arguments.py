@@ -8,9 +8,14 @@ from typing import Any
 
 import pytest
 import rclpy.logging
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 from rclpy._arguments import RosArguments, parse, remove_ros_args
+from rclpy._parameter_files import ParameterFileError, read_parameter_file
+from rclpy._parameter_values import parse_value
 from rclpy.exceptions import RCLInvalidROSArgsError, UnknownROSArgsError
 from rclpy.logging import LoggingSeverity
+from rclpy.parameter import Parameter
 
 
 def ros(*arguments: str) -> RosArguments:
@@ -153,6 +158,7 @@ def test_the_outputs_of_a_process_are_not_a_nodes_business() -> None:
         (".inf", float("inf")),
         ("-inf", float("-inf")),
         ("1e999", "1e999"),
+        ("9" * 5000, "9" * 5000),
         ("hello", "hello"),
         ("hello world", "hello world"),
         ("a:b", "a:b"),
@@ -205,6 +211,7 @@ def test_a_parameter_may_be_named_after_a_topic() -> None:
         ("x:=[[1]]", "a list may contain scalars only, found a list"),
         ("x:=[1", "line 1: "),
         ("x:=*a", "aliases are not supported"),
+        ("x:=" + "[" * 5000, "nested too deeply"),
     ],
 )
 def test_a_parameter_that_cannot_be_understood_is_an_error_of_one_line(rule: str, reason: str) -> None:
@@ -314,6 +321,29 @@ def test_a_mistake_in_a_file_is_told_in_one_line_with_file_key_and_reason(
         ros("--params-file", path)
     assert path in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+@given(text=st.text() | st.text("[]{}:,-'\"&*!#|>\n ~a1.", min_size=1))
+def test_any_text_is_a_value_or_a_mistake(text: str) -> None:
+    mistake = ""
+    try:
+        Parameter("x", value=parse_value(text))
+    except ValueError as error:
+        mistake = str(error)
+    assert "\n" not in mistake
+
+
+@given(text=st.text() | st.text("[]{}:,-'\"&*!#|>\n ~a1./", min_size=1))
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_any_text_in_a_file_is_understood_or_a_mistake(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "any.yaml"
+    path.write_text(f"n:\n  ros__parameters:\n    {text}", encoding="utf-8", errors="replace")
+    mistake = ""
+    try:
+        read_parameter_file(str(path))
+    except ParameterFileError as error:
+        mistake = str(error)
+    assert "\n" not in mistake
 
 
 def test_a_file_that_cannot_be_read_is_named(tmp_path: Path) -> None:

@@ -18,6 +18,7 @@ from rclpy.parameter import PARAMETER_SEPARATOR_STRING, Parameter
 _PARAMETERS_KEY = "ros__parameters"
 _STRING_TAG = "tag:yaml.org,2002:str"
 _PLAIN_TAG = "plain"
+_TOO_DEEP = "it is nested too deeply"
 _KINDS = {bool: "bool", int: "integer", float: "double", str: "string"}
 
 
@@ -40,6 +41,8 @@ def read_parameter_file(path: str) -> NodeParameters:
         raise ParameterFileError(f"{path}: {error}") from None
     except yaml.YAMLError as error:
         raise ParameterFileError(f"{path}: {_reason(error)}") from None
+    except RecursionError:
+        raise ParameterFileError(f"{path}: {_TOO_DEEP}") from None
 
     nodes: NodeParameters = {}
     try:
@@ -61,6 +64,8 @@ def parse_yaml_value(text: str) -> Any:
         return _value(yaml.compose(text, Loader=_Loader))
     except yaml.YAMLError as error:
         raise ValueError(_reason(error)) from None
+    except RecursionError:
+        raise ValueError(_TOO_DEEP) from None
 
 
 class _Loader(yaml.SafeLoader):

@@ -41,7 +41,8 @@ def plain_scalar(text: str) -> bool | int | float | str:
         return True
     if text in _FALSE:
         return False
-    if number := _INTEGER.fullmatch(text):
+    # No 64 bit integer is longer than that, and Python refuses to convert thousands of digits.
+    if len(text) <= 66 and (number := _INTEGER.fullmatch(text)):
         integer = int(text, 16 if number["hexadecimal"] else 8 if number["octal"] else 10)
         if -(2**63) <= integer < 2**63:
             return integer
