@@ -1,6 +1,6 @@
 """The nodes that are measured: plain rclpy, so that they run on every rclpy alike.
 
-``python nodes.py echo|ping|sink|flood|timer|start`` with a ``ROS_DOMAIN_ID`` of its own; one line of JSON each.
+``python nodes.py echo|ping|sink|flood|publish|timer|idle|start``, in their own domain; a line of JSON each.
 """
 
 from __future__ import annotations

@@ -1,12 +1,14 @@
 """rclpy, the ROS 2 client library for Python, on Eclipse Cyclone DDS and without a ROS installation.
 
-The names, signatures and behaviour are those of ROS 2 Jazzy; what is not supported raises NotImplementedError.
+Names, signatures and behaviour are those of ROS 2 Jazzy; what is not supported raises NotImplementedError.
 """
 
 from __future__ import annotations
 
+import importlib
+import importlib.util
 from collections.abc import Callable
-from types import TracebackType
+from types import ModuleType, TracebackType
 from typing import TYPE_CHECKING
 
 from rclpy.context import Context
@@ -45,6 +47,13 @@ __all__ = [
 ]
 
 _executor: Executor | None = None
+
+
+def __getattr__(name: str) -> ModuleType:
+    """Import a submodule, such as ``rclpy.executors``, when it is first asked for."""
+    if importlib.util.find_spec(f"{__name__}.{name}") is None:
+        raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
+    return importlib.import_module(f"{__name__}.{name}")
 
 
 class InitContextManager:

@@ -1,7 +1,7 @@
 """The ROS graph: which nodes exist and what they publish, subscribe to, serve and call.
 
-DDS knows endpoints; which node they belong to travels on the topic ``ros_discovery_info``, where every process
-keeps its latest ``rmw_dds_common/msg/ParticipantEntitiesInfo`` (facts/wire_samples.json).
+DDS knows endpoints; which node they belong to travels on the topic ``ros_discovery_info``, where every
+process keeps its latest ``rmw_dds_common/msg/ParticipantEntitiesInfo`` (facts/wire_samples.json).
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Executors: they wait for what happens to nodes and run the callbacks.
 
-An executor waits in a DDS wait set, with the interpreter lock released, on one condition per reader and on one
-guard condition by which everything else wakes it: timers that changed, tasks, guard conditions, entities that
-came or went. So nothing polls, and a change from any thread is seen at once. The wait set belongs to the
+An executor waits in a DDS wait set, with the interpreter lock released, on one condition per reader and on
+one guard condition by which everything else wakes it: timers that changed, tasks, guard conditions, entities
+that came or went. So nothing polls, and a change from any thread is seen at once. The wait set belongs to the
 spinning thread alone: other threads only leave word and wake it.
 """
 
@@ -73,7 +73,8 @@ class TimeoutObject:
 class _Entity(Protocol):
     """What an executor waits for and runs: a subscription, timer, service, client, guard or event."""
 
-    callback_group: CallbackGroup | None
+    @property
+    def callback_group(self) -> CallbackGroup | None: ...
 
     def _take(self) -> Any: ...
 
@@ -120,7 +121,8 @@ class Executor(AbstractContextManager["Executor"]):
         self._blocked: dict[int, tuple[_Entity, int]] = {}  # the same, while their callback group is busy
         self._tokens: dict[int, int] = {}  # DDS handle -> token
         self._last_token = _WAKE
-        self._ready: deque[tuple[_Entity, int]] = deque()  # entity, how many more messages this turn
+        # An entity or task, and how many more messages it may take in this turn.
+        self._ready: deque[tuple[Any, int]] = deque()
         self._context._executors.add(self)
         signals._watch(self)
 

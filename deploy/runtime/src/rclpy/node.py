@@ -117,9 +117,7 @@ class Node(NodeParameters, NodeGraph):
         namespace = "/" + (namespace or "").lstrip("/")
         validate_namespace(namespace)
         process_arguments = self._context.arguments if use_global_arguments else parse([])
-        own_arguments = parse(
-            ["--ros-args", *cli_args] if cli_args and "--ros-args" not in cli_args else cli_args or []
-        )
+        own_arguments = parse(cli_args or [])
         self._arguments = own_arguments.before(process_arguments)
         self._name, self._namespace = self._arguments.node_name(node_name, namespace)
         self._fully_qualified_name = f"{self._namespace.rstrip('/')}/{self._name}"
@@ -146,7 +144,7 @@ class Node(NodeParameters, NodeGraph):
         with self._graph.one_announcement():
             self._graph.add_node(self)
             self._rosout_publisher: Publisher | None = None
-            if enable_rosout and self._arguments.rosout_logs:
+            if enable_rosout and self._context.arguments.rosout_logs:
                 self._rosout_publisher = self.create_publisher(Log, "/rosout", _ROSOUT_QOS)
                 _logging_output.add_rosout_publisher(self._logger.name, self._publish_log)
             self._parameter_event_publisher = self.create_publisher(
@@ -281,8 +279,10 @@ class Node(NodeParameters, NodeGraph):
     @property
     def waitables(self) -> Iterator[Waitable]:
         """The QoS event handlers of its publishers and subscriptions."""
-        for owner in (*self.publishers, *self.subscriptions):
-            yield from owner.event_handlers
+        for publisher in self.publishers:
+            yield from publisher.event_handlers
+        for subscription in self.subscriptions:
+            yield from subscription.event_handlers
 
     def add_waitable(self, waitable: Waitable) -> None:
         """Not supported: raises NotImplementedError."""
@@ -602,7 +602,7 @@ class Node(NodeParameters, NodeGraph):
                 self._guards,
             ):
                 for entity in list(entities):
-                    self._destroy(entities, entity)  # type: ignore[arg-type]
+                    self._destroy(entities, entity)
             self._graph.remove_node(self)
         self._context._forget(self)
 

@@ -80,7 +80,7 @@ class Publisher:
         self.handle.assert_liveliness()
 
     def wait_for_all_acked(self, timeout: Duration = Duration(seconds=-1)) -> bool:  # noqa: B008
-        """Whether all reliable subscriptions have everything, waiting at most ``timeout`` (negative: no end)."""
+        """Wait until all reliable subscriptions have everything, at most ``timeout`` (negative: for ever)."""
         nanoseconds = timeout.nanoseconds
         return self.handle.wait_for_acks(nanoseconds if nanoseconds >= 0 else 2**63 - 1)
 

@@ -1,7 +1,7 @@
 """What Ctrl-C and SIGTERM do: they shut every context down, and whoever spins returns.
 
 A thread that waits in DDS cannot notice a signal. So the C-level handler of Python writes to a pipe
-(``signal.set_wakeup_fd``), and a thread that reads it wakes the executors; then Python runs the handler below.
+(``signal.set_wakeup_fd``), and a thread that reads it wakes the executors; then Python runs the handler.
 """
 
 from __future__ import annotations

@@ -14,7 +14,7 @@ START_TYPE_DESCRIPTION_SERVICE_PARAM = "start_type_description_service"
 
 
 class TypeDescriptionService:
-    """Describes the types of this runtime, unless the parameter ``start_type_description_service`` is false."""
+    """Describes types, unless the parameter ``start_type_description_service`` is false."""
 
     def __init__(self, node: Node) -> None:
         """Declare the parameter, and create the service if it says so."""
@@ -55,7 +55,7 @@ class TypeDescriptionService:
         try:
             if request.type_hash != type_hash(request.type_name):
                 raise LookupError(f"type {request.type_name} has another hash than {request.type_hash}")
-            description = type_description(request.type_name)
+            description: Any = type_description(request.type_name)
         except (LookupError, ValueError) as error:
             response.successful, response.failure_reason = False, str(error)
             return response

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import threading
 from collections.abc import Sequence
 
@@ -32,7 +31,7 @@ def get_default_context(*, shutting_down: bool = False) -> Context:
 
 def remove_ros_args(args: Sequence[str] | None = None) -> list[str]:
     """Return ``args`` (``sys.argv`` if ``None``) without what is for ROS."""
-    return _arguments.parse(list(sys.argv if args is None else args)).remaining
+    return _arguments.remove_ros_args(None if args is None else list(args))
 
 
 def ok(*, context: Context | None = None) -> bool:

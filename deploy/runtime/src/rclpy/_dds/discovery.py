@@ -65,7 +65,7 @@ class _BuiltinReader:
             self._capacity *= 2  # there may be more: once more, with room for it
         try:
             for index in range(count):
-                yield ct.cast(samples[index], self._structure).contents, infos[index]
+                yield ct.cast(samples[index] or 0, self._structure).contents, infos[index]
         finally:
             if count:
                 blocking.dds_return_loan(self.handle, samples, count)

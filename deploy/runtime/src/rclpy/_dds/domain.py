@@ -10,7 +10,6 @@ from __future__ import annotations
 import os
 import threading
 from collections.abc import Mapping
-from xml.sax.saxutils import quoteattr
 
 from .library import PRECONDITION_NOT_MET, blocking, checked
 
@@ -44,6 +43,8 @@ def configuration(environment: Mapping[str, str] = os.environ) -> str:
     if environment.get("ROS_LOCALHOST_ONLY", "0") == "1" and discovery_range == "SUBNET":
         discovery_range = "LOCALHOST"
     peers = [peer.strip() for peer in environment.get("ROS_STATIC_PEERS", "").split(";") if peer.strip()]
+    if any(character in peer for peer in peers for character in "<>&\"'"):
+        raise ValueError(f"ROS_STATIC_PEERS must be addresses or host names with ';' between, not {peers}")
     general, discovery = "", ""
     if discovery_range == "LOCALHOST":
         interface = '<NetworkInterface name="lo" multicast="true"/>'
@@ -54,7 +55,7 @@ def configuration(environment: Mapping[str, str] = os.environ) -> str:
         tag = f"<Tag>ros_discovery_off_{os.getpid()}</Tag>"
         discovery = f"<Discovery><ParticipantIndex>none</ParticipantIndex>{tag}</Discovery>"
     if discovery_range == "LOCALHOST" or (discovery_range == "SUBNET" and peers):
-        addresses = "".join(f"<Peer address={quoteattr(peer)}/>" for peer in peers)
+        addresses = "".join(f'<Peer address="{peer}"/>' for peer in peers)
         discovery = (
             "<Discovery><ParticipantIndex>auto</ParticipantIndex>"
             "<MaxAutoParticipantIndex>99</MaxAutoParticipantIndex>"

@@ -41,7 +41,7 @@ def _matched_handles(handle: int, getter: str) -> list[int]:
     count = getattr(quick, getter)(handle, None, 0)
     handles = (ct.c_uint64 * max(0, count))()
     count = getattr(quick, getter)(handle, handles, len(handles))
-    return handles[: max(0, min(count, len(handles)))]
+    return list(handles[: max(0, min(count, len(handles)))])
 
 
 def _user_data(handle: int, getter: str, other: int) -> str | None:

@@ -5,8 +5,8 @@ the interpreter lock while it writes, announces XTypes information that a ROS 2 
 takes 130 ms to import. The C functions below are Cyclone's own interface for applications that bring their
 messages as CDR, the one that ``rmw_cyclonedds`` builds on, too.
 
-Two handles on one library: ``blocking`` releases the interpreter lock during a call and is for everything that
-may wait; ``quick`` keeps it, which is cheaper, and is for calls that never block.
+Two handles on one library: ``blocking`` releases the interpreter lock during a call and is for everything
+that may wait; ``quick`` keeps it, which is cheaper, and is for calls that never block.
 """
 
 from __future__ import annotations
