@@ -5,9 +5,9 @@ left out; a source that no scenario drives follows its parameters. ::
 
     l1: 2.0                                 # a value, from the origin on
     l2: 3.0
-    theta1: {center: 0.8, amplitude: 0.5, period: 12.0, rate: 25.0, phase: 0.0}
+    theta1: {center: 0.8, amplitude: 0.5, period: 12.0, rate: 25.0, phase: 0.0, delay: 0.0}
                                             # center + amplitude · sin(2π · t/period + phase), `rate` times a
-                                            # second
+                                            # second, the first at `delay`
     theta2:                                 # values, each from its time on
       - {at: 1.5, value: 0.8}
       - {at: 4.0, value: 1.8}
@@ -20,7 +20,7 @@ left out; a source that no scenario drives follows its parameters. ::
       - {at: 5.0, command: turn_on}
     repeat: 60.0                            # all of it but the sweeps starts again every 60 s; without: once
 
-``rate`` (25 Hz) and ``phase`` (0 rad) have defaults.
+``rate`` (25 Hz), ``phase`` (0 rad) and ``delay`` (0 s) have these defaults.
 """
 
 from __future__ import annotations
@@ -93,13 +93,14 @@ class Events(Generic[T]):
 
 @dataclass(frozen=True)
 class Sweep:
-    """center + amplitude · sin(2π · t/period + phase), ``rate`` times a second, for ever."""
+    """center + amplitude · sin(2π · t/period + phase) at t = ``delay`` + n / ``rate``, for ever."""
 
     center: float
     amplitude: float
     period: float
     rate: float = 25.0
     phase: float = 0.0
+    delay: float = 0.0
     catches_up = False
 
     def at(self, time: float) -> float:
@@ -108,7 +109,8 @@ class Sweep:
 
     def after(self, time: float) -> Iterator[tuple[float, float]]:
         """Return the values after a time."""
-        times = (step / self.rate for step in itertools.count(math.floor(time * self.rate) + 1))
+        steps = itertools.count(math.floor((time - self.delay) * self.rate) + 1)
+        times = (self.delay + step / self.rate for step in steps)
         return ((at, self.at(at)) for at in times)
 
 
@@ -220,15 +222,15 @@ def _values(item: _Item, topic: topics.Topic, repeat: float | None) -> Timeline[
         return item.events(event, repeat)
     if not isinstance(item.value, dict):
         return Events(((0.0, value(item)),))
-    item.require({"center", "amplitude", "period"}, {"rate", "phase"})
+    item.require({"center", "amplitude", "period"}, {"rate", "phase", "delay"})
     sweep = Sweep(
         item["center"].number(),
         item["amplitude"].number(0.0),
         item["period"].number(above=0.0),
-        **{key: item[key].number() for key in ("rate", "phase") if key in item},
+        item["rate"].number(above=0.0, most=1000.0) if "rate" in item else Sweep.rate,
+        item["phase"].number() if "phase" in item else Sweep.phase,
+        item["delay"].number(0.0) if "delay" in item else Sweep.delay,
     )
-    if not 0 < sweep.rate <= 1000:
-        raise item["rate"].error("must be more than 0 and at most 1000 Hz")
     if fault := topic.fault(topic.type(data=sweep.center - sweep.amplitude)):
         raise item["amplitude"].error(f"at its lowest, {fault}")
     return sweep
@@ -321,7 +323,7 @@ class _Item:
         for key in sorted(keys - self.value.keys()):
             raise self.error(f"lacks {key!r}")
 
-    def number(self, least: float = -math.inf, *, above: float = -math.inf) -> float:
+    def number(self, least: float = -math.inf, *, above: float = -math.inf, most: float = math.inf) -> float:
         if isinstance(self.value, bool) or not isinstance(self.value, int | float):
             raise self.error(f"must be a number, not {self.value!r}")
         if not math.isfinite(self.value):
@@ -330,6 +332,8 @@ class _Item:
             raise self.error(f"must be at least {least:g}, not {self.value:g}")
         if self.value <= above:
             raise self.error(f"must be more than {above:g}, not {self.value:g}")
+        if self.value > most:
+            raise self.error(f"must be at most {most:g}, not {self.value:g}")
         return float(self.value)
 
     def items(self) -> list[_Item]:

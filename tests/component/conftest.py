@@ -1,0 +1,78 @@
+"""Virtual time for recipes, real nodes for the interfaces."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from typing import Any
+
+import pytest
+import rclpy
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from reactivex.testing import TestScheduler
+
+from interfaces.reactive_node import ReactiveNode
+
+
+@pytest.fixture
+def scheduler() -> TestScheduler:
+    """Virtual time [s]."""
+    return TestScheduler()
+
+
+@pytest.fixture
+def context(domain_id: int) -> Iterator[Context]:
+    """An initialized context that handles no signals, in a domain of its own."""
+    context = Context()
+    rclpy.init(args=[], context=context, domain_id=domain_id)
+    yield context
+    context.try_shutdown()
+
+
+@pytest.fixture
+def executor(context: Context) -> Iterator[SingleThreadedExecutor]:
+    """The executor of the test's nodes."""
+    with SingleThreadedExecutor(context=context) as executor:
+        yield executor
+
+
+@pytest.fixture
+def make_node(context: Context, executor: SingleThreadedExecutor) -> Iterator[Callable[..., Any]]:
+    """Makes nodes that the test's executor spins."""
+    with ExitStack() as stack:
+
+        def make(name: str, kind: type[Node] = ReactiveNode, **options: Any) -> Node:
+            node = kind(name, context=context, **options)
+            stack.callback(node.destroy_node)
+            executor.add_node(node)
+            return node
+
+        yield make
+
+
+@pytest.fixture
+def spin_until(executor: SingleThreadedExecutor) -> Callable[..., None]:
+    """Spins until a condition is true; fails when that takes too long."""
+
+    def spin(condition: Callable[[], object], seconds: float = 10.0) -> None:
+        deadline = time.monotonic() + seconds
+        while not condition():
+            assert time.monotonic() < deadline, f"not within {seconds} s"
+            executor.spin_once(timeout_sec=0.05)
+
+    return spin
+
+
+@pytest.fixture
+def spin_for(executor: SingleThreadedExecutor) -> Callable[[float], None]:
+    """Spins for so many seconds: for what must not happen."""
+
+    def spin(seconds: float) -> None:
+        deadline = time.monotonic() + seconds
+        while (left := deadline - time.monotonic()) > 0:
+            executor.spin_once(timeout_sec=left)
+
+    return spin

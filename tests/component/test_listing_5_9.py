@@ -1,0 +1,145 @@
+"""Listing 5.9 of the thesis: its inputs through all recipes give its output, line by line."""
+
+from __future__ import annotations
+
+import re
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+import reactivex as rx
+from geometry_msgs.msg import Point, PointStamped
+from reactivex import Observable
+from reactivex.scheduler import VirtualTimeScheduler
+from reactivex.subject import Subject
+from reactivex.testing import TestScheduler
+from std_msgs.msg import Bool, Float64, Header, String
+
+from deploy import terminal
+from interfaces import age, scenario, topics
+from interfaces.age import Timestamp
+from services.engine_controller import engine_state
+from services.kinematics import effector_position
+from services.operator_watchdog import operator_incapacitated
+from services.velocity import Position, effector_speed
+
+SCENARIO = Path(__file__).parents[2] / "deploy" / "scenarios" / "listing_5_9.yaml"
+ORIGIN = datetime(1970, 1, 1, tzinfo=UTC)
+START = 0.005  # [s]: the terminal is there before the services
+WATCH_BEGINS = 0.010  # [s]: the thesis' samples fall on 2010, 2510, 4510 ms
+
+# As printed in the thesis, but for the time that its program took: of the first line (1941), of two by
+# the watchdog (10512, 13513), and of the position that is printed at 4243 and is of 4244 by the next speed.
+LISTING = """
+[1942] ### Received new data: {2, 3, 0.785398, 0.785398}
+[1942] Position x: 1.41421 and y: 4.41421
+[1942] ### Received signal from operator
+[1991] ### Received signal from operator
+[2010] Operator is alive
+[2041] ### Received signal from operator
+[2091] ### Received signal from operator
+[2141] ### Received signal from operator
+[2192] ### Received signal from operator
+[2242] ### Received signal from operator
+[2292] ### Received signal from operator
+[2342] ### Received signal from operator
+[2392] ### Received signal from operator
+[2510] Operator is alive
+[3443] ### Received new data: {2, 3, 1.91986, 0.785398}
+[3443] Position x: -3.40296 and y: 3.14725
+[3443] Speed: 3.31845 [m/s]
+[3943] ### Received new data: {2, 3, 1.91986, 1.7854}
+[3943] Position x: -3.21994 and y: 0.276522
+[3943] Speed: 5.75311 [m/s]
+[4143] ### Received new data: {2, 3, 1.91986, 1.7854}
+[4143] Position x: -3.21994 and y: 0.276522
+[4143] Speed: 0 [m/s]
+[4244] ### Received new data: {2, 3, 1.91986, 1.7854}
+[4244] Position x: -3.21994 and y: 0.276522
+[4444] ### Received new data: {2, 3, 1.5708, 1.7854}
+[4444] Position x: -2.93119 and y: 1.36111
+[4444] Speed: 5.61186 [m/s]
+[4444] ### Received signal from operator
+[4510] Operator is alive
+[6444] ### Received new data: {2, 3, 2.35619, 1.7854}
+[6444] Position x: -3.03513 and y: -1.11019
+[6444] Speed: 1.23674 [m/s]
+[7510] Not received signal from operator...
+[10510] Not received signal from operator...
+[13510] Not received signal from operator...
+[13510] Operator is sleeping !!!
+[13510] Turning off engines...
+""".strip().splitlines()
+
+
+class Arm:
+    """All recipes, wired with subjects for topics, in virtual time."""
+
+    def __init__(self, path: Path) -> None:
+        self.scheduler = TestScheduler()
+        self.topics: dict[str, Subject[Any]] = {topic.name: Subject() for topic in topics.CONTRACT}
+        self.lines: list[str] = []
+        played = scenario.load(path)
+        terminal.view(self.seen, WATCH_BEGINS).subscribe(self.print, scheduler=self.scheduler)
+        self.scheduler.advance_to(START)
+        self.wire()
+        for name, timeline in played.configuration.items():
+            self.publish(name, scenario.play(timeline, START).map(lambda value: Float64(data=value)))
+        assert played.heartbeats is not None
+        self.publish(
+            "operator_heartbeat", scenario.play(played.heartbeats, START).map(lambda beat: Bool(data=beat))
+        )
+
+    def seen(self, topic: topics.Topic) -> Observable[Any]:
+        return self.topics[topic.name].timestamp(scheduler=self.scheduler)
+
+    def publish(self, name: str, messages: Observable[Any]) -> None:
+        messages.subscribe(self.topics[name].on_next, scheduler=self.scheduler)
+
+    def print(self, line: terminal.Line) -> None:
+        self.lines.append(f"[{(line.time - ORIGIN) / timedelta(milliseconds=1):.0f}] {line.text}")
+
+    def wire(self) -> None:
+        configuration = [self.topics[name].map(lambda m: m.data) for name in topics.CONFIGURATION]
+        self.publish("effector/position", effector_position(*configuration).map(self.position))
+        positions = self.topics["effector/position"].map(
+            lambda m: Position(m.header.stamp.sec * 10**9 + m.header.stamp.nanosec, m.point.x, m.point.y)
+        )
+        self.publish("effector/speed", effector_speed(positions).map(lambda speed: Float64(data=speed)))
+
+        heartbeats = self.seen(topics.OPERATOR_HEARTBEAT)
+        presence: Subject[Timestamp[Any]] = Subject()
+        self.publish(
+            "operator_presence", presence.map(lambda item: Header(stamp=age.to_message(item.timestamp)))
+        )
+        commands = operator_incapacitated(heartbeats, alive=presence.on_next)
+        begun = rx.timer(WATCH_BEGINS - START).flat_map(lambda _: commands)
+        self.publish("engines", begun.map(lambda command: String(data=command)))
+        states = engine_state(
+            self.topics["engines"].map(lambda m: m.data).timestamp(scheduler=self.scheduler),
+            self.topics["operator_presence"].map(lambda m: age.from_message(m.stamp)),
+            now=lambda: self.scheduler.now,
+        )
+        self.publish("engines/state", states.map(lambda state: String(data=state)))
+
+    def position(self, position: tuple[float, float]) -> PointStamped:
+        stamp = age.to_message(VirtualTimeScheduler.to_datetime(self.scheduler.clock))
+        return PointStamped(header=Header(stamp=stamp), point=Point(x=position[0], y=position[1]))
+
+
+def test_the_inputs_of_the_listing_give_its_lines() -> None:
+    arm = Arm(SCENARIO)
+
+    arm.scheduler.advance_to(20.0)
+
+    assert [line for line in arm.lines if "Engines are" not in line] == LISTING
+
+
+def test_the_engines_never_ran() -> None:
+    arm = Arm(SCENARIO)
+
+    arm.scheduler.advance_to(20.0)
+
+    assert [re.sub(r"\[.*\] ", "", line) for line in arm.lines if "Engines are" in line] == [
+        "Engines are off"
+    ]
