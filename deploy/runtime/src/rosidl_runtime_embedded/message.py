@@ -28,8 +28,14 @@ class _OnFirstUse:
         self._name = name
 
     def __get__(self, instance: object, owner: type[Message]) -> Any:
-        setattr(owner, self._name, self._make(owner))
-        return getattr(owner if instance is None else instance, self._name)
+        cls = _message_class(owner)
+        setattr(cls, self._name, self._make(cls))
+        return getattr(cls, self._name)
+
+
+def _message_class(cls: type[Message]) -> type[Message]:
+    """The class that was made for a definition: the class itself, or the one that a user derived it from."""
+    return next(base for base in cls.__mro__ if "_DEFINITION" in vars(base))
 
 
 def _make_constructor(cls: type[Message]) -> Callable[..., None]:
@@ -99,7 +105,12 @@ class Message:
         def _deserialize(cls, data: bytes) -> Self:
             """Message from little-endian XCDR1 with its header. Raises ValueError for anything else."""
     else:
-        __init__ = _OnFirstUse(_make_constructor)
+
+        def __init__(self, *args, **fields):
+            cls = _message_class(type(self))
+            cls.__init__ = _make_constructor(cls)
+            cls.__init__(self, *args, **fields)
+
         _serialize = _OnFirstUse(_make_serializer)
         _deserialize = _OnFirstUse(_make_deserializer)
         _TYPE_HASH = _OnFirstUse(_make_type_hash)

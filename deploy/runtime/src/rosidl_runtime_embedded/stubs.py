@@ -72,6 +72,10 @@ def _imports(body: str, module: str) -> list[str]:
 def _message(definition: MessageDefinition) -> str:
     package, kind, name = definition.name.split("/")
     lines = [f"    {line}" for field in definition.fields for line in _field(field, package, kind)]
+    for field in definition.fields:
+        if field.default is not None and not field.type.is_plural:
+            default = python_value(field.type.base, field.default)
+            lines.append(f"    {field.name.upper()}__DEFAULT: Final = {default!r}")
     for constant in definition.constants:
         lines.append(f"    {constant.name}: Final = {python_value(constant.type, constant.value)!r}")
     if definition.fields:

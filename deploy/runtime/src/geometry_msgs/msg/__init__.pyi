@@ -1,6 +1,7 @@
 """Messages of geometry_msgs. Made by rosidl_runtime_embedded.stubs."""
 
 from collections.abc import Iterable
+from typing import Final
 
 import numpy
 from numpy.typing import NDArray
@@ -225,6 +226,10 @@ class Quaternion(Message):
     y: float
     z: float
     w: float
+    X__DEFAULT: Final = 0.0
+    Y__DEFAULT: Final = 0.0
+    Z__DEFAULT: Final = 0.0
+    W__DEFAULT: Final = 1.0
     def __init__(
         self,
         *,

@@ -101,6 +101,8 @@ class ParameterDescriptor(Message):
     dynamic_typing: bool
     floating_point_range: list[FloatingPointRange]
     integer_range: list[IntegerRange]
+    READ_ONLY__DEFAULT: Final = False
+    DYNAMIC_TYPING__DEFAULT: Final = False
     def __init__(
         self,
         *,

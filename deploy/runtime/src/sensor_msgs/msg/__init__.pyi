@@ -419,6 +419,7 @@ class NavSatFix(Message):
 class NavSatStatus(Message):
     status: int
     service: int
+    STATUS__DEFAULT: Final = -2
     STATUS_UNKNOWN: Final = -2
     STATUS_NO_FIX: Final = -1
     STATUS_FIX: Final = 0

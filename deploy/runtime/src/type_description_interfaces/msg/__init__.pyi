@@ -21,6 +21,7 @@ class FieldType(Message):
     capacity: int
     string_capacity: int
     nested_type_name: str
+    TYPE_ID__DEFAULT: Final = 0
     FIELD_TYPE_NOT_SET: Final = 0
     FIELD_TYPE_NESTED_TYPE: Final = 1
     FIELD_TYPE_INT8: Final = 2

@@ -1,6 +1,6 @@
 """Services of type_description_interfaces. Made by rosidl_runtime_embedded.stubs."""
 
-from typing import TypeAlias
+from typing import Final, TypeAlias
 
 import service_msgs.msg
 import type_description_interfaces.msg
@@ -10,6 +10,7 @@ class GetTypeDescription_Request(Message):
     type_name: str
     type_hash: str
     include_type_sources: bool
+    INCLUDE_TYPE_SOURCES__DEFAULT: Final = True
     def __init__(
         self,
         *,
