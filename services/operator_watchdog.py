@@ -48,9 +48,9 @@ def operator_incapacitated(
     heartbeats: Observable[Heartbeat], *, repeat: float = 0.5, **activity: Any
 ) -> Observable[str]:
     """
-    Emit ``turn_off`` when the operator is incapacitated (Listing 5.8), and every ``repeat`` [s] until the return.
+    Emit ``turn_off`` when the operator is incapacitated (Listing 5.8), and again every ``repeat`` [s].
 
-    The first heartbeat then is "Operator is alive", and new strikes begin.
+    The next heartbeat ends that: "Operator is alive", and new strikes begin.
 
     :param activity: see :func:`operator_activity`.
     """
