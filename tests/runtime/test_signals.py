@@ -14,23 +14,19 @@ import rclpy
 from rclpy.executors import ExternalShutdownException
 rclpy.init(args=[])
 node = rclpy.create_node("spinner")
-print("spinning", flush=True)
+timer = node.create_timer(0.0, lambda: (timer.cancel(), print("spinning", flush=True)))
 try:
     rclpy.spin(node)
-except (KeyboardInterrupt, ExternalShutdownException) as error:
-    print(type(error).__name__, rclpy.ok())
+except (KeyboardInterrupt, ExternalShutdownException):
+    pass  # or spin() returns, if the signal came while a callback ran
+print(rclpy.ok())
 node.destroy_node()
 rclpy.try_shutdown()
 """
 
 
-@pytest.mark.parametrize(
-    ("number", "exception"),
-    [(signal.SIGINT, "KeyboardInterrupt"), (signal.SIGTERM, "ExternalShutdownException")],
-)
-def test_a_signal_ends_spinning_and_shuts_the_context_down(
-    number: signal.Signals, exception: str, domain_id: int
-) -> None:
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_spinning_and_shuts_the_context_down(number: signal.Signals, domain_id: int) -> None:
     environment = {**os.environ, "ROS_DOMAIN_ID": str(domain_id)}
     with subprocess.Popen(
         [sys.executable, "-c", SPIN],
@@ -45,5 +41,5 @@ def test_a_signal_ends_spinning_and_shuts_the_context_down(
         assert process.stdout.readline() == "spinning\n"
         process.send_signal(number)
         assert process.wait(10) == 0
-        assert process.stdout.read() == f"{exception} False\n"
+        assert process.stdout.read() == "False\n"
         assert process.stderr.read() == ""

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from rclpy import _names
 from rclpy._dds.discovery import Endpoint
 from rclpy._dds.qos import user_data_value
+from rclpy.exceptions import NameValidationException
 from rclpy.topic_endpoint_info import TopicEndpointInfo, TopicEndpointTypeEnum
 from rclpy.type_hash import TypeHash
 
@@ -79,19 +80,19 @@ class NodeGraph:
 
     def count_publishers(self, topic_name: str) -> int:
         """Return how many publishers a topic has."""
-        return self._graph.count_writers(_names.topic_to_dds(self.resolve_topic_name(topic_name)))
+        return self._graph.count_writers(self._dds_topic(topic_name))
 
     def count_subscribers(self, topic_name: str) -> int:
         """Return how many subscriptions a topic has."""
-        return self._graph.count_readers(_names.topic_to_dds(self.resolve_topic_name(topic_name)))
+        return self._graph.count_readers(self._dds_topic(topic_name))
 
     def count_services(self, service_name: str) -> int:
         """Return how many servers a service has."""
-        return self._graph.count_readers(_names.request_to_dds(self.resolve_service_name(service_name)))
+        return self._graph.count_readers(self._dds_requests(service_name))
 
     def count_clients(self, service_name: str) -> int:
         """Return how many clients a service has."""
-        return self._graph.count_writers(_names.request_to_dds(self.resolve_service_name(service_name)))
+        return self._graph.count_writers(self._dds_requests(service_name))
 
     def get_publishers_info_by_topic(
         self, topic_name: str, no_mangle: bool = False
@@ -107,8 +108,17 @@ class NodeGraph:
         found = self._graph.readers_of(self._dds_topic(topic_name, no_mangle))
         return [_info(*one, TopicEndpointTypeEnum.SUBSCRIPTION) for one in found]
 
-    def _dds_topic(self, name: str, no_mangle: bool) -> str:
-        return name if no_mangle else _names.topic_to_dds(self.resolve_topic_name(name))
+    def _dds_topic(self, name: str, no_mangle: bool = False) -> str:
+        try:
+            return name if no_mangle else _names.topic_to_dds(self.resolve_topic_name(name))
+        except NameValidationException as error:
+            raise ValueError(f"topic name '{name}' is invalid: {error}") from error
+
+    def _dds_requests(self, name: str) -> str:
+        try:
+            return _names.request_to_dds(self.resolve_service_name(name))
+        except NameValidationException as error:
+            raise ValueError(f"service name '{name}' is invalid: {error}") from error
 
     def wait_for_node(self, fully_qualified_node_name: str, timeout: float) -> bool:
         """Wait until a node is there; ``False`` if that takes longer than ``timeout`` seconds."""

@@ -38,7 +38,7 @@ class Context(AbstractContextManager["Context"]):
     """
     Holds what nodes share: arguments, domain, and whether rclpy runs.
 
-    Usable in a ``with``, which shuts it down at its end.
+    Usable in a ``with``, which initializes it and shuts it down at its end.
     """
 
     def __init__(self) -> None:
@@ -159,7 +159,8 @@ class Context(AbstractContextManager["Context"]):
         return True
 
     def __enter__(self) -> Context:
-        """Enter a ``with``; :func:`rclpy.init` has initialized the context already."""
+        """Initialize with the command line's arguments; :meth:`init` takes others, without a ``with``."""
+        self.init()
         return self
 
     def __exit__(

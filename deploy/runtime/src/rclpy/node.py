@@ -146,6 +146,7 @@ class Node(NodeParameters, NodeGraph):
             self._rosout_publisher: Publisher | None = None
             if enable_rosout and self._context.arguments.rosout_logs:
                 self._rosout_publisher = self.create_publisher(Log, "/rosout", _ROSOUT_QOS)
+                self._publishers.remove(self._rosout_publisher)  # it is not the user's
                 _logging_output.add_rosout_publisher(self._logger.name, self._publish_log)
             self._parameter_event_publisher = self.create_publisher(
                 ParameterEvent, "/parameter_events", qos_profile_parameter_events
@@ -592,6 +593,8 @@ class Node(NodeParameters, NodeGraph):
         with self._graph.one_announcement():
             if self._rosout_publisher is not None:
                 _logging_output.remove_rosout_publisher(self._publish_log)
+                self._events.pop(self._rosout_publisher, None)
+                self._rosout_publisher.destroy()
             self._destroyed = True
             for entities in (
                 self._publishers,

@@ -15,7 +15,6 @@ from enum import IntEnum
 from types import FrameType
 from typing import TYPE_CHECKING, Any
 
-from rclpy.exceptions import RCLError
 from rclpy.guard_condition import GuardCondition
 
 if TYPE_CHECKING:
@@ -102,25 +101,17 @@ def get_current_signal_handlers_options() -> SignalHandlerOptions:
 
 
 def install_signal_handlers(options: SignalHandlerOptions = SignalHandlerOptions.ALL) -> None:
-    """
-    Handle the signals that ``options`` name. Only Python's main thread can.
-
-    :raises RCLError: if other handlers of ours are installed already.
-    """
+    """Handle the signals that ``options`` name, besides those handled already. Only the main thread can."""
     global _options
-    if options == _options:
-        return
-    if _options != SignalHandlerOptions.NO:
-        raise RCLError("rclpy's signal handlers are installed already")
     if threading.current_thread() is not threading.main_thread():
         return
     for number, option in (
         (signal.SIGINT, SignalHandlerOptions.SIGINT),
         (signal.SIGTERM, SignalHandlerOptions.SIGTERM),
     ):
-        if options & option:
+        if options & option and not _options & option:
             _previous[number] = signal.signal(number, _handle)
-    _options = options
+    _options = SignalHandlerOptions(_options | options)
     _listen()
 
 
