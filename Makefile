@@ -21,17 +21,17 @@ help:
 	@echo "make setup    only set up .venv                   (PYTHON= chooses the interpreter, 3.11 to 3.13)"
 
 setup:
-	@deploy/setup.sh "$(PYTHON)"
+	@deploy/setup.sh '$(PYTHON)'
 
 run start: setup
-	@$(PY) -m deploy.launcher $@ "$(SCENARIO)"
+	@$(PY) -m deploy.launcher $@ '$(SCENARIO)'
 
 # These do without a set-up: what they look at, or end, runs already.
 console status logs stop:
 	@if test -x $(PY); then exec $(PY) -m deploy.launcher $@; else echo "Nothing runs: .venv is not set up."; fi
 
 test: setup
-	@$(PY) -m pytest "$(TESTS)"
+	@$(PY) -m pytest $(TESTS)
 
 check: setup
 	@$(PY) -m ruff check .

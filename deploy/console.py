@@ -7,6 +7,7 @@ import select
 import sys
 import time
 from collections.abc import Callable
+from datetime import timedelta
 from typing import Any
 
 from rclpy.parameter import Parameter
@@ -15,7 +16,7 @@ from reactivex import Observable
 from std_msgs.msg import String
 
 from deploy import terminal
-from interfaces import topics
+from interfaces import age, topics
 from interfaces.reactive_node import ReactiveNode
 
 HELP = """\
@@ -30,7 +31,6 @@ class Console:
         """:param epoch: what the lines' times count from [s, monotonic clock]"""
         self.has_quit = False
         self._node = node
-        self._epoch = epoch
         self._input: int | None = 0
         self._typed = b""
         self._engines = node.create_publisher(String, topics.ENGINES.name, topics.ENGINES.qos)
@@ -42,12 +42,9 @@ class Console:
             "turn_off": lambda: self._engines.publish(String(data=topics.TURN_OFF)),
             "quit": self._quit,
         }
-        lines = terminal.view(self._seen, max(0.0, epoch - time.monotonic())).pipe(terminal.thinned)
-        lines.subscribe(lambda line: self.say(line.text), scheduler=node.scheduler)
-
-    def say(self, text: str) -> None:
-        """Print a line with the time, in milliseconds since the scenario's origin."""
-        print(f"[{(time.monotonic() - self._epoch) * 1000:.0f}] {text}", flush=True)
+        elapsed = time.monotonic() - epoch
+        self._origin = age.now() - timedelta(seconds=elapsed)
+        terminal.view(self._seen, max(0.0, -elapsed)).subscribe(self._show, scheduler=node.scheduler)
 
     def read_commands(self) -> None:
         """Do what was typed since; never waits for input."""
@@ -68,7 +65,11 @@ class Console:
                 self._obey(word)
 
     def _seen(self, topic: topics.Topic) -> Observable[Any]:
-        return self._node.create_observable(topic.type, topic.name, topic.qos)
+        return self._node.create_observable(topic.type, topic.name, topic.qos, timestamped=True)
+
+    def _show(self, line: terminal.Line) -> None:
+        milliseconds = (line.time - self._origin) / timedelta(milliseconds=1)
+        print(f"[{milliseconds:.0f}] {line.text}", flush=True)
 
     def _obey(self, word: str) -> None:
         meant = [command for command in self._commands if command.startswith(word)]
@@ -79,7 +80,7 @@ class Console:
 
     def _hold_switch(self, pressed: bool) -> None:
         if not self._switch.services_are_ready():
-            self.say("dead_mans_switch is not there")
+            print("dead_mans_switch is not there", flush=True)
             return
         self._switch.set_parameters([Parameter("pressed", value=pressed)])
 

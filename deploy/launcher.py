@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from deploy import interruption  # isort: split
+
 import argparse
 import os
-import signal
+import subprocess
 import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from types import FrameType
 from typing import TYPE_CHECKING
 
 from deploy.system import DeploymentError, Program, System
@@ -21,52 +22,23 @@ START_LIMIT = 60.0  # s until all services have to report their health
 STATUS_LIMIT = 1.5  # s that they have when they are up: they report at 1 Hz
 LOG_LINES = 15  # of a service that does not start
 
-
-class Interrupted(Exception):
-    """Ctrl-C, SIGTERM, or the terminal was closed."""
+# rclpy takes its time to load: a command loads it when it is sure to need it.
 
 
-class Interruption:
-    """Notes that a signal asks for the end; `check` raises where that is convenient.
-
-    A signal in the middle of a start must not leave half of it undone, nor a second Ctrl-C interrupt the stop
-    that the first one began.
-    """
-
-    def __init__(self) -> None:
-        self._noted = False
-        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-            signal.signal(number, self._note)
-        signal.signal(
-            signal.SIGTTIN, signal.SIG_IGN
-        )  # reading in the background fails instead of stopping us
-
-    def check(self) -> None:
-        """Raise Interrupted if the end was asked for."""
-        if self._noted:
-            raise Interrupted
-
-    def _note(self, number: int, frame: FrameType | None) -> None:
-        self._noted = True
-
-
-# rclpy takes most of a second to load: each command loads it when it is sure to need it.
-
-
-def run(system: System, scenario: str, interruption: Interruption) -> None:
+def run(system: System, scenario: str) -> None:
     """Run the system in this terminal until the end is asked for."""
-    with _started(system, scenario, interruption) as (member, epoch):
-        _show(system, member, epoch, interruption, owner=True)
+    with _started(system, scenario) as (member, epoch):
+        _show(system, member, epoch, owner=True)
     _stop(system)
 
 
-def start(system: System, scenario: str, interruption: Interruption) -> None:
+def start(system: System, scenario: str) -> None:
     """Start the system in the background; returns when all services are up."""
-    with _started(system, scenario, interruption):
+    with _started(system, scenario):
         print("It runs in the background: make console, make status, make logs, make stop.")
 
 
-def console(system: System, interruption: Interruption) -> None:
+def console(system: System) -> None:
     """Show a running system in this terminal."""
     from deploy.member import Member
     from deploy.parameters import epoch_of
@@ -74,10 +46,10 @@ def console(system: System, interruption: Interruption) -> None:
     if not _adopt_environment(system):
         raise DeploymentError("Nothing runs: make start")
     with Member() as member:
-        _show(system, member, epoch_of(system), interruption)
+        _show(system, member, epoch_of(system))
 
 
-def status(system: System, interruption: Interruption) -> None:
+def status(system: System) -> None:
     """Print a table of the services."""
     from deploy.member import Member
     from deploy.status import table
@@ -100,12 +72,18 @@ def logs(system: System) -> None:
     files = sorted(str(path.relative_to(system.run)) for path in system.logs.glob("*.log"))
     if not files:
         raise DeploymentError("There are no logs yet: make start")
-    os.chdir(system.run)
-    os.execvp("tail", ["tail", "-n", "10", "-F", *files])
+    with subprocess.Popen(["tail", "-n", "10", "-F", *files], cwd=system.run) as tail:
+        try:
+            while tail.poll() is None:
+                interruption.check()
+                with suppress(subprocess.TimeoutExpired):
+                    tail.wait(0.1)
+        finally:
+            tail.terminate()
 
 
 @contextmanager
-def _started(system: System, scenario: str, interruption: Interruption) -> Iterator[tuple[Member, float]]:
+def _started(system: System, scenario: str) -> Iterator[tuple[Member, float]]:
     """Start the system and wait until all services are up; stop it when that, or what follows, fails."""
     from deploy import parameters
     from deploy.member import Member
@@ -118,15 +96,18 @@ def _started(system: System, scenario: str, interruption: Interruption) -> Itera
         domain = os.environ.get("ROS_DOMAIN_ID") or "0"
         print(f"Starting the services, scenario {scenario}, ROS domain {domain} ...", flush=True)
         with Member() as member:
-            _await_services(system, member, interruption)
+            _await_services(system, member)
+            epoch = parameters.epoch_of(system)
             print(f"All services are up after {time.monotonic() - began:.1f} s.", flush=True)
-            yield member, parameters.epoch_of(system)
+            if (late := time.monotonic() - epoch) > 0:
+                print(f"The scenario has begun {late:.1f} s ago: this machine is slow.", flush=True)
+            yield member, epoch
     except BaseException:
         _stop(system)
         raise
 
 
-def _await_services(system: System, member: Member, interruption: Interruption) -> None:
+def _await_services(system: System, member: Member) -> None:
     """Wait until every service has reported its health."""
     deadline = time.monotonic() + START_LIMIT
     while missing := [program for program in system.programs() if not _reports(program, member)]:
@@ -148,9 +129,7 @@ def _reports(program: Program, member: Member) -> bool:
     return program.name in member.health and member.health[program.name].pid == program.pid
 
 
-def _show(
-    system: System, member: Member, epoch: float, interruption: Interruption, *, owner: bool = False
-) -> None:
+def _show(system: System, member: Member, epoch: float, *, owner: bool = False) -> None:
     """Be the operator's terminal until the end; the owner of the system revives a killed supervisord."""
     from deploy.console import HELP, Console
 
@@ -200,22 +179,21 @@ def main(arguments: list[str]) -> int:
 
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     system = System()
-    interruption = Interruption()
     try:
         match options.command:
             case "run":
-                run(system, options.scenario, interruption)
+                run(system, options.scenario)
             case "start":
-                start(system, options.scenario, interruption)
+                start(system, options.scenario)
             case "console":
-                console(system, interruption)
+                console(system)
             case "status":
-                status(system, interruption)
+                status(system)
             case "logs":
                 logs(system)
             case "stop":
                 _stop(system)
-    except Interrupted:
+    except interruption.Interrupted:
         return 0
     except DeploymentError as error:
         print(error, file=sys.stderr)

@@ -13,7 +13,7 @@ from deploy.system import DeploymentError, System
 from interfaces import scenario
 
 SCENARIOS = ROOT / "deploy" / "scenarios"
-LEAD = 6.0  # s from the start to the origin of a scenario: by then the services have found each other
+LEAD = 4.0  # s from the start to the origin of a scenario: by then the services have found each other
 
 
 def of_scenario(name: str) -> dict[str, object]:

@@ -2,8 +2,8 @@
 
 Runs on the bare interpreter, before anything is installed. Stamps in .venv tell what it was made from; where
 the right one is missing (older requirements, another interpreter, ROS 2 sourced since, an interrupted set-up)
-it is made anew, so that half an installation never counts as one. deploy/runtime has a stamp of its own: who works on it
-waits a second.
+it is made anew, so that half an installation never counts as one. deploy/runtime has a stamp of its own: who
+works on it waits a second.
 """
 
 from __future__ import annotations

@@ -122,7 +122,10 @@ class System:
         """All programs as supervisord sees them. Raises DeploymentError when it does not answer."""
         pid = self.supervisor()
         if pid is None:
-            raise DeploymentError(f"Nothing is supervised in {self.run}")
+            raise DeploymentError(
+                f"supervisord has died; {len(self.members())} services go on without it in {self.run}.\n"
+                "make start begins anew with them, make stop ends them."
+            )
         try:
             rows = cast(list[dict[str, Any]], self._call(pid, "supervisor.getAllProcessInfo"))
             starts = cast(dict[str, int], self._call(pid, "arm.starts"))

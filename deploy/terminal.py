@@ -18,33 +18,36 @@ from reactivex import operators as ops
 from interfaces import topics
 
 Seen = Callable[[topics.Topic], Observable[Any]]
-"""Gives the messages of a topic."""
+"""Gives the messages of a topic, each as a Timestamp with the time at which it was sent."""
 
 MISSED_AFTER = 3.0  # s, as the operator watchdog
 AWAY_AFTER = 1.5  # s: three of the watchdog's samples
+SORTED_WITHIN = 0.02  # s by which one message may overtake another on its way
+KINDS = ("data", "position", "speed", "signal", "alive", "missed", "asleep", "engines", "service")
 BURST = defaultdict(lambda: 6.0, signal=12.0)  # lines of a kind shown in a row: Listing 5.9 has room in it
 RATE = 1.0  # lines of a kind per second thereafter
 
 
 class Line(NamedTuple):
-    """One line for the operator; lines of one kind are thinned together."""
+    """A line for the operator; by kind lines are thinned, and those of one time are ordered."""
 
+    time: datetime
     kind: str
     text: str
 
 
 def view(seen: Seen, begin: float = 0.0) -> Observable[Line]:
     """All lines; the operator is expected from `begin` [s from now] on."""
-    return rx.merge(measurements(seen), operator(seen, begin), engines(seen), services(seen))
+    return rx.merge(measurements(seen), operator(seen, begin), engines(seen), services(seen)).pipe(
+        ops.publish(in_order), ops.filter(Allowance().covers)
+    )
 
 
 def measurements(seen: Seen) -> Observable[Line]:
     """New configurations, positions and speeds."""
-    configuration = [seen(topic).pipe(ops.map(_data)) for topic in topics.CONFIGURATION.values()]
+    configuration = rx.combine_latest(*(seen(topic) for topic in topics.CONFIGURATION.values()))
     return rx.merge(
-        rx.combine_latest(*configuration).pipe(
-            _line("data", lambda values: f"### Received new data: {{{', '.join(f'{v:g}' for v in values)}}}")
-        ),
+        configuration.pipe(ops.map(_new_data)),
         seen(topics.EFFECTOR_POSITION).pipe(
             _line("position", lambda m: f"Position x: {m.point.x:g} and y: {m.point.y:g}")
         ),
@@ -56,9 +59,7 @@ def operator(seen: Seen, begin: float) -> Observable[Line]:
     """The operator's signals, and that he is alive, missed, asleep."""
     presence = seen(topics.OPERATOR_PRESENCE).pipe(ops.share())
     last_seen = rx.merge(rx.timer(begin), presence).pipe(ops.share())
-    turn_off = seen(topics.ENGINES).pipe(
-        ops.map(_data), ops.filter(lambda command: command == topics.TURN_OFF)
-    )
+    turn_off = seen(topics.ENGINES).pipe(_of(topics.TURN_OFF))
     # The watchdog repeats its command while he is away: the first one counts.
     asleep = last_seen.pipe(
         ops.map(lambda _: rx.timer(AWAY_AFTER).pipe(ops.flat_map(lambda _: turn_off), ops.take(1))),
@@ -68,80 +69,73 @@ def operator(seen: Seen, begin: float) -> Observable[Line]:
     silences = rx.merge(
         last_seen.pipe(ops.map(lambda _: rx.interval(MISSED_AFTER))),
         asleep.pipe(ops.map(lambda _: rx.never())),
-    ).pipe(ops.switch_latest())
-    # The command comes with the last silence; whichever is noticed first, it is one line and stands in front.
+    ).pipe(ops.switch_latest(), ops.timestamp())
+    # The command comes with the last silence: whichever is noticed first, it is one line.
     missed = rx.merge(silences, asleep).pipe(ops.throttle_first(AWAY_AFTER))
+    commanded = last_seen.pipe(
+        ops.map(lambda _: turn_off.pipe(ops.take_until(rx.timer(AWAY_AFTER)))), ops.switch_latest()
+    )
     return rx.merge(
         seen(topics.OPERATOR_HEARTBEAT).pipe(
-            ops.filter(_data), _line("signal", lambda _: "### Received signal from operator")
+            _of(True), _line("signal", lambda _: "### Received signal from operator")
         ),
         presence.pipe(_line("alive", lambda _: "Operator is alive")),
         missed.pipe(_line("missed", lambda _: "Not received signal from operator...")),
         asleep.pipe(_line("asleep", lambda _: "Operator is sleeping !!!")),
-        asleep.pipe(_line("engines", lambda _: "Turning off engines...")),
+        rx.merge(asleep, commanded).pipe(_line("engines", lambda _: "Turning off engines...")),
     )
 
 
 def engines(seen: Seen) -> Observable[Line]:
     """Commands to turn the engines on, and whether they are on."""
     return rx.merge(
-        seen(topics.ENGINES).pipe(
-            ops.map(_data),
-            ops.filter(lambda command: command == topics.TURN_ON),
-            _line("engines", lambda _: "Turning on engines..."),
-        ),
+        seen(topics.ENGINES).pipe(_of(topics.TURN_ON), _line("engines", lambda _: "Turning on engines...")),
         seen(topics.ENGINES_STATE).pipe(
-            ops.map(_data),
-            ops.distinct_until_changed(),
-            _line("engines", lambda state: f"Engines are {state}"),
+            ops.distinct_until_changed(_data),
+            _line("engines", lambda state: f"Engines are {state.data}"),
         ),
     )
 
 
 def services(seen: Seen) -> Observable[Line]:
     """What services have to complain about."""
+    complaints: dict[str, str] = {}
 
-    def complaint(status: Any) -> str:
-        service = status.name.rpartition("/")[2]
-        return "" if status.level == type(status).OK else f"{service}: {status.message}"
+    def news(diagnostics: Any) -> Observable[Line]:
+        lines = []
+        for status in diagnostics.value.status:
+            complaint = "" if status.level == type(status).OK else status.message
+            if complaint and complaint != complaints.get(status.name):
+                service = status.name.rpartition("/")[2]
+                lines.append(Line(diagnostics.timestamp, "service", f"{service}: {complaint}"))
+            complaints[status.name] = complaint
+        return rx.from_iterable(lines)
 
-    def complaints(statuses: Observable[Any]) -> Observable[Any]:
-        return statuses.pipe(ops.map(complaint), ops.distinct_until_changed(), ops.filter(bool))
-
-    def statuses(message: Any) -> Observable[Any]:
-        return rx.from_iterable(message.status)
-
-    def name(status: Any) -> str:
-        return str(status.name)
-
-    each: Any = ops.flat_map(statuses)
-    by_service: Any = ops.group_by(name)
-    return seen(topics.DIAGNOSTICS).pipe(each, by_service, ops.flat_map(complaints), _line("service", str))
+    return seen(topics.DIAGNOSTICS).pipe(ops.flat_map(news))
 
 
-def thinned(lines: Observable[Line]) -> Observable[Line]:
-    """Leave lines of a kind out where they come too fast to be read."""
-    return rx.defer(
-        lambda _: lines.pipe(
-            ops.timestamp(),
-            ops.filter(_Allowance().covers),
-            ops.map(_value),
-        )
-    )
+def in_order(lines: Observable[Line]) -> Observable[Line]:
+    """Emit the lines of a hot observable in the order of their times."""
+
+    def by_time(lines: list[Line]) -> list[Line]:
+        return sorted(lines, key=lambda line: (line.time, KINDS.index(line.kind)))
+
+    full = lines.pipe(ops.throttle_first(SORTED_WITHIN), ops.flat_map(lambda _: rx.timer(SORTED_WITHIN)))
+    return lines.pipe(ops.buffer(full), ops.flat_map(by_time))
 
 
-class _Allowance:
+class Allowance:
     """How many lines of each kind may be shown now: it grows by RATE a second, up to BURST."""
 
     def __init__(self) -> None:
         self._left = BURST.copy()
-        self._at: dict[str, datetime] = {}
+        self._since: dict[str, datetime] = {}
 
-    def covers(self, item: Any) -> bool:
-        """Whether this line (a Timestamp) may be shown."""
-        kind = item.value.kind
-        passed = (item.timestamp - self._at.get(kind, item.timestamp)).total_seconds()
-        self._at[kind] = item.timestamp
+    def covers(self, line: Line) -> bool:
+        """Whether a line may be shown; lines that come too fast to be read are not."""
+        kind = line.kind
+        passed = (line.time - self._since.get(kind, line.time)).total_seconds()
+        self._since[kind] = line.time
         self._left[kind] = min(BURST[kind], self._left[kind] + passed * RATE)
         if self._left[kind] < 1:
             return False
@@ -149,13 +143,18 @@ class _Allowance:
         return True
 
 
+def _new_data(configuration: Any) -> Line:
+    values = ", ".join(f"{item.value.data:g}" for item in configuration)
+    return Line(max(item.timestamp for item in configuration), "data", f"### Received new data: {{{values}}}")
+
+
+def _data(item: Any) -> Any:
+    return item.value.data
+
+
+def _of(data: object) -> Callable[[Observable[Any]], Observable[Any]]:
+    return ops.filter(lambda item: _data(item) == data)
+
+
 def _line(kind: str, text: Callable[[Any], str]) -> Callable[[Observable[Any]], Observable[Line]]:
-    return ops.map(lambda item: Line(kind, text(item)))
-
-
-def _data(message: Any) -> Any:
-    return message.data
-
-
-def _value(item: Any) -> Any:
-    return item.value
+    return ops.map(lambda item: Line(item.timestamp, kind, text(item.value)))
