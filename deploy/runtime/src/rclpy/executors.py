@@ -103,7 +103,6 @@ class Executor(AbstractContextManager["Executor"]):
         self._tasks: deque[Task] = deque()
         self._is_shutdown = False
         self._closed = False
-        self._working = 0  # spins and callbacks under way
         self._idle = threading.Condition()
 
         self._guard = GuardCondition()
@@ -398,19 +397,14 @@ class Executor(AbstractContextManager["Executor"]):
             if self._blocked:
                 self._groups_changed = True
 
-    def _begin_spin(self) -> None:
-        with self._idle:
-            self._working += 1
-        self._spinning_thread = threading.get_ident()
+    def _is_idle(self) -> bool:
+        """Whether no thread spins or runs a callback."""
+        return self._spinning_thread is None
 
     def _end_spin(self) -> None:
         self._spinning_thread = self._callback_thread = None
-        self._end_work()
-
-    def _end_work(self) -> None:
-        with self._idle:
-            self._working -= 1
-            if not self._working:
+        if self._is_shutdown:  # somebody may be waiting for this; who comes later finds it done
+            with self._idle:
                 self._idle.notify_all()
 
     def shutdown(self, timeout_sec: float | None = None) -> bool:
@@ -425,7 +419,7 @@ class Executor(AbstractContextManager["Executor"]):
         # A callback, or a signal handler, on the spinning thread cannot wait for itself to end.
         if threading.get_ident() != self._spinning_thread:
             with self._idle:
-                if not self._idle.wait_for(lambda: not self._working, timeout_sec):
+                if not self._idle.wait_for(self._is_idle, timeout_sec):
                     return False
         if not self._closed:
             self._closed = True
@@ -461,7 +455,7 @@ class SingleThreadedExecutor(Executor):
     """Runs all callbacks on the thread that spins."""
 
     def _spin_once(self, timeout: float | TimeoutObject | None, condition: Callable[[], bool] | None) -> None:
-        self._begin_spin()
+        self._spinning_thread = threading.get_ident()
         try:
             try:
                 entity, taken = self._next(timeout, condition)
@@ -488,15 +482,16 @@ class MultiThreadedExecutor(Executor):
         threads = num_threads or max(2, os.cpu_count() or 2)
         self._pool = ThreadPoolExecutor(threads, thread_name_prefix="rclpy-executor")
         self._errors: deque[BaseException] = deque()
+        self._in_pool = 0  # callbacks under way there
 
     def _spin_once(self, timeout: float | TimeoutObject | None, condition: Callable[[], bool] | None) -> None:
-        self._begin_spin()
+        self._spinning_thread = threading.get_ident()
         try:
             entity, taken = self._next(
                 timeout, lambda: bool(self._errors) or (condition is not None and condition())
             )
             with self._idle:
-                self._working += 1
+                self._in_pool += 1
             self._pool.submit(self._run_in_pool, entity, taken)
         except (TimeoutException, ShutdownException, ConditionReachedException):
             pass
@@ -513,7 +508,12 @@ class MultiThreadedExecutor(Executor):
         finally:
             # The spinning thread may be waiting without this entity's callback group, or for an error.
             self.wake()
-            self._end_work()
+            with self._idle:
+                self._in_pool -= 1
+                self._idle.notify_all()
+
+    def _is_idle(self) -> bool:
+        return super()._is_idle() and not self._in_pool
 
     def shutdown(self, timeout_sec: float | None = None) -> bool:
         """Stop, and wait for the callbacks that run; see :meth:`Executor.shutdown`."""

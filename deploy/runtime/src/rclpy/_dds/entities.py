@@ -164,6 +164,7 @@ class Reader:
         self.handle = handle
         self.gid = _guid(handle)
         self.condition = checked(blocking.dds_create_readcondition(handle, ANY_STATE), "read condition")
+        self._buffer = ct.create_string_buffer(64)
         self._serdata = Pointer()
         self._serdata_address = ct.addressof(self._serdata)
         self._info = SampleInfo()
@@ -175,10 +176,12 @@ class Reader:
             serdata, info = self._serdata.value, self._info
             if info.valid_data:
                 size = quick.ddsi_serdata_size(serdata)
-                buffer = ct.create_string_buffer(size)
-                quick.ddsi_serdata_to_ser(serdata, 0, size, buffer)
+                if size > len(self._buffer):
+                    self._buffer = ct.create_string_buffer(size)
+                quick.ddsi_serdata_to_ser(serdata, 0, size, self._buffer)
                 quick.ddsi_serdata_unref(serdata)
-                return Sample(buffer.raw, info.source_timestamp, info.publication_handle)
+                data = ct.string_at(self._buffer, size)
+                return Sample(data, info.source_timestamp, info.publication_handle)
             quick.ddsi_serdata_unref(serdata)  # a writer came or went: news, but no message
         return None
 
