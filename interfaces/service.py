@@ -30,6 +30,7 @@ from datetime import datetime
 from typing import Any, NoReturn, TypeVar
 
 import rclpy
+import reactivex as rx
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rcl_interfaces.msg import (
     FloatingPointRange,
@@ -104,16 +105,26 @@ class ServiceNode(ReactiveNode):
         :raises ScenarioError: if there is a mistake in it.
         """
         path = self.declare("scenario", "", None, "file of the scenario, empty for none")
+        self.declare_origin()
+        return load(path) if path else Scenario()
+
+    def declare_origin(self) -> None:
+        """Declare the parameter that says when the scenario begins, for all processes at once."""
         origin = "origin of the scenario [s of this host's CLOCK_MONOTONIC], 0 for the start of this process"
         self._scenario_epoch = self.declare("scenario_epoch", 0.0, (0.0, 1e12), origin)
-        return load(path) if path else Scenario()
+
+    def _elapsed(self) -> float:
+        return time.monotonic() - self._scenario_epoch if self._scenario_epoch else 0.0
 
     def play(self, timeline: Timeline[T] | None, *, resume: bool = True) -> Observable[T] | None:
         """Return a timeline from where the scenario is now; see :func:`interfaces.scenario.play`."""
         if timeline is None:
             return None
-        elapsed = time.monotonic() - self._scenario_epoch if self._scenario_epoch else 0.0
-        return play(timeline, elapsed, resume=resume)
+        return rx.defer(lambda _: play(timeline, self._elapsed(), resume=resume))
+
+    def from_origin(self, items: Observable[T]) -> Observable[T]:
+        """Subscribe to an observable when the scenario begins, or at once if it has begun."""
+        return rx.defer(lambda _: items.delay_subscription(max(0.0, -self._elapsed())))
 
     def observe(self, topic: Topic, *, timestamped: bool = False) -> Observable[Any]:
         """

@@ -71,6 +71,8 @@ def wire(node: ServiceNode) -> None:
     strikes = node.declare("strikes", 3, (1, 100), "the strike that turns the engines off")
     repeat = node.declare("repeat", 0.5, (0.05, 10.0), "turn_off is repeated this often [s]")
 
+    node.declare_origin()
+
     presences: Subject[Heartbeat] = Subject()
     commands = operator_incapacitated(
         age.fresh(
@@ -86,7 +88,8 @@ def wire(node: ServiceNode) -> None:
         repeat=repeat,
     )
     node.publish(OPERATOR_PRESENCE, presences.map(lambda seen: Header(stamp=age.to_message(seen.timestamp))))
-    node.publish(ENGINES, commands.map(lambda command: String(data=command)))
+    # Before a scenario begins nobody is expected: no silence counts yet.
+    node.publish(ENGINES, node.from_origin(commands).map(lambda command: String(data=command)))
 
 
 def main() -> None:
