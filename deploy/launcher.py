@@ -89,7 +89,7 @@ def _started(system: System, scenario: str) -> Iterator[tuple[Member, float]]:
     from deploy.member import Member
 
     began = time.monotonic()
-    given = parameters.of_scenario(scenario)
+    given = parameters.of_scenario(scenario, loading=time.monotonic() - began)
     interruption.check()
     system.start(given)
     try:

@@ -13,18 +13,25 @@ from deploy.system import DeploymentError, System
 from interfaces import scenario
 
 SCENARIOS = ROOT / "deploy" / "scenarios"
-LEAD = 4.0  # s from the start to the origin of a scenario: by then the services have found each other
+PROCESSES = 10  # that start at the same time
+SETTLING = 2.0  # s in which they find each other and report
 
 
-def of_scenario(name: str) -> dict[str, object]:
-    """The ROS parameters of all services for a scenario, a name or a file. Raises DeploymentError."""
+def of_scenario(name: str, loading: float) -> dict[str, object]:
+    """
+    The ROS parameters of all services for a scenario, a name or a file. Raises DeploymentError.
+
+    Its origin lies so far ahead that all of them are up by then: `loading` [s] is what it took to load rclpy here,
+    just now, and each of them has to do that too.
+    """
     _check_domain()
     path = _scenario_file(name)
     try:
         scenario.load(path)
     except scenario.ScenarioError as error:
         raise DeploymentError(str(error)) from error
-    shared = {"scenario": str(path), "scenario_epoch": round(time.monotonic() + LEAD, 3)}
+    lead = SETTLING + loading * PROCESSES / (os.cpu_count() or 1)
+    shared = {"scenario": str(path), "scenario_epoch": round(time.monotonic() + lead, 3)}
     return {"/**": {"ros__parameters": shared}}
 
 
