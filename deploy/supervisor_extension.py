@@ -1,6 +1,7 @@
 """What supervisord lacks for a robot, plugged in through its own extension point (supervisord.conf).
 
 - It counts how often it started each program: RPC `arm.starts`.
+- It tells the sentinel about them (RPC `arm.watch`), and kills a sentinel that has stopped asking.
 - It looks after its children every 100 ms and at once after each change, instead of once a second: a killed
   service is started again 1–2 s later otherwise.
 
@@ -9,20 +10,32 @@ Runs inside supervisord, so it must not fail: it does nothing else.
 
 from __future__ import annotations
 
+import os
+import signal
+import time
 from collections import Counter
+from contextlib import suppress
 from typing import Any
 
 from supervisor import events
+from supervisor.states import ProcessStates, getProcessStateDescription
 
 LONGEST_WAIT = 0.1  # s
+_ENDS = (events.ProcessStateExitedEvent, events.ProcessStateBackoffEvent)
+SENTINEL = "sentinel"
+SENTINEL_START = 10.0  # s until it has to ask for the first time
+SENTINEL_PATIENCE = 3.0  # s that it may be silent then
 
 
 class ArmInterface:
     """The RPC namespace `arm` of one supervisord."""
 
     def __init__(self, supervisord: Any) -> None:
+        self._supervisord = supervisord
         self._starts: Counter[str] = Counter()
         self._changed = False
+        self._exits: dict[str, str] = {}
+        self._guarded = (0, 0.0)  # the sentinel's pid, and until when it has to ask
         self._poll = supervisord.options.poller.poll
         supervisord.options.poller.poll = self._poll_briefly
         events.subscribe(events.ProcessStateEvent, self._on_change)
@@ -31,13 +44,55 @@ class ArmInterface:
         """How often each program was started since supervisord runs."""
         return dict(self._starts)
 
+    def watch(self) -> list[dict[str, Any]]:
+        """What the sentinel has to know of each program; it has to ask again and again."""
+        rows = []
+        for name, process in self._processes().items():
+            if name == SENTINEL:
+                self._guarded = (process.pid, time.monotonic() + SENTINEL_PATIENCE)
+            rows.append(
+                {
+                    "name": name,
+                    "state": getProcessStateDescription(process.get_state()),
+                    "pid": process.pid,
+                    "restarts": max(0, self._starts[name] - 1),
+                    "exit": self._exits.get(name, ""),
+                    "error": process.spawnerr or "",
+                }
+            )
+        return rows
+
+    def _processes(self) -> dict[str, Any]:
+        groups = self._supervisord.process_groups.values()
+        return {name: process for group in groups for name, process in group.processes.items()}
+
+    def _guard(self) -> None:
+        """Kill the sentinel if it hangs; as its parent, supervisord cannot mistake its pid."""
+        sentinel = self._processes().get(SENTINEL)
+        if sentinel is None or sentinel.get_state() not in (ProcessStates.STARTING, ProcessStates.RUNNING):
+            return
+        pid, deadline = self._guarded
+        if pid != sentinel.pid:
+            self._guarded = (sentinel.pid, time.monotonic() + SENTINEL_START)
+        elif time.monotonic() > deadline:
+            self._guarded = (sentinel.pid, time.monotonic() + SENTINEL_START)
+            with suppress(ProcessLookupError):
+                os.kill(sentinel.pid, signal.SIGKILL)
+
     def _on_change(self, event: Any) -> None:
         self._changed = True
+        name = event.process.config.name
         if isinstance(event, events.ProcessStateStartingEvent):
-            self._starts[event.process.config.name] += 1
+            self._starts[name] += 1
+        elif isinstance(event, _ENDS):
+            # supervisord keeps no signal's number, and no code at all of a process that ended early.
+            code = event.process.exitstatus
+            early = isinstance(event, events.ProcessStateBackoffEvent)
+            self._exits[name] = "early" if early else "killed by a signal" if code == -1 else f"code {code}"
 
     def _poll_briefly(self, timeout: float) -> Any:
         # supervisord acts on a change only after its next poll: a change must not wait for one to time out.
+        self._guard()
         wait = 0.0 if self._changed else min(timeout, LONGEST_WAIT)
         self._changed = False
         return self._poll(wait)

@@ -22,6 +22,8 @@ from deploy import processes
 CONFIGURATION = processes.ROOT / "deploy" / "supervisord.conf"
 SERVICE_GRACE = 1.0  # s from SIGTERM to SIGKILL of a service, as in supervisord.conf
 SUPERVISOR_GRACE = 2.5  # s that supervisord has to stop all of them
+WATCH_LIMIT = 1.0  # s that it has to answer the sentinel
+GROUP = "arm"  # of all programs, in supervisord.conf
 READY_GRACE = 20.0  # s that supervisord has to answer its first call
 
 
@@ -41,6 +43,19 @@ class Program(NamedTuple):
     """[s] since its process was started; 0 when none runs"""
     restarts: int
     """how often it was started again since the system was started"""
+
+
+class Watched(NamedTuple):
+    """A supervised program as the sentinel sees it."""
+
+    name: str
+    state: str
+    pid: int
+    restarts: int
+    exit: str
+    """how its last process ended, in words; '' before the first end"""
+    error: str
+    """what supervisord says about the last start or end"""
 
 
 class System:
@@ -141,6 +156,21 @@ class System:
             )
             for row in rows
         ]
+
+    def watch(self, supervisor: int) -> list[Watched]:
+        """What the sentinel has to know of each program; asking is its sign of life. Raises DeploymentError."""
+        rows = cast(list[dict[str, Any]], self._ask(supervisor, "arm.watch"))
+        return [Watched(**row) for row in rows]
+
+    def revive(self, supervisor: int, program: str) -> None:
+        """Start a program that supervisord has given up. Raises DeploymentError."""
+        self._ask(supervisor, "supervisor.startProcess", f"{GROUP}:{program}", False)
+
+    def _ask(self, supervisor: int, method: str, *arguments: object) -> object:
+        try:
+            return self._call(supervisor, method, *arguments, timeout=WATCH_LIMIT)
+        except (OSError, http.client.HTTPException, xmlrpc.client.Error) as error:
+            raise DeploymentError(f"supervisord (pid {supervisor}) does not answer: {error}") from error
 
     def _end_members(self) -> None:
         """End what lives, without supervisord's help."""
