@@ -246,6 +246,8 @@ class Graph:
                 if remaining <= 0 or not alive():
                     return False
                 waitset.wait(int(remaining * 1e9))
+                self._take()
+                self._discovered().refresh()
             return True
         finally:
             waitset.close()
@@ -320,21 +322,21 @@ class Graph:
 
     def writers_of(self, dds_topic: str) -> list[tuple[Endpoint, str, str]]:
         """The writers on a topic, each with its node's name and namespace."""
-        found = self._discovered().writers(lambda topic: topic == dds_topic)
+        found = [writer for writer in self._discovered().writers() if writer.topic == dds_topic]
         return [(endpoint, *self._owner(endpoint.gid)) for endpoint in found]
 
     def readers_of(self, dds_topic: str) -> list[tuple[Endpoint, str, str]]:
         """The readers on a topic, each with its node's name and namespace."""
-        found = self._discovered().readers(lambda topic: topic == dds_topic)
+        found = [reader for reader in self._discovered().readers() if reader.topic == dds_topic]
         return [(endpoint, *self._owner(endpoint.gid)) for endpoint in found]
 
     def count_writers(self, dds_topic: str) -> int:
         """How many writers a topic has."""
-        return len(self._discovered().writers(lambda topic: topic == dds_topic))
+        return sum(writer.topic == dds_topic for writer in self._discovered().writers())
 
     def count_readers(self, dds_topic: str) -> int:
         """How many readers a topic has."""
-        return len(self._discovered().readers(lambda topic: topic == dds_topic))
+        return sum(reader.topic == dds_topic for reader in self._discovered().readers())
 
 
 def _sorted(found: dict[str, set[str]]) -> NamesAndTypes:

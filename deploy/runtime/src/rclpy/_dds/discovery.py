@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes as ct
+import threading
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -27,8 +28,6 @@ _NOT_READ = 0x7E  # ANY_STATE without the sample state "read"
 _ALIVE = 16
 _NOT_ALIVE = 3 | 12 | 32 | 64  # any sample and view state, instance disposed or without writers
 _INITIAL_CAPACITY = 64
-# Our own readers below: Cyclone lists them here, but announces them to nobody.
-_BUILTIN = b"org::eclipse::cyclonedds::builtin::"
 
 
 @dataclass(frozen=True)
@@ -42,13 +41,20 @@ class Endpoint:
     user_data: str
     profile: QoSProfile
 
+    @property
+    def is_builtin(self) -> bool:
+        """Whether it is one of our own readers below: Cyclone lists them, but announces them to nobody."""
+        return self.type_name.startswith("org::eclipse::cyclonedds::builtin::")
+
 
 class _BuiltinReader:
-    """A reader of one of Cyclone's built-in topics."""
+    """A reader of one of Cyclone's built-in topics, and what it has read, kept until there is news."""
 
     def __init__(self, participant: int, topic: int, structure: type[ct.Structure]) -> None:
         self._structure = ct.POINTER(structure)
         self._capacity = _INITIAL_CAPACITY
+        self._lock = threading.Lock()
+        self._known: list[Any] | None = None
         self.handle = checked(blocking.dds_create_reader(participant, topic, None, None), "built-in reader")
         self.news = checked(blocking.dds_create_readcondition(self.handle, _NOT_READ), "read condition")
 
@@ -70,13 +76,18 @@ class _BuiltinReader:
             if count:
                 blocking.dds_return_loan(self.handle, samples, count)
 
-    def alive(self) -> Iterator[Any]:
-        """What exists now. The structures live only as long as the iteration."""
-        for _ in self._loan("dds_take_mask", _NOT_ALIVE):
-            pass  # what has gone is not kept
-        for structure, info in self._loan("dds_read_mask", ANY_STATE):
-            if info.valid_data and info.instance_state == _ALIVE:
-                yield structure
+    def alive(self, convert: Callable[[Any], Any]) -> list[Any]:
+        """What exists now, each as ``convert`` makes it from the C structure."""
+        with self._lock:
+            if self._known is None or blocking.dds_triggered(self.news):
+                for _ in self._loan("dds_take_mask", _NOT_ALIVE):
+                    pass  # what has gone is not kept
+                self._known = [
+                    convert(structure)
+                    for structure, info in self._loan("dds_read_mask", ANY_STATE)
+                    if info.valid_data and info.instance_state == _ALIVE
+                ]
+            return self._known
 
 
 class Discovery:
@@ -92,21 +103,30 @@ class Discovery:
         """The DDS conditions that are true while there is something new."""
         return [self._participants.news, self._writers.news, self._readers.news]
 
+    def refresh(self) -> None:
+        """Read all the news, so that only further ones trigger the conditions."""
+        self.participants()
+        self.writers()
+        self.readers()
+
     def participants(self) -> dict[bytes, str]:
         """The GUID of every participant and its USER_DATA."""
-        return {bytes(found.key.bytes): qos.user_data(found.qos) for found in self._participants.alive()}
+        return dict(self._participants.alive(_participant))
 
-    def writers(self, wanted: Callable[[str], bool] = lambda topic: True) -> list[Endpoint]:
-        """Every writer on a topic that is ``wanted``."""
-        return _endpoints(self._writers, wanted)
+    def writers(self) -> list[Endpoint]:
+        """Every writer."""
+        return [found for found in self._writers.alive(_endpoint) if not found.is_builtin]
 
-    def readers(self, wanted: Callable[[str], bool] = lambda topic: True) -> list[Endpoint]:
-        """Every reader on a topic that is ``wanted``."""
-        return _endpoints(self._readers, wanted)
+    def readers(self) -> list[Endpoint]:
+        """Every reader."""
+        return [found for found in self._readers.alive(_endpoint) if not found.is_builtin]
+
+
+def _participant(found: BuiltinParticipant) -> tuple[bytes, str]:
+    return bytes(found.key.bytes), qos.user_data(found.qos)
 
 
 def _endpoint(found: BuiltinEndpoint) -> Endpoint:
-    """A built-in topic's sample as an object of its own."""
     return Endpoint(
         gid=bytes(found.key.bytes),
         participant=bytes(found.participant_key.bytes),
@@ -115,11 +135,3 @@ def _endpoint(found: BuiltinEndpoint) -> Endpoint:
         user_data=qos.user_data(found.qos),
         profile=qos.profile_of(found.qos),
     )
-
-
-def _endpoints(reader: _BuiltinReader, wanted: Callable[[str], bool]) -> list[Endpoint]:
-    return [
-        _endpoint(found)
-        for found in reader.alive()
-        if not found.type_name.startswith(_BUILTIN) and wanted(found.topic_name.decode(errors="replace"))
-    ]

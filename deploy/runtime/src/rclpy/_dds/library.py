@@ -153,6 +153,7 @@ _BLOCKING: dict[str, tuple[Any, list[Any]]] = {
     "dds_get_status_changes": (ct.c_int32, [Entity, ct.POINTER(ct.c_uint32)]),
     "dds_read_mask": (ct.c_int32, [Entity, Pointer, Pointer, ct.c_size_t, ct.c_uint32, ct.c_uint32]),
     "dds_take_mask": (ct.c_int32, [Entity, Pointer, Pointer, ct.c_size_t, ct.c_uint32, ct.c_uint32]),
+    "dds_triggered": (ct.c_int32, [Entity]),
     "dds_return_loan": (ct.c_int32, [Entity, Pointer, ct.c_int32]),
 }
 
