@@ -5,10 +5,12 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import random
 import struct
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +19,7 @@ import pytest
 import rosidl_runtime_embedded
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosidl_runtime_embedded import message_class
 from rosidl_runtime_embedded.definition import FieldType, integer_range
 from rosidl_runtime_embedded.fields import ARRAY_CODES
@@ -43,6 +45,7 @@ MAIN_TYPES = [
     "type_description_interfaces/srv/GetTypeDescription_Response",
 ]
 STORE = get_typestore(Stores.ROS2_JAZZY)
+NUMBERS = itertools.count()
 
 
 def elements(type_: FieldType) -> st.SearchStrategy[Any]:
@@ -138,6 +141,54 @@ def test_a_bool_that_is_neither_true_nor_false_is_refused(value: int) -> None:
     sample = bytes((0, 1, 0, 0)) + bytes(4 * 8) + struct.pack("<IB", 1, value)
     with pytest.raises(ValueError, match="a bool is neither 0 nor 1"):
         message_class("rcl_interfaces/msg/ParameterValue")._deserialize(sample)
+
+
+PRIMITIVES = ["bool", "byte", "char", "float32", "float64", "string"] + [
+    f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)
+]
+PLURALS = st.sampled_from(["", "", "", "[]", "[<=2]", "[1]", "[3]"])
+
+
+def definitions(bases: list[str]) -> st.SearchStrategy[str]:
+    """Definition files of any fields."""
+    types = st.lists(st.builds(str.__add__, st.sampled_from(bases), PLURALS), max_size=6)
+    return types.map(lambda types: "".join(f"{type_} field{n}\n" for n, type_ in enumerate(types)))
+
+
+@pytest.fixture(scope="module")
+def prefix(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """A directory in AMENT_PREFIX_PATH."""
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        path = tmp_path_factory.mktemp("prefix")
+        monkeypatch.setenv("AMENT_PREFIX_PATH", str(path))
+        yield path
+
+
+@settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck))
+@given(data=st.data())
+def test_messages_of_any_definition_are_written_as_by_rosbags_and_read_back(
+    data: st.DataObject, prefix: Path
+) -> None:
+    # names of their own for each example: we remember types
+    number = next(NUMBERS)
+    directory = prefix / "share" / "any_msgs" / "msg"
+    directory.mkdir(parents=True, exist_ok=True)
+    bases = PRIMITIVES
+    for level in "ABC":
+        name = f"{level}{number}"
+        text = data.draw(definitions(bases))
+        (directory / f"{name}.msg").write_text(text)
+        STORE.register(get_types_from_msg(text, f"any_msgs/msg/{name}"))
+        bases = [*bases, name, name, name]
+
+    message = data.draw(messages(f"any_msgs/msg/{name}"))
+    cls: Any = type(message)
+    written = cls._serialize(message)
+    assert written == bytes(STORE.serialize_cdr(as_rosbags(message), message._TYPE_NAME))
+    assert cls._deserialize(written) == message
+    if "char" not in "".join(path.read_text() for path in directory.glob(f"?{number}.msg")):
+        assert STORE.hash_rihs01(message._TYPE_NAME) == cls._TYPE_HASH
+    feed(message._TYPE_NAME, 200, random.Random(number))
 
 
 def string_sample(*data: int) -> bytes:

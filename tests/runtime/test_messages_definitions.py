@@ -264,6 +264,12 @@ def test_what_nobody_defines_cannot_be_imported(define: Define) -> None:
         service_class("std_srvs/srv/Gone")
 
 
+def test_actions_are_said_to_be_missing(define: Define) -> None:
+    package = define({"Move.action": "---\n---\n"})
+    with pytest.raises(NotImplementedError, match=rf"{package}\.action: the embedded runtime has no actions"):
+        importlib.import_module(f"{package}.action")
+
+
 def test_the_packages_of_the_distribution_win_over_a_users(define: Define, tmp_path: Path) -> None:
     define({})
     path = tmp_path / "share" / "std_msgs" / "msg" / "Float64.msg"

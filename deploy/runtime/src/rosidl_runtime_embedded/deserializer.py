@@ -1,7 +1,8 @@
 """Code that reads a message type from little-endian XCDR1, made and compiled per type.
 
 The counterpart of :mod:`.serializer`. A sample comes from anywhere: nothing is allocated or repeated on the
-word of a count that the sample is too short for, and whatever is malformed raises ValueError.
+word of a count that the sample is too short for, and whatever is malformed raises ValueError. Only the bounds
+of strings are not checked, as no ROS 2 checks them: C++ sends longer ones.
 """
 
 from __future__ import annotations

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from .service import Service
 
 _SHIPPED = os.path.dirname(os.path.dirname(__file__))
-_KINDS = ["msg", "srv"]
+_KINDS = ["msg", "srv", "action"]
 _SERVICE_PARTS = ("Request", "Response", "Event")
 
 
@@ -122,16 +122,14 @@ def interfaces(module_name: str) -> tuple[Callable[[str], Any], Callable[[], lis
     def get(name: str) -> Any:
         if name == "__all__":
             return names()
-        try:
-            if name[:1].isupper():
-                part_of_service = kind == "srv" and name.rpartition("_")[2] in _SERVICE_PARTS
-                make = service_class if kind == "srv" and not part_of_service else message_class
-                value = make(f"{package}/{kind}/{name}")
-                setattr(sys.modules[module_name], name, value)
-                return value
-        except LookupError:
-            pass
-        raise AttributeError(f"module '{module_name}' has no attribute '{name}'")
+        is_part = kind == "srv" and name.endswith(tuple(f"_{part}" for part in _SERVICE_PARTS))
+        interface = name.rpartition("_")[0] if is_part else name
+        if not _is_defined(f"{package}/{kind}/{interface}"):
+            raise AttributeError(f"module '{module_name}' has no attribute '{name}'")
+        make = service_class if kind == "srv" and not is_part else message_class
+        value = make(f"{package}/{kind}/{name}")
+        setattr(sys.modules[module_name], name, value)
+        return value
 
     return get, names
 
@@ -142,7 +140,7 @@ class _UserPackages:
     def find_spec(
         self, name: str, path: Sequence[str] | None = None, target: ModuleType | None = None
     ) -> ModuleSpec | None:
-        """Spec of ``<package>``, ``<package>.msg`` or ``<package>.srv``; None if it is no message package."""
+        """Spec of ``<package>``, ``<package>.msg`` and the like; None if it is no message package."""
         package, _, kind = name.partition(".")
         kinds = [kind] if kind in _KINDS else [] if kind else _KINDS
         if not any(interface_names(package, kind) for kind in kinds):
@@ -154,6 +152,8 @@ class _UserPackages:
 
     def exec_module(self, module: ModuleType) -> None:
         """Give the module its classes."""
+        if module.__name__.endswith(".action"):
+            raise NotImplementedError(f"{module.__name__}: the embedded runtime has no actions")
         if "." in module.__name__:
             vars(module)["__getattr__"], vars(module)["__dir__"] = interfaces(module.__name__)
 
