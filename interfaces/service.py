@@ -54,15 +54,17 @@ from interfaces.scenario import Scenario, ScenarioError, Timeline, load, play
 from interfaces.topics import DIAGNOSTICS, Topic, is_latched
 
 T = TypeVar("T")
+_HEALTH_PERIOD = 1.0  # [s]
+_MISTAKES = (NameValidationException, ParameterException, ScenarioError)  # of who started the service
 _RECENT = 16  # messages of which a second reader may bring a copy
 
 
 class ServiceNode(ReactiveNode):
     """A node that speaks the contract, keeps bad input out, and reports its health."""
 
-    def __init__(self, name: str) -> None:
-        """Create the node of a service."""
-        super().__init__(name)
+    def __init__(self, node_name: str, **options: Any) -> None:
+        """Create the node of a service; the options are those of :class:`rclpy.node.Node`."""
+        super().__init__(node_name, **options)
         self._started = time.monotonic()
         self._observed: list[Topic] = []
         self._published_count = 0
@@ -72,7 +74,7 @@ class ServiceNode(ReactiveNode):
         self.add_on_set_parameters_callback(_only_finite)
         self._health = self.create_publisher(DIAGNOSTICS.type, DIAGNOSTICS.name, DIAGNOSTICS.qos)
         # By the steady clock even while ROS time is simulated: a simulation that pauses is no hung service.
-        self.create_timer(1.0, self._report_health, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self.create_timer(_HEALTH_PERIOD, self.report_health, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def declare(
         self,
@@ -200,7 +202,8 @@ class ServiceNode(ReactiveNode):
         count = self._remarks.get(what, (0, ""))[0]
         self._remarks[what] = (count + 1, why)
 
-    def _report_health(self) -> None:
+    def report_health(self) -> None:
+        """Publish the health, with all remarks since the last time; this happens at 1 Hz anyway."""
         for topic in self._observed:
             for publisher in self.get_publishers_info_by_topic(self.resolve_topic_name(topic.name)):
                 if publisher.topic_type != topic.type_name:
@@ -303,7 +306,7 @@ def _live(name: str, wire: Callable[[ServiceNode], None]) -> int:
             return _spin(node, wire)
         finally:
             node.destroy_node()
-    except (NameValidationException, ParameterException, ScenarioError) as error:
+    except _MISTAKES as error:
         return _refuse(name, error, 2)
     except _AlreadyRunning as error:
         return _refuse(name, error, 1)
@@ -313,13 +316,15 @@ def _live(name: str, wire: Callable[[ServiceNode], None]) -> int:
 
 def _spin(node: ServiceNode, wire: Callable[[ServiceNode], None]) -> int:
     with _claim(node), SingleThreadedExecutor() as executor:
-        wire(node)
-        executor.add_node(node)
-        stopping.spinning()
         try:
+            wire(node)
+            executor.add_node(node)
+            stopping.spinning()
             executor.spin()
         except ExternalShutdownException:
             pass
+        except _MISTAKES:
+            raise
         except Exception:
             node.get_logger().fatal(traceback.format_exc())
             return 1

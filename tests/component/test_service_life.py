@@ -1,0 +1,205 @@
+"""The life of a service as a process: how it starts, refuses to, and ends."""
+
+from __future__ import annotations
+
+import re
+import select
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+
+HANGING = """
+from interfaces import service
+
+def wire(node):
+    def hang():
+        print("hangs", flush=True)
+        while True:
+            pass
+    node.create_timer(0.01, hang)
+
+service.run("hanging", wire)
+"""
+
+FAILING = """
+import reactivex as rx
+from interfaces import service
+from interfaces.topics import L1
+
+def wire(node):
+    node.publish(L1, rx.timer(0.01).map(lambda _: 1 / 0))
+    node.create_timer(0.001, lambda: None)
+
+service.run("failing", wire)
+"""
+
+FAILING_WHILE_WIRED = """
+from interfaces import service
+
+def wire(node):
+    raise LookupError("planted")
+
+service.run("failing", wire)
+"""
+
+READY = """
+from interfaces import service
+
+def wire(node):
+    node.create_timer(0.01, lambda: print("ready", flush=True))
+
+service.run("ready", wire)
+"""
+
+
+class Process:
+    """A Python process whose output is at hand."""
+
+    def __init__(self, *arguments: str) -> None:
+        self.popen = subprocess.Popen(
+            [sys.executable, *arguments], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        )
+
+    def wait_for_line(self) -> str:
+        assert self.popen.stdout is not None
+        assert select.select([self.popen.stdout], [], [], 10)[0], "no output within 10 s"
+        return self.popen.stdout.readline().strip()
+
+    def end(self, by: signal.Signals | None = None) -> tuple[int, str]:
+        """Return the exit code and what it wrote to standard error, after a signal if one is given."""
+        if by is not None:
+            self.popen.send_signal(by)
+        _, errors = self.popen.communicate(timeout=10)
+        return self.popen.returncode, errors
+
+
+Start = Callable[..., Process]
+
+
+@pytest.fixture
+def start(domain_id: int) -> Iterator[Start]:
+    with ExitStack() as stack:
+
+        def start(*arguments: str) -> Process:
+            process = Process(*arguments)
+            stack.enter_context(process.popen)
+            stack.callback(process.popen.kill)
+            return process
+
+        yield start
+
+
+def service(name: str, announce: bool = False) -> tuple[str, ...]:
+    """The command line of a service, which may say when its first line has run."""
+    if not announce:
+        return "-m", f"services.{name}"
+    announced = "import services; print('begun', flush=True); import runpy; "
+    return "-c", announced + f"runpy.run_module('services.{name}', run_name='__main__', alter_sys=True)"
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+@pytest.mark.parametrize("delay", [0.0, 0.03, 0.06, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.6])
+def test_a_signal_ends_a_service_in_order_at_every_moment(
+    start: Start, number: signal.Signals, delay: float
+) -> None:
+    process = start(*service("operator_watchdog", announce=True))
+    assert process.wait_for_line() == "begun"
+    time.sleep(delay)
+    begin = time.monotonic()
+
+    assert process.end(by=number) == (0, "")
+
+    assert time.monotonic() - begin < 3.0  # 1 s, on a machine that has time
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_signal_ends_a_service_that_hangs(start: Start, number: signal.Signals) -> None:
+    process = start("-c", HANGING)
+    assert process.wait_for_line() == "hangs"
+
+    assert process.end(by=number) == (0, "")
+
+
+def test_two_signals_end_a_service_at_once(start: Start) -> None:
+    process = start("-c", HANGING)
+    assert process.wait_for_line() == "hangs"
+    process.popen.send_signal(signal.SIGINT)
+
+    assert process.end(by=signal.SIGTERM) == (0, "")
+
+
+@pytest.mark.parametrize(
+    ("program", "error"), [(FAILING, "ZeroDivisionError"), (FAILING_WHILE_WIRED, "LookupError: planted")]
+)
+def test_an_unexpected_error_is_logged_once_and_ends_the_service(
+    start: Start, program: str, error: str
+) -> None:
+    code, errors = start("-c", program).end()
+
+    assert code == 1
+    assert errors.count("Traceback") == 1
+    assert errors.count(error) == 1
+    assert "[failing]" in errors
+
+
+def test_a_second_instance_refuses_to_start_and_names_the_first(start: Start) -> None:
+    first = start("-c", READY)
+    assert first.wait_for_line() == "ready"
+
+    code, errors = start("-c", READY).end()
+
+    assert code == 1
+    assert errors.count("\n") == 1
+    assert errors.startswith("ready: /ready runs already in domain")
+    assert errors.endswith(f": process {first.popen.pid}\n")
+
+
+def test_another_namespace_or_name_is_another_instance(start: Start) -> None:
+    processes = [
+        start("-c", READY, *arguments)
+        for arguments in ([], ["--ros-args", "-r", "__ns:=/arm1"], ["--ros-args", "-r", "__node:=other"])
+    ]
+
+    assert [process.wait_for_line() for process in processes] == ["ready"] * 3
+
+
+def test_a_killed_instance_makes_room_at_once(start: Start) -> None:
+    first = start("-c", READY)
+    assert first.wait_for_line() == "ready"
+    first.end(by=signal.SIGKILL)
+
+    assert start("-c", READY).wait_for_line() == "ready"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "reason"),
+    [
+        (["services.config_publisher"], "must be one of l1, l2, theta1, theta2, not ''"),
+        (["services.config_publisher", "l1", "--ros-args", "-p", "value:=-1.0"], "config_l1: .*-1.0.*value"),
+        (["services.config_publisher", "l1", "--ros-args", "-p", "value:=.nan"], "config_l1: .*nan.*value"),
+        (
+            ["services.config_publisher", "l1", "--ros-args", "-p", "value:=long"],
+            "config_l1: .*'long'.*value",
+        ),
+        (
+            ["services.dead_mans_switch", "--ros-args", "-p", "scenario:=/nowhere.yaml"],
+            "dead_mans_switch: /nowhere.yaml: No such file or directory",
+        ),
+    ],
+)
+def test_a_mistake_in_a_parameter_is_one_line_and_exit_code_2(
+    start: Start, arguments: list[str], reason: str
+) -> None:
+    code, errors = start("-m", *arguments).end()
+
+    assert code == 2
+    assert errors.count("\n") == 1
+    assert re.search(reason, errors)

@@ -1,0 +1,305 @@
+"""What all services have: the edge that keeps bad input out, parameters, scenarios and health."""
+
+from __future__ import annotations
+
+import math
+import os
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+import reactivex as rx
+from diagnostic_msgs.msg import DiagnosticStatus
+from geometry_msgs.msg import Point, PointStamped
+from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.qos import QoSProfile
+from std_msgs.msg import Bool, Float64, Header, String
+
+from interfaces import topics
+from interfaces.scenario import ScenarioError
+from interfaces.service import ServiceNode
+
+Make = Callable[..., Any]
+SpinUntil = Callable[..., None]
+SpinFor = Callable[[float], None]
+
+
+@pytest.fixture
+def service(make_node: Make, monkeypatch: pytest.MonkeyPatch) -> ServiceNode:
+    """A service that reports its health when it is told to."""
+    monkeypatch.setattr("interfaces.service._HEALTH_PERIOD", 3600.0)
+    node: ServiceNode = make_node("service", kind=ServiceNode)
+    return node
+
+
+@pytest.fixture
+def peer(make_node: Make) -> Node:
+    node: Node = make_node("peer", kind=Node)
+    return node
+
+
+@pytest.fixture
+def health(service: ServiceNode, peer: Node, spin_until: SpinUntil) -> Callable[[], dict[str, Any]]:
+    """Gives the health message that the service would send now."""
+    heard: list[Any] = []
+    topic = topics.DIAGNOSTICS
+    peer.create_subscription(topic.type, topic.name, heard.append, topic.qos)
+
+    spin_until(lambda: service.count_subscribers(topic.name) == 1)
+    spin_until(lambda: peer.count_publishers(topic.name) == 1)
+
+    def following() -> dict[str, Any]:
+        heard.clear()
+        service.report_health()
+        spin_until(lambda: heard)
+        (status,) = heard[0].status
+        return {
+            "name": status.name,
+            "level": status.level,
+            "message": status.message,
+            **{pair.key: pair.value for pair in status.values},
+        }
+
+    return following
+
+
+def number(data: float) -> Float64:
+    return Float64(data=data)
+
+
+def position(x: float, y: float) -> PointStamped:
+    return PointStamped(point=Point(x=x, y=y))
+
+
+GOOD_AND_BAD = [
+    (
+        topics.L1,
+        [number(0.0), number(2.5)],
+        [number(math.nan), number(math.inf), number(-math.inf), number(-1e-9)],
+    ),
+    (topics.THETA2, [number(-7.0), number(1e300)], [number(math.nan), number(math.inf), number(-math.inf)]),
+    (
+        topics.EFFECTOR_POSITION,
+        [position(-1.0, 2.0)],
+        [position(math.nan, 0.0), position(0.0, math.inf)],
+    ),
+    (topics.EFFECTOR_SPEED, [number(0.0)], [number(math.nan), number(-1.0)]),
+    (topics.OPERATOR_HEARTBEAT, [Bool(data=True)], [Bool(data=False)]),
+    (topics.OPERATOR_PRESENCE, [Header()], []),
+    (
+        topics.ENGINES,
+        [String(data="turn_on"), String(data="turn_off")],
+        [String(data="Turn_on"), String(data=""), String(data="x" * 100_000)],
+    ),
+    (topics.ENGINES_STATE, [String(data="on"), String(data="off")], [String(data="turn_off")]),
+]
+
+
+@pytest.mark.parametrize(("topic", "good", "bad"), GOOD_AND_BAD, ids=lambda value: getattr(value, "name", ""))
+def test_bad_input_is_dropped_and_reported(
+    service: ServiceNode,
+    peer: Node,
+    spin_until: SpinUntil,
+    health: Callable[[], dict[str, Any]],
+    topic: topics.Topic,
+    good: list[Any],
+    bad: list[Any],
+) -> None:
+    received: list[Any] = []
+    service.observe(topic).subscribe(received.append)
+    publisher = peer.create_publisher(topic.type, topic.name, topic.qos)
+    spin_until(lambda: publisher.get_subscription_count() == 1)
+
+    for message in bad:
+        before = service._dropped_count
+        publisher.publish(message)
+        spin_until(lambda before=before: service._dropped_count == before + 1)
+    for message in good:
+        publisher.publish(message)
+        spin_until(lambda message=message: received[-1:] == [message])
+
+    assert received == good
+    report = health()
+    assert report["dropped"] == str(len(bad))
+    assert report["level"] == (DiagnosticStatus.WARN if bad else DiagnosticStatus.OK)
+    if bad:
+        assert report["message"].startswith(f"{topic.name}: {topic.fault(bad[-1])}")
+        assert len(report["message"]) < 200
+    following = health()
+    assert (following["level"], following["message"]) == (DiagnosticStatus.OK, "running")
+    assert following["dropped"] == str(len(bad))
+
+
+def test_a_publisher_of_another_type_is_reported(
+    service: ServiceNode, peer: Node, spin_until: SpinUntil, health: Callable[[], dict[str, Any]]
+) -> None:
+    service.observe(topics.L1).subscribe()
+    peer.create_publisher(String, "l1", topics.L1.qos)
+    spin_until(lambda: service.count_publishers("l1") == 1)
+
+    report = health()
+
+    assert report["level"] == DiagnosticStatus.WARN
+    assert report["message"] == "l1: peer publishes std_msgs/msg/String"
+
+
+def test_a_latched_topic_also_hears_publishers_that_are_not(
+    service: ServiceNode, peer: Node, spin_until: SpinUntil, spin_for: SpinFor
+) -> None:
+    received: list[float] = []
+    service.observe(topics.L1).subscribe(lambda message: received.append(message.data))
+    latched = peer.create_publisher(Float64, "l1", topics.L1.qos)
+    latched.publish(number(1.0))
+    spin_until(lambda: received == [1.0])
+
+    by_hand = peer.create_publisher(Float64, "l1", QoSProfile(depth=10))
+    spin_until(lambda: by_hand.get_subscription_count() == 1)
+    by_hand.publish(number(2.0))
+    spin_until(lambda: received == [1.0, 2.0])
+    spin_until(lambda: latched.get_subscription_count() == 2)
+    latched.publish(number(3.0))
+    spin_until(lambda: len(received) == 3)
+    spin_for(0.05)
+
+    assert received == [1.0, 2.0, 3.0]
+
+
+def test_what_the_contract_forbids_is_not_published_either(
+    service: ServiceNode, peer: Node, spin_until: SpinUntil, health: Callable[[], dict[str, Any]]
+) -> None:
+    received: list[float] = []
+    topic = topics.EFFECTOR_SPEED
+    peer.create_subscription(topic.type, topic.name, lambda message: received.append(message.data), topic.qos)
+    spin_until(lambda: service.count_subscribers(topic.name) == 1)
+    speeds: rx.Subject[float] = rx.Subject()
+    service.publish(topic, speeds.map(number))
+    spin_until(
+        lambda: any(
+            p.get_subscription_count() for p in service.publishers if p.topic_name == "/effector/speed"
+        )
+    )
+
+    assert health()["seconds_since_output"] == ""
+    for speed in (math.inf, 1.0, 2.0):
+        speeds.on_next(speed)
+    spin_until(lambda: received == [1.0, 2.0])
+
+    report = health()
+    assert (report["published"], report["dropped"]) == ("2", "1")
+    assert 0 <= float(report["seconds_since_output"]) < 5
+
+
+def test_health_says_who_it_is_and_how_long_it_runs(
+    service: ServiceNode, health: Callable[[], dict[str, Any]]
+) -> None:
+    report = health()
+
+    assert report["name"] == "/service"
+    assert report["pid"] == str(os.getpid())
+    assert 0 < float(report["uptime"]) < 60
+
+
+def test_a_remark_is_a_warning_but_not_bad_input(
+    service: ServiceNode, health: Callable[[], dict[str, Any]]
+) -> None:
+    service.remark("engines", "refused")
+    service.remark("engines", "refused again")
+
+    report = health()
+
+    assert report["message"] == "engines: refused again (2 times)"
+    assert (report["level"], report["dropped"]) == (DiagnosticStatus.WARN, "0")
+
+
+# Parameters
+
+
+def overridden(make_node: Make, **values: Any) -> ServiceNode:
+    overrides = [Parameter(name, value=value) for name, value in values.items()]
+    node: ServiceNode = make_node("service", kind=ServiceNode, parameter_overrides=overrides)
+    return node
+
+
+def test_a_parameter_is_described_and_has_a_range(service: ServiceNode) -> None:
+    assert service.declare("rate", 20.0, (1.0, 100.0), "how often [Hz]") == 20.0
+    assert service.declare("strikes", 3, (1, 9), "how many") == 3
+
+    rate, strikes = service.describe_parameters(["rate", "strikes"])
+
+    assert (rate.description, rate.read_only) == ("how often [Hz]", True)
+    assert (rate.floating_point_range[0].from_value, rate.floating_point_range[0].to_value) == (1.0, 100.0)
+    assert (strikes.integer_range[0].from_value, strikes.integer_range[0].to_value) == (1, 9)
+
+
+@pytest.mark.parametrize("value", [0.5, 100.5, math.nan, math.inf, -math.inf])
+def test_a_value_out_of_range_is_refused(make_node: Make, value: float) -> None:
+    node = overridden(make_node, rate=value)
+
+    with pytest.raises(InvalidParameterValueException, match="rate"):
+        node.declare("rate", 20.0, (1.0, 100.0), "how often [Hz]")
+
+
+def test_a_value_of_another_type_is_refused(make_node: Make) -> None:
+    node = overridden(make_node, rate="fast")
+
+    with pytest.raises(InvalidParameterTypeException, match="rate"):
+        node.declare("rate", 20.0, (1.0, 100.0), "how often [Hz]")
+
+
+def test_only_what_is_settable_can_be_set_while_it_runs(service: ServiceNode) -> None:
+    service.declare("fixed", 20.0, (1.0, 100.0), "fixed")
+    service.declare("value", 20.0, (1.0, 100.0), "value", settable=True)
+
+    def set_to(name: str, value: float) -> bool:
+        return bool(service.set_parameters([Parameter(name, value=value)])[0].successful)
+
+    assert not set_to("fixed", 21.0)
+    assert set_to("value", 21.0)
+    assert not set_to("value", math.nan)
+    assert service.get_parameter("value").value == 21.0
+
+
+# Scenarios
+
+
+def test_without_a_scenario_nothing_is_driven(service: ServiceNode) -> None:
+    assert service.declare_scenario().configuration == {}
+    assert service.play(None) is None
+
+
+def test_a_scenario_is_played_from_where_it_is_now(
+    make_node: Make, tmp_path: Path, spin_until: SpinUntil
+) -> None:
+    path = tmp_path / "scenario.yaml"
+    path.write_text(
+        "l1: [{at: 0, value: 1}, {at: 100, value: 2}, {at: 100.2, value: 3}, {at: 999, value: 4}]"
+    )
+    node = overridden(make_node, scenario=str(path), scenario_epoch=time.monotonic() - 100.1)
+    values: list[float] = []
+
+    node.play(node.declare_scenario().configuration["l1"]).subscribe(values.append, scheduler=node.scheduler)
+
+    assert values == [2.0]
+    spin_until(lambda: values == [2.0, 3.0])
+
+
+def test_a_mistake_in_a_scenario_is_an_error(make_node: Make) -> None:
+    node = overridden(make_node, scenario="/nowhere.yaml")
+
+    with pytest.raises(ScenarioError, match=r"/nowhere\.yaml"):
+        node.declare_scenario()
+
+
+def test_health_is_reported_once_a_second(make_node: Make, peer: Node, spin_until: SpinUntil) -> None:
+    heard: list[float] = []
+    topic = topics.DIAGNOSTICS
+    peer.create_subscription(topic.type, topic.name, lambda _: heard.append(time.monotonic()), topic.qos)
+    make_node("punctual", kind=ServiceNode)
+
+    spin_until(lambda: len(heard) == 2)
+
+    assert heard[1] - heard[0] > 0.5
