@@ -62,12 +62,23 @@ class TimeoutObject:
     """A timeout that many calls share."""
 
     def __init__(self, timeout: float) -> None:
-        self._deadline = time.monotonic() + timeout if timeout >= 0 else None
+        self._deadline = _deadline(timeout)
 
     @property
     def timeout(self) -> float:
         """Seconds that remain, never negative; -1 for no end."""
-        return -1.0 if self._deadline is None else max(0.0, self._deadline - time.monotonic())
+        if self._deadline is None:
+            return -1.0
+        return max(0, self._deadline - time.monotonic_ns()) / S_TO_NS
+
+
+def _deadline(timeout: float | TimeoutObject | None) -> int | None:
+    """When a timeout [s] is over, by the steady clock [ns]; ``None`` for never."""
+    if isinstance(timeout, TimeoutObject):
+        return timeout._deadline
+    if timeout is None or timeout < 0:
+        return None
+    return time.monotonic_ns() + int(timeout * S_TO_NS)
 
 
 class _Entity(Protocol):
@@ -205,25 +216,29 @@ class Executor(AbstractContextManager["Executor"]):
 
     def spin_once(self, timeout_sec: float | None = None) -> None:
         """Run one callback, waiting at most ``timeout_sec`` for it (``None`` or negative: for ever)."""
-        self._spin_once(timeout_sec, None)
+        self._spin_once(_deadline(timeout_sec), None)
 
     def spin_until_future_complete(self, future: Future, timeout_sec: float | None = None) -> None:
         """Run callbacks until ``future`` is done or cancelled, but no longer than ``timeout_sec``."""
         future._call_when_complete(self.wake)
-        timeout = TimeoutObject(-1 if timeout_sec is None else timeout_sec)
-        while self._context.ok() and not self._is_shutdown:
-            if _complete(future) or timeout.timeout == 0:
+        deadline = _deadline(timeout_sec)
+
+        def complete() -> bool:
+            return future.done() or future.cancelled()
+
+        while self._context.ok() and not self._is_shutdown and not complete():
+            if deadline is not None and time.monotonic_ns() >= deadline:
                 return
-            self._spin_once(timeout, lambda: _complete(future))
+            self._spin_once(deadline, complete)
 
     def spin_once_until_future_complete(
         self, future: Future, timeout_sec: float | TimeoutObject | None = None
     ) -> None:
         """Run one callback, unless ``future`` is or gets done before one is ready."""
         future._call_when_complete(self.wake)
-        self._spin_once(timeout_sec, lambda: _complete(future))
+        self._spin_once(_deadline(timeout_sec), lambda: future.done() or future.cancelled())
 
-    def _spin_once(self, timeout: float | TimeoutObject | None, condition: Callable[[], bool] | None) -> None:
+    def _spin_once(self, deadline: int | None, condition: Callable[[], bool] | None) -> None:
         """Run one callback, unless the time is over or the condition true before one is ready."""
         raise NotImplementedError
 
@@ -239,7 +254,7 @@ class Executor(AbstractContextManager["Executor"]):
         :raises TimeoutException, ShutdownException, ExternalShutdownException, ConditionReachedException:
             if there is none.
         """
-        entity, taken = self._next(timeout_sec, condition)
+        entity, taken = self._next(_deadline(timeout_sec), condition)
         node = next((node for node in self.get_nodes() if entity in node._entities()), None)
         return Task(self._run, (entity, taken), executor=self), entity, node
 
@@ -247,14 +262,8 @@ class Executor(AbstractContextManager["Executor"]):
         """Whether ``entity``'s callback group would let it run now."""
         return entity.callback_group is None or bool(entity.callback_group.can_execute(entity))
 
-    def _next(
-        self, timeout_sec: float | TimeoutObject | None, condition: Callable[[], bool] | None = None
-    ) -> tuple[Any, Any]:
+    def _next(self, deadline: int | None, condition: Callable[[], bool] | None) -> tuple[Any, Any]:
         """Wait for work: an entity and what was taken from it; for a task, the task and ``None``."""
-        timeout = timeout_sec.timeout if isinstance(timeout_sec, TimeoutObject) else timeout_sec
-        deadline = None
-        if timeout is not None and timeout >= 0:
-            deadline = time.monotonic_ns() + int(timeout * S_TO_NS)
         waited = False
         while True:
             if not self._context.ok():
@@ -442,10 +451,6 @@ class Executor(AbstractContextManager["Executor"]):
         self.shutdown()
 
 
-def _complete(future: Future) -> bool:
-    return future.done() or future.cancelled()
-
-
 def _raise_exception_of(task: Task) -> None:
     if task.done() and task.exception() is not None:
         task.result()
@@ -454,11 +459,11 @@ def _raise_exception_of(task: Task) -> None:
 class SingleThreadedExecutor(Executor):
     """Runs all callbacks on the thread that spins."""
 
-    def _spin_once(self, timeout: float | TimeoutObject | None, condition: Callable[[], bool] | None) -> None:
+    def _spin_once(self, deadline: int | None, condition: Callable[[], bool] | None) -> None:
         self._spinning_thread = threading.get_ident()
         try:
             try:
-                entity, taken = self._next(timeout, condition)
+                entity, taken = self._next(deadline, condition)
             except (TimeoutException, ShutdownException, ConditionReachedException):
                 return
             self._callback_thread = self._spinning_thread
@@ -484,11 +489,11 @@ class MultiThreadedExecutor(Executor):
         self._errors: deque[BaseException] = deque()
         self._in_pool = 0  # callbacks under way there
 
-    def _spin_once(self, timeout: float | TimeoutObject | None, condition: Callable[[], bool] | None) -> None:
+    def _spin_once(self, deadline: int | None, condition: Callable[[], bool] | None) -> None:
         self._spinning_thread = threading.get_ident()
         try:
             entity, taken = self._next(
-                timeout, lambda: bool(self._errors) or (condition is not None and condition())
+                deadline, lambda: bool(self._errors) or (condition is not None and condition())
             )
             with self._idle:
                 self._in_pool += 1

@@ -131,8 +131,11 @@ class Timer:
         """Nanoseconds to wait for it; for ever while it rests, or while its time is a simulator's."""
         if self._canceled or self._destroyed:
             return INFINITY
-        remaining = self._next_call - self._source.nanoseconds()
-        return INFINITY if remaining > 0 and self._source.get_ros_time_override_is_enabled() else remaining
+        source = self._source
+        if source._override is None:
+            return self._next_call - source._read()
+        # Simulated time comes as a message: there is nothing to wait for until it is there.
+        return INFINITY if self._next_call > source._override else 0
 
     def _take(self) -> tuple[()] | None:
         if self._destroyed or self._canceled:
