@@ -1,0 +1,109 @@
+"""What happened, as seen from outside: the messages of each topic, the lives of processes, and the faults.
+
+Times are seconds since the record began, by the monotonic clock of the host.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_left, bisect_right
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+from interfaces import topics
+
+SENTINEL = "sentinel"
+OPERATOR, ALL, NOTHING = "operator", "all", "nothing"
+"""What a fault may be done to besides a program; `nothing` is what must not be able to disturb anything."""
+
+
+class Sample(NamedTuple):
+    """A message as the observer got it."""
+
+    sent: float
+    """when its publisher wrote it (DDS source time)"""
+    received: float
+    value: Any
+    """its content, plain: a float, a bool, a string; (x, y) of a position, (node, pid) of a health report"""
+
+
+class Life(NamedTuple):
+    """A process of the system."""
+
+    program: str
+    """the supervised program; '' for supervisord"""
+    pid: int
+    began: float
+    ended: float | None
+    """None while it lives on"""
+
+
+class Fault(NamedTuple):
+    """What the monkey did, and what it hit."""
+
+    kind: str
+    target: str
+    """the program, or what else it was done to"""
+    begin: float
+    end: float
+    """when the monkey stopped doing it; `begin` for what takes no time"""
+    pid: int = 0
+    detail: str = ""
+
+
+@dataclass(frozen=True)
+class History:
+    """Everything that one arm did while the record ran."""
+
+    end: float
+    streams: dict[str, list[Sample]] = field(default_factory=dict)
+    """by relative topic name, in the order of sending"""
+    lives: list[Life] = field(default_factory=list)
+    faults: list[Fault] = field(default_factory=list)
+
+    def stream(self, topic: topics.Topic) -> list[Sample]:
+        """The messages of a topic."""
+        return self.streams.get(topic.name, [])
+
+    def output(self, program: str) -> list[Sample]:
+        """The messages by which one sees that a program works."""
+        if topic := OUTPUTS.get(program):
+            return self.stream(topic)
+        return [s for s in self.stream(topics.DIAGNOSTICS) if s.value[0] == program]
+
+    def deaths(self, program: str, begin: float, end: float) -> list[Life]:
+        """The processes of a program that ended between two times."""
+        return [
+            life
+            for life in self.lives
+            if life.program == program and life.ended is not None and begin <= life.ended <= end
+        ]
+
+
+OUTPUTS = {
+    publisher: topic
+    for topic in topics.CONTRACT
+    if topic not in (topics.ENGINES, topics.DIAGNOSTICS)
+    for publisher in topic.publishers
+}
+"""The topic by which one sees that a service works; the sentinel's is its health."""
+
+PROGRAMS = (*OUTPUTS, SENTINEL)
+
+
+def between(samples: Sequence[Sample], begin: float, end: float) -> Sequence[Sample]:
+    """The samples sent from `begin` up to and including `end`."""
+    return samples[
+        bisect_left(samples, begin, key=lambda s: s.sent) : bisect_right(samples, end, key=lambda s: s.sent)
+    ]
+
+
+def gaps(times: Iterable[float], begin: float, end: float) -> Iterable[tuple[float, float]]:
+    """The stretches from one time to the next, also from `begin` to the first and from the last to `end`."""
+    last = begin
+    for time in times:
+        if time > last:
+            yield last, time
+            last = time
+    if end > last:
+        yield last, end

@@ -1,0 +1,165 @@
+"""The liveness promises L1 to L4: pure functions from a history to a finding."""
+
+from __future__ import annotations
+
+import math
+
+from deploy.chaos.findings import Evidence, Finding, percentile
+from deploy.chaos.history import ALL, OPERATOR, OUTPUTS, PROGRAMS, Fault, History, between
+from deploy.chaos.safety import Published
+from interfaces import topics
+
+MEDIAN, SLOWEST = 1.0, 2.0  # s, L1
+GAP = 0.25  # s, L2
+HUNG = 5.0  # s, L4
+SETTLED = 0.5  # s after a recovery until everything downstream is right
+FLOWING = 1.2  # s within which a program's output came before it was hit, or it has none just now
+
+DOWNSTREAM = {
+    "kinematics": ("velocity",),
+    "dead_mans_switch": ("operator_watchdog",),
+    OPERATOR: ("dead_mans_switch", "operator_watchdog"),
+}
+"""What falls silent because its only source does."""
+STEADY = tuple(program for program in OUTPUTS if program != "operator_watchdog")
+"""Programs whose output comes more often than every 250 ms, as long as the operator holds the switch."""
+
+MOMENTARY = ("kill", "terminate", "raise")
+LASTING = ("stop", "hang", "hog")
+
+
+def comes_back(history: History) -> Finding:
+    """L1: after SIGKILL of any service its output flows again: p50 ≤ 1.0 s, p99 ≤ 2.0 s."""
+    times: dict[str, list[float]] = {}
+    evidence, unknown = [], 0
+    for fault in history.faults:
+        if fault.kind == "kill":
+            time = _recovery(history, fault)
+            if time is None or not _undisturbed(
+                history, fault, fault.begin, fault.begin + min(time, SLOWEST)
+            ):
+                unknown += 1
+                continue
+            times.setdefault(fault.target, []).append(time)
+            if time > SLOWEST:
+                what = f"{fault.target} is silent {_seconds(time)} after SIGKILL"
+                evidence.append(Evidence(fault.begin, what))
+    for program, values in times.items():
+        if (median := percentile(values, 50)) > MEDIAN:
+            evidence.append(Evidence(0.0, f"{program} takes {median:.2f} s in the median"))
+    every = [time for values in times.values() for time in values]
+    figures = f"p50 {percentile(every, 50):.2f} s, p99 {percentile(every, 99):.2f} s"
+    return Finding("L1", len(every), figures if every else "", evidence, unknown, times)
+
+
+def others_flow_on(history: History) -> Finding:
+    """L2: the streams of the other services show no gap over 250 ms meanwhile."""
+    evidence, cases, longest = [], 0, 0.0
+    for fault in history.faults:
+        if fault.kind != "kill":
+            continue
+        end = fault.begin + (_recovery(history, fault) or SLOWEST)
+        for program in STEADY:
+            if program in (fault.target, *DOWNSTREAM.get(fault.target, ())):
+                continue
+            if not _flowed(history, program, fault.begin, GAP):
+                continue
+            if any(_disturbs(other, program, fault.begin - 1.0, end) for other in history.faults):
+                continue
+            sent = [s.sent for s in between(history.output(program), fault.begin - GAP, end + GAP)]
+            cases += 1
+            for one, two in zip(sent, [*sent[1:], end], strict=True):
+                longest = max(longest, two - one)
+                if two - one > GAP:
+                    what = f"{program} is silent for {two - one:.2f} s when {fault.target} is killed"
+                    evidence.append(Evidence(one, what))
+    return Finding("L2", cases, f"longest gap {1000 * longest:.0f} ms of {1000 * GAP:.0f} ms", evidence)
+
+
+def right_after_return(history: History) -> Finding:
+    """L3: what changed while a service was dead is right after its return."""
+    published = Published(history)
+    evidence, cases = [], 0
+    concerned = ("kinematics", *(topics.CONFIGURATION[name].publishers[0] for name in topics.CONFIGURATION))
+    for fault in history.faults:
+        if fault.target not in concerned or fault.kind not in (*MOMENTARY, *LASTING):
+            continue
+        time = _recovery(history, fault)
+        if time is None or time == math.inf:
+            continue
+        begin = fault.begin + time + SETTLED
+        if not all(
+            other is fault or not _disturbs(other, program, begin - SETTLED - 5.0, begin + 1.0)
+            for other in history.faults
+            for program in concerned
+        ):
+            continue
+        positions = between(history.stream(topics.EFFECTOR_POSITION), begin, begin + 1.0)
+        cases += bool(positions)
+        wrong = [s for s in positions if not published.explains(s, within=GAP)]
+        if wrong:
+            what = (
+                f"{len(wrong)} of {len(positions)} positions are not of the last values after {fault.target}"
+            )
+            evidence.append(Evidence(wrong[0].sent, what))
+    return Finding("L3", cases, f"right after {cases - len(evidence)} of {cases} returns", evidence)
+
+
+def hung_is_replaced(history: History) -> Finding:
+    """L4: a hung service is replaced within 5 s."""
+    times: dict[str, list[float]] = {}
+    evidence, unknown = [], 0
+    for fault in history.faults:
+        lasted = fault.end - fault.begin
+        if fault.kind not in ("stop", "hang") or fault.target not in PROGRAMS or lasted < HUNG:
+            continue
+        time = _recovery(history, fault)
+        if time is None or not _undisturbed(history, fault, fault.begin, fault.begin + min(time, HUNG)):
+            unknown += 1
+            continue
+        times.setdefault(fault.target, []).append(time)
+        if time > HUNG:
+            evidence.append(Evidence(fault.begin, f"{fault.target} hangs, silent for {_seconds(time)}"))
+    every = [time for values in times.values() for time in values]
+    figures = f"replaced after {max(every):.2f} s at most" if every else ""
+    return Finding("L4", len(every), figures, evidence, unknown, times)
+
+
+def _recovery(history: History, fault: Fault) -> float | None:
+    """How long a program was silent after a fault; infinite if for good; None if it had nothing to say."""
+    output = history.output(fault.target)
+    if not _flowed(history, fault.target, fault.begin, FLOWING):
+        return None
+    following = [s.received for s in between(output, fault.begin + 0.02, history.end)]
+    if following:
+        return min(following) - fault.begin
+    # Nothing came: for good, if the record lasts long enough to say so.
+    return math.inf if history.end - fault.begin > HUNG else None
+
+
+def _flowed(history: History, program: str, time: float, within: float) -> bool:
+    return bool(between(history.output(program), time - within, time))
+
+
+def _undisturbed(history: History, fault: Fault, begin: float, end: float) -> bool:
+    """Whether nothing else kept the program from its output."""
+    sources = [source for source, targets in DOWNSTREAM.items() if fault.target in targets]
+    return not any(
+        _disturbs(other, program, begin - SLOWEST, end)
+        for other in history.faults
+        if other is not fault
+        for program in (fault.target, *sources)
+    )
+
+
+def _disturbs(fault: Fault, program: str, begin: float, end: float) -> bool:
+    """Whether a fault, or the recovery from it, concerns a program's output within a time."""
+    recovery = HUNG if fault.kind in LASTING else SLOWEST
+    if fault.end + recovery < begin or fault.begin > end:
+        return False
+    concerned = (fault.target, *DOWNSTREAM.get(fault.target, ()))
+    return program in concerned or fault.target == ALL
+
+
+def _seconds(time: float) -> str:
+    return "for good" if time == math.inf else f"{time:.2f} s"

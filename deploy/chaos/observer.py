@@ -1,0 +1,195 @@
+"""The outside observer: records all topics of some arms, and the lives of their processes, into one file.
+
+A process of its own, of which the system knows nothing. The monkey tells it its faults on standard input, a
+JSON object a line; the end of standard input ends the record. ::
+
+    python -m deploy.chaos.observer RECORD NAMESPACE=RUN_DIRECTORY ...
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import select
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterable
+from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import rclpy
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from rclpy.signals import SignalHandlerOptions
+
+from deploy import processes
+from deploy.chaos.history import Life
+from deploy.chaos.record import FAULTS, PROCESSES, Recorder, qos_profiles
+from interfaces import topics
+
+LOOK = 0.02  # s between two looks for new processes
+UNNAMED = 0.5  # s within which a new process shows what program it runs
+FORK = 0.2  # s that a child of supervisord may look like it
+DEPTH = 200  # messages that may wait while the observer is not scheduled
+THINNED = 10  # heartbeats that may: of a flood not all are worth recording
+
+
+class Arm(NamedTuple):
+    """What is observed."""
+
+    namespace: str
+    run: Path
+
+    @classmethod
+    def parse(cls, text: str) -> Arm:
+        """From `NAMESPACE=RUN_DIRECTORY`."""
+        namespace, _, run = text.partition("=")
+        return cls(namespace, Path(run))
+
+
+def listen(node: Node, recorder: Recorder, arms: Iterable[Arm]) -> None:
+    """Record every topic of the contract."""
+    names = {
+        name: topic
+        for arm in arms
+        for topic in topics.CONTRACT
+        for name in [topic.name if topic.name[0] == "/" else f"{arm.namespace.rstrip('/')}/{topic.name}"]
+    }
+    for name, topic in names.items():
+        depth = THINNED if topic is topics.OPERATOR_HEARTBEAT else DEPTH
+        qos = QoSProfile(depth=depth, reliability=topic.qos.reliability, durability=topic.qos.durability)
+        callback = _writer(recorder, name, topic)
+        node.create_subscription(topic.type, name, callback, qos, raw=True)
+
+
+def _writer(recorder: Recorder, name: str, topic: topics.Topic) -> Callable[[bytes, Any], None]:
+    qos = qos_profiles(topic)
+
+    def write(data: bytes, info: Any) -> None:
+        now = time.monotonic_ns()
+        age = time.time_ns() - info["source_timestamp"]
+        recorder.message(name, topic.type_name, qos, data, now, now - age)
+
+    return write
+
+
+class Census:
+    """Knows the processes of the arms: sees new ones within 20 ms, and the end of each at once."""
+
+    def __init__(self, arms: Iterable[Arm], report: Callable[[str, Life], None]) -> None:
+        self._arms = {str(arm.run): arm.namespace for arm in arms}
+        self._report = report
+        self._poll = select.poll()
+        self._known: set[int] = set()
+        self._pending: dict[int, float] = {}
+        self._alive: dict[int, tuple[str, Life]] = {}
+
+    def run(self, ended: threading.Event) -> None:
+        """Take the census until the end."""
+        while not ended.is_set():
+            self.look()
+            for handle, _ in self._poll.poll(LOOK * 1000):
+                self._end(handle, time.monotonic())
+        for handle in list(self._alive):
+            os.close(handle)
+
+    def look(self) -> None:
+        """See what is new."""
+        pids = {int(name) for name in os.listdir("/proc") if name.isdigit()}
+        now = time.monotonic()
+        self._pending |= dict.fromkeys(pids - self._known, now)
+        self._known = pids
+        for pid, since in list(self._pending.items()):
+            if self._is_named(pid, now - since) or now - since > UNNAMED:
+                del self._pending[pid]
+
+    def _is_named(self, pid: int, known: float) -> bool:
+        """Whether it is clear what a process is that is known for so long; one of an arm is reported."""
+        environment = processes.environment_of(pid)
+        namespace = self._arms.get(environment.get(processes.MARK, ""))
+        program = environment.get("SUPERVISOR_PROCESS_NAME", "")
+        if namespace is None or not (program or "supervisord" in _command(pid)):
+            return False
+        if not program and known < FORK:
+            return False
+        try:
+            handle = os.pidfd_open(pid)
+            began = _began(pid)
+        except (OSError, ValueError, IndexError):
+            return True
+        life = Life(program, pid, began, None)
+        self._alive[handle] = (namespace, life)
+        self._poll.register(handle, select.POLLIN)
+        self._report(namespace, life)
+        return True
+
+    def _end(self, handle: int, now: float) -> None:
+        self._poll.unregister(handle)
+        os.close(handle)
+        namespace, life = self._alive.pop(handle)
+        self._report(namespace, life._replace(ended=now))
+
+
+def _began(pid: int) -> float:
+    """When a process was started, on the monotonic clock."""
+    ticks = int(Path(f"/proc/{pid}/stat").read_text().rpartition(") ")[2].split()[19])
+    suspended = time.clock_gettime(time.CLOCK_BOOTTIME) - time.monotonic()
+    return ticks / os.sysconf("SC_CLK_TCK") - suspended
+
+
+def _command(pid: int) -> str:
+    try:
+        return Path(f"/proc/{pid}/cmdline").read_bytes().replace(b"\0", b" ").decode(errors="replace")
+    except OSError:
+        return ""
+
+
+def main(arguments: list[str]) -> int:
+    """Observe until standard input ends."""
+    path, arms = Path(arguments[0]), [Arm.parse(text) for text in arguments[1:]]
+    origin = time.monotonic()
+    recorder = Recorder(path, round(origin * 1e9), time.time_ns())
+
+    def relative(event: dict[str, Any], *keys: str) -> dict[str, Any]:
+        return event | {key: event[key] - origin for key in keys if event[key] is not None}
+
+    def report(namespace: str, life: Life) -> None:
+        event = relative(life._asdict(), "began", "ended") | {"namespace": namespace}
+        recorder.event(PROCESSES, time.monotonic_ns(), event)
+
+    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+    node = Node(f"observer_{os.getpid()}")
+    ended = threading.Event()
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    listen(node, recorder, arms)
+
+    def obey() -> None:
+        print("observing", flush=True)
+        for line in sys.stdin:
+            event = relative(json.loads(line), "begin", "end")
+            recorder.event(FAULTS, time.monotonic_ns(), event)
+        ended.set()
+
+    threads = [
+        threading.Thread(target=obey, daemon=True),
+        threading.Thread(target=partial(Census(arms, report).run, ended)),
+    ]
+    for thread in threads:
+        thread.start()
+    try:
+        while not ended.is_set():
+            executor.spin_once(timeout_sec=0.1)
+    finally:
+        ended.set()
+        threads[1].join()
+        recorder.close()
+        rclpy.try_shutdown()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

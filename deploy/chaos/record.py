@@ -1,0 +1,158 @@
+"""The file that a record is: an MCAP of ROS 2 messages, which Foxglove and `ros2 bag` open.
+
+Log time is when the observer got a message, publish time when its publisher wrote it. What processes and the
+monkey did stands beside it, as JSON in std_msgs/String.
+"""
+
+from __future__ import annotations
+
+import json
+import threading
+from collections import Counter
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import yaml
+from mcap.reader import make_reader
+from mcap.writer import Writer
+from rclpy.serialization import deserialize_message, serialize_message
+from rosbags.typesys import Stores, get_typestore
+from std_msgs.msg import String
+
+from deploy.chaos.history import Fault, History, Life, Sample
+from deploy.chaos.marks import is_babble
+from interfaces import topics
+
+PROCESSES, FAULTS = "/chaos/processes", "/chaos/faults"
+METADATA = "reactive-arm"
+
+
+class Recorder:
+    """Writes a record; any thread may."""
+
+    def __init__(self, path: Path, monotonic: int, epoch: int) -> None:
+        """:param monotonic, epoch: the same moment on the monotonic clock and since 1970 [ns]"""
+        self._file = path.open("xb")
+        self._writer = Writer(self._file)
+        self._writer.start(profile="ros2", library="reactive-arm")
+        self._origin = monotonic
+        self._offset = epoch - monotonic
+        self._types = get_typestore(Stores.ROS2_JAZZY)
+        self._lock = threading.Lock()
+        self._schemas: dict[str, int] = {}
+        self._channels: dict[str, int] = {}
+        self._counts: Counter[str] = Counter()
+        self._writer.add_metadata(METADATA, {"origin": str(self._origin + self._offset)})
+
+    def message(self, topic: str, type_name: str, qos: str, data: bytes, received: int, sent: int) -> None:
+        """Record a serialized message; times by the monotonic clock [ns]."""
+        with self._lock:
+            if topic not in self._channels:
+                self._add(topic, type_name, qos)
+            self._counts[topic] += 1
+            self._writer.add_message(
+                self._channels[topic],
+                log_time=received + self._offset,
+                data=data,
+                publish_time=max(0, sent + self._offset),
+                sequence=self._counts[topic],
+            )
+
+    def event(self, topic: str, time: int, event: Mapping[str, object]) -> None:
+        """Record what a process or the monkey did."""
+        data = serialize_message(String(data=json.dumps(event)))
+        self.message(topic, "std_msgs/msg/String", "", data, time, time)
+
+    def close(self) -> None:
+        """Complete the file."""
+        with self._lock:
+            self._writer.finish()  # type: ignore[no-untyped-call]
+            self._file.close()
+
+    def _add(self, topic: str, type_name: str, qos: str) -> None:
+        if type_name not in self._schemas:
+            definition, _ = self._types.generate_msgdef(type_name, ros_version=2)
+            self._schemas[type_name] = self._writer.register_schema(type_name, "ros2msg", definition.encode())
+        self._channels[topic] = self._writer.register_channel(
+            topic, "cdr", self._schemas[type_name], {"offered_qos_profiles": qos}
+        )
+
+
+def qos_profiles(topic: topics.Topic) -> str:
+    """The QoS of a topic as rosbag2 writes it."""
+    latched, lifespan = topics.is_latched(topic.qos), topic.qos.lifespan.nanoseconds
+    profile = {
+        "history": 1,
+        "depth": topic.qos.depth,
+        "reliability": int(topic.qos.reliability),
+        "durability": 1 if latched else 2,
+        "deadline": {"sec": 0, "nsec": 0},
+        "lifespan": {"sec": lifespan // 10**9, "nsec": lifespan % 10**9},
+        "liveliness": 1,
+        "liveliness_lease_duration": {"sec": 0, "nsec": 0},
+        "avoid_ros_namespace_conventions": False,
+    }
+    return str(yaml.safe_dump([profile]))
+
+
+def load(path: Path, namespace: str = "/") -> History:
+    """What happened to the arm in a namespace, according to a record."""
+    prefix = namespace.rstrip("/") + "/"
+    names = {topic.name if topic.name[0] == "/" else prefix + topic.name: topic for topic in topics.CONTRACT}
+    streams: dict[str, list[Sample]] = {topic.name: [] for topic in topics.CONTRACT}
+    lives: dict[tuple[int, float], Life] = {}
+    faults: list[Fault] = []
+    end = 0.0
+    with path.open("rb") as file:
+        reader = make_reader(file)
+        origin = next(int(m.metadata["origin"]) for m in reader.iter_metadata() if m.name == METADATA)
+        for _, channel, message in reader.iter_messages():
+            received, sent = ((t - origin) / 1e9 for t in (message.log_time, message.publish_time))
+            end = max(end, received)
+            if topic := names.get(channel.topic):
+                streams[topic.name] += [
+                    Sample(sent, received, value) for value in _values(topic, message.data, prefix)
+                ]
+            elif channel.topic in (PROCESSES, FAULTS):
+                event = json.loads(deserialize_message(message.data, String).data)
+                if event.pop("namespace", namespace) != namespace:
+                    continue
+                if channel.topic == FAULTS:
+                    faults.append(Fault(**event))
+                else:
+                    life = Life(**event)
+                    lives[life.pid, life.began] = life
+    for samples in streams.values():
+        samples.sort()
+    return History(
+        end,
+        streams,
+        sorted(lives.values(), key=lambda life: life.began),
+        sorted(faults, key=lambda f: f.begin),
+    )
+
+
+def _values(topic: topics.Topic, data: bytes, prefix: str) -> list[Any]:
+    """What a message says, plain; nothing where it is the monkey's babble."""
+    if is_babble(data):
+        return []
+    try:
+        message = deserialize_message(data, topic.type)
+    except Exception:  # whatever the runtime raises: it is babble that nobody can read
+        return []
+    if topic is topics.EFFECTOR_POSITION:
+        return [(message.point.x, message.point.y)]
+    if topic is topics.OPERATOR_PRESENCE:
+        return [message.stamp.sec + message.stamp.nanosec / 1e9]
+    if topic is not topics.DIAGNOSTICS:
+        return [message.data]
+    return [
+        (status.name.removeprefix(prefix), int(pair.value))
+        for status in message.status
+        if status.name.startswith(prefix)
+        and "/" not in status.name.removeprefix(prefix)
+        and ":" not in status.name
+        for pair in status.values
+        if pair.key == "pid"
+    ]

@@ -1,0 +1,240 @@
+"""The safety promises S1 to S5: pure functions from a history to a finding."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from bisect import bisect_left, bisect_right
+from collections.abc import Iterator, Sequence
+
+from deploy.chaos.findings import Evidence, Finding
+from deploy.chaos.history import History, Life, Sample, between, gaps
+from interfaces import topics
+from interfaces.topics import OFF, ON, TURN_OFF, TURN_ON
+
+DRIVE = 0.4
+"""[s] The engines' drive lets go when the controller's `on` is not renewed for so long (deploy/SAFETY.md)."""
+OFF_WITHIN = 10.5  # s, S1
+STRIKE, STRIKES = 3.0, 3  # s; silences after which the operator watchdog turns the engines off
+SAMPLING = 0.5  # s by which it may notice the begin of a silence early
+SEEN_WITHIN = 1.0  # s, S3
+TRANSPORT = 0.15  # s that a message may take on a busy machine
+ROUNDING = 1e-8  # m
+LONGEST_PAUSE = 20.0  # s that a process may have stood still, and its values be old
+CLAIM = 5.0  # s within which a double has to notice that it is one
+
+
+def engines_off_in_time(history: History) -> Finding:
+    """S1: engines are off at most 10.5 s after the operator's last sign of life."""
+    alive = [s.sent for s in history.stream(topics.OPERATOR_HEARTBEAT) if s.value is True]
+    evidence, longest, cases = [], 0.0, 0
+    running = list(_running(history))
+    for begin, end in gaps(alive, -math.inf, history.end):
+        late = [(on, off) for on, off in running if on < end and off > begin]
+        if not late:
+            continue
+        if begin == -math.inf:
+            evidence.append(Evidence(late[0][0], "engines on before the operator's first sign of life"))
+            continue
+        last = min(late[-1][1], end)
+        longest = max(longest, last - begin)
+        # It was put to the test if the operator stayed away until they were off.
+        cases += late[-1][1] < end and end - begin > SEEN_WITHIN
+        if last - begin > OFF_WITHIN:
+            what = f"engines still on {last - begin:.2f} s after the operator's last sign of life"
+            evidence.append(Evidence(begin + OFF_WITHIN, what))
+    return Finding("S1", cases, f"off after {longest:.2f} s at most, allowed {OFF_WITHIN} s", evidence)
+
+
+def stays_on(history: History) -> Finding:
+    """S2: while the operator is alive, no kill of any other service turns the engines off."""
+    evidence, explained, held = [], 0, 0
+    for on, off in _changes(history, ON, OFF):
+        absent = _absences(history, off.sent) >= STRIKES
+        if absent or _controller_died(history, on, off) or _commanded_by_others(history, off):
+            explained += 1
+        else:
+            evidence.append(Evidence(off.sent, "engines turned off though the operator was there"))
+    states = history.stream(topics.ENGINES_STATE)
+    for fault in history.faults:
+        if fault.kind == "kill" and fault.target != "engine_controller":
+            before = _last(states, fault.begin)
+            held += before is not None and before.value == ON
+    return Finding("S2", held, f"{held} kills while on; off {explained} times for a good reason", evidence)
+
+
+def turned_on_by_the_present(history: History) -> Finding:
+    """S3: engines go on only by a `turn_on` with the operator present."""
+    commands = [s for s in history.stream(topics.ENGINES) if s.value == TURN_ON]
+    heartbeats = [s for s in history.stream(topics.OPERATOR_HEARTBEAT) if s.value is True]
+    evidence, cases, unknown, oldest = [], 0, 0, 0.0
+    for _, on in _changes(history, OFF, ON):
+        command = between(commands, on.sent - SEEN_WITHIN - TRANSPORT, on.sent + 0.01)
+        seen = between(heartbeats, on.sent - SEEN_WITHIN - TRANSPORT, on.sent + 0.01)
+        if command and seen:
+            cases += 1
+            oldest = max(oldest, on.sent - seen[-1].sent)
+        elif not command and any(
+            life.program == "dead_mans_switch" and on.sent - 3.0 < life.began <= on.sent
+            for life in history.lives
+        ):
+            unknown += 1  # a command of a new publisher, which the observer did not know yet
+        else:
+            missing = "a turn_on" if not command else "a sign of life"
+            evidence.append(Evidence(on.sent, f"engines went on without {missing} in the last second"))
+    return Finding("S3", cases, f"{cases} times on, operator seen {oldest:.2f} s before", evidence, unknown)
+
+
+def speeds_and_positions_are_true(history: History) -> Finding:
+    """S4: a speed is finite and ≥ 0; a position equals the kinematics of values that were published."""
+    evidence = [
+        Evidence(s.sent, f"speed {s.value}")
+        for s in history.stream(topics.EFFECTOR_SPEED)
+        if not (math.isfinite(s.value) and s.value >= 0)
+    ]
+    published = Published(history)
+    positions = history.stream(topics.EFFECTOR_POSITION)
+    for position in positions:
+        if not published.explains(position, within=LONGEST_PAUSE):
+            evidence.append(Evidence(position.sent, f"position {position.value} of no published values"))
+    speeds = len(history.stream(topics.EFFECTOR_SPEED))
+    return Finding("S4", len(positions) + speeds, f"{len(positions)} positions, {speeds} speeds", evidence)
+
+
+def never_two_alive(history: History) -> Finding:
+    """S5: never two live instances of one service."""
+    evidence, cases = [], 0
+    for _, group in itertools.groupby(
+        sorted(history.lives, key=lambda life: (life.program, life.began)), lambda life: life.program
+    ):
+        lives = list(group)
+        cases += len(lives) - 1
+        evidence += [_two(a, b) for a, b in _overlapping(lives, history.end)]
+    evidence += list(_interleaved(history))
+    return Finding("S5", cases, f"{cases} successors and doubles", sorted(evidence))
+
+
+class Published:
+    """The values that were published, and what positions follow from them."""
+
+    def __init__(self, history: History) -> None:
+        self._streams = [history.stream(topic) for topic in topics.CONFIGURATION.values()]
+
+    def explains(self, position: Sample, within: float) -> bool:
+        """Whether it follows from values that were the latest within so many seconds before it was sent."""
+        # Nearly always from the latest ones: so these first, and only then ever older ones.
+        for window in (0.05, 0.3, 2.0, LONGEST_PAUSE):
+            candidates = [
+                self._candidates(stream, position.sent, min(window, within)) for stream in self._streams
+            ]
+            if _any_fits(candidates, *position.value):
+                return True
+            if window >= within:
+                break
+        return False
+
+    @staticmethod
+    def _candidates(stream: Sequence[Sample], time: float, window: float) -> list[float]:
+        """What was the latest value at some moment of the window, the latest first."""
+        newest = bisect_right(stream, time + 0.005, key=lambda s: s.sent)
+        oldest = bisect_right(stream, time - window, key=lambda s: s.sent)
+        return [s.value for s in reversed(stream[max(0, oldest - 1) : newest])]
+
+
+def _any_fits(candidates: list[list[float]], x: float, y: float) -> bool:
+    """Whether some values give the position, up to rounding."""
+    if not (math.isfinite(x) and math.isfinite(y)):
+        return False
+    l1s, l2s, theta1s, theta2s = candidates
+    l2s = sorted(l2s)
+    for theta1, l1 in itertools.product(theta1s, l1s):
+        # What is left for the second link has to fit in length before angles are tried.
+        rest_x, rest_y = x - l1 * math.cos(theta1), y - l1 * math.sin(theta1)
+        length = math.hypot(rest_x, rest_y)
+        for l2 in l2s[bisect_left(l2s, length - ROUNDING) : bisect_right(l2s, length + ROUNDING)]:
+            for theta2 in theta2s:
+                heading = theta1 + theta2
+                error_x, error_y = rest_x - l2 * math.cos(heading), rest_y - l2 * math.sin(heading)
+                if abs(error_x) < ROUNDING and abs(error_y) < ROUNDING:
+                    return True
+    return False
+
+
+def _running(history: History) -> Iterator[tuple[float, float]]:
+    """The stretches for which the engines run: renewed by each `on`, ended by an `off` or by nothing."""
+    states = history.stream(topics.ENGINES_STATE)
+    for state, following in itertools.zip_longest(states, states[1:]):
+        if state.value == ON:
+            yield state.sent, min(following.sent if following else history.end, state.sent + DRIVE)
+
+
+def _changes(history: History, before: str, after: str) -> Iterator[tuple[Sample, Sample]]:
+    for one, two in itertools.pairwise(history.stream(topics.ENGINES_STATE)):
+        if (one.value, two.value) == (before, after):
+            yield one, two
+
+
+def _controller_died(history: History, on: Sample, off: Sample) -> bool:
+    """Whether another process than the one that said `on` may have said `off`."""
+    return any(
+        life.program == "engine_controller" and on.sent - 0.02 < life.began <= off.sent
+        for life in history.lives
+    )
+
+
+def _absences(history: History, time: float) -> float:
+    """The strikes that an operator watchdog may have counted until a time, since it counted anew."""
+    since = max(
+        (s.sent for s in history.stream(topics.ENGINES) if s.value == TURN_OFF and s.sent < time - 1.0),
+        default=0.0,
+    )
+    heartbeats = [s.sent for s in history.stream(topics.OPERATOR_HEARTBEAT) if s.value is True]
+    begin = max((t for t in heartbeats if t <= since), default=0.0)
+    # While it was stopped it saw nobody either: that is what S2 does not promise.
+    blind = [
+        (fault.begin, fault.end)
+        for fault in history.faults
+        if fault.kind in BLINDING and fault.target in ("operator_watchdog", "all") and fault.end <= time + 1.0
+    ]
+    silences = [*gaps([t for t in heartbeats if begin < t <= time], begin, time), *blind]
+    return sum((end - begin + SAMPLING) // STRIKE for begin, end in silences)
+
+
+BLINDING = ("stop", "hang", "hog", "partition")
+"""Faults that keep a process from hearing."""
+
+
+def _commanded_by_others(history: History, off: Sample) -> bool:
+    return any(
+        fault.kind == "turn_off" and fault.begin <= off.sent <= fault.begin + 1.0 for fault in history.faults
+    )
+
+
+def _last(samples: Sequence[Sample], time: float) -> Sample | None:
+    index = bisect_right(samples, time, key=lambda s: s.sent)
+    return samples[index - 1] if index else None
+
+
+def _overlapping(lives: Sequence[Life], end: float) -> Iterator[tuple[Life, Life]]:
+    for one, two in itertools.combinations(lives, 2):
+        last = min(end if one.ended is None else one.ended, end if two.ended is None else two.ended)
+        if last - max(one.began, two.began) > CLAIM:
+            yield one, two
+
+
+def _two(one: Life, two: Life) -> Evidence:
+    return Evidence(two.began, f"processes {one.pid} and {two.pid} are both {one.program or 'supervisord'}")
+
+
+def _interleaved(history: History) -> Iterator[Evidence]:
+    """Health reports of one name, of a process, of another one, and of the first one again."""
+    gone: dict[str, set[int]] = {}
+    last: dict[str, int] = {}
+    for sample in history.stream(topics.DIAGNOSTICS):
+        name, pid = sample.value
+        if pid in gone.setdefault(name, set()):
+            yield Evidence(sample.sent, f"process {pid} is {name} besides process {last[name]}")
+            gone[name].discard(pid)
+        if last.get(name, pid) != pid:
+            gone[name].add(last[name])
+        last[name] = pid

@@ -1,0 +1,118 @@
+"""Made-up histories: one in which all is well, and the means to plant what is not."""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_right
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+from deploy.chaos.history import PROGRAMS, Fault, History, Life, Sample
+from interfaces import topics
+from services.kinematics import forward_kinematics
+
+END = 60.0
+RATES: dict[str, float] = {
+    "l1": 10.0,
+    "l2": 10.0,
+    "theta1": 25.0,
+    "theta2": 25.0,
+    "operator_heartbeat": 20.0,
+    "operator_presence": 2.0,
+    "engines/state": 10.0,
+}
+
+
+def _times(rate: float) -> list[float]:
+    return [step / rate for step in range(1, int(END * rate))]
+
+
+def value_at(topic: str, time: float) -> float:
+    """What a config publisher says at a time."""
+    return 2.0 + math.sin(time * (1 + len(topic)) / 7)
+
+
+@cache
+def good() -> History:
+    """A minute in which the operator holds the switch, turns the engines on at 5 s, and nothing dies."""
+    streams: dict[str, list[Sample]] = {topic.name: [] for topic in topics.CONTRACT}
+    for name, rate in RATES.items():
+        streams[name] = [Sample(t, t + 0.001, _value(name, t)) for t in _times(rate)]
+    for t in _times(50.0):
+        values = [_latest(streams[name], t) for name in topics.CONFIGURATION]
+        if None not in values:
+            streams["effector/position"].append(Sample(t, t + 0.001, forward_kinematics(*values)))
+            streams["effector/speed"].append(Sample(t, t + 0.001, 0.5))
+    streams["engines"] = [Sample(4.95, 4.951, topics.TURN_ON)]
+    streams["/diagnostics"] = sorted(
+        Sample(t, t + 0.001, (name, 100 + index)) for t in _times(1.0) for index, name in enumerate(PROGRAMS)
+    )
+    lives = [Life(name, 100 + index, 0.0, None) for index, name in enumerate(PROGRAMS)]
+    return History(END, streams, [Life("", 99, 0.0, None), *lives], [])
+
+
+def _value(name: str, time: float) -> Any:
+    if name == "operator_heartbeat":
+        return True
+    if name == "engines/state":
+        return topics.ON if time >= 5.0 else topics.OFF
+    return time if name == "operator_presence" else value_at(name, time)
+
+
+def _latest(samples: list[Sample], time: float) -> Any:
+    index = bisect_right(samples, time, key=lambda s: s.sent)
+    return samples[index - 1].value if index else None
+
+
+def change(history: History, topic: str, how: Callable[[Sample], Sample | None]) -> History:
+    """The history with other messages on a topic; None for none."""
+    samples = sorted(new for s in history.streams[topic] if (new := how(s)) is not None)
+    return replace(history, streams=history.streams | {topic: samples})
+
+
+def silent(history: History, topic: str, begin: float, end: float) -> History:
+    """The history without what was sent on a topic between two times."""
+    return change(history, topic, lambda s: None if begin < s.sent < end else s)
+
+
+def says(history: History, topic: str, value: Any, begin: float, end: float = END) -> History:
+    """The history with another value on a topic between two times."""
+    return change(history, topic, lambda s: s._replace(value=value) if begin < s.sent < end else s)
+
+
+def added(history: History, topic: str, *samples: tuple[float, Any]) -> History:
+    """The history with further messages."""
+    new = [Sample(t, t + 0.001, value) for t, value in samples]
+    return replace(history, streams=history.streams | {topic: sorted([*history.streams[topic], *new])})
+
+
+def faulty(history: History, *faults: Fault) -> History:
+    """The history with faults."""
+    return replace(history, faults=sorted([*history.faults, *faults], key=lambda f: f.begin))
+
+
+def killed(history: History, program: str, at: float, back: float) -> History:
+    """The history in which a program was killed and its next process was there after `back` seconds."""
+    old = next(life for life in history.lives if life.program == program)
+    new = Life(program, old.pid + 1000, at + 0.05, None)
+    lives = [replace_end(life, at) if life is old else life for life in history.lives]
+    history = faulty(replace(history, lives=[*lives, new]), Fault("kill", program, at, at, old.pid))
+    streams = [topic.name for topic in topics.CONTRACT if topic.publishers == (program,)]
+    for topic in streams:
+        history = silent(history, topic, at, at + back)
+    return change(
+        history,
+        "/diagnostics",
+        lambda s: s if s.value[0] != program or s.sent <= at else _successor(s, new.pid, at + back),
+    )
+
+
+def replace_end(life: Life, time: float) -> Life:
+    """A life that ended."""
+    return life._replace(ended=time)
+
+
+def _successor(sample: Sample, pid: int, since: float) -> Sample | None:
+    return sample._replace(value=(sample.value[0], pid)) if sample.sent >= since else None

@@ -1,0 +1,270 @@
+"""The checkers, on made-up histories: they let good ones pass, and catch every violation planted in them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from deploy.chaos.findings import HOLDS, UNKNOWN, VIOLATED, percentile
+from deploy.chaos.history import ALL, OPERATOR, Fault, History, Life, Sample
+from deploy.chaos.promises import CHECKERS, meaning
+from interfaces.topics import OFF, ON, TURN_OFF
+
+from .histories import END, added, change, faulty, good, killed, says, silent, value_at
+
+
+def verdict(promise: str, history: History) -> str:
+    """What a checker concludes."""
+    return CHECKERS[promise](history).verdict
+
+
+def asleep(history: History, begin: float, off: float) -> History:
+    """The history in which the operator falls asleep and the engines go off."""
+    history = silent(history, "operator_heartbeat", begin, END)
+    history = silent(history, "operator_presence", begin, END)
+    history = says(history, "engines/state", OFF, off)
+    history = added(history, "engines", (off, TURN_OFF))
+    return faulty(history, Fault("silence", OPERATOR, begin, END))
+
+
+@pytest.mark.parametrize("promise", CHECKERS)
+def test_nothing_is_violated_where_nothing_happens(promise: str) -> None:
+    assert verdict(promise, good()) in (HOLDS, UNKNOWN)
+
+
+@pytest.mark.parametrize("promise", CHECKERS)
+def test_what_was_not_put_to_the_test_is_unknown(promise: str) -> None:
+    assert verdict(promise, History(0.0)) == UNKNOWN
+
+
+@pytest.mark.parametrize("promise", CHECKERS)
+def test_every_promise_is_told_in_a_sentence(promise: str) -> None:
+    assert meaning(promise).endswith(".")
+
+
+# S1
+
+
+def test_s1_holds_when_engines_go_off_in_time() -> None:
+    finding = CHECKERS["S1"](asleep(good(), 20.0, 29.6))
+    assert finding.verdict == HOLDS
+    assert finding.cases == 1
+
+
+def test_s1_catches_engines_that_go_off_too_late() -> None:
+    (evidence,) = CHECKERS["S1"](asleep(good(), 20.0, 30.7)).evidence
+    assert evidence.time == pytest.approx(30.5)
+
+
+def test_s1_catches_engines_that_go_on_again() -> None:
+    history = says(asleep(good(), 20.0, 29.6), "engines/state", ON, 40.0, 40.3)
+    assert verdict("S1", history) == VIOLATED
+
+
+def test_s1_catches_engines_that_run_before_anybody_was_there() -> None:
+    assert verdict("S1", silent(good(), "operator_heartbeat", 0.0, 10.0)) == VIOLATED
+
+
+def test_s1_a_dead_controller_renews_nothing_so_the_drive_lets_go() -> None:
+    history = silent(asleep(good(), 20.0, 50.0), "engines/state", 29.9, END)
+    assert verdict("S1", history) == HOLDS
+
+
+def test_s1_a_controller_that_renews_until_it_is_stopped_too_late_is_caught() -> None:
+    history = silent(asleep(good(), 20.0, 50.0), "engines/state", 30.25, END)
+    assert verdict("S1", history) == VIOLATED
+
+
+def test_s1_a_released_switch_is_no_sign_of_life() -> None:
+    history = asleep(good(), 20.0, 50.0)
+    history = added(history, "operator_heartbeat", *((20.0 + n, False) for n in range(30)))
+    assert verdict("S1", history) == VIOLATED
+
+
+# S2
+
+
+def test_s2_holds_when_other_services_are_killed() -> None:
+    history = killed(killed(good(), "kinematics", 20.0, 0.6), "operator_watchdog", 30.0, 1.1)
+    finding = CHECKERS["S2"](history)
+    assert (finding.verdict, finding.cases) == (HOLDS, 2)
+
+
+def test_s2_catches_engines_that_go_off_though_the_operator_is_there() -> None:
+    history = says(killed(good(), "operator_watchdog", 30.0, 1.1), "engines/state", OFF, 31.0)
+    (evidence,) = CHECKERS["S2"](history).evidence
+    assert evidence.time == pytest.approx(31.1)
+
+
+def test_s2_the_death_of_the_controller_is_a_good_reason() -> None:
+    history = says(killed(good(), "engine_controller", 30.0, 0.6), "engines/state", OFF, 30.5)
+    assert verdict("S2", history) != VIOLATED
+
+
+def test_s2_the_death_of_the_controller_long_before_is_none() -> None:
+    history = says(killed(good(), "engine_controller", 20.0, 0.6), "engines/state", OFF, 30.5)
+    assert verdict("S2", history) == VIOLATED
+
+
+def test_s2_three_silences_are_a_good_reason_and_two_are_none() -> None:
+    history = good()
+    for begin in (20.0, 30.0):
+        history = silent(history, "operator_heartbeat", begin, begin + 4.0)
+    assert verdict("S2", says(history, "engines/state", OFF, 44.0)) == VIOLATED
+    history = silent(history, "operator_heartbeat", 40.0, 44.0)
+    assert verdict("S2", says(history, "engines/state", OFF, 44.0)) != VIOLATED
+
+
+# S3
+
+
+def test_s3_holds_when_a_present_operator_turns_them_on() -> None:
+    assert verdict("S3", good()) == HOLDS
+
+
+def test_s3_catches_engines_that_go_on_without_a_command() -> None:
+    assert verdict("S3", says(good(), "engines/state", OFF, 20.0, 25.0)) == VIOLATED
+
+
+def test_s3_catches_engines_that_go_on_without_an_operator() -> None:
+    assert verdict("S3", silent(good(), "operator_heartbeat", 3.0, 6.0)) == VIOLATED
+
+
+def test_s3_a_command_that_the_observer_may_have_missed_stays_unknown() -> None:
+    history = killed(says(good(), "engines/state", OFF, 20.0, 25.0), "dead_mans_switch", 23.0, 0.6)
+    finding = CHECKERS["S3"](history)
+    assert (finding.verdict, finding.unknown) == (HOLDS, 1)
+
+
+# S4
+
+
+@pytest.mark.parametrize("speed", [-0.1, math.nan, math.inf, -math.inf])
+def test_s4_catches_a_speed_that_is_none(speed: float) -> None:
+    assert verdict("S4", added(good(), "effector/speed", (30.0, speed))) == VIOLATED
+
+
+@pytest.mark.parametrize("position", [(0.0, 0.0), (math.nan, 0.0), (math.inf, 1.0)])
+def test_s4_catches_a_position_of_no_published_values(position: tuple[float, float]) -> None:
+    assert verdict("S4", added(good(), "effector/position", (30.0, position))) == VIOLATED
+
+
+def test_s4_a_position_of_older_values_is_true() -> None:
+    history = good()
+    old = next(s for s in history.streams["effector/position"] if s.sent > 20.0)
+    assert verdict("S4", added(history, "effector/position", (24.0, old.value))) == HOLDS
+
+
+# S5
+
+
+def test_s5_holds_where_one_follows_the_other() -> None:
+    assert verdict("S5", killed(good(), "kinematics", 20.0, 0.6)) == HOLDS
+
+
+def test_s5_catches_two_that_live_side_by_side() -> None:
+    history = good()
+    history = replace(history, lives=[*history.lives, Life("kinematics", 777, 20.0, 40.0)])
+    assert verdict("S5", history) == VIOLATED
+
+
+def test_s5_a_double_that_ends_itself_is_none() -> None:
+    history = good()
+    history = replace(history, lives=[*history.lives, Life("kinematics", 777, 20.0, 22.0)])
+    assert verdict("S5", history) == HOLDS
+
+
+def test_s5_catches_two_that_report_their_health_in_turn() -> None:
+    reports = ((20.0 + n, ("kinematics", 777)) for n in range(3))
+    assert verdict("S5", added(good(), "/diagnostics", *((t + 0.5, v) for t, v in reports))) == VIOLATED
+
+
+# L1
+
+
+def test_l1_holds_when_the_output_is_back_soon() -> None:
+    finding = CHECKERS["L1"](killed(good(), "kinematics", 20.0, 0.6))
+    assert finding.verdict == HOLDS
+    assert finding.times["kinematics"] == [pytest.approx(0.621, abs=0.02)]
+
+
+@pytest.mark.parametrize(("back", "what"), [(1.2, "in the median"), (2.5, "silent"), (99.0, "for good")])
+def test_l1_catches_what_comes_back_late_or_never(back: float, what: str) -> None:
+    finding = CHECKERS["L1"](killed(good(), "kinematics", 20.0, back))
+    assert finding.verdict == VIOLATED
+    assert any(what in evidence.what for evidence in finding.evidence)
+
+
+def test_l1_what_a_second_fault_held_up_is_unknown() -> None:
+    history = faulty(killed(good(), "kinematics", 20.0, 5.0), Fault("kill_all", ALL, 20.5, 20.5))
+    finding = CHECKERS["L1"](history)
+    assert (finding.verdict, finding.unknown) == (UNKNOWN, 1)
+
+
+def test_l1_a_switch_that_is_not_held_has_nothing_to_say() -> None:
+    history = asleep(good(), 20.0, 29.6)
+    history = killed(history, "dead_mans_switch", 25.0, 0.6)
+    assert verdict("L1", history) == UNKNOWN
+
+
+# L2
+
+
+def test_l2_holds_when_the_others_flow_on() -> None:
+    finding = CHECKERS["L2"](killed(good(), "kinematics", 20.0, 0.6))
+    assert (finding.verdict, finding.cases) == (HOLDS, 6)
+
+
+def test_l2_catches_a_stream_that_pauses_meanwhile() -> None:
+    history = silent(killed(good(), "kinematics", 20.0, 0.6), "theta1", 20.1, 20.5)
+    (evidence,) = CHECKERS["L2"](history).evidence
+    assert "config_theta1 is silent" in evidence.what
+
+
+def test_l2_speed_may_pause_when_positions_do() -> None:
+    history = silent(killed(good(), "kinematics", 20.0, 0.6), "effector/speed", 20.0, 20.7)
+    assert verdict("L2", history) == HOLDS
+
+
+# L3
+
+
+def test_l3_holds_when_positions_are_right_after_the_return() -> None:
+    assert verdict("L3", killed(good(), "kinematics", 20.0, 0.6)) == HOLDS
+
+
+def test_l3_catches_positions_of_values_from_before() -> None:
+    history = killed(good(), "kinematics", 20.0, 0.6)
+    stale = next(s.value for s in history.streams["effector/position"] if s.sent > 19.0)
+
+    def keep(sample: Sample) -> Sample:
+        return sample._replace(value=stale) if 20.5 < sample.sent < 25.0 else sample
+
+    assert verdict("L3", change(history, "effector/position", keep)) == VIOLATED
+
+
+# L4
+
+
+def hung(replaced_after: float) -> History:
+    """The history in which kinematics was stopped for 15 s."""
+    history = silent(good(), "effector/position", 20.0, 20.0 + replaced_after)
+    return faulty(history, Fault("stop", "kinematics", 20.0, 35.0, 105))
+
+
+def test_l4_holds_when_it_is_replaced_soon() -> None:
+    assert verdict("L4", hung(3.9)) == HOLDS
+
+
+@pytest.mark.parametrize("after", [5.2, 15.0, 99.0])
+def test_l4_catches_what_is_replaced_late_or_never(after: float) -> None:
+    assert verdict("L4", hung(after)) == VIOLATED
+
+
+def test_percentiles_are_values_that_occurred() -> None:
+    values = [float(n) for n in range(1, 101)]
+    assert (percentile(values, 50), percentile(values, 99)) == (50.0, 99.0)
+    assert math.isnan(percentile([], 50))
+    assert value_at("l1", 0.0) == 2.0
