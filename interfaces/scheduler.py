@@ -23,6 +23,7 @@ from reactivex.scheduler.periodicscheduler import PeriodicScheduler
 from interfaces import age
 
 _TState = TypeVar("_TState")
+_CATCH_UP = 50_000_000  # [ns] by which a periodic action may be late and still keep its rate
 _FEW = 64  # so many cancelled items in the heap are not worth a clean-up
 
 
@@ -111,12 +112,13 @@ class NodeScheduler(PeriodicScheduler):
         action: typing.ScheduledPeriodicAction[_TState],
         state: _TState | None = None,
     ) -> abc.DisposableBase:
-        """Run an action every ``period``, without drift; periods that were missed are skipped."""
+        """Run an action every ``period``, without drift; what is more than 50 ms late is skipped."""
         nanoseconds = max(1, round(self.to_seconds(period) * 1e9))
 
         def run(_: abc.SchedulerBase, state: Any) -> None:
             following = action(state)
-            missed = max(0, self._read() - item.due) // nanoseconds
+            late = self._read() - item.due
+            missed = late // nanoseconds if late > _CATCH_UP else 0
             self._put(item, item.due + (missed + 1) * nanoseconds, run, following)
 
         with self._lock:  # so that it does not run before it has its name

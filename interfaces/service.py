@@ -71,6 +71,7 @@ class ServiceNode(ReactiveNode):
         self._last_output: float | None = None
         self._dropped_count = 0
         self._remarks: dict[str, tuple[int, str]] = {}  # since the last report: about what, how often, why
+        self._logged: set[str] = set()  # those of the last report
         self.add_on_set_parameters_callback(_only_finite)
         self._health = self.create_publisher(DIAGNOSTICS.type, DIAGNOSTICS.name, DIAGNOSTICS.qos)
         # By the steady clock even while ROS time is simulated: a simulation that pauses is no hung service.
@@ -209,9 +210,11 @@ class ServiceNode(ReactiveNode):
                 if publisher.topic_type != topic.type_name:
                     self.remark(topic.name, f"{publisher.node_name} publishes {publisher.topic_type}")
         remarks, self._remarks = self._remarks, {}
+        news = {f"{what}: {why}" for what, (_, why) in remarks.items()}
+        if not news <= self._logged:
+            self.get_logger().warning("; ".join(sorted(news)))
+        self._logged = news
         told = [f"{what}: {why}" + (f" ({n} times)" if n > 1 else "") for what, (n, why) in remarks.items()]
-        if told:
-            self.get_logger().warning("; ".join(told))
         now = time.monotonic()
         silence = "" if self._last_output is None else f"{now - self._last_output:.3f}"
         values = {

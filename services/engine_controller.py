@@ -47,8 +47,8 @@ def engine_state(
 
     :param commands: ``turn_on`` and ``turn_off``, with their source times.
     :param presences: the stamps of the operator's presences.
-    :param presence: ``turn_on`` is obeyed if it and the last sight of the operator are no older [s].
-    :param absence: when nobody was seen for so long [s] the engines turn off.
+    :param presence: ``turn_on`` is obeyed if it and the last sight of the operator are younger [s].
+    :param absence: when nobody was seen for so long [s], the engines turn off; not less than ``presence``.
     :param now: the clock of source times and stamps.
     :param refused: is told why a ``turn_on`` is not obeyed.
     """
@@ -60,13 +60,10 @@ def engine_state(
             return OFF
         waited = abs(now() - command.timestamp).total_seconds()
         unseen = (arrived.timestamp - seen).total_seconds() if seen else math.inf
-        if waited <= presence and unseen <= presence:
+        if waited < presence and unseen < presence:
             return ON
-        late = waited > presence
-        refused(
-            f"{TURN_ON} refused: "
-            + (f"{waited:.3f} s old" if late else f"no operator seen for {unseen:.3f} s")
-        )
+        why = f"no operator seen for {unseen:.3f} s" if waited < presence else f"{waited:.3f} s old"
+        refused(f"{TURN_ON} refused: {why}")
         return None
 
     def latch(seen: Observable[datetime]) -> Observable[str]:
@@ -82,10 +79,9 @@ def engine_state(
 
 def wire(node: ServiceNode) -> None:
     """Connect the recipe with its topics."""
-    presence = node.declare("presence", 1.0, (0.1, 10.0), "turn_on needs an operator seen within [s]")
+    presence = node.declare("presence", 1.0, (0.1, 1.0), "turn_on needs an operator seen within [s]")
     absence = node.declare("absence", 10.0, (1.0, 60.0), "off when no operator was seen for [s]")
     repeat = node.declare("repeat", 1.0, (0.1, 10.0), "the state is repeated this often [s]")
-
     states = engine_state(
         node.observe(ENGINES, timestamped=True).map(lambda item: Timestamp(item.value.data, item.timestamp)),
         node.observe(OPERATOR_PRESENCE).map(lambda header: age.from_message(header.stamp)),
