@@ -85,10 +85,10 @@ def logs(system: System) -> None:
 @contextmanager
 def _started(system: System, scenario: str) -> Iterator[tuple[Member, float]]:
     """Start the system and wait until all services are up; stop it when that, or what follows, fails."""
+    began = time.monotonic()
     from deploy import parameters
     from deploy.member import Member
 
-    began = time.monotonic()
     given = parameters.of_scenario(scenario, loading=time.monotonic() - began)
     interruption.check()
     system.start(given)

@@ -14,15 +14,15 @@ from interfaces import scenario
 
 SCENARIOS = ROOT / "deploy" / "scenarios"
 PROCESSES = 10  # that start at the same time
-SETTLING = 2.0  # s in which they find each other and report
+SETTLING = 2.5  # s in which they find each other and report
 
 
 def of_scenario(name: str, loading: float) -> dict[str, object]:
     """
     The ROS parameters of all services for a scenario, a name or a file. Raises DeploymentError.
 
-    Its origin lies so far ahead that all of them are up by then: `loading` [s] is what it took to load rclpy here,
-    just now, and each of them has to do that too.
+    Its origin lies so far ahead that all of them are up by then: `loading` [s] is what it took to load rclpy
+    here, just now, and each of them has to do that too.
     """
     _check_domain()
     path = _scenario_file(name)

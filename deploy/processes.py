@@ -90,8 +90,8 @@ def await_end(handles: Iterable[int], wait: float) -> list[int]:
     for handle in left:
         poll.register(handle, select.POLLIN)
     deadline = time.monotonic() + wait
-    while left and (remaining := deadline - time.monotonic()) > 0:
-        for handle, _ in poll.poll(remaining * 1000):
+    while left and (ended := poll.poll(max(0.0, deadline - time.monotonic()) * 1000)):
+        for handle, _ in ended:
             poll.unregister(handle)
             left.remove(handle)
     return left

@@ -232,20 +232,32 @@ class System:
             os.close(directory)
 
 
+class _UnixConnection(http.client.HTTPConnection):
+    """HTTP over a unix socket."""
+
+    def __init__(self, path: str, timeout: float) -> None:
+        super().__init__("localhost")
+        self._path = path
+        self._limit = timeout
+
+    def connect(self) -> None:
+        self.sock = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        self.sock.settimeout(self._limit)
+        self.sock.connect(self._path)
+
+
 class _UnixTransport(xmlrpc.client.Transport):
     """XML-RPC over a unix socket, with a time limit for a hung supervisord."""
 
     def __init__(self, path: str, timeout: float) -> None:
         super().__init__()
-        self._path = path
-        self._timeout = timeout
+        self._unix_connection = _UnixConnection(path, timeout)
 
     def make_connection(self, host: Any) -> http.client.HTTPConnection:
-        connection = http.client.HTTPConnection("localhost", timeout=self._timeout)
-        connection.sock = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-        connection.sock.settimeout(self._timeout)
-        connection.sock.connect(self._path)
-        return connection
+        return self._unix_connection
+
+    def close(self) -> None:
+        self._unix_connection.close()
 
 
 def _prepend(environment: dict[str, str], name: str, path: str) -> None:

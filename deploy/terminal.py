@@ -64,6 +64,8 @@ def operator(seen: Seen, begin: float) -> Observable[Line]:
     asleep = last_seen.pipe(
         ops.map(lambda _: rx.timer(AWAY_AFTER).pipe(ops.flat_map(lambda _: turn_off), ops.take(1))),
         ops.switch_latest(),
+        ops.map(lambda _: None),
+        ops.timestamp(),  # as the silences, which are noticed here
         ops.share(),
     )
     silences = rx.merge(

@@ -1,0 +1,33 @@
+"""Systems for the tests, each in a run directory and a DDS domain of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+
+from tests.system.sites import Peer, Site
+
+
+@pytest.fixture
+def site(tmp_path: Path, domain_id: int) -> Iterator[Site]:
+    """A place for a system of this test."""
+    with closing(Site(tmp_path / "run", domain_id)) as site:
+        yield site
+
+
+@pytest.fixture(scope="module")
+def module_site(tmp_path_factory: pytest.TempPathFactory, module_domain_id: int) -> Iterator[Site]:
+    """A place for a system that the tests of a module share; its path is as unpleasant as paths get."""
+    run = tmp_path_factory.mktemp("unpleasant") / 'it\'s 100 % "fine"' / ("deep" * 30) / "run"
+    with closing(Site(run, module_domain_id)) as site:
+        yield site
+
+
+@pytest.fixture
+def peer(module_site: Site) -> Iterator[Peer]:
+    """A node of the test beside the module's system."""
+    with closing(Peer(module_site.domain)) as peer:
+        yield peer

@@ -1,0 +1,208 @@
+"""Whole systems as the user runs them: where they live, their commands and terminals, a node beside them."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import pytest
+import rclpy
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+
+from deploy import processes
+from deploy.system import System
+from interfaces import topics
+
+ROOT = Path(__file__).parents[2]
+LIMIT = 30.0  # s in which whatever is waited for has to happen, also on a busy machine
+
+
+class Command:
+    """A command with its terminal, and what it has printed so far: lines, each with its time [s]."""
+
+    def __init__(self, arguments: list[str], environment: dict[str, str]) -> None:
+        self.lines: list[tuple[float, str]] = []
+        self._changed = threading.Condition()
+        self._process = subprocess.Popen(
+            arguments,
+            cwd=ROOT,
+            env=environment,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            start_new_session=True,
+            text=True,
+            bufsize=1,
+        )
+        self._reader = threading.Thread(target=self._read)
+        self._reader.start()
+
+    @property
+    def pid(self) -> int:
+        """Its process."""
+        return self._process.pid
+
+    @property
+    def is_alive(self) -> bool:
+        """Whether it has not ended yet."""
+        return self._process.poll() is None
+
+    @property
+    def output(self) -> str:
+        """All that it has printed."""
+        return "\n".join(text for _, text in self.lines)
+
+    def await_line(self, pattern: str, seconds: float = LIMIT) -> re.Match[str]:
+        """The first line with this pattern, as soon as it is there."""
+        found: re.Match[str] | None = None
+
+        def is_there() -> bool:
+            nonlocal found
+            found = next((match for _, text in self.lines if (match := re.search(pattern, text))), None)
+            return found is not None
+
+        with self._changed:
+            self._changed.wait_for(is_there, seconds)
+        assert found is not None, f"no {pattern!r} within {seconds} s:\n{self.output}"
+        return found
+
+    def type(self, text: str) -> None:
+        """Type at its terminal."""
+        assert self._process.stdin is not None
+        self._process.stdin.write(text)
+        self._process.stdin.flush()
+
+    def signal(self, number: int) -> None:
+        """Send a signal to it and whom it started beside the system, as a terminal does."""
+        os.killpg(self._process.pid, number)
+
+    def wait(self, seconds: float = LIMIT) -> int:
+        """Its exit code, when it has ended."""
+        try:
+            code = self._process.wait(seconds)
+        except subprocess.TimeoutExpired:
+            pytest.fail(f"has not ended within {seconds} s:\n{self.output}")
+        self._reader.join()
+        return code
+
+    def close(self) -> None:
+        """End it, if it has not ended yet."""
+        if self._process.poll() is None:
+            self.signal(signal.SIGKILL)
+        self._process.wait()
+        self._reader.join()
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        self._process.stdin.close()
+        self._process.stdout.close()
+
+    def _read(self) -> None:
+        assert self._process.stdout is not None
+        for line in self._process.stdout:
+            with self._changed:
+                self.lines.append((time.monotonic(), line.rstrip("\r\n")))
+                self._changed.notify_all()
+
+
+class Site:
+    """A run directory and a DDS domain for one system."""
+
+    def __init__(self, run: Path, domain: int) -> None:
+        self.run = run
+        self.domain = domain
+        self._commands = ExitStack()
+
+    @property
+    def environment(self) -> dict[str, str]:
+        """What a user would set to have a second system beside the usual one."""
+        return os.environ | {"REACTIVE_ARM_RUN_DIR": str(self.run), "ROS_DOMAIN_ID": str(self.domain)}
+
+    def begin(self, *arguments: str) -> Command:
+        """Begin a command of the launcher."""
+        return self._begin([sys.executable, "-m", "deploy.launcher", *arguments])
+
+    def begin_in_terminal(self, *command: str) -> Command:
+        """Begin any command in a terminal of its own, which closes when what is returned is killed."""
+        return self._begin([sys.executable, "-c", "import pty, sys; pty.spawn(sys.argv[1:])", *command])
+
+    def _begin(self, command: list[str]) -> Command:
+        begun = Command(command, self.environment)
+        self._commands.callback(begun.close)
+        return begun
+
+    def do(self, *arguments: str) -> tuple[int, str]:
+        """A whole command of the launcher: its exit code, and what it has printed."""
+        done = subprocess.run(
+            [sys.executable, "-m", "deploy.launcher", *arguments],
+            cwd=ROOT,
+            env=self.environment,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            timeout=2 * LIMIT,
+        )
+        return done.returncode, done.stdout.strip()
+
+    @property
+    def members(self) -> dict[str, int]:
+        """The pids of the live processes of the system, by program; that of supervisord by ''."""
+        return {process.program: process.pid for process in processes.of_system(self.run)}
+
+    def await_members(self, condition: Callable[[dict[str, int]], bool]) -> None:
+        """Wait until the live processes are as they should be."""
+        deadline = time.monotonic() + LIMIT
+        while not condition(self.members):
+            assert time.monotonic() < deadline, f"{self.members} after {LIMIT} s"
+            time.sleep(0.02)
+
+    def close(self) -> None:
+        """Leave nothing behind."""
+        self._commands.close()
+        System(self.run).stop()
+
+
+class Peer:
+    """A node of the test in a site's domain."""
+
+    def __init__(self, domain: int) -> None:
+        self._context = Context()
+        rclpy.init(args=[], context=self._context, domain_id=domain)
+        self.node = Node("peer", context=self._context)
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self.node)
+
+    def collect(self, topic: topics.Topic) -> list[Any]:
+        """A list of what is published on a topic from now on, and of what is latched."""
+        messages: list[Any] = []
+        self.node.create_subscription(topic.type, topic.name, messages.append, topic.qos)
+        return messages
+
+    def publisher(self, topic: topics.Topic) -> Publisher:
+        """A publisher on a topic."""
+        return self.node.create_publisher(topic.type, topic.name, topic.qos)
+
+    def spin_until(self, condition: Callable[[], object], seconds: float = LIMIT) -> None:
+        """Let things happen until a condition is true."""
+        deadline = time.monotonic() + seconds
+        while not condition():
+            assert time.monotonic() < deadline, f"not within {seconds} s"
+            self._executor.spin_once(timeout_sec=0.1)
+
+    def close(self) -> None:
+        """Leave the domain."""
+        self._executor.shutdown()
+        self.node.destroy_node()
+        self._context.try_shutdown()

@@ -1,0 +1,170 @@
+"""A system in the background, as its user, its peers and its faults see it."""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+import signal
+import stat
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from geometry_msgs.msg import Point, PointStamped
+from std_msgs.msg import Bool, Float64, String
+
+from interfaces import topics
+from tests.system.sites import ROOT, Peer, Site
+
+STEADY = str(Path(__file__).with_name("steady.yaml"))
+SERVICES = {
+    "config_l1",
+    "config_l2",
+    "config_theta1",
+    "config_theta2",
+    "dead_mans_switch",
+    "kinematics",
+    "velocity",
+    "operator_watchdog",
+    "engine_controller",
+}
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _system(module_site: Site) -> Iterator[None]:
+    code, printed = module_site.do("start", STEADY)
+    assert code == 0, printed
+    yield
+    assert module_site.do("stop")[0] == 0
+    assert module_site.members == {}
+
+
+def rows(table: str) -> dict[str, list[str]]:
+    """The rows of `make status` by service."""
+    return {row[0]: row[1:] for row in (re.split(r"  +", line) for line in table.splitlines()[1:])}
+
+
+def test_status_shows_every_service_running(module_site: Site) -> None:
+    code, printed = module_site.do("status")
+    assert code == 0
+    services = rows(printed)
+    assert services.keys() >= SERVICES
+    for name, (state, pid, _uptime, restarts, *_) in services.items():
+        assert (state, int(pid), restarts) == ("RUNNING", module_site.members[name], "0")
+
+
+def test_starting_twice_says_that_it_runs_and_where(module_site: Site) -> None:
+    for command in ("start", "run"):
+        code, printed = module_site.do(command, STEADY)
+        assert code == 1
+        where = f"supervisord has pid {module_site.members['']} and works in {module_site.run}"
+        assert printed == f"Already running: {where}"
+
+
+def test_supervisord_is_reached_by_its_user_alone(module_site: Site) -> None:
+    socket = module_site.run / "supervisor.sock"
+    assert stat.S_IMODE(socket.stat().st_mode) == 0o700
+    assert stat.S_IMODE(module_site.run.stat().st_mode) == 0o700
+    sockets = {os.readlink(link) for link in Path(f"/proc/{module_site.members['']}/fd").iterdir()}
+    tables = [Path(f"/proc/net/{family}").read_text().splitlines()[1:] for family in ("tcp", "tcp6")]
+    assert not [line for table in tables for line in table if f"socket:[{line.split()[9]}]" in sockets]
+
+
+def test_no_shell_stands_between_supervisord_and_a_service(module_site: Site) -> None:
+    for program, pid in module_site.members.items():
+        if program:
+            parent = int(Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[1])
+            assert parent == module_site.members[""]
+            assert Path(f"/proc/{pid}/cmdline").read_bytes().split(b"\0")[1:3][0] == b"-m"
+
+
+def test_each_service_has_a_log_of_its_own(module_site: Site) -> None:
+    assert {path.stem for path in (module_site.run / "logs").glob("*.log")} >= SERVICES
+
+
+def test_a_late_joiner_gets_the_latched_configuration_and_position(peer: Peer) -> None:
+    heard = {name: peer.collect(topic) for name, topic in topics.CONFIGURATION.items()}
+    positions = peer.collect(topics.EFFECTOR_POSITION)
+    peer.spin_until(lambda: positions and all(heard.values()))
+    assert [heard[name][-1].data for name in ("l1", "l2", "theta1", "theta2")] == [2.0, 3.0, 0.0, 0.0]
+    assert (positions[-1].point.x, positions[-1].point.y) == (5.0, 0.0)
+
+
+def test_a_second_instance_of_a_service_refuses_to_start_and_names_the_first(module_site: Site) -> None:
+    second = subprocess.run(
+        [sys.executable, "-m", "services.kinematics"],
+        cwd=ROOT,
+        env=module_site.environment,
+        capture_output=True,
+        text=True,
+        timeout=30,
+    )
+    assert second.returncode == 1
+    assert second.stderr.count("\n") == 1
+    assert f"process {module_site.members['kinematics']}" in second.stderr
+
+
+BAD = [
+    (topics.L1, Float64(data=-1.0), "kinematics"),
+    (topics.L1, Float64(data=math.nan), "kinematics"),
+    (topics.L2, Float64(data=math.inf), "kinematics"),
+    (topics.THETA1, Float64(data=-math.inf), "kinematics"),
+    (topics.THETA2, Float64(data=math.nan), "kinematics"),
+    (topics.EFFECTOR_POSITION, PointStamped(point=Point(x=math.nan)), "velocity"),
+    (topics.OPERATOR_HEARTBEAT, Bool(data=False), "operator_watchdog"),
+    (topics.ENGINES, String(data="explode"), "engine_controller"),
+]
+"""What no service may swallow, and who has to report it."""
+
+
+@pytest.mark.parametrize(("topic", "message", "reporter"), BAD)
+def test_a_bad_value_is_dropped_and_reported_and_everything_keeps_running(
+    module_site: Site, peer: Peer, topic: topics.Topic, message: object, reporter: str
+) -> None:
+    before = module_site.members
+    health = peer.collect(topics.DIAGNOSTICS)
+    positions, speeds = peer.collect(topics.EFFECTOR_POSITION), peer.collect(topics.EFFECTOR_SPEED)
+    publisher = peer.publisher(topic)
+
+    def is_reported() -> bool:
+        publisher.publish(message)
+        statuses = [status for array in health for status in array.status if status.name == f"/{reporter}"]
+        return any(status.level == status.WARN and topic.name in status.message for status in statuses)
+
+    peer.spin_until(is_reported)
+    assert module_site.members == before
+    assert topic is topics.EFFECTOR_POSITION or all(math.isfinite(position.point.x) for position in positions)
+    assert all(math.isfinite(speed.data) and speed.data >= 0 for speed in speeds)
+
+
+def test_a_killed_service_comes_back_and_is_counted(module_site: Site, peer: Peer) -> None:
+    killed = module_site.members["kinematics"]
+    positions = peer.collect(topics.EFFECTOR_POSITION)
+    peer.spin_until(lambda: positions)
+    os.kill(killed, signal.SIGKILL)
+    peer.spin_until(lambda: len(positions) > 1)  # the first one of the new process, at once
+    assert (positions[-1].point.x, positions[-1].point.y) == (5.0, 0.0)
+    state, pid, _uptime, restarts, *_ = rows(module_site.do("status")[1])["kinematics"]
+    assert state in ("STARTING", "RUNNING")
+    assert (int(pid), restarts) == (module_site.members["kinematics"], "1")
+    assert int(pid) != killed
+
+
+def test_the_operator_commands_switch_and_engines_from_the_console(module_site: Site) -> None:
+    console = module_site.begin("console")
+    console.await_line("Engines are off")
+    console.type("press\n")
+    console.await_line("Operator is alive")
+    console.type("turn_on\n")
+    console.await_line("Engines are on")
+    console.type("turn_off\n")
+    console.await_line("Turning off engines")
+    console.type("release\nfly\n")
+    console.await_line(r"fly\? Commands: press, release, turn_on, turn_off, quit")
+    console.await_line("Not received signal from operator")
+    console.type("quit\n")
+    assert console.wait() == 0
+    assert module_site.members.keys() >= SERVICES

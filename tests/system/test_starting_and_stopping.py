@@ -1,0 +1,163 @@
+"""How a system begins and ends: in order, against its will, after accidents. Nothing ever stays behind."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.system.sites import Site
+
+STEADY = str(Path(__file__).with_name("steady.yaml"))
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize("moment", ["Starting the services", "Engines are off"])
+def test_a_signal_ends_everything(site: Site, number: int, moment: str) -> None:
+    command = site.begin("run", STEADY)
+    command.await_line(moment)
+    command.signal(number)
+    assert command.wait(10) == 0
+    assert "All have ended." in command.output
+    assert site.members == {}
+
+
+@pytest.mark.parametrize("moment", ["Starting the services", "Engines are off"])
+def test_ctrl_c_at_the_terminal_of_make_run_ends_everything(site: Site, moment: str) -> None:
+    terminal = site.begin_in_terminal("make", "run", f"SCENARIO={STEADY}")
+    terminal.await_line(moment)
+    terminal.type("\x03\x03")
+    terminal.wait(10)
+    assert "All have ended." in terminal.output
+    assert site.members == {}
+
+
+def test_ctrl_c_before_anything_has_started_ends_it_without_a_traceback(site: Site) -> None:
+    command = site.begin("run", STEADY)
+    while signal.SIGHUP not in caught_signals(command.pid):
+        assert command.is_alive
+    command.signal(signal.SIGINT)
+    assert command.wait(10) == 0
+    assert "Traceback" not in command.output
+    assert site.members == {}
+
+
+def caught_signals(pid: int) -> set[int]:
+    """The signals that a process handles itself."""
+    status = Path(f"/proc/{pid}/status").read_text()
+    mask = int(status.partition("SigCgt:")[2].split()[0], 16)
+    return {number for number in range(1, 65) if mask >> (number - 1) & 1}
+
+
+def test_closing_the_terminal_ends_everything(site: Site) -> None:
+    terminal = site.begin_in_terminal("make", "run", f"SCENARIO={STEADY}")
+    terminal.await_line("Engines are off")
+    members = site.members
+    terminal.signal(signal.SIGKILL)
+    site.await_members(lambda left: not left)
+    assert len(members) >= 10
+
+
+def test_the_end_of_a_pipe_ends_everything(site: Site) -> None:
+    run = f"'{sys.executable}' -m deploy.launcher run '{STEADY}'"
+    reader = site.begin_in_terminal("sh", "-c", f"{run} | head -n 1")
+    reader.await_line("Starting the services")
+    site.await_members(lambda left: not left)
+
+
+def test_it_is_started_anew_when_supervisord_is_killed(site: Site) -> None:
+    command = site.begin("run", STEADY)
+    command.await_line("Engines are off")
+    before = site.members
+    os.kill(before[""], signal.SIGKILL)
+    command.await_line("supervisord was killed: everything has been started anew")
+    after = site.members
+    assert set(after.values()).isdisjoint(before.values())
+    command.type("quit\n")
+    assert command.wait(10) == 0
+    assert site.members == {}
+
+
+def test_stopping_from_elsewhere_ends_the_terminal_too(site: Site) -> None:
+    command = site.begin("run", STEADY)
+    command.await_line("Engines are off")
+    assert site.do("stop")[0] == 0
+    command.await_line("The system has ended")
+    assert command.wait(10) == 0
+    assert site.members == {}
+
+
+def orphaned(site: Site) -> dict[str, int]:
+    """The services of a system whose supervisord was killed."""
+    assert site.do("start", STEADY)[0] == 0
+    os.kill(site.members[""], signal.SIGKILL)
+    site.await_members(lambda left: "" not in left)
+    return site.members
+
+
+def test_stop_ends_what_a_killed_supervisord_left_behind(site: Site) -> None:
+    assert len(orphaned(site)) >= 9
+    code, printed = site.do("status")
+    assert code == 1
+    assert "supervisord has died" in printed
+    assert site.do("stop")[0] == 0
+    assert site.members == {}
+    assert site.do("stop") == (0, "Nothing runs.")
+
+
+def test_start_replaces_what_a_killed_supervisord_left_behind(site: Site) -> None:
+    orphans = orphaned(site)
+    assert site.do("start", STEADY)[0] == 0
+    assert set(site.members.values()).isdisjoint(orphans.values())
+
+
+@pytest.mark.parametrize("hung", ["", "velocity"])
+def test_stop_ends_what_hangs(site: Site, hung: str) -> None:
+    assert site.do("start", STEADY)[0] == 0
+    os.kill(site.members[hung], signal.SIGSTOP)
+    assert site.do("stop")[0] == 0
+    assert site.members == {}
+
+
+MISTAKES = [
+    ("l1: -1.0", "{file}: l1: -1.0 is negative"),
+    ("l3: 1.0", "{file}: scenario: unknown key 'l3'"),
+    ("l1: [", "{file}: "),
+]
+
+
+@pytest.mark.parametrize(("text", "complaint"), MISTAKES)
+def test_a_mistake_in_a_scenario_is_told_before_anything_starts(
+    site: Site, tmp_path: Path, text: str, complaint: str
+) -> None:
+    file = tmp_path / "mistake.yaml"
+    file.write_text(text)
+    code, printed = site.do("run", str(file))
+    assert code == 1
+    assert printed.startswith(complaint.format(file=file))
+    assert "\n" not in printed
+    assert not site.run.exists()
+
+
+def test_an_unknown_scenario_is_told_with_those_that_there_are(site: Site) -> None:
+    assert site.do("run", "tango") == (1, "SCENARIO=tango is neither a file nor one of: demo, listing_5_9")
+
+
+def test_an_impossible_domain_is_told(site: Site) -> None:
+    site.domain = 233
+    assert site.do("run", STEADY) == (1, "ROS_DOMAIN_ID=233 is not a number from 0 to 232")
+
+
+def test_a_second_system_in_the_same_domain_is_told_and_the_first_goes_on(site: Site, tmp_path: Path) -> None:
+    assert site.do("start", STEADY)[0] == 0
+    before = site.members
+    second = Site(tmp_path / "second", site.domain)
+    code, printed = second.do("start", STEADY)
+    assert code == 1
+    assert "does not start" in printed
+    assert "runs already in domain" in printed
+    assert second.members == {}
+    assert site.members == before
