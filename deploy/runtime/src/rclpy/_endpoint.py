@@ -1,14 +1,19 @@
-"""What a publisher, subscription, service or client stands on: DDS entities that belong to a node."""
+"""What publishers, subscriptions, services and clients stand on: DDS entities that belong to a node."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from types import TracebackType
+from typing import TYPE_CHECKING, TypeVar
 
 from rclpy._dds import Reader, Writer
+from rclpy.event_handler import EventHandler
+from rclpy.exceptions import InvalidHandle
 
 if TYPE_CHECKING:
     from rclpy.node import Node
+
+_Self = TypeVar("_Self", bound="Owner")
 
 
 @dataclass(frozen=True)
@@ -37,3 +42,38 @@ class ServiceEndpoint:
     name: str
     writer: Writer
     reader: Reader
+
+
+class Owner:
+    """Who uses DDS entities of a node until it is destroyed."""
+
+    def __init__(self, node: Node, name: str, *entities: Writer | Reader) -> None:
+        self._node = node
+        self._name = name
+        self._entities = entities
+        self._destroyed = False
+        self.event_handlers: list[EventHandler] = []
+
+    def _check_usable(self) -> None:
+        if self._destroyed:
+            kind = type(self).__name__.lower()
+            raise InvalidHandle(f"cannot use a {kind} of {self._name} that was destroyed")
+
+    def destroy(self) -> None:
+        """End it; whoever created it should use the node's method for that."""
+        if not self._destroyed:
+            self._destroyed = True
+            for handler in self.event_handlers:
+                handler.destroy()
+            self._node._graph.destroy(self._node, *self._entities)
+
+    def __enter__(self: _Self) -> _Self:
+        return self
+
+    def __exit__(
+        self,
+        exc_type: type[BaseException] | None,
+        exc_val: BaseException | None,
+        exc_tb: TracebackType | None,
+    ) -> None:
+        self.destroy()

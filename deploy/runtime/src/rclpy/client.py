@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import itertools
 import threading
-from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 from rclpy._bad_input import BadInput
 from rclpy._dds import Writer
-from rclpy._endpoint import ServiceEndpoint
+from rclpy._endpoint import Owner, ServiceEndpoint
 from rclpy._service_wire import RequestId, server_is_matched, unwrap, wrap
 from rclpy.callback_groups import CallbackGroup
-from rclpy.exceptions import InvalidHandle
 from rclpy.qos import QoSProfile
 from rclpy.task import Future
 
@@ -21,7 +19,7 @@ if TYPE_CHECKING:
     from rclpy.context import Context
 
 
-class Client:
+class Client(Owner):
     """Calls one service; :meth:`rclpy.node.Node.create_client` makes them."""
 
     def __init__(
@@ -33,13 +31,11 @@ class Client:
         qos_profile: QoSProfile,
         callback_group: CallbackGroup,
     ) -> None:
+        super().__init__(client_impl.node, client_impl.name, client_impl.writer, client_impl.reader)
         self._requests = client_impl.writer
         self._replies = client_impl.reader
         self._handles = (self._replies.condition,)
-        self._node = client_impl.node
-        self._service_name = client_impl.name
-        self._destroyed = False
-        self._bad_input = BadInput(self._node, self._service_name)
+        self._bad_input = BadInput(self._node, self._name)
         self._sequence_numbers = itertools.count(1)
         self._pending_requests: dict[int, Future] = {}
         self._lock = threading.Lock()
@@ -52,14 +48,13 @@ class Client:
     @property
     def handle(self) -> Writer:
         """The DDS writer of the requests. Raises InvalidHandle when the client was destroyed."""
-        if self._destroyed:
-            raise InvalidHandle("cannot use a client that was destroyed")
+        self._check_usable()
         return self._requests
 
     @property
     def service_name(self) -> str:
         """The fully qualified, remapped name."""
-        return self._service_name
+        return self._name
 
     def call(self, request: Any, timeout_sec: float | None = None) -> Any:
         """
@@ -86,7 +81,7 @@ class Client:
         """
         if not isinstance(request, self.srv_type.Request):
             expected = self.srv_type.Request._TYPE_NAME
-            raise TypeError(f"{self._service_name} is called with {expected}, not {request!r}")
+            raise TypeError(f"{self._name} is called with {expected}, not {request!r}")
         data = self.srv_type.Request._serialize(request)
         future = Future(executor=self._node.executor)
         with self._lock:
@@ -122,23 +117,6 @@ class Client:
     ) -> None:
         """Not supported: raises NotImplementedError."""
         raise NotImplementedError("rclpy.client.Client.configure_introspection")
-
-    def destroy(self) -> None:
-        """End it; whoever created it should use :meth:`rclpy.node.Node.destroy_client`."""
-        if not self._destroyed:
-            self._destroyed = True
-            self._node._graph.destroy(self._node, self._requests, self._replies)
-
-    def __enter__(self) -> Client:
-        return self
-
-    def __exit__(
-        self,
-        exc_type: type[BaseException] | None,
-        exc_val: BaseException | None,
-        exc_tb: TracebackType | None,
-    ) -> None:
-        self.destroy()
 
     # What the executor asks of everything it waits for.
 

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from types import TracebackType
 from typing import Any
 
 from rclpy._dds import Writer
-from rclpy._endpoint import PublisherEndpoint
+from rclpy._endpoint import Owner, PublisherEndpoint
 from rclpy.callback_groups import CallbackGroup
 from rclpy.duration import Duration
-from rclpy.event_handler import EventHandler, PublisherEventCallbacks
-from rclpy.exceptions import InvalidHandle, RCLError
+from rclpy.event_handler import PublisherEventCallbacks
+from rclpy.exceptions import RCLError
 from rclpy.qos import QoSProfile
 
 
-class Publisher:
+class Publisher(Owner):
     """Publishes messages of one type on one topic; :meth:`rclpy.node.Node.create_publisher` makes them."""
 
     def __init__(
@@ -26,30 +25,27 @@ class Publisher:
         event_callbacks: PublisherEventCallbacks,
         callback_group: CallbackGroup,
     ) -> None:
+        super().__init__(publisher_impl.node, publisher_impl.name, publisher_impl.writer)
         self._writer = publisher_impl.writer
-        self._node = publisher_impl.node
         self._context = publisher_impl.node.context
-        self._topic_name = publisher_impl.name
-        self._destroyed = False
         self._serialize = msg_type._serialize
         self.msg_type = msg_type
         self.topic = topic
         self.qos_profile = qos_profile
-        self.event_handlers: list[EventHandler] = event_callbacks.create_event_handlers(
+        self.event_handlers = event_callbacks.create_event_handlers(
             callback_group, publisher_impl.writer, publisher_impl.name
         )
 
     @property
     def handle(self) -> Writer:
         """The DDS writer. Raises InvalidHandle when the publisher was destroyed."""
-        if self._destroyed:
-            raise InvalidHandle("cannot use a publisher that was destroyed")
+        self._check_usable()
         return self._writer
 
     @property
     def topic_name(self) -> str:
         """The fully qualified, remapped topic."""
-        return self._topic_name
+        return self._name
 
     def publish(self, msg: Any) -> None:
         """
@@ -58,18 +54,19 @@ class Publisher:
         :raises TypeError: if ``msg`` is not of the publisher's type, or a field has a wrong type.
         :raises ValueError: if a field has a value that its type cannot have.
         :raises RCLError: if the context was shut down.
+        :raises InvalidHandle: if the publisher was destroyed.
         """
-        if self._destroyed:
-            raise InvalidHandle("cannot publish: the publisher was destroyed")
+        if self._destroyed:  # asked here first: this is where every message passes
+            self._check_usable()
         if not self._context._valid:
-            raise RCLError(f"cannot publish on {self._topic_name}: the context was shut down")
+            raise RCLError(f"cannot publish on {self._name}: the context was shut down")
         if msg.__class__ is self.msg_type or isinstance(msg, self.msg_type):
             self._writer.write(self._serialize(msg))
         elif isinstance(msg, bytes):
             self._writer.write(msg)
         else:
             expected = self.msg_type._TYPE_NAME
-            raise TypeError(f"Expected {expected} on {self._topic_name}, got {type(msg).__name__}: {msg!r}")
+            raise TypeError(f"Expected {expected} on {self._name}, got {type(msg).__name__}: {msg!r}")
 
     def get_subscription_count(self) -> int:
         """How many subscriptions receive what is published here."""
@@ -83,22 +80,3 @@ class Publisher:
         """Wait until all reliable subscriptions have everything, at most ``timeout`` (negative: for ever)."""
         nanoseconds = timeout.nanoseconds
         return self.handle.wait_for_acks(nanoseconds if nanoseconds >= 0 else 2**63 - 1)
-
-    def destroy(self) -> None:
-        """End it; whoever created it should use :meth:`rclpy.node.Node.destroy_publisher`."""
-        if not self._destroyed:
-            self._destroyed = True
-            for handler in self.event_handlers:
-                handler.destroy()
-            self._node._graph.destroy(self._node, self._writer)
-
-    def __enter__(self) -> Publisher:
-        return self
-
-    def __exit__(
-        self,
-        exc_type: type[BaseException] | None,
-        exc_val: BaseException | None,
-        exc_tb: TracebackType | None,
-    ) -> None:
-        self.destroy()

@@ -6,15 +6,13 @@ import inspect
 import threading
 import time
 from collections.abc import Callable, Coroutine
-from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 from rclpy._bad_input import BadInput
 from rclpy._dds import Reader
-from rclpy._endpoint import ServiceEndpoint
+from rclpy._endpoint import Owner, ServiceEndpoint
 from rclpy._service_wire import RequestId, client_is_matched, unwrap, wrap
 from rclpy.callback_groups import CallbackGroup
-from rclpy.exceptions import InvalidHandle
 from rclpy.qos import QoSProfile
 
 if TYPE_CHECKING:
@@ -24,7 +22,7 @@ if TYPE_CHECKING:
 _PATIENCE = 0.1
 
 
-class Service:
+class Service(Owner):
     """Answers requests by its callback; :meth:`rclpy.node.Node.create_service` makes them."""
 
     def __init__(
@@ -36,13 +34,11 @@ class Service:
         callback_group: CallbackGroup,
         qos_profile: QoSProfile,
     ) -> None:
+        super().__init__(service_impl.node, service_impl.name, service_impl.writer, service_impl.reader)
         self._replies = service_impl.writer
         self._requests = service_impl.reader
         self._handles = (self._requests.condition,)
-        self._node = service_impl.node
-        self._service_name = service_impl.name
-        self._destroyed = False
-        self._bad_input = BadInput(self._node, self._service_name)
+        self._bad_input = BadInput(self._node, self._name)
         self._known_clients: set[int] = set()
         self._lock = threading.Lock()
         self.srv_type = srv_type
@@ -54,14 +50,13 @@ class Service:
     @property
     def handle(self) -> Reader:
         """The DDS reader of the requests. Raises InvalidHandle when the service was destroyed."""
-        if self._destroyed:
-            raise InvalidHandle("cannot use a service that was destroyed")
+        self._check_usable()
         return self._requests
 
     @property
     def service_name(self) -> str:
         """The fully qualified, remapped name."""
-        return self._service_name
+        return self._name
 
     def send_response(self, response: Any, header: RequestId) -> None:
         """
@@ -71,7 +66,7 @@ class Service:
         """
         if not isinstance(response, self.srv_type.Response):
             expected = self.srv_type.Response._TYPE_NAME
-            raise TypeError(f"{self._service_name} must answer with {expected}, not {response!r}")
+            raise TypeError(f"{self._name} must answer with {expected}, not {response!r}")
         data = wrap(header, self.srv_type.Response._serialize(response))
         self._wait_for_client(header.publication_handle)
         if not self._destroyed:
@@ -97,23 +92,6 @@ class Service:
     ) -> None:
         """Not supported: raises NotImplementedError."""
         raise NotImplementedError("rclpy.service.Service.configure_introspection")
-
-    def destroy(self) -> None:
-        """End it; whoever created it should use :meth:`rclpy.node.Node.destroy_service`."""
-        if not self._destroyed:
-            self._destroyed = True
-            self._node._graph.destroy(self._node, self._requests, self._replies)
-
-    def __enter__(self) -> Service:
-        return self
-
-    def __exit__(
-        self,
-        exc_type: type[BaseException] | None,
-        exc_val: BaseException | None,
-        exc_tb: TracebackType | None,
-    ) -> None:
-        self.destroy()
 
     # What the executor asks of everything it waits for.
 

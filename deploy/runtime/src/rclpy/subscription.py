@@ -6,19 +6,17 @@ import inspect
 import time
 from collections.abc import Callable
 from enum import Enum
-from types import TracebackType
 from typing import Any
 
 from rclpy._bad_input import BadInput
 from rclpy._dds import Reader
-from rclpy._endpoint import SubscriptionEndpoint
+from rclpy._endpoint import Owner, SubscriptionEndpoint
 from rclpy.callback_groups import CallbackGroup
-from rclpy.event_handler import EventHandler, SubscriptionEventCallbacks
-from rclpy.exceptions import InvalidHandle
+from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.qos import QoSProfile
 
 
-class Subscription:
+class Subscription(Owner):
     """Calls back with each message of a topic; :meth:`rclpy.node.Node.create_subscription` makes them."""
 
     class CallbackType(Enum):
@@ -38,34 +36,29 @@ class Subscription:
         raw: bool,
         event_callbacks: SubscriptionEventCallbacks,
     ) -> None:
+        super().__init__(subscription_impl.node, subscription_impl.name, subscription_impl.reader)
         self._reader = subscription_impl.reader
         self._handles = (self._reader.condition,)
-        self._node = subscription_impl.node
-        self._topic_name = subscription_impl.name
-        self._destroyed = False
         self._deserialize = msg_type._deserialize
-        self._bad_input = BadInput(self._node, self._topic_name)
+        self._bad_input = BadInput(self._node, self._name)
         self.callback = callback
         self.callback_group = callback_group
         self.msg_type = msg_type
         self.topic = topic
         self.qos_profile = qos_profile
         self.raw = raw
-        self.event_handlers: list[EventHandler] = event_callbacks.create_event_handlers(
-            callback_group, self._reader, self._topic_name
-        )
+        self.event_handlers = event_callbacks.create_event_handlers(callback_group, self._reader, self._name)
 
     @property
     def handle(self) -> Reader:
         """The DDS reader. Raises InvalidHandle when the subscription was destroyed."""
-        if self._destroyed:
-            raise InvalidHandle("cannot use a subscription that was destroyed")
+        self._check_usable()
         return self._reader
 
     @property
     def topic_name(self) -> str:
         """The fully qualified, remapped topic."""
-        return self._topic_name
+        return self._name
 
     @property
     def callback(self) -> Callable[..., Any]:
@@ -80,25 +73,6 @@ class Subscription:
     def get_publisher_count(self) -> int:
         """How many publishers this subscription receives from."""
         return self.handle.matched()
-
-    def destroy(self) -> None:
-        """End it; whoever created it should use :meth:`rclpy.node.Node.destroy_subscription`."""
-        if not self._destroyed:
-            self._destroyed = True
-            for handler in self.event_handlers:
-                handler.destroy()
-            self._node._graph.destroy(self._node, self._reader)
-
-    def __enter__(self) -> Subscription:
-        return self
-
-    def __exit__(
-        self,
-        exc_type: type[BaseException] | None,
-        exc_val: BaseException | None,
-        exc_tb: TracebackType | None,
-    ) -> None:
-        self.destroy()
 
     # What the executor asks of everything it waits for.
 
