@@ -131,6 +131,8 @@ def shutdown(*, context: Context | None = None, uninstall_handlers: bool | None 
     :param uninstall_handlers: whether to handle signals no longer; by default so for the default context.
     :raises RuntimeError: if the context does not run.
     """
+    if _executor is not None and _executor.context is (context or get_default_context()):
+        _executor._told_to_end = True  # so that spin() on another thread just returns
     _shutdown(context=context)
     if uninstall_handlers or (uninstall_handlers is None and context is None):
         uninstall_signal_handlers()

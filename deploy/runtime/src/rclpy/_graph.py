@@ -174,6 +174,7 @@ class Graph:
         """A writer of ``msg_type`` that belongs to ``node``; ``extra`` goes to USER_DATA before the hash."""
         user_data = f"{extra}typehash={msg_type._TYPE_HASH};"
         writer = self.participant.create_writer(topic, msg_type._DDS_TYPE_NAME, profile, user_data)
+        writer.logger_name = node.get_logger().name
         self._change(node, lambda own: own.writers.append(writer.gid))
         return writer
 
@@ -183,6 +184,7 @@ class Graph:
         """A reader of ``msg_type`` that belongs to ``node``; ``extra`` goes to USER_DATA before the hash."""
         user_data = f"{extra}typehash={msg_type._TYPE_HASH};"
         reader = self.participant.create_reader(topic, msg_type._DDS_TYPE_NAME, profile, user_data)
+        reader.logger_name = node.get_logger().name
         self._change(node, lambda own: own.readers.append(reader.gid))
         return reader
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Protocol
 from rclpy import logging
 from rclpy._arguments import RosArguments, parse
 from rclpy._dds import domain
-from rclpy.exceptions import NotInitializedException
+from rclpy.exceptions import NotInitializedException, RCLError
 
 if TYPE_CHECKING:
     from rclpy._graph import Graph
@@ -124,10 +124,10 @@ class Context(AbstractContextManager["Context"]):
         """
         End: everybody who waits is woken, and nothing can be waited for any more.
 
-        :raises RuntimeError: if the context does not run.
+        :raises RCLError: if the context does not run.
         """
         if not self._end():
-            raise RuntimeError("Context must be initialized before it can be shutdown")
+            raise RCLError("Context must be initialized before it can be shutdown")
 
     def try_shutdown(self) -> None:
         """End, unless that has happened already."""

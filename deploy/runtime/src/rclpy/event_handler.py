@@ -222,13 +222,10 @@ def _handlers(
     return handlers
 
 
-_LOGGER = "rclpy.event_handler"
-
-
-def _warn_of_incompatible_qos(text: str, topic_name: str) -> Callable[[Any], None]:
+def _warn_of_incompatible_qos(logger_name: str, text: str) -> Callable[[Any], None]:
     def warn(info: _Incompatible) -> None:
         policy = qos_policy_name_from_kind(info.last_policy_kind)
-        logging.get_logger(_LOGGER).warning(f"{text.format(topic_name)} Last incompatible policy: {policy}")
+        logging.get_logger(logger_name).warning(f"{text} Last incompatible policy: {policy}")
 
     return warn
 
@@ -263,9 +260,10 @@ class SubscriptionEventCallbacks:
         incompatible_qos = self.incompatible_qos
         if incompatible_qos is None and self.use_default_callbacks:
             text = (
-                "New publisher on topic '{}' offers incompatible QoS: none of its messages will be received."
+                f"New publisher discovered on topic '{topic_name}', offering incompatible QoS. "
+                "No messages will be received from it."
             )
-            incompatible_qos = _warn_of_incompatible_qos(text, topic_name)
+            incompatible_qos = _warn_of_incompatible_qos(subscription.logger_name, text)
         kind = QoSSubscriptionEventType
         return _handlers(
             {
@@ -308,8 +306,11 @@ class PublisherEventCallbacks:
         """The handlers of one publisher."""
         incompatible_qos = self.incompatible_qos
         if incompatible_qos is None and self.use_default_callbacks:
-            text = "New subscription on topic '{}' requests incompatible QoS: no messages will be sent to it."
-            incompatible_qos = _warn_of_incompatible_qos(text, topic_name)
+            text = (
+                f"New subscription discovered on topic '{topic_name}', requesting incompatible QoS. "
+                "No messages will be sent to it."
+            )
+            incompatible_qos = _warn_of_incompatible_qos(publisher.logger_name, text)
         kind = QoSPublisherEventType
         return _handlers(
             {

@@ -113,6 +113,7 @@ class Executor(AbstractContextManager["Executor"]):
         self._nodes_lock = threading.RLock()
         self._tasks: deque[Task] = deque()
         self._is_shutdown = False
+        self._told_to_end = False  # by rclpy.shutdown(), as opposed to a signal
         self._closed = False
         self._idle = threading.Condition()
 
@@ -267,7 +268,7 @@ class Executor(AbstractContextManager["Executor"]):
         waited = False
         while True:
             if not self._context.ok():
-                raise ExternalShutdownException
+                raise ShutdownException if self._told_to_end else ExternalShutdownException
             if self._is_shutdown:
                 raise ShutdownException
             if condition is not None and condition():

@@ -23,7 +23,7 @@ from rclpy.event_handler import (
     PublisherEventCallbacks,
     SubscriptionEventCallbacks,
 )
-from rclpy.exceptions import InvalidHandle, NotInitializedException, NoTypeSupportImportedException
+from rclpy.exceptions import InvalidHandle, NotInitializedException
 from rclpy.expand_topic_name import expand_topic_name
 from rclpy.guard_condition import GuardCondition
 from rclpy.impl import _logging_output
@@ -45,6 +45,7 @@ from rclpy.subscription import Subscription
 from rclpy.time_source import TimeSource
 from rclpy.timer import Rate, Timer
 from rclpy.type_description_service import TypeDescriptionService
+from rclpy.type_support import check_is_valid_msg_type, check_is_valid_srv_type
 from rclpy.utilities import get_default_context
 from rclpy.validate_full_topic_name import validate_full_topic_name
 from rclpy.validate_namespace import validate_namespace
@@ -114,7 +115,7 @@ class Node(NodeParameters, NodeGraph):
         if not self._context.ok():
             raise NotInitializedException("cannot create node")
         validate_node_name(node_name)
-        namespace = "/" + (namespace or "").lstrip("/")
+        namespace = namespace if namespace and namespace[0] == "/" else f"/{namespace or ''}"
         validate_namespace(namespace)
         process_arguments = self._context.arguments if use_global_arguments else parse([])
         own_arguments = parse(cli_args or [])
@@ -405,8 +406,7 @@ class Node(NodeParameters, NodeGraph):
         overriding: QoSOverridingOptions | None,
     ) -> tuple[QoSProfile, str]:
         """The profile, with its overrides, and the fully qualified name of a new endpoint's topic."""
-        if not hasattr(msg_type, "_DDS_TYPE_NAME"):
-            raise NoTypeSupportImportedException
+        check_is_valid_msg_type(msg_type)
         if isinstance(qos_profile, QoSProfile):
             profile = qos_profile
         elif isinstance(qos_profile, int):
@@ -465,8 +465,7 @@ class Node(NodeParameters, NodeGraph):
     def _service_endpoint(
         self, srv_type: Any, srv_name: str, profile: QoSProfile, *, is_server: bool
     ) -> ServiceEndpoint:
-        if not hasattr(srv_type, "Request"):
-            raise NoTypeSupportImportedException
+        check_is_valid_srv_type(srv_type)
         graph = self.handle._graph
         name = self.resolve_service_name(srv_name)
         identity = f"{'serviceid' if is_server else 'clientid'}={graph.next_service_id()};"

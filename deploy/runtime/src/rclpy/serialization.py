@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any, TypeVar
 
+from rclpy.exceptions import RMWError
 from rclpy.type_support import check_is_valid_msg_type
 
 _Message = TypeVar("_Message")
@@ -28,9 +29,12 @@ def deserialize_message(serialized_message: bytes, message_type: type[_Message])
 
     :raises NoTypeSupportImportedException: if `message_type` is no type of messages or services.
     :raises RuntimeError: if it is a type of services.
-    :raises ValueError: if the bytes are no message of that type.
+    :raises RMWError: if the bytes are no message of that type.
     """
     type_: Any = message_type
     check_is_valid_msg_type(type_)
-    message: _Message = type_._deserialize(serialized_message)
+    try:
+        message: _Message = type_._deserialize(serialized_message)
+    except ValueError as error:
+        raise RMWError(f"failed to deserialize ROS message: {error}") from None
     return message

@@ -11,7 +11,7 @@ from rclpy.callback_groups import CallbackGroup
 from rclpy.clock import Clock, ClockChange, JumpThreshold, TimeJump
 from rclpy.clock_type import ClockType
 from rclpy.duration import Duration
-from rclpy.exceptions import InvalidHandle, ROSInterruptException
+from rclpy.exceptions import InvalidHandle, RCLError, ROSInterruptException
 from rclpy.utilities import get_default_context
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ class Timer:
         :param autostart: whether it runs at once, or waits for :meth:`reset`.
         """
         if timer_period_ns < 0:
-            raise ValueError("timer period must not be negative")
+            raise RCLError("failed to create timer: timer period must be non-negative")
         self.callback = callback
         self.callback_group = callback_group
         self._context = get_default_context() if context is None else context
@@ -186,10 +186,13 @@ class Rate:
         """
         Sleep until the next tick.
 
-        :raises ROSInterruptException: if the context is shut down, or the rate destroyed, meanwhile.
+        :raises ROSInterruptException: if the context is or gets shut down.
+        :raises RuntimeError: if the rate is destroyed; a sleep under way just ends then.
         """
         with self._ticks:
+            if self._is_destroyed and self._context.ok():
+                raise RuntimeError("Rate cannot sleep because it has been destroyed")
             tick = self._tick
             self._ticks.wait_for(lambda: self._tick != tick or self._is_destroyed)
-            if self._tick == tick:
+            if not self._context.ok():
                 raise ROSInterruptException

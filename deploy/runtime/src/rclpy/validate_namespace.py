@@ -28,4 +28,6 @@ def _problem(namespace: str) -> tuple[str, int] | None:
     """Say what is wrong with `namespace` and at which index, or `None`."""
     if namespace == "/":
         return None
+    if namespace.endswith("/"):
+        return "namespace must not end with a '/', unless only a '/'", len(namespace) - 1
     return validate_full_topic_name._problem(namespace, "namespace", _MAX_LENGTH)

@@ -113,6 +113,7 @@ class Writer:
 
     def __init__(self, handle: int) -> None:
         self.handle = handle
+        self.logger_name = ""  # of the node that it belongs to
         self.gid = _guid(handle)
         sertype = Pointer()
         checked(quick.dds_get_entity_sertype(handle, ct.byref(sertype)), "cannot read a writer's type")
@@ -162,6 +163,7 @@ class Reader:
 
     def __init__(self, handle: int) -> None:
         self.handle = handle
+        self.logger_name = ""  # of the node that it belongs to
         self.gid = _guid(handle)
         self.condition = checked(blocking.dds_create_readcondition(handle, ANY_STATE), "read condition")
         self._buffer = ct.create_string_buffer(64)

@@ -175,9 +175,10 @@ class RcutilsLogger:
         :raises TypeError: if `message` is no string or a filter is not known.
         :raises ValueError: if a filter's value is invalid, or the same call asked for something else before.
         """
+        if severity.__class__ is not LoggingSeverity:
+            severity = LoggingSeverity(severity)
         if severity < _logging_levels.effective_level(self.name):
             return False
-        severity = LoggingSeverity(severity)
         name = kwargs.pop("name", self.name) if kwargs else self.name
         if kwargs:
             _check_options(kwargs)
