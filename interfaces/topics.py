@@ -134,7 +134,7 @@ ENGINES_STATE = Topic(
     _STATE,
     "",
     ("engine_controller",),
-    f"`{ON}` or `{OFF}`, on every change and at 1 Hz",
+    f"`{ON}` or `{OFF}`, on every change and at 10 Hz: the drive takes an `{ON}` for 400 ms",
     _not_one_of(ON, OFF),
 )
 DIAGNOSTICS = Topic("/diagnostics", DiagnosticArray, _EVENTS, "", ("every service",), "1 Hz health")

@@ -38,7 +38,7 @@ def engine_state(
     *,
     presence: float = 1.0,
     absence: float = 10.0,
-    repeat: float = 1.0,
+    repeat: float = 0.1,
     now: Callable[[], datetime] = age.now,
     refused: Callable[[str], None] = lambda why: None,
 ) -> Observable[str]:
@@ -81,7 +81,8 @@ def wire(node: ServiceNode) -> None:
     """Connect the recipe with its topics."""
     presence = node.declare("presence", 1.0, (0.1, 1.0), "turn_on needs an operator seen within [s]")
     absence = node.declare("absence", 10.0, (1.0, 60.0), "off when no operator was seen for [s]")
-    repeat = node.declare("repeat", 1.0, (0.1, 10.0), "the state is repeated this often [s]")
+    # The engines' drive lets go when `on` is not renewed: so they stop also when this process does.
+    repeat = node.declare("repeat", 0.1, (0.02, 1.0), "the state is repeated this often [s]")
     states = engine_state(
         node.observe(ENGINES, timestamped=True).map(lambda item: Timestamp(item.value.data, item.timestamp)),
         node.observe(OPERATOR_PRESENCE).map(lambda header: age.from_message(header.stamp)),

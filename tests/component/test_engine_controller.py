@@ -58,7 +58,9 @@ class Engines:
             *(on_next(at, at_time(stamp)) for at, stamp in presences)
         )
         results = self.scheduler.start(
-            lambda: engine_state(self.commands, self.presences, now=self.now, refused=self.refusals.append),
+            lambda: engine_state(
+                self.commands, self.presences, repeat=1.0, now=self.now, refused=self.refusals.append
+            ),
             created=0.001,
             subscribed=0.002,
             disposed=until,
@@ -86,7 +88,7 @@ def engines() -> Engines:
     return Engines()
 
 
-def test_they_start_off_and_the_state_is_repeated_every_second(engines: Engines) -> None:
+def test_they_start_off_and_the_state_is_repeated(engines: Engines) -> None:
     assert engines.states([], [], 3.5) == [(0.002, OFF), (1.002, OFF), (2.002, OFF), (3.002, OFF)]
     assert engines.commands.subscriptions == [subscribe(0.002, 3.5)]
     assert engines.presences.subscriptions == [subscribe(0.002, 3.5)]
@@ -97,6 +99,12 @@ def test_they_go_on_with_the_operator_present_and_off_by_command_at_once(engines
 
     assert states == [(0.002, OFF), (2.2, ON), (5.7, OFF)]
     assert engines.refusals == []
+
+
+def test_a_command_that_changes_nothing_is_no_news(engines: Engines) -> None:
+    commands = [(at, TURN_OFF, at) for at in (0.1, 0.2, 0.3)]
+
+    assert engines.states(commands, seen_until(2), 1.5) == [(0.002, OFF), (1.002, OFF)]
 
 
 def test_they_do_not_go_on_while_nobody_was_seen(engines: Engines) -> None:
@@ -131,7 +139,7 @@ def test_an_old_presence_that_arrives_late_is_as_old_as_its_stamp(engines: Engin
 
 
 def test_a_presence_from_the_future_or_of_before_the_last_one_counts_for_nothing(engines: Engines) -> None:
-    states = engines.run([(2.2, TURN_ON, 2.2)], [*seen_until(3), (4.0, 5.0), (5.0, 2.5), (6.0, 2.9)])
+    states = engines.run([(2.2, TURN_ON, 2.2)], [*seen_until(3), (4.0, 5.0), (5.0, 2.9), (6.0, 2.5)])
 
     assert states == [(0.002, OFF), (2.2, ON), (12.9, OFF)]
 

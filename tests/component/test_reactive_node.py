@@ -213,6 +213,23 @@ def test_what_was_retained_dies_with_its_publisher(
     assert late == []
 
 
+def test_a_new_reader_has_not_kept_what_the_one_before_had(
+    node: ReactiveNode, latched_talker: Talker, spin_until: SpinUntil
+) -> None:
+    deep = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    observable = node.create_observable(String, "topic", deep)
+    latched_talker.say("0", "1")
+    for _ in range(2):
+        first: list[str] = []
+        late: list[str] = []
+        subscriptions = [observable.subscribe(texts_into(first))]
+        spin_until(lambda first=first: first == ["0", "1"])
+        subscriptions.append(observable.subscribe(texts_into(late)))
+        spin_until(lambda late=late: late == ["0", "1"])
+        for subscription in subscriptions:
+            subscription.dispose()
+
+
 def test_a_further_observer_of_a_volatile_topic_gets_what_comes(
     node: ReactiveNode, talker: Talker, spin_until: SpinUntil
 ) -> None:

@@ -169,6 +169,27 @@ def test_ten_thousand_items_a_second_under_a_timeout_leave_no_trace(
     assert len(scheduler._heap) < 200
 
 
+def test_what_is_left_of_many_cancelled_items_runs_in_order(
+    scheduler: NodeScheduler, spin_until: SpinUntil
+) -> None:
+    ran: list[int] = []
+    begin = scheduler.now + timedelta(milliseconds=20)
+    order = [(n * 7919) % 1000 for n in range(1000)]
+    items = [
+        scheduler.schedule_absolute(
+            begin + timedelta(microseconds=n), lambda _, state: ran.append(state or 0), n
+        )
+        for n in order
+    ]
+
+    for item, n in zip(items, order, strict=True):
+        if n % 10:
+            item.dispose()
+    spin_until(lambda: len(ran) == 100)
+
+    assert ran == list(range(0, 1000, 10))
+
+
 def test_setting_the_wall_clock_changes_nothing(
     scheduler: NodeScheduler, spin_until: SpinUntil, monkeypatch: pytest.MonkeyPatch
 ) -> None:
