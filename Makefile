@@ -2,6 +2,7 @@
 
 PYTHON ?=
 SCENARIO ?= demo
+PARAMETERS ?=
 TESTS ?= tests
 SHELL := /bin/sh
 MAKEFLAGS += --no-print-directory
@@ -24,7 +25,7 @@ setup:
 	@deploy/setup.sh '$(PYTHON)'
 
 run start: setup
-	@$(PY) -m deploy.launcher $@ '$(SCENARIO)'
+	@$(PY) -m deploy.launcher $@ '$(SCENARIO)' '$(PARAMETERS)'
 
 # These do without a set-up: what they look at, or end, runs already.
 console status logs stop:

@@ -25,16 +25,16 @@ LOG_LINES = 15  # of a service that does not start
 # rclpy takes its time to load: a command loads it when it is sure to need it.
 
 
-def run(system: System, scenario: str) -> None:
+def run(system: System, scenario: str, parameter_file: str) -> None:
     """Run the system in this terminal until the end is asked for."""
-    with _started(system, scenario) as (member, epoch):
+    with _started(system, scenario, parameter_file) as (member, epoch):
         _show(system, member, epoch, owner=True)
     _stop(system)
 
 
-def start(system: System, scenario: str) -> None:
+def start(system: System, scenario: str, parameter_file: str) -> None:
     """Start the system in the background; returns when all services are up."""
-    with _started(system, scenario):
+    with _started(system, scenario, parameter_file):
         print("It runs in the background: make console, make status, make logs, make stop.")
 
 
@@ -83,13 +83,13 @@ def logs(system: System) -> None:
 
 
 @contextmanager
-def _started(system: System, scenario: str) -> Iterator[tuple[Member, float]]:
+def _started(system: System, scenario: str, parameter_file: str) -> Iterator[tuple[Member, float]]:
     """Start the system and wait until all services are up; stop it when that, or what follows, fails."""
     began = time.monotonic()
     from deploy import parameters
     from deploy.member import Member
 
-    given = parameters.of_scenario(scenario, loading=time.monotonic() - began)
+    given = parameters.of_system(scenario, parameter_file, loading=time.monotonic() - began)
     interruption.check()
     system.start(given)
     try:
@@ -172,7 +172,9 @@ def main(arguments: list[str]) -> int:
     parser = argparse.ArgumentParser(prog="launcher")
     commands = parser.add_subparsers(dest="command", required=True)
     for name in ("run", "start"):
-        commands.add_parser(name).add_argument("scenario")
+        command = commands.add_parser(name)
+        command.add_argument("scenario")
+        command.add_argument("parameter_file", nargs="?", default="")
     for name in ("console", "status", "logs", "stop"):
         commands.add_parser(name)
     options = parser.parse_args(arguments)
@@ -182,9 +184,9 @@ def main(arguments: list[str]) -> int:
     try:
         match options.command:
             case "run":
-                run(system, options.scenario)
+                run(system, options.scenario, options.parameter_file)
             case "start":
-                start(system, options.scenario)
+                start(system, options.scenario, options.parameter_file)
             case "console":
                 console(system)
             case "status":

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import yaml
 
@@ -15,29 +18,34 @@ from interfaces import scenario
 SCENARIOS = ROOT / "deploy" / "scenarios"
 PROCESSES = 10  # that start at the same time
 SETTLING = 2.5  # s in which they find each other and report
+ALL, KEY = "/**", "ros__parameters"  # the form of ROS 2's parameter files
 
 
-def of_scenario(name: str, loading: float) -> dict[str, object]:
+def of_system(scenario_name: str, user_file: str, loading: float) -> dict[str, Any]:
     """
-    The ROS parameters of all services for a scenario, a name or a file. Raises DeploymentError.
+    The content of the parameter file of all services. Raises DeploymentError for any mistake of the user's.
 
-    Its origin lies so far ahead that all of them are up by then: `loading` [s] is what it took to load rclpy
-    here, just now, and each of them has to do that too.
+    The scenario's origin lies so far ahead that all services are up by then: `loading` [s] is what it took to
+    load rclpy here, just now, and each of them has to do that too.
+
+    :param scenario_name: name or file of a scenario
+    :param user_file: a parameter file, '' for none
     """
     _check_domain()
-    path = _scenario_file(name)
+    path = _scenario_file(scenario_name)
     try:
         scenario.load(path)
     except scenario.ScenarioError as error:
         raise DeploymentError(str(error)) from error
-    lead = SETTLING + loading * PROCESSES / (os.cpu_count() or 1)
-    shared = {"scenario": str(path), "scenario_epoch": round(time.monotonic() + lead, 3)}
-    return {"/**": {"ros__parameters": shared}}
+    given = _checked(user_file) if user_file else {}
+    origin = time.monotonic() + SETTLING + loading * PROCESSES / (os.cpu_count() or 1)
+    shared = given.pop(ALL, {KEY: {}})[KEY] | {"scenario": str(path), "scenario_epoch": round(origin, 3)}
+    return {ALL: {KEY: shared}, **given}
 
 
 def epoch_of(system: System) -> float:
     """The origin of the running system's scenario [s, monotonic clock]."""
-    return float(yaml.safe_load(system.parameters.read_text())["/**"]["ros__parameters"]["scenario_epoch"])
+    return float(yaml.safe_load(system.parameters.read_text())[ALL][KEY]["scenario_epoch"])
 
 
 def _scenario_file(name: str) -> Path:
@@ -46,6 +54,14 @@ def _scenario_file(name: str) -> Path:
             return path.resolve()
     known = ", ".join(sorted(path.stem for path in SCENARIOS.glob("*.yaml")))
     raise DeploymentError(f"SCENARIO={name} is neither a file nor one of: {known}")
+
+
+def _checked(user_file: str) -> dict[str, Any]:
+    check = [sys.executable, "-m", "deploy.parameter_file", user_file]
+    done = subprocess.run(check, cwd=ROOT, capture_output=True, text=True)
+    if done.returncode:
+        raise DeploymentError(done.stderr.strip())
+    return dict(yaml.safe_load(Path(user_file).read_text(encoding="utf-8")))
 
 
 def _check_domain() -> None:

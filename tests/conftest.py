@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import random
+import signal
 import socket
 import time
 import uuid
@@ -22,6 +23,12 @@ def pytest_configure() -> None:
     name, _, value = MARK.partition("=")
     os.environ[name] = value
     os.environ[DISCOVERY_RANGE] = "LOCALHOST"
+
+
+def pytest_collection_finish() -> None:
+    """Let Ctrl-C end the tests, with clean-up: a service that a test module imports would end on the spot."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
 
 
 @contextmanager

@@ -161,3 +161,18 @@ def test_a_second_system_in_the_same_domain_is_told_and_the_first_goes_on(site: 
     assert "runs already in domain" in printed
     assert second.members == {}
     assert site.members == before
+
+
+def test_a_mistake_in_a_parameter_file_is_told_before_anything_starts(site: Site, tmp_path: Path) -> None:
+    file = tmp_path / "mine.yaml"
+    file.write_text("operator_watchdog: {ros__parameters: {silence: -1.0}}")
+    complaint = f"{file}: operator_watchdog.silence: must be from 0.1 to 60, not -1.0"
+    assert site.do("start", STEADY, str(file)) == (1, complaint)
+    assert not site.run.exists()
+
+
+def test_a_parameter_file_reaches_the_services(site: Site, tmp_path: Path) -> None:
+    file = tmp_path / "mine.yaml"
+    file.write_text("dead_mans_switch: {ros__parameters: {pressed: true}}")
+    command = site.begin("run", STEADY, str(file))
+    command.await_line("Operator is alive")

@@ -1,0 +1,127 @@
+"""Checks a user's parameter file before anything starts. It has the form of ROS 2::
+
+    operator_watchdog:
+      ros__parameters:
+        silence: 2.0
+
+with `/**` for all services that have the parameter. This is done in a process of its own: it loads the
+services, and who loads a service becomes one, down to its signals.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import yaml
+
+from deploy import sentinel
+from interfaces import topics
+from services import (
+    config_publisher,
+    dead_mans_switch,
+    engine_controller,
+    kinematics,
+    operator_watchdog,
+    velocity,
+)
+
+ALL = "/**"
+KEY = "ros__parameters"
+KINDS = {bool: "true or false", int: "an integer", float: "a number with a decimal point", str: "a string"}
+
+WIRES: dict[str, Callable[[Any], None]] = {
+    **{f"config_{name}": partial(config_publisher.wire, topic=t) for name, t in topics.CONFIGURATION.items()},
+    "dead_mans_switch": dead_mans_switch.wire,
+    "kinematics": kinematics.wire,
+    "velocity": velocity.wire,
+    "operator_watchdog": operator_watchdog.wire,
+    "engine_controller": engine_controller.wire,
+    "sentinel": sentinel.wire,
+}
+
+
+class Declared(NamedTuple):
+    """A parameter as a service declares it."""
+
+    default: Any
+    within: tuple[Any, Any] | None
+    """the least and the greatest value that are allowed"""
+
+    def fault(self, value: object) -> str:
+        """What is wrong with a value, in words; '' for a good one."""
+        if type(value) is not type(self.default):
+            return f"must be {KINDS[type(self.default)]}, not {value!r}"
+        if self.within and not self.within[0] <= value <= self.within[1]:
+            return f"must be from {self.within[0]:g} to {self.within[1]:g}, not {value!r}"
+        return ""
+
+
+def declared() -> dict[str, dict[str, Declared]]:
+    """The parameters of each service that a user may set."""
+    return {name: _Declarations(wire).parameters for name, wire in WIRES.items()}
+
+
+def faults(document: Any) -> Iterator[tuple[str, str]]:
+    """The mistakes in a parameter file: the key at which each stands, and the reason."""
+    known = declared()
+    known[ALL] = {name: one for parameters in known.values() for name, one in parameters.items()}
+    if not isinstance(document, dict):
+        yield "file", f"must name services, of {', '.join(known)}"
+        return
+    for node, content in document.items():
+        parameters = known.get(str(node) if node == ALL else str(node).removeprefix("/"))
+        if parameters is None:
+            yield node, f"is no service; those are {', '.join(known)}"
+        elif not isinstance(content, dict) or [*content] != [KEY] or not isinstance(content[KEY], dict):
+            yield node, f"must hold {KEY}, and that its parameters"
+        else:
+            for name, value in content[KEY].items():
+                if name not in parameters:
+                    yield f"{node}.{name}", f"is no parameter; those are {', '.join(parameters) or 'none'}"
+                elif fault := parameters[name].fault(value):
+                    yield f"{node}.{name}", fault
+
+
+class _Declarations:
+    """Stands for the node while a service wires itself, until it has declared its parameters."""
+
+    class _AllDeclared(Exception):
+        pass
+
+    def __init__(self, wire: Callable[[Any], None]) -> None:
+        self.parameters = {"use_sim_time": Declared(False, None)}
+        with suppress(self._AllDeclared):
+            wire(self)
+
+    def declare(
+        self, name: str, default: Any, within: Any, description: str, *, settable: bool = False
+    ) -> Any:
+        self.parameters[name] = Declared(default, within)
+        return default
+
+    def declare_scenario(self) -> None:
+        """The scenario and its origin are none of the user's parameters."""
+        raise self._AllDeclared
+
+    def __getattr__(self, name: str) -> Any:
+        raise self._AllDeclared
+
+
+def main(path: str) -> str | None:
+    """The first mistake with file, key and reason; None for a good file."""
+    try:
+        document = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
+    except OSError as error:
+        return f"{path}: {error.strerror}"
+    except (UnicodeDecodeError, yaml.YAMLError) as error:
+        return f"{path}: {' '.join(str(error).split())}"
+    return next((f"{path}: {key}: {fault}" for key, fault in faults(document)), None)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1]))
