@@ -25,7 +25,7 @@ STEADY = tuple(program for program in OUTPUTS if program != "operator_watchdog")
 """Programs whose output comes more often than every 250 ms, as long as the operator holds the switch."""
 
 MOMENTARY = ("kill", "terminate", "raise")
-LASTING = ("stop", "hang", "hog")
+LASTING = ("stop", "hang", "hog", "crash_loop", "kill_all", "kill_supervisor")
 
 
 def comes_back(history: History) -> Finding:
@@ -88,10 +88,10 @@ def right_after_return(history: History) -> Finding:
         if time is None or time == math.inf:
             continue
         begin = fault.begin + time + SETTLED
-        if not all(
-            other is fault or not _disturbs(other, program, begin - SETTLED - 5.0, begin + 1.0)
+        if any(
+            _disturbs(other, "kinematics", begin, begin + 1.0)
             for other in history.faults
-            for program in concerned
+            if other is not fault
         ):
             continue
         positions = between(history.stream(topics.EFFECTOR_POSITION), begin, begin + 1.0)
@@ -145,7 +145,7 @@ def _undisturbed(history: History, fault: Fault, begin: float, end: float) -> bo
     """Whether nothing else kept the program from its output."""
     sources = [source for source, targets in DOWNSTREAM.items() if fault.target in targets]
     return not any(
-        _disturbs(other, program, begin - SLOWEST, end)
+        _disturbs(other, program, begin, end)
         for other in history.faults
         if other is not fault
         for program in (fault.target, *sources)

@@ -51,7 +51,7 @@ class Arm(NamedTuple):
 
 
 def listen(node: Node, recorder: Recorder, arms: Iterable[Arm]) -> None:
-    """Record every topic of the contract."""
+    """Record every topic of the contract; say `seen NAME` on standard output when one comes first."""
     names = {
         name: topic
         for arm in arms
@@ -67,8 +67,13 @@ def listen(node: Node, recorder: Recorder, arms: Iterable[Arm]) -> None:
 
 def _writer(recorder: Recorder, name: str, topic: topics.Topic) -> Callable[[bytes, Any], None]:
     qos = qos_profiles(topic)
+    seen = False
 
     def write(data: bytes, info: Any) -> None:
+        nonlocal seen
+        if not seen:
+            seen = True
+            print("seen", name, flush=True)
         now = time.monotonic_ns()
         age = time.time_ns() - info["source_timestamp"]
         recorder.message(name, topic.type_name, qos, data, now, now - age)

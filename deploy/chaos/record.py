@@ -147,12 +147,10 @@ def _values(topic: topics.Topic, data: bytes, prefix: str) -> list[Any]:
         return [message.stamp.sec + message.stamp.nanosec / 1e9]
     if topic is not topics.DIAGNOSTICS:
         return [message.data]
-    return [
-        (status.name.removeprefix(prefix), int(pair.value))
-        for status in message.status
-        if status.name.startswith(prefix)
-        and "/" not in status.name.removeprefix(prefix)
-        and ":" not in status.name
-        for pair in status.values
-        if pair.key == "pid"
-    ]
+    found = []
+    for status in message.status:
+        # The sentinel reports on others as `sentinel: NAME`; what it says of itself counts as its own.
+        reporter, _, subject = status.name.removeprefix(prefix).partition(": ")
+        if status.name.startswith(prefix) and "/" not in reporter and subject in ("", reporter):
+            found += [(reporter, int(pair.value)) for pair in status.values if pair.key == "pid"]
+    return found

@@ -146,7 +146,7 @@ def test_s4_catches_a_speed_that_is_none(speed: float) -> None:
     assert verdict("S4", added(good(), "effector/speed", (30.0, speed))) == VIOLATED
 
 
-@pytest.mark.parametrize("position", [(0.0, 0.0), (math.nan, 0.0), (math.inf, 1.0)])
+@pytest.mark.parametrize("position", [(1.0, 9.0), (math.nan, 0.0), (math.inf, 1.0)])
 def test_s4_catches_a_position_of_no_published_values(position: tuple[float, float]) -> None:
     assert verdict("S4", added(good(), "effector/position", (30.0, position))) == VIOLATED
 
@@ -155,6 +155,13 @@ def test_s4_a_position_of_older_values_is_true() -> None:
     history = good()
     old = next(s for s in history.streams["effector/position"] if s.sent > 20.0)
     assert verdict("S4", added(history, "effector/position", (24.0, old.value))) == HOLDS
+
+
+def test_s4_a_value_that_the_observer_may_have_missed_leaves_a_position_unknown() -> None:
+    history = added(killed(good(), "config_l1", 29.0, 0.5), "effector/position", (29.6, (1.0, 9.0)))
+    finding = CHECKERS["S4"](history)
+    assert finding.verdict == HOLDS
+    assert finding.unknown >= 1
 
 
 # S5

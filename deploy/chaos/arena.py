@@ -1,0 +1,280 @@
+"""Where the monkey plays: arms of its own in a ROS domain of its own, under observation. Never the user's.
+
+::
+
+    with Arena(directory) as arena:
+        arena.play(schedule)
+    history = arena.history()
+"""
+
+from __future__ import annotations
+
+import heapq
+import itertools
+import json
+import os
+import queue
+import random
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager, suppress
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import yaml
+
+from deploy import processes
+from deploy.chaos import record
+from deploy.chaos.faults import FAULTS, INJECTED
+from deploy.chaos.history import ALL, OPERATOR, Fault, History
+from deploy.chaos.schedule import AWAKE, PERIOD, Schedule
+from deploy.system import DeploymentError, System
+from interfaces import topics
+
+UP = 60.0  # s until the arms have to be up
+LEAD = 1.0  # s from the start to the origin of the scenario
+READY = 2.0  # s that a fault waits for a victim that is just being restarted
+AWAITED = [t for t in topics.CONTRACT if t not in (topics.ENGINES, topics.DIAGNOSTICS)]
+"""What is seen of an arm that is up; its operator holds the switch from the beginning."""
+
+SCENARIO: dict[str, Any] = {
+    "l1": {"center": 2.0, "amplitude": 0.3, "period": 11.0, "rate": 10.0},
+    "l2": {"center": 3.0, "amplitude": 0.3, "period": 17.0, "rate": 10.0},
+    "theta1": {"center": 0.8, "amplitude": 0.8, "period": 13.0},
+    "theta2": {"center": 0.8, "amplitude": 0.5, "period": 7.0},
+    "operator": {"pressed": [{"from": 0.0, "to": AWAKE}]},
+    "engines": [{"at": at, "command": topics.TURN_ON} for at in (1.5, 11.5, 21.5, 31.5)],
+    "repeat": PERIOD,
+}
+"""Everything moves; the operator's day has a minute, of which he sleeps the last quarter."""
+
+
+class ArmUnderTest:
+    """An arm that the monkey may break."""
+
+    def __init__(self, namespace: str, system: System) -> None:
+        self.namespace = namespace
+        self.system = system
+
+    def pid(self, program: str) -> int:
+        """The process of a program; waits a little for one that is just being restarted, 0 if in vain."""
+        deadline = time.monotonic() + READY
+        while True:
+            with suppress(DeploymentError):
+                for each in self.system.programs():
+                    if each.name == program and each.state == "RUNNING":
+                        return each.pid
+            if time.monotonic() > deadline:
+                return self._orphan(program)
+            time.sleep(0.02)
+
+    def _orphan(self, program: str) -> int:
+        return next((p.pid for p in self.system.members() if p.program == program), 0)
+
+    def environment(self) -> dict[str, str]:
+        """The environment of the arm's processes."""
+        return self.system.environment()
+
+
+class Arena:
+    """One or more arms, and an observer that records them until the end of the `with`."""
+
+    def __init__(
+        self,
+        directory: Path,
+        namespaces: tuple[str, ...] = ("/",),
+        scenario: Mapping[str, Any] = SCENARIO,
+        say: Callable[[str], None] = lambda text: None,
+    ) -> None:
+        """:param directory: for the record and the runtime files; does not exist yet"""
+        self.record = directory / "record.mcap"
+        self.arms = [
+            ArmUnderTest(name, System(directory / f"run{name.replace('/', '_').rstrip('_')}"))
+            for name in namespaces
+        ]
+        self._directory = directory
+        self._scenario = scenario
+        self._say = say
+        self._stack = ExitStack()
+        self._epoch = 0.0
+
+    def __enter__(self) -> Arena:
+        with ExitStack() as stack:
+            self._directory.mkdir(parents=True)
+            scenario = self._directory / "scenario.yaml"
+            scenario.write_text(yaml.safe_dump(dict(self._scenario)))
+            environment = {
+                "ROS_DOMAIN_ID": str(stack.enter_context(_domain())),
+                "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+            }
+            self._observer = stack.enter_context(_observer(self.record, self.arms, environment))
+            lines = _lines(self._observer)
+            self._epoch = time.monotonic() + LEAD
+            shared = {"scenario": str(scenario), "scenario_epoch": round(self._epoch, 3)}
+            injected = environment | {
+                "PYTHONPATH": os.pathsep.join([str(INJECTED), *filter(None, [os.environ.get("PYTHONPATH")])])
+            }
+            for arm in self.arms:
+                stack.callback(arm.system.stop)
+                with _environment(injected | {"REACTIVE_ARM_NAMESPACE": arm.namespace}):
+                    arm.system.start({"/**": {"ros__parameters": shared}})
+            self._await_up(lines)
+            self._stack = stack.pop_all()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._stack.close()
+
+    def play(self, schedule: Schedule, until: float = 0.0) -> None:
+        """Do what is planned, to every arm, and then wait until so many seconds after the beginning."""
+        begin = time.monotonic()
+        self._tell_silences(begin, max([until, *(p.at + p.lasting for p in schedule)]) + 60.0)
+        order = itertools.count()
+        agenda: list[tuple[float, int, Callable[[], None]]] = []
+        undone = ExitStack()
+
+        def add(at: float, what: Callable[[], None]) -> None:
+            heapq.heappush(agenda, (at, next(order), what))
+
+        def start(arm: ArmUnderTest, kind: str, target: str, lasting: float) -> None:
+            pid = arm.pid(target) if target not in (ALL, "nothing") else 0
+            self._say(f"{time.monotonic() - begin:7.1f} s  {arm.namespace:7} {kind} {target}")
+            at = time.monotonic()
+            undo = FAULTS[kind].do(arm, target)
+            self._tell(Fault(kind, target, at, at + lasting, pid), arm.namespace)
+            if undo is not None:
+                once = _Once(undo)
+                undone.callback(once)
+                add(at + lasting, once)
+
+        for planned in schedule:
+            for arm in self.arms:
+                add(begin + planned.at, lambda arm=arm, p=planned: start(arm, p.kind, p.target, p.lasting))  # type: ignore[misc]
+        add(begin + until, lambda: None)
+        with undone:
+            while agenda:
+                at, _, what = heapq.heappop(agenda)
+                if (wait := at - time.monotonic()) > 0:
+                    time.sleep(wait)
+                what()
+
+    def history(self, namespace: str = "/") -> History:
+        """What happened to an arm; after the `with`."""
+        return record.load(self.record, namespace)
+
+    def _tell(self, fault: Fault, namespace: str) -> None:
+        assert self._observer.stdin is not None
+        self._observer.stdin.write(json.dumps(fault._asdict() | {"namespace": namespace}) + "\n")
+        self._observer.stdin.flush()
+
+    def _tell_silences(self, begin: float, duration: float) -> None:
+        """The operator's sleep is a fault too: whoever reads the record has to know it."""
+        pressed = self._scenario["operator"]["pressed"][-1]
+        period = self._scenario.get("repeat")
+        if period is None or "to" not in pressed:
+            return
+        for day in range(
+            int((begin - self._epoch) // period), int((begin + duration - self._epoch) // period) + 1
+        ):
+            dawn = self._epoch + day * period
+            for arm in self.arms:
+                self._tell(Fault("silence", OPERATOR, dawn + pressed["to"], dawn + period), arm.namespace)
+
+    def _await_up(self, lines: queue.Queue[str]) -> None:
+        missing = {f"{arm.namespace.rstrip('/')}/{topic.name}" for arm in self.arms for topic in AWAITED}
+        deadline = time.monotonic() + UP
+        while missing:
+            try:
+                missing.discard(
+                    lines.get(timeout=max(0.0, deadline - time.monotonic())).removeprefix("seen ")
+                )
+            except queue.Empty:
+                raise DeploymentError(f"Nothing is seen of {', '.join(sorted(missing))}") from None
+
+
+class _Once:
+    """Does something at its first call."""
+
+    def __init__(self, do: Callable[[], None]) -> None:
+        self._do: Callable[[], None] | None = do
+
+    def __call__(self) -> None:
+        do, self._do = self._do, None
+        if do is not None:
+            do()
+
+
+@contextmanager
+def _observer(
+    path: Path, arms: list[ArmUnderTest], environment: Mapping[str, str]
+) -> Iterator[subprocess.Popen[str]]:
+    process = subprocess.Popen(
+        [
+            sys.executable,
+            "-m",
+            "deploy.chaos.observer",
+            str(path),
+            *(f"{arm.namespace}={arm.system.run}" for arm in arms),
+        ],
+        cwd=processes.ROOT,
+        env={**os.environ, **environment},
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+        start_new_session=True,  # Ctrl-C is for the monkey; the record is completed then
+    )
+    try:
+        yield process
+        process.communicate(timeout=30.0)
+    finally:
+        process.kill()
+        process.wait()
+
+
+def _lines(process: subprocess.Popen[str]) -> queue.Queue[str]:
+    """What a process says, as far as somebody wants to wait for it."""
+    said: queue.Queue[str] = queue.Queue()
+    assert process.stdout is not None
+    stream = os.fdopen(os.dup(process.stdout.fileno()), "r")
+
+    def read() -> None:
+        with stream, suppress(ValueError):
+            for line in stream:
+                said.put(line.strip())
+
+    threading.Thread(target=read, daemon=True).start()
+    return said
+
+
+@contextmanager
+def _domain() -> Iterator[int]:
+    """A ROS domain that no other arena nor test on this host uses."""
+    with ExitStack() as stack:
+        for domain in random.sample(range(30, 102), 72):
+            owner = stack.enter_context(socket.socket(socket.AF_UNIX))
+            probe = stack.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM))
+            with suppress(OSError):
+                owner.bind(f"\0reactive-arm-test-domain-{domain}")
+                probe.bind(("", 7400 + 250 * domain + 10))  # RTPS 9.6.1: of its first participant
+                probe.close()
+                yield domain
+                return
+    raise DeploymentError("no free ROS domain on this host")
+
+
+@contextmanager
+def _environment(changes: Mapping[str, str]) -> Iterator[None]:
+    before = dict(os.environ)
+    os.environ.update(changes)
+    try:
+        yield
+    finally:
+        os.environ.clear()
+        os.environ.update(before)
