@@ -65,11 +65,9 @@ class NodeScheduler(PeriodicScheduler):
         self._cancelled = 0  # items in the heap
         self._orders = itertools.count()
         self._armed_for: int | None = None
-        self._running_thread: int | None = None
         self._disposed = False
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._use_clock(self._time_is_simulated())
-        self._wake = node.create_guard_condition(self._run)
         self._jumps = node.get_clock().create_jump_callback(
             JumpThreshold(min_forward=None, min_backward=Duration(nanoseconds=-1), on_clock_change=True),
             post_callback=self._time_has_jumped,
@@ -157,7 +155,6 @@ class NodeScheduler(PeriodicScheduler):
 
     def _run(self) -> None:
         """Run what is due by now; what that schedules waits until the executor has seen to other work."""
-        self._running_thread = threading.get_ident()
         horizon = self._read()
         try:
             while (due := self._pop(horizon)) is not None:
@@ -169,7 +166,6 @@ class NodeScheduler(PeriodicScheduler):
             with self._lock:
                 self._armed_for = None
                 self._arm()
-                self._running_thread = None
 
     def _pop(self, horizon: int) -> tuple[_Item, Any, Any] | None:
         with self._lock:
@@ -204,9 +200,7 @@ class NodeScheduler(PeriodicScheduler):
             return  # it rings early at worst, and looks again
         self._armed_for = due
         self._timer.timer_period_ns = max(1, due - self._read())
-        self._timer.reset()
-        if threading.get_ident() != self._running_thread:
-            self._wake.trigger()  # the executor may wait for a later time already
+        self._timer.reset()  # which wakes an executor that waits
 
     # The clock
 
@@ -252,4 +246,3 @@ class NodeScheduler(PeriodicScheduler):
             self._heap.clear()
             self._jumps.unregister()
         self._node.destroy_timer(self._timer)
-        self._node.destroy_guard_condition(self._wake)
