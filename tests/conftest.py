@@ -31,6 +31,16 @@ def pytest_collection_finish() -> None:
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
 
 
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    """Where REACTIVE_ARM_SKIPS=fail, a skipped test is a failure, unless the machine cannot help it."""
+    if os.environ.get("REACTIVE_ARM_SKIPS") != "fail":
+        return
+    skipped = session.config.pluginmanager.get_plugin("terminalreporter").stats.get("skipped", [])
+    reasons = [str(report.longrepr[2]).removeprefix("Skipped: ") for report in skipped]
+    if session.exitstatus == pytest.ExitCode.OK and not all(reason.startswith("platform:") for reason in reasons):
+        session.exitstatus = pytest.ExitCode.TESTS_FAILED
+
+
 @contextmanager
 def reserved_domain() -> Iterator[int]:
     """A ROS_DOMAIN_ID that nobody uses, kept from other test runs on this host until it is given back."""

@@ -44,9 +44,9 @@ MISTAKES = """
 pilot: {ros__parameters: {}}                            pilot: is no service; those are config_l1
 operator_watchdog: {silence: 2.0}                       operator_watchdog: must hold ros__parameters
 operator_watchdog: {ros__parameters: {silense: 2.0}}    operator_watchdog.silense: is no parameter; those are
-operator_watchdog: {ros__parameters: {silence: 2}}      operator_watchdog.silence: must be a number with a decimal
+operator_watchdog: {ros__parameters: {silence: 2}}      operator_watchdog.silence: must be a number with a
 operator_watchdog: {ros__parameters: {strikes: 2.0}}    operator_watchdog.strikes: must be an integer, not 2.0
-operator_watchdog: {ros__parameters: {strikes: 0}}      operator_watchdog.strikes: must be from 1 to 100, not 0
+operator_watchdog: {ros__parameters: {strikes: 0}}      operator_watchdog.strikes: must be from 1 to 100
 config_l1: {ros__parameters: {value: .nan}}             config_l1.value: must be from 0 to 1000, not nan
 dead_mans_switch: {ros__parameters: {pressed: 1}}       dead_mans_switch.pressed: must be true or false, not 1
 dead_mans_switch: {ros__parameters: {scenario: x}}      dead_mans_switch.scenario: is no parameter
