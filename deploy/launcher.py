@@ -89,22 +89,23 @@ def _started(system: System, scenario: str, parameter_file: str) -> Iterator[tup
     from deploy import parameters
     from deploy.member import Member
 
-    given = parameters.of_system(scenario, parameter_file, loading=time.monotonic() - began)
-    interruption.check()
-    system.start(given)
-    try:
-        domain = os.environ.get("ROS_DOMAIN_ID") or "0"
-        print(f"Starting the services, scenario {scenario}, ROS domain {domain} ...", flush=True)
-        with Member() as member:
+    parameters.check_environment()
+    with Member() as member:
+        given = parameters.of_system(scenario, parameter_file, loading=time.monotonic() - began)
+        interruption.check()
+        system.start(given)
+        try:
+            domain = os.environ.get("ROS_DOMAIN_ID") or "0"
+            print(f"Starting the services, scenario {scenario}, ROS domain {domain} ...", flush=True)
             _await_services(system, member)
             epoch = parameters.epoch_of(system)
             print(f"All services are up after {time.monotonic() - began:.1f} s.", flush=True)
             if (late := time.monotonic() - epoch) > 0:
                 print(f"The scenario has begun {late:.1f} s ago: this machine is slow.", flush=True)
             yield member, epoch
-    except BaseException:
-        _stop(system)
-        raise
+        except BaseException:
+            _stop(system)
+            raise
 
 
 def _await_services(system: System, member: Member) -> None:

@@ -17,7 +17,7 @@ from interfaces import scenario
 
 SCENARIOS = ROOT / "deploy" / "scenarios"
 PROCESSES = 10  # that start at the same time
-SETTLING = 2.5  # s in which they find each other and report
+SETTLING = 3.0  # s in which they find each other and report
 ALL, KEY = "/**", "ros__parameters"  # the form of ROS 2's parameter files
 
 
@@ -26,12 +26,11 @@ def of_system(scenario_name: str, user_file: str, loading: float) -> dict[str, A
     The content of the parameter file of all services. Raises DeploymentError for any mistake of the user's.
 
     The scenario's origin lies so far ahead that all services are up by then: `loading` [s] is what it took to
-    load rclpy here, just now, and each of them has to do that too.
+    load rclpy and make a node here, just now, and each of them has to do that too.
 
     :param scenario_name: name or file of a scenario
     :param user_file: a parameter file, '' for none
     """
-    _check_domain()
     path = _scenario_file(scenario_name)
     try:
         scenario.load(path)
@@ -64,7 +63,8 @@ def _checked(user_file: str) -> dict[str, Any]:
     return dict(yaml.safe_load(Path(user_file).read_text(encoding="utf-8")))
 
 
-def _check_domain() -> None:
+def check_environment() -> None:
+    """Raise DeploymentError for an environment in which no node could live."""
     domain = os.environ.get("ROS_DOMAIN_ID") or "0"
     if not domain.isdecimal() or int(domain) > 232:
         raise DeploymentError(f"ROS_DOMAIN_ID={domain} is not a number from 0 to 232")

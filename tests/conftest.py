@@ -37,7 +37,7 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
         return
     skipped = session.config.pluginmanager.get_plugin("terminalreporter").stats.get("skipped", [])
     reasons = [str(report.longrepr[2]).removeprefix("Skipped: ") for report in skipped]
-    if session.exitstatus == pytest.ExitCode.OK and not all(reason.startswith("platform:") for reason in reasons):
+    if not all(reason.startswith("platform:") for reason in reasons) and session.exitstatus == 0:
         session.exitstatus = pytest.ExitCode.TESTS_FAILED
 
 
