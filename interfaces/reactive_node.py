@@ -15,20 +15,26 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any
 
+import reactivex as rx
+from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile
 from rclpy.subscription import Subscription
+from rclpy.task import Future
 from reactivex import Observable, abc
 from reactivex.disposable import Disposable
+from reactivex.subject import AsyncSubject
 
 from interfaces import age
 from interfaces.age import Timestamp
 from interfaces.scheduler import NodeScheduler
 
+_SERVER_POLL = 0.05  # [s]: ROS does not tell when a server appears
+
 
 class ReactiveNode(Node):
-    """A node whose topics and parameters are observables, and which publishes observables."""
+    """A node whose topics, parameters, QoS events and calls are observables, and which publishes observables."""
 
     def __init__(self, node_name: str, **options: Any) -> None:
         """Create a node; the options are those of :class:`rclpy.node.Node`."""
@@ -36,6 +42,7 @@ class ReactiveNode(Node):
         self._readers: set[_SharedReader] = set()
         self._sinks: set[Disposable] = set()
         self._ended = False
+        self._end: AsyncSubject[None] = AsyncSubject()
         self.scheduler = NodeScheduler(self)
         """Schedules on the executor and clock of this node; for ``observable.subscribe(…, scheduler=…)``."""
 
@@ -83,7 +90,62 @@ class ReactiveNode(Node):
             self.add_post_set_parameters_callback(changed)
             return Disposable(lambda: self.remove_post_set_parameters_callback(changed))
 
-        return Observable(subscribe)
+        return Observable(subscribe).take_until(self._end)
+
+    def create_event_observable(
+        self, msg_type: Any, topic: str, qos_profile: QoSProfile | int, event: str
+    ) -> Observable[Any]:
+        """
+        Return what happens to a subscription by its QoS as an observable, cold and shared.
+
+        :param event: ``deadline``, ``liveliness``, ``message_lost``, ``incompatible_qos``, ``incompatible_type``
+            or ``matched``: an argument of :class:`rclpy.event_handler.SubscriptionEventCallbacks`.
+        """
+
+        def create_reader(callback: Callable[..., None]) -> Subscription:
+            events = SubscriptionEventCallbacks(**{event: callback})
+            return self.create_subscription(
+                msg_type, topic, lambda _: None, qos_profile, event_callbacks=events
+            )
+
+        return Observable(_SharedReader(self, create_reader, None, timestamped=False).subscribe)
+
+    def create_call(
+        self, srv_type: Any, srv_name: str, *, timeout: float | None = None, **options: Any
+    ) -> Callable[[Any], Observable[Any]]:
+        """
+        Return a function from a request to an observable of the response, for ``requests.flat_map(call)``.
+
+        A call begins when it is subscribed to, waits for a server if there is none, and blocks nothing; disposing
+        it gives it up.
+
+        :param timeout: with no response within so many seconds, the observable ends in a TimeoutError.
+        :param options: further arguments of :meth:`rclpy.node.Node.create_client`.
+        """
+        client = self.create_client(srv_type, srv_name, **options)
+        late = rx.throw(TimeoutError(f"no response of {srv_name} within {timeout} s"))
+
+        def call(request: Any) -> Observable[Any]:
+            def send(
+                observer: abc.ObserverBase[Any], scheduler: abc.SchedulerBase | None = None
+            ) -> abc.DisposableBase:
+                def done(future: Future) -> None:
+                    error = future.exception()
+                    if error is not None:
+                        observer.on_error(error)
+                    else:
+                        observer.on_next(future.result())
+                        observer.on_completed()
+
+                future = client.call_async(request)
+                future.add_done_callback(done)
+                return Disposable(lambda: client.remove_pending_request(future))
+
+            ready = rx.timer(0.0, _SERVER_POLL, self.scheduler).filter(lambda _: client.service_is_ready())
+            response = ready.take(1).flat_map(lambda _: Observable(send)).take_until(self._end)
+            return response if timeout is None else response.timeout(timeout, late, self.scheduler)
+
+        return call
 
     def publish_observable(
         self, observable: Observable[Any], msg_type: Any, topic: str, qos_profile: QoSProfile | int = 10
@@ -121,6 +183,8 @@ class ReactiveNode(Node):
         """End the node; its observables complete first."""
         if not self._ended:
             self._ended = True
+            self._end.on_next(None)
+            self._end.on_completed()
             for reader in list(self._readers):
                 reader.complete()
             for sink in list(self._sinks):

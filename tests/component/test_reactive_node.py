@@ -9,13 +9,15 @@ from typing import Any
 
 import pytest
 import reactivex as rx
+from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
-from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.qos import DurabilityPolicy, LivelinessPolicy, QoSProfile
 from reactivex.abc import DisposableBase
 from reactivex.subject import Subject
 from std_msgs.msg import Float64, String
+from std_srvs.srv import SetBool
 
 from interfaces.age import Timestamp
 from interfaces.reactive_node import ReactiveNode
@@ -466,3 +468,141 @@ def test_a_parameter_is_an_observable_of_its_value_and_of_each_that_is_set(node:
     node.set_parameters([Parameter("gain", value=4.0)])
 
     assert gains == [1.0, 2.0, 3.0]
+
+
+def test_a_parameter_observable_completes_with_the_node(node: ReactiveNode) -> None:
+    node.declare_parameter("gain", 1.0)
+    completed: list[bool] = []
+    node.create_parameter_observable("gain").subscribe(on_completed=lambda: completed.append(True))
+
+    node.destroy_node()
+
+    assert completed == [True]
+
+
+# Calls
+
+
+def answer(request: Any, response: Any) -> Any:
+    response.success = request.data
+    response.message = "answered"
+    return response
+
+
+def test_a_call_is_an_observable_of_its_response(
+    node: ReactiveNode, peer: Node, spin_until: SpinUntil
+) -> None:
+    peer.create_service(SetBool, "switch", answer)
+    call = node.create_call(SetBool, "switch", timeout=10.0)
+    requests: Subject[SetBool.Request] = Subject()
+    responses: list[tuple[bool, str]] = []
+    requests.flat_map(call).subscribe(lambda response: responses.append((response.success, response.message)))
+
+    requests.on_next(SetBool.Request(data=True))
+    spin_until(lambda: responses == [(True, "answered")])
+    requests.on_next(SetBool.Request(data=False))
+    spin_until(lambda: responses == [(True, "answered"), (False, "answered")])
+
+
+def test_a_call_waits_for_a_server_without_blocking_anything(
+    node: ReactiveNode, peer: Node, spin_until: SpinUntil
+) -> None:
+    ticks: list[int] = []
+    responses: list[Any] = []
+    node.create_call(SetBool, "switch")(SetBool.Request()).subscribe(responses.append)
+    rx.interval(0.01).subscribe(ticks.append, scheduler=node.scheduler)
+
+    spin_until(lambda: len(ticks) > 10)
+    assert responses == []
+    peer.create_service(SetBool, "switch", answer)
+
+    spin_until(lambda: responses)
+
+
+def test_a_call_that_gets_no_response_ends_in_a_timeout(node: ReactiveNode, spin_until: SpinUntil) -> None:
+    errors: list[Exception] = []
+    call = node.create_call(SetBool, "nowhere", timeout=0.1)
+
+    call(SetBool.Request()).subscribe(on_error=errors.append)
+    spin_until(lambda: errors)
+
+    assert isinstance(errors[0], TimeoutError)
+    assert str(errors[0]) == "no response of nowhere within 0.1 s"
+
+
+def test_a_call_with_something_else_than_a_request_is_an_error(
+    node: ReactiveNode, peer: Node, spin_until: SpinUntil
+) -> None:
+    peer.create_service(SetBool, "switch", answer)
+    errors: list[Exception] = []
+
+    node.create_call(SetBool, "switch")("no request").subscribe(on_error=errors.append)
+    spin_until(lambda: errors)
+
+    assert isinstance(errors[0], TypeError)
+
+
+def test_a_call_that_is_given_up_gets_nothing(
+    node: ReactiveNode, peer: Node, spin_until: SpinUntil, spin_for: SpinFor
+) -> None:
+    served: list[bool] = []
+
+    def serve(request: Any, response: Any) -> Any:
+        served.append(True)
+        call.dispose()
+        return response
+
+    peer.create_service(SetBool, "switch", serve)
+    responses: list[Any] = []
+    call = node.create_call(SetBool, "switch")(SetBool.Request()).subscribe(responses.append)
+    spin_until(lambda: served)
+    spin_for(0.05)
+
+    assert responses == []
+
+
+def test_a_call_completes_with_the_node(node: ReactiveNode) -> None:
+    completed: list[bool] = []
+    node.create_call(SetBool, "nowhere")(SetBool.Request()).subscribe(
+        on_completed=lambda: completed.append(True)
+    )
+
+    node.destroy_node()
+
+    assert completed == [True]
+
+
+# QoS events
+
+
+def test_a_missed_deadline_is_an_event(node: ReactiveNode, peer: Node, spin_until: SpinUntil) -> None:
+    qos = QoSProfile(depth=1, deadline=Duration(seconds=0.1))
+    missed: list[int] = []
+    events = node.create_event_observable(String, "topic", qos, "deadline")
+    subscription = events.subscribe(lambda info: missed.append(info.total_count))
+
+    publisher = peer.create_publisher(String, "topic", qos)
+    spin_until(lambda: publisher.get_subscription_count() == 1)
+    publisher.publish(String(data="once"))
+    spin_until(lambda: missed[-1:] >= [1])
+    subscription.dispose()
+    spin_until(lambda: publisher.get_subscription_count() == 0)
+
+
+def test_a_publisher_that_is_not_alive_is_an_event(
+    node: ReactiveNode, peer: Node, spin_until: SpinUntil
+) -> None:
+    qos = QoSProfile(
+        depth=1,
+        liveliness=LivelinessPolicy.MANUAL_BY_TOPIC,
+        liveliness_lease_duration=Duration(seconds=0.2),
+    )
+    alive: list[int] = []
+    events = node.create_event_observable(String, "topic", qos, "liveliness")
+    events.subscribe(lambda info: alive.append(info.alive_count))
+
+    publisher = peer.create_publisher(String, "topic", qos)
+    spin_until(lambda: publisher.get_subscription_count() == 1)
+    publisher.assert_liveliness()
+    spin_until(lambda: alive[-1:] == [1])
+    spin_until(lambda: alive[-1:] == [0])
