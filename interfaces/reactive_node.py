@@ -34,7 +34,7 @@ _SERVER_POLL = 0.05  # [s]: ROS does not tell when a server appears
 
 
 class ReactiveNode(Node):
-    """A node whose topics, parameters, QoS events and calls are observables, and which publishes observables."""
+    """A node whose topics, parameters, QoS events and calls are observables, and that publishes such."""
 
     def __init__(self, node_name: str, **options: Any) -> None:
         """Create a node; the options are those of :class:`rclpy.node.Node`."""
@@ -98,12 +98,13 @@ class ReactiveNode(Node):
         """
         Return what happens to a subscription by its QoS as an observable, cold and shared.
 
-        :param event: ``deadline``, ``liveliness``, ``message_lost``, ``incompatible_qos``, ``incompatible_type``
-            or ``matched``: an argument of :class:`rclpy.event_handler.SubscriptionEventCallbacks`.
+        :param event: ``deadline``, ``liveliness``, ``message_lost``, ``incompatible_qos``,
+            ``incompatible_type`` or ``matched``, as in :class:`rclpy.event_handler.SubscriptionEventCallbacks`.
         """
 
         def create_reader(callback: Callable[..., None]) -> Subscription:
-            events = SubscriptionEventCallbacks(**{event: callback})
+            callbacks: dict[str, Any] = {event: callback}
+            events = SubscriptionEventCallbacks(**callbacks)
             return self.create_subscription(
                 msg_type, topic, lambda _: None, qos_profile, event_callbacks=events
             )
@@ -116,8 +117,8 @@ class ReactiveNode(Node):
         """
         Return a function from a request to an observable of the response, for ``requests.flat_map(call)``.
 
-        A call begins when it is subscribed to, waits for a server if there is none, and blocks nothing; disposing
-        it gives it up.
+        A call begins when it is subscribed to, waits for a server if there is none, and blocks nothing;
+        disposing gives it up.
 
         :param timeout: with no response within so many seconds, the observable ends in a TimeoutError.
         :param options: further arguments of :meth:`rclpy.node.Node.create_client`.
@@ -130,11 +131,12 @@ class ReactiveNode(Node):
                 observer: abc.ObserverBase[Any], scheduler: abc.SchedulerBase | None = None
             ) -> abc.DisposableBase:
                 def done(future: Future) -> None:
-                    error = future.exception()
-                    if error is not None:
+                    try:
+                        response = future.result()
+                    except Exception as error:
                         observer.on_error(error)
                     else:
-                        observer.on_next(future.result())
+                        observer.on_next(response)
                         observer.on_completed()
 
                 future = client.call_async(request)
