@@ -99,7 +99,7 @@ class ReactiveNode(Node):
         Return what happens to a subscription by its QoS as an observable, cold and shared.
 
         :param event: ``deadline``, ``liveliness``, ``message_lost``, ``incompatible_qos``,
-            ``incompatible_type`` or ``matched``, as in :class:`rclpy.event_handler.SubscriptionEventCallbacks`.
+            ``incompatible_type`` or ``matched``: see :class:`rclpy.event_handler.SubscriptionEventCallbacks`.
         """
 
         def create_reader(callback: Callable[..., None]) -> Subscription:
