@@ -4,11 +4,14 @@ PYTHON ?=
 SCENARIO ?= demo
 PARAMETERS ?=
 TESTS ?= tests
+MINUTES ?= 5
+SEED ?=
+CHAOS ?=
 SHELL := /bin/sh
 MAKEFLAGS += --no-print-directory
 PY := .venv/bin/python
 
-.PHONY: help setup run start stop status logs console test check
+.PHONY: help setup run start stop status logs console chaos test check
 
 help:
 	@echo "make run      start the system, show it in this terminal, stop it with Ctrl-C"
@@ -17,6 +20,7 @@ help:
 	@echo "make status   its services: state, pid, uptime, restarts, last output"
 	@echo "make logs     follow their logs"
 	@echo "make stop     stop it"
+	@echo "make chaos    let a monkey break a system of its own, and judge  (MINUTES=5 SEED= CHAOS=--help for more)"
 	@echo "make test     run the tests                       (TESTS=tests/component for a part)"
 	@echo "make check    ruff, mypy, shellcheck, yamllint"
 	@echo "make setup    only set up .venv                   (PYTHON= chooses the interpreter, 3.11 to 3.13)"
@@ -30,6 +34,9 @@ run start: setup
 # These do without a set-up: what they look at, or end, runs already.
 console status logs stop:
 	@if test -x $(PY); then exec $(PY) -m deploy.launcher $@; else echo "Nothing runs: .venv is not set up."; fi
+
+chaos: setup
+	@$(PY) -m deploy.chaos --minutes $(MINUTES) $(if $(SEED),--seed $(SEED)) $(CHAOS)
 
 test: setup
 	@$(PY) -m pytest $(TESTS)

@@ -265,7 +265,7 @@ def wire(node: ServiceNode) -> None:
     )
     own = node.get_fully_qualified_name()
     namespace = node.get_namespace().rstrip("/")
-    eyes = Eyes(System(), os.getppid())
+    eyes = Eyes(System(Path(os.environ[processes.MARK])), os.getppid())
     judge = Judge(patience)
     heard: dict[str, Heard] = {}
     known: list[Watched] = []

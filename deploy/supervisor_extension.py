@@ -2,6 +2,7 @@
 
 - It counts how often it started each program: RPC `arm.starts`.
 - It tells the sentinel about them (RPC `arm.watch`), and kills a sentinel that has stopped asking.
+- It survives a full disk: a line that cannot be logged is lost, and nothing else.
 - It looks after its children every 100 ms and at once after each change, instead of once a second: a killed
   service is started again 1–2 s later otherwise.
 
@@ -17,7 +18,7 @@ from collections import Counter
 from contextlib import suppress
 from typing import Any
 
-from supervisor import events
+from supervisor import events, loggers
 from supervisor.states import ProcessStates, getProcessStateDescription
 
 LONGEST_WAIT = 0.1  # s
@@ -98,6 +99,11 @@ class ArmInterface:
         return self._poll(wait)
 
 
+def _lose(handler: Any) -> None:
+    """Complain to nobody: supervisord's own way, to standard error on the same full disk, would end it."""
+
+
 def make_interface(supervisord: Any, **config: str) -> ArmInterface:
     """The factory that supervisord.conf names."""
+    loggers.Handler.handleError = _lose
     return ArmInterface(supervisord)

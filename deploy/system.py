@@ -158,7 +158,7 @@ class System:
         ]
 
     def watch(self, supervisor: int) -> list[Watched]:
-        """What the sentinel has to know of each program; asking is its sign of life. Raises DeploymentError."""
+        """What the sentinel has to know of each program; its asking is its sign of life."""
         rows = cast(list[dict[str, Any]], self._ask(supervisor, "arm.watch"))
         return [Watched(**row) for row in rows]
 

@@ -32,7 +32,7 @@ from deploy import processes
 from deploy.chaos import record
 from deploy.chaos.faults import FAULTS, INJECTED
 from deploy.chaos.history import ALL, OPERATOR, Fault, History
-from deploy.chaos.schedule import AWAKE, PERIOD, Schedule
+from deploy.chaos.schedule import AWAKE, FIRST, PERIOD, Schedule
 from deploy.system import DeploymentError, System
 from interfaces import topics
 
@@ -48,7 +48,7 @@ SCENARIO: dict[str, Any] = {
     "theta1": {"center": 0.8, "amplitude": 0.8, "period": 13.0},
     "theta2": {"center": 0.8, "amplitude": 0.5, "period": 7.0},
     "operator": {"pressed": [{"from": 0.0, "to": AWAKE}]},
-    "engines": [{"at": at, "command": topics.TURN_ON} for at in (1.5, 11.5, 21.5, 31.5)],
+    "engines": [{"at": at, "command": topics.TURN_ON} for at in (1.5, 11.5, 21.5)],
     "repeat": PERIOD,
 }
 """Everything moves; the operator's day has a minute, of which he sleeps the last quarter."""
@@ -90,8 +90,13 @@ class Arena:
         namespaces: tuple[str, ...] = ("/",),
         scenario: Mapping[str, Any] = SCENARIO,
         say: Callable[[str], None] = lambda text: None,
+        check: Callable[[], None] = lambda: None,
     ) -> None:
-        """:param directory: for the record and the runtime files; does not exist yet"""
+        """
+        :param directory: for the record and the runtime files; does not exist yet
+        :param say: is told what the monkey does
+        :param check: is called often, and raises what is to end the play
+        """
         self.record = directory / "record.mcap"
         self.arms = [
             ArmUnderTest(name, System(directory / f"run{name.replace('/', '_').rstrip('_')}"))
@@ -100,6 +105,7 @@ class Arena:
         self._directory = directory
         self._scenario = scenario
         self._say = say
+        self._check = check
         self._stack = ExitStack()
         self._epoch = 0.0
 
@@ -133,8 +139,10 @@ class Arena:
         self._stack.close()
 
     def play(self, schedule: Schedule, until: float = 0.0) -> None:
-        """Do what is planned, to every arm, and then wait until so many seconds after the beginning."""
-        begin = time.monotonic()
+        """Do what is planned, to every arm, and wait until so many seconds after the scenario's origin."""
+        begin = self._epoch
+        while time.monotonic() > begin + FIRST - 1.0:
+            begin += PERIOD  # it took so long until all was up: on the next day, then
         self._tell_silences(begin, max([until, *(p.at + p.lasting for p in schedule)]) + 60.0)
         order = itertools.count()
         agenda: list[tuple[float, int, Callable[[], None]]] = []
@@ -161,8 +169,9 @@ class Arena:
         with undone:
             while agenda:
                 at, _, what = heapq.heappop(agenda)
-                if (wait := at - time.monotonic()) > 0:
-                    time.sleep(wait)
+                while (wait := at - time.monotonic()) > 0:
+                    time.sleep(min(wait, 0.1))
+                    self._check()
                 what()
 
     def history(self, namespace: str = "/") -> History:

@@ -20,7 +20,7 @@ from rclpy.node import Node
 from rclpy.serialization import serialize_message
 from std_msgs.msg import Bool, Header
 
-from deploy.chaos.marks import NAN, TEXT
+from deploy.chaos.marks import GARBAGE, NAN, TEXT
 from interfaces import topics
 
 RATE = 10_000  # Hz, of a flood
@@ -31,8 +31,7 @@ _FRESH = (Time(sec=0), Time(sec=2**31 - 1))  # of a presence that counts for not
 def nonsense(topic: topics.Topic, rng: random.Random) -> Any:
     """A message, or serialized bytes, that no reader of the topic may take for good."""
     if rng.random() < 0.5:
-        # The mark, and a length that no reader can believe.
-        return b"\x00\x01\x00\x00" + b"\xff" * 4 + TEXT.encode() + rng.randbytes(rng.randrange(3))
+        return GARBAGE + rng.randbytes(rng.randrange(64))
     if topic is topics.EFFECTOR_POSITION:
         return PointStamped(header=Header(frame_id=TEXT), point=Point(x=NAN, y=rng.random()))
     if topic is topics.OPERATOR_PRESENCE:

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import itertools
+import math
 import random
 from collections.abc import Callable, Iterable, Sequence
 from typing import NamedTuple
 
 from deploy.chaos.faults import FAULTS
-from deploy.chaos.history import ALL, PROGRAMS
+from deploy.chaos.history import ALL, NOTHING, PROGRAMS
 
-PERIOD = 60.0  # s of the operator's day
-AWAKE = 44.0  # s of it in which the switch is held
+PERIOD = 45.0  # s of the operator's day
+AWAKE = 30.0  # s of it in which the switch is held
+SETTLE = 6.0  # s after the last fault
 FIRST = 5.0  # s until the first fault: by then the engines are on
 
 
@@ -19,7 +21,7 @@ class Planned(NamedTuple):
     """A fault to come."""
 
     at: float
-    """[s since the arm is up]"""
+    """[s since the operator's day began]"""
     kind: str
     target: str
     lasting: float = 0.0
@@ -86,8 +88,11 @@ def kill_controller() -> Schedule:
 
 
 def stop_controller() -> Schedule:
-    """Stop the engine controller just before it would turn off the engines of a sleeping operator."""
-    return [Planned(AWAKE + 9.2, "stop", "engine_controller", 4.0)]
+    """Stop the engine controller just before it would turn off, when the watchdog has lost its strikes."""
+    return [
+        Planned(AWAKE + 5.0, "kill", "operator_watchdog"),
+        Planned(AWAKE + 9.6, "stop", "engine_controller", 4.0),
+    ]
 
 
 def kill_supervisor() -> Schedule:
@@ -95,21 +100,48 @@ def kill_supervisor() -> Schedule:
     return [
         Planned(8.0, "kill_supervisor", ALL, 3.0),
         Planned(9.5, "kill", "kinematics"),
-        Planned(22.0, "kill_supervisor", ALL, 1.0),
+        Planned(20.0, "kill_supervisor", ALL, 1.0),
     ]
 
 
 def nonsense() -> Schedule:
     """Flood, babble, doubles and a full disk, with kills meanwhile."""
     return [
-        Planned(6.0, "flood", "nothing", 6.0),
+        Planned(6.0, "flood", NOTHING, 6.0),
         Planned(9.0, "kill", "operator_watchdog"),
-        Planned(14.0, "babble", "nothing", 10.0),
+        Planned(14.0, "babble", NOTHING, 10.0),
         Planned(17.0, "kill", "kinematics"),
         Planned(21.0, "kill", "velocity"),
-        Planned(26.0, "full_disk", "nothing", 8.0),
+        Planned(26.0, "full_disk", NOTHING, 8.0),
         Planned(29.0, "kill", "config_theta1"),
         Planned(32.0, "double", "engine_controller", 5.0),
+    ]
+
+
+def briefly() -> Schedule:
+    """Kill every program three times; then the operator sleeps, and the watchdog is killed every 2 s."""
+    return [*kill_each(3), *(Planned(at, "kill", "operator_watchdog") for at in _every(2.0, AWAKE, PERIOD))]
+
+
+def variously() -> Schedule:
+    """All other faults once, ending with a controller that is stopped while it should act."""
+    return [
+        Planned(5.0, "hang", "kinematics", 15.0),
+        Planned(5.5, "double", "engine_controller", 5.0),
+        Planned(6.0, "stop", "config_l1", 15.0),
+        Planned(8.0, "terminate", "config_l2"),
+        Planned(9.0, "raise", "config_theta1"),
+        Planned(11.0, "hog", "velocity"),
+        Planned(12.0, "crash_loop", "config_l2", 3.0),
+        Planned(13.0, "flood", NOTHING, 5.0),
+        Planned(15.0, "kill", "operator_watchdog"),
+        Planned(18.0, "babble", NOTHING, 7.0),
+        Planned(20.0, "kill", "kinematics"),
+        Planned(20.5, "stop", "sentinel", 15.0),
+        Planned(26.0, "full_disk", NOTHING, 4.0),
+        Planned(27.0, "kill", "config_theta1"),
+        *stop_controller(),
+        Planned(PERIOD + 1.0, "kill_supervisor", ALL, 1.0),
     ]
 
 
@@ -121,6 +153,16 @@ def everything() -> Schedule:
         lasting = min(FAULTS[kind].lasting[1], 6.0)
         planned.append(Planned(at, kind, target, lasting))
         at += max(3.5, lasting + 1.0)
+    return planned
+
+
+def complete() -> Schedule:
+    """All the named scenarios, one after the other; each begins with a day of the operator."""
+    planned, begin = [], 0.0
+    for name, scenario in NAMED.items():
+        if name != "complete":
+            planned += [each._replace(at=begin + each.at) for each in scenario()]
+            begin = math.ceil((planned[-1].at + SETTLE) / PERIOD) * PERIOD
     return planned
 
 
@@ -138,7 +180,10 @@ NAMED: dict[str, Callable[[], Schedule]] = {
         stop_controller,
         kill_supervisor,
         nonsense,
+        briefly,
+        variously,
         everything,
+        complete,
     )
 }
 """The named scenarios."""
@@ -146,4 +191,4 @@ NAMED: dict[str, Callable[[], Schedule]] = {
 
 def duration(schedule: Schedule) -> float:
     """How long a schedule takes, with the time to settle after its last fault [s]."""
-    return max((planned.at + planned.lasting for planned in schedule), default=0.0) + 6.0
+    return max((planned.at + planned.lasting for planned in schedule), default=0.0) + SETTLE

@@ -1,0 +1,151 @@
+"""`make chaos`: unleash the monkey, and tell what it found. Exit code 1 if a promise is violated.
+
+usage: python -m deploy.chaos [--minutes 5] [--seed N] [--scenario NAME] [--every 5] [--faults kill,stop]
+                              [--targets kinematics,velocity] [--replay RECORD]
+"""
+
+from __future__ import annotations
+
+from deploy import interruption  # isort: split
+
+import argparse
+import fcntl
+import math
+import os
+import random
+import shutil
+import sys
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+from deploy import processes
+from deploy.chaos import record, schedule
+from deploy.chaos.arena import Arena
+from deploy.chaos.faults import FAULTS
+from deploy.chaos.findings import VIOLATED
+from deploy.chaos.history import PROGRAMS, History
+from deploy.chaos.page import page
+from deploy.chaos.promises import check
+from deploy.chaos.report import text
+from deploy.system import DeploymentError, System
+
+KEPT = 10  # records
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Obey the command line; the exit code."""
+    options = _options(arguments)
+    try:
+        if options.replay:
+            return conclude(options.replay, f"Record {options.replay}", record.load(options.replay))
+        return unleash(options)
+    except interruption.Interrupted:
+        print("Interrupted: everything has been stopped.")
+        return 130
+    except (DeploymentError, OSError) as error:
+        print(error, file=sys.stderr)
+        return 1
+
+
+def unleash(options: argparse.Namespace) -> int:
+    """Start an arm, let the monkey play, and judge."""
+    if options.scenario == "monkey":
+        seed = random.randrange(10**6) if options.seed is None else options.seed
+        length = 60 * options.minutes
+        planned = schedule.monkey(
+            seed, length, every=options.every, kinds=options.faults, targets=options.targets
+        )
+        title = f"Random monkey, seed {seed}, {options.minutes:g} min, a fault each {options.every:g} s"
+    else:
+        planned = schedule.NAMED[options.scenario]()
+        length = schedule.duration(planned)
+        title = f"Scenario {options.scenario}, {length:.0f} s"
+    print(title, flush=True)
+    with _directory() as directory:
+        arena = Arena(directory, say=lambda text: print(text, flush=True), check=interruption.check)
+        with arena:
+            arena.play(planned, length)
+        return conclude(arena.record, title, arena.history())
+
+
+def conclude(path: Path, title: str, history: History) -> int:
+    """Judge a history, print the verdict and write the page beside its record."""
+    findings = check(history)
+    print("\n" + text(findings))
+    report = path.with_name("report.html")
+    faults = sum(fault.kind != "silence" for fault in history.faults)
+    messages = sum(map(len, history.streams.values()))
+    remarks = [
+        f"{title} · {faults} faults · {messages} messages in {history.end:.0f} s",
+        f"{time.strftime('%Y-%m-%d %H:%M')} · {os.cpu_count()} cores · record {path.name} (MCAP)",
+    ]
+    report.write_text(page(title, remarks, findings, history), encoding="utf-8")
+    print(f"\nReport: {report}\nRecord: {path}")
+    return int(any(finding.verdict == VIOLATED for finding in findings))
+
+
+def _options(arguments: Sequence[str]) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="make chaos", description="unleash the chaos monkey")
+    parser.add_argument("--minutes", type=_positive, default=5.0)
+    parser.add_argument("--seed", type=int, help="the same seed, the same faults; default: a new one")
+    parser.add_argument("--every", type=_positive, default=5.0, help="seconds from fault to fault")
+    parser.add_argument("--scenario", choices=["monkey", *schedule.NAMED], default="monkey")
+    parser.add_argument("--faults", type=_words(FAULTS), default=tuple(FAULTS), help=", ".join(FAULTS))
+    parser.add_argument("--targets", type=_words(PROGRAMS), default=(), help=", ".join(PROGRAMS))
+    parser.add_argument("--replay", type=Path, help="only judge a record")
+    return parser.parse_args(arguments)
+
+
+def _positive(text: str) -> float:
+    number = float(text)
+    if not 0 < number < math.inf:
+        raise argparse.ArgumentTypeError(f"{text} is not more than 0")
+    return number
+
+
+def _words(known: Iterable[str]) -> Callable[[str], tuple[str, ...]]:
+    names = list(known)
+
+    def parse(text: str) -> tuple[str, ...]:
+        words = tuple(word.strip() for word in text.split(","))
+        for word in words:
+            if word not in names:
+                raise argparse.ArgumentTypeError(f"{word!r} is none of {', '.join(names)}")
+        return words
+
+    return parse
+
+
+@contextmanager
+def _directory() -> Iterator[Path]:
+    """A directory for this play, of which there is one at a time; of the older ones the latest are kept."""
+    base = processes.run_directory() / "chaos"
+    base.mkdir(parents=True, exist_ok=True)
+    with _opened(base) as descriptor:
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise DeploymentError(f"A monkey plays already in {base}") from None
+        old = sorted(base.iterdir())
+        for directory in old:
+            for run in directory.glob("run*"):
+                System(run).stop()  # what a killed monkey has left behind
+        for directory in old[: 1 - KEPT]:
+            shutil.rmtree(directory)
+        yield base / time.strftime("%Y%m%d-%H%M%S")
+
+
+@contextmanager
+def _opened(directory: Path) -> Iterator[int]:
+    """An open file descriptor of a directory."""
+    descriptor = os.open(directory, os.O_RDONLY)
+    try:
+        yield descriptor
+    finally:
+        os.close(descriptor)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

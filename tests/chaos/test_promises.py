@@ -1,0 +1,121 @@
+"""The promises of the design, on what a monkey does to real systems; `make chaos` does it longer.
+
+Two plays run side by side, each in a system and a domain of its own, and are judged when both are over.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from deploy import processes
+from deploy.chaos import record
+from deploy.chaos.findings import HOLDS, UNKNOWN, Finding
+from deploy.chaos.history import PROGRAMS, History
+from deploy.chaos.promises import CHECKERS
+
+PLAYS = ("briefly", "variously")
+pytestmark = pytest.mark.timeout(180)
+
+
+class Play:
+    """A play that is over."""
+
+    def __init__(self, directory: Path, output: str, code: int) -> None:
+        self.output = output
+        self.code = code
+        self.page = next(directory.glob("chaos/*/report.html"))
+        self.history: History = record.load(self.page.with_name("record.mcap"))
+        self.findings: dict[str, Finding] = {name: check(self.history) for name, check in CHECKERS.items()}
+
+    def finding(self, promise: str) -> Finding:
+        """The finding on a promise; all that is known of its violations goes into the report of the test."""
+        finding = self.findings[promise]
+        assert not finding.evidence, f"{promise}: {finding.evidence}"
+        return finding
+
+
+@pytest.fixture(scope="module")
+def plays(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Play]]:
+    """What came of each play."""
+    directories = {name: tmp_path_factory.mktemp(name) for name in PLAYS}
+    running = {
+        name: subprocess.Popen(
+            [sys.executable, "-m", "deploy.chaos", "--scenario", name],
+            cwd=processes.ROOT,
+            env=environment(directory),
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        )
+        for name, directory in directories.items()
+    }
+    try:
+        outputs = {name: process.communicate(timeout=150.0)[0] for name, process in running.items()}
+    finally:
+        for process in running.values():
+            if process.poll() is None:
+                process.terminate()
+                process.wait(timeout=20.0)
+    for name, output in outputs.items():
+        assert "Report: " in output, output
+    yield {name: Play(directories[name], outputs[name], running[name].returncode) for name in PLAYS}
+
+
+def environment(run: Path) -> dict[str, str]:
+    """The environment of a play with its own runtime files."""
+    return {**os.environ, "REACTIVE_ARM_RUN_DIR": str(run)}
+
+
+@pytest.mark.parametrize("name", PLAYS)
+@pytest.mark.parametrize("promise", CHECKERS)
+def test_no_promise_is_broken(plays: dict[str, Play], name: str, promise: str) -> None:
+    assert plays[name].finding(promise).verdict in (HOLDS, UNKNOWN)
+
+
+@pytest.mark.parametrize("promise", CHECKERS)
+def test_every_promise_is_put_to_the_test(plays: dict[str, Play], promise: str) -> None:
+    assert sum(play.finding(promise).cases for play in plays.values()) > 0
+
+
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_every_killed_program_is_back_within_two_seconds(plays: dict[str, Play], program: str) -> None:
+    assert max(plays["briefly"].finding("L1").times[program]) <= 2.0
+
+
+def test_engines_go_off_in_time_though_the_watchdog_is_killed_every_two_seconds(
+    plays: dict[str, Play],
+) -> None:
+    assert plays["briefly"].finding("S1").cases == 1
+
+
+def test_engines_go_off_in_time_though_the_controller_is_stopped(plays: dict[str, Play]) -> None:
+    assert plays["variously"].finding("S1").cases == 1
+
+
+def test_a_hung_kinematics_a_stopped_source_and_a_stopped_sentinel_are_replaced(
+    plays: dict[str, Play],
+) -> None:
+    assert set(plays["variously"].finding("L4").times) == {"kinematics", "config_l1", "sentinel"}
+
+
+def test_supervisord_is_killed_and_nothing_lives_twice_afterwards(plays: dict[str, Play]) -> None:
+    play = plays["variously"]
+    supervisors = [life for life in play.history.lives if not life.program]
+    assert len(supervisors) == 2
+    assert play.finding("S5").cases >= len(PROGRAMS)
+
+
+@pytest.mark.parametrize("name", PLAYS)
+def test_the_exit_code_and_the_page_tell_the_verdict(plays: dict[str, Play], name: str) -> None:
+    play = plays[name]
+    assert play.code == 0, play.output
+    page = play.page.read_text(encoding="utf-8")
+    assert "All promises hold" in page
+    assert page.count("<svg") >= 2
+    assert not any(word in page for word in ("http:", "https:", "src="))
