@@ -10,13 +10,13 @@ import time
 from collections.abc import Callable
 from enum import IntEnum
 from types import TracebackType
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 from rclpy.clock_type import ClockType
 from rclpy.constants import S_TO_NS
 from rclpy.duration import Duration
 from rclpy.exceptions import NotInitializedException
-from rclpy.time import Time
+from rclpy.time import Time, TimeHandle
 
 if TYPE_CHECKING:
     from rclpy.context import Context
@@ -74,15 +74,6 @@ class JumpThreshold:
         self.min_backward = min_backward
         self.on_clock_change = on_clock_change
 
-    def is_exceeded_by(self, change: ClockChange, delta: int) -> bool:
-        """Whether a jump by ``delta`` [ns] with this clock change counts."""
-        if change in (ClockChange.ROS_TIME_ACTIVATED, ClockChange.ROS_TIME_DEACTIVATED):
-            return self.on_clock_change
-        forward, backward = self.min_forward, self.min_backward
-        return (forward is not None and delta >= forward.nanoseconds) or (
-            backward is not None and delta <= backward.nanoseconds
-        )
-
 
 class TimeJump:
     """A time jump that has happened."""
@@ -123,12 +114,17 @@ class JumpHandle:
         self.threshold = threshold
         self.pre_callback = pre_callback
         self.post_callback = post_callback
-        clock.handle.add(self)
+        clock.handle.add_clock_callback(
+            self,
+            threshold.on_clock_change,
+            0 if threshold.min_forward is None else threshold.min_forward.nanoseconds,
+            0 if threshold.min_backward is None else threshold.min_backward.nanoseconds,
+        )
 
     def unregister(self) -> None:
         """Hear of no more jumps."""
         if self._clock is not None:
-            self._clock.handle.remove(self)
+            self._clock.handle.remove_clock_callback(self)
             self._clock = None
 
     def __enter__(self) -> JumpHandle:
@@ -143,11 +139,33 @@ class JumpHandle:
 class ClockHandle(Protocol):
     """What a clock reads, and who hears of its jumps."""
 
-    def get_now(self) -> Time: ...
+    def get_now(self) -> TimeHandle: ...
 
-    def add(self, jump_handle: JumpHandle) -> None: ...
+    def get_ros_time_override_is_enabled(self) -> bool: ...
 
-    def remove(self, jump_handle: JumpHandle) -> None: ...
+    def set_ros_time_override_is_enabled(self, enabled: bool) -> None: ...
+
+    def set_ros_time_override(self, time_point: TimeHandle) -> None: ...
+
+    def add_clock_callback(
+        self, pyjump_handle: JumpHandle, on_clock_change: bool, min_forward: int, min_backward: int
+    ) -> None: ...
+
+    def remove_clock_callback(self, pyjump_handle: JumpHandle) -> None: ...
+
+
+class _Listener(NamedTuple):
+    """Who hears of which jumps: shortest ones forward and backward [ns], 0 for none."""
+
+    jump_handle: JumpHandle
+    on_clock_change: bool
+    min_forward: int
+    min_backward: int
+
+    def hears(self, change: ClockChange, delta: int) -> bool:
+        if change in (ClockChange.ROS_TIME_ACTIVATED, ClockChange.ROS_TIME_DEACTIVATED):
+            return self.on_clock_change
+        return (0 < self.min_forward <= delta) or (0 > self.min_backward >= delta)
 
 
 class _ClockSource:
@@ -158,7 +176,7 @@ class _ClockSource:
         self._read = time.monotonic_ns if clock_type == ClockType.STEADY_TIME else time.time_ns
         self._override: int | None = None  # simulated time [ns] while ROS time is driven from outside
         self._latest = 0
-        self._jump_handles: list[JumpHandle] = []
+        self._listeners: list[_Listener] = []
         self._lock = threading.Lock()
 
     def nanoseconds(self) -> int:
@@ -171,13 +189,16 @@ class _ClockSource:
     def get_ros_time_override_is_enabled(self) -> bool:
         return self._override is not None
 
-    def add(self, jump_handle: JumpHandle) -> None:
+    def add_clock_callback(
+        self, pyjump_handle: JumpHandle, on_clock_change: bool, min_forward: int, min_backward: int
+    ) -> None:
+        listener = _Listener(pyjump_handle, on_clock_change, min_forward, min_backward)
         with self._lock:
-            self._jump_handles = [*self._jump_handles, jump_handle]
+            self._listeners = [*self._listeners, listener]
 
-    def remove(self, jump_handle: JumpHandle) -> None:
+    def remove_clock_callback(self, pyjump_handle: JumpHandle) -> None:
         with self._lock:
-            self._jump_handles = [handle for handle in self._jump_handles if handle is not jump_handle]
+            self._listeners = [one for one in self._listeners if one.jump_handle is not pyjump_handle]
 
     def set_ros_time_override_is_enabled(self, enabled: bool) -> None:
         if enabled == (self._override is not None):
@@ -187,14 +208,14 @@ class _ClockSource:
         else:
             self._change(None, ClockChange.ROS_TIME_DEACTIVATED)
 
-    def set_ros_time_override(self, nanoseconds: int) -> None:
-        self._latest = nanoseconds
+    def set_ros_time_override(self, time_point: TimeHandle) -> None:
+        self._latest = nanoseconds = time_point.nanoseconds
         if self._override is not None and self._override != nanoseconds:
             self._change(nanoseconds, ClockChange.ROS_TIME_NO_CHANGE)
 
     def _change(self, override: int | None, change: ClockChange) -> None:
         delta = (self._read() if override is None else override) - self.nanoseconds()
-        affected = [handle for handle in self._jump_handles if handle.threshold.is_exceeded_by(change, delta)]
+        affected = [one.jump_handle for one in self._listeners if one.hears(change, delta)]
         for handle in affected:
             if handle.pre_callback is not None:
                 handle.pre_callback()
@@ -333,4 +354,4 @@ class ROSClock(Clock):
         """
         if not isinstance(time, Time):
             raise TypeError("Time must be specified as rclpy.time.Time")
-        self._source.set_ros_time_override(time.nanoseconds)
+        self._source.set_ros_time_override(time)
