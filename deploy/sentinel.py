@@ -30,6 +30,7 @@ from interfaces.service import ServiceNode
 from interfaces.topics import DIAGNOSTICS
 
 NAME = "sentinel"
+MEETING = 0.3  # s after its start until it is discovered: what it says before may be lost
 
 
 class Heard(NamedTuple):
@@ -300,7 +301,7 @@ def wire(node: ServiceNode) -> None:
 
     node.observe(DIAGNOSTICS).subscribe(listen, scheduler=node.scheduler)
     changes = rx.timer(0.0, patience.look).map(look).filter(bool)
-    node.publish(DIAGNOSTICS, rx.merge(changes, rx.interval(1.0)).map(message))
+    node.publish(DIAGNOSTICS, rx.merge(changes, rx.timer(MEETING, 1.0)).map(message))
 
 
 def main() -> None:

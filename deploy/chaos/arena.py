@@ -48,7 +48,7 @@ SCENARIO: dict[str, Any] = {
     "theta1": {"center": 0.8, "amplitude": 0.8, "period": 13.0},
     "theta2": {"center": 0.8, "amplitude": 0.5, "period": 7.0},
     "operator": {"pressed": [{"from": 0.0, "to": AWAKE}]},
-    "engines": [{"at": at, "command": topics.TURN_ON} for at in (1.5, 11.5, 21.5)],
+    "engines": [{"at": at, "command": topics.TURN_ON} for at in (1.5, 11.5, 20.5, 28.5)],
     "repeat": PERIOD,
 }
 """Everything moves; the operator's day has a minute, of which he sleeps the last quarter."""

@@ -10,6 +10,7 @@ from deploy.chaos.safety import Published
 from interfaces import topics
 
 MEDIAN, SLOWEST = 1.0, 2.0  # s, L1
+SAMPLES = 3  # of fewer there is no median worth the name
 GAP = 0.25  # s, L2
 HUNG = 5.0  # s, L4
 SETTLED = 0.5  # s after a recovery until everything downstream is right
@@ -45,7 +46,7 @@ def comes_back(history: History) -> Finding:
                 what = f"{fault.target} is silent {_seconds(time)} after SIGKILL"
                 evidence.append(Evidence(fault.begin, what))
     for program, values in times.items():
-        if (median := percentile(values, 50)) > MEDIAN:
+        if len(values) >= SAMPLES and (median := percentile(values, 50)) > MEDIAN:
             evidence.append(Evidence(0.0, f"{program} takes {median:.2f} s in the median"))
     every = [time for values in times.values() for time in values]
     figures = f"p50 {percentile(every, 50):.2f} s, p99 {percentile(every, 99):.2f} s"
@@ -58,7 +59,7 @@ def others_flow_on(history: History) -> Finding:
     for fault in history.faults:
         if fault.kind != "kill":
             continue
-        end = fault.begin + (_recovery(history, fault) or SLOWEST)
+        end = min(fault.begin + min(_recovery(history, fault) or SLOWEST, SLOWEST), history.end - GAP)
         for program in STEADY:
             if program in (fault.target, *DOWNSTREAM.get(fault.target, ())):
                 continue

@@ -21,7 +21,7 @@ SEEN_WITHIN = 1.0  # s, S3
 TRANSPORT = 0.15  # s that a message may take on a busy machine
 ROUNDING = 1e-8  # m
 LONGEST_PAUSE = 20.0  # s that a process may have stood still, and its values be old
-MEETING = 2.0  # s from the start of a process until everybody has discovered it
+MEETING = 1.0  # s from the first message that the observer got until all have discovered a process
 CLAIM = 5.0  # s within which a double has to notice that it is one
 
 
@@ -128,9 +128,13 @@ def never_two_alive(history: History) -> Finding:
 
 def _a_source_was_new(history: History, time: float) -> bool:
     """Whether others may have got a value that the observer did not: it may have met its source later."""
-    return any(
-        life.program.startswith("config_") and time - MEETING < life.began < time for life in history.lives
-    )
+    for life in history.lives:
+        if life.program.startswith("config_") and life.began < time:
+            output = history.output(life.program)
+            first = bisect_right(output, life.began, key=lambda s: s.sent)
+            if first == len(output) or time < output[first].sent + MEETING:
+                return True
+    return False
 
 
 class Published:

@@ -199,7 +199,10 @@ def test_l1_holds_when_the_output_is_back_soon() -> None:
 
 @pytest.mark.parametrize(("back", "what"), [(1.2, "in the median"), (2.5, "silent"), (99.0, "for good")])
 def test_l1_catches_what_comes_back_late_or_never(back: float, what: str) -> None:
-    finding = CHECKERS["L1"](killed(good(), "kinematics", 20.0, back))
+    history = good()
+    for at in (30.0, 20.0, 10.0):
+        history = killed(history, "kinematics", at, back)
+    finding = CHECKERS["L1"](history)
     assert finding.verdict == VIOLATED
     assert any(what in evidence.what for evidence in finding.evidence)
 

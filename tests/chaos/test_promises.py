@@ -8,7 +8,6 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -41,7 +40,7 @@ class Play:
 
 
 @pytest.fixture(scope="module")
-def plays(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Play]]:
+def plays(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Play]:
     """What came of each play."""
     directories = {name: tmp_path_factory.mktemp(name) for name in PLAYS}
     running = {
@@ -62,9 +61,9 @@ def plays(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Play]]
             if process.poll() is None:
                 process.terminate()
                 process.wait(timeout=20.0)
-    for name, output in outputs.items():
+    for output in outputs.values():
         assert "Report: " in output, output
-    yield {name: Play(directories[name], outputs[name], running[name].returncode) for name in PLAYS}
+    return {name: Play(directories[name], outputs[name], running[name].returncode) for name in PLAYS}
 
 
 def environment(run: Path) -> dict[str, str]:
