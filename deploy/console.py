@@ -12,12 +12,15 @@ from typing import Any
 
 from rclpy.parameter import Parameter
 from rclpy.parameter_client import AsyncParameterClient
+from rclpy.qos import QoSProfile
 from reactivex import Observable
 from std_msgs.msg import String
 
 from deploy import terminal
 from interfaces import age, topics
 from interfaces.reactive_node import ReactiveNode
+
+BACKLOG = 50  # messages of a topic that wait for the terminal
 
 HELP = """\
 Type press or release (the operator's switch), turn_on or turn_off (the engines), or quit, and Enter.
@@ -65,7 +68,9 @@ class Console:
                 self._obey(word)
 
     def _seen(self, topic: topics.Topic) -> Observable[Any]:
-        return self._node.create_observable(topic.type, topic.name, topic.qos, timestamped=True)
+        # A service wants the last message, the operator all of them: the terminal may be slow for a moment.
+        qos = QoSProfile(depth=BACKLOG, reliability=topic.qos.reliability, durability=topic.qos.durability)
+        return self._node.create_observable(topic.type, topic.name, qos, timestamped=True)
 
     def _show(self, line: terminal.Line) -> None:
         milliseconds = (line.time - self._origin) / timedelta(milliseconds=1)

@@ -129,6 +129,11 @@ class Site:
         """What a user would set to have a second system beside the usual one."""
         return os.environ | {"REACTIVE_ARM_RUN_DIR": str(self.run), "ROS_DOMAIN_ID": str(self.domain)}
 
+    def begin_python(self, script: str, *arguments: str) -> Command:
+        """Begin a script that uses the checkout."""
+        path = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])
+        return self._begin([sys.executable, script, *arguments], PYTHONPATH=path)
+
     def begin(self, *arguments: str) -> Command:
         """Begin a command of the launcher."""
         return self._begin([sys.executable, "-m", "deploy.launcher", *arguments])
@@ -137,8 +142,8 @@ class Site:
         """Begin any command in a terminal of its own, which closes when what is returned is killed."""
         return self._begin([sys.executable, "-c", "import pty, sys; pty.spawn(sys.argv[1:])", *command])
 
-    def _begin(self, command: list[str]) -> Command:
-        begun = Command(command, self.environment)
+    def _begin(self, command: list[str], **environment: str) -> Command:
+        begun = Command(command, self.environment | environment)
         self._commands.callback(begun.close)
         return begun
 

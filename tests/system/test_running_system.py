@@ -168,3 +168,20 @@ def test_the_operator_commands_switch_and_engines_from_the_console(module_site: 
     console.type("quit\n")
     assert console.wait() == 0
     assert module_site.members.keys() >= SERVICES
+
+
+def test_the_service_of_the_readme_works(module_site: Site, peer: Peer, tmp_path: Path) -> None:
+    (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), re.DOTALL)
+    (tmp_path / "speed_guard.py").write_text(code)
+    commands, speed = peer.collect(topics.ENGINES), peer.publisher(topics.EFFECTOR_SPEED)
+    guard = module_site.begin_python(str(tmp_path / "speed_guard.py"), "--ros-args", "-p", "limit:=3.0")
+
+    def is_commanded() -> bool:
+        speed.publish(Float64(data=2.9))
+        speed.publish(Float64(data=3.1))
+        return bool(commands)
+
+    peer.spin_until(is_commanded)
+    assert commands[0].data == topics.TURN_OFF
+    guard.signal(signal.SIGTERM)
+    assert guard.wait() == 0
