@@ -64,6 +64,7 @@ class System:
     def __init__(self, run: Path | None = None) -> None:
         self.run = run or processes.run_directory()
         self._supervisor: int | None = None  # a pidfd
+        self._environment = dict(os.environ)
 
     @property
     def logs(self) -> Path:
@@ -96,6 +97,7 @@ class System:
         with self._alone():
             if pid := self.supervisor():
                 raise DeploymentError(f"Already running: supervisord has pid {pid} and works in {self.run}")
+            self._environment = dict(os.environ)  # also for `start_again`
             self.logs.mkdir(exist_ok=True)
             self.run.chmod(0o700)
             self.parameters.write_text(yaml.safe_dump(dict(parameters), sort_keys=False))
@@ -185,7 +187,7 @@ class System:
 
     def _start_supervisor(self) -> None:
         self._end_members()
-        environment = dict(os.environ)
+        environment = dict(self._environment)
         environment[processes.MARK] = str(self.run)
         environment["PYTHONUNBUFFERED"] = "1"
         _prepend(environment, "PATH", str(Path(sys.executable).parent))

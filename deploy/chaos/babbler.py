@@ -31,7 +31,8 @@ _FRESH = (Time(sec=0), Time(sec=2**31 - 1))  # of a presence that counts for not
 def nonsense(topic: topics.Topic, rng: random.Random) -> Any:
     """A message, or serialized bytes, that no reader of the topic may take for good."""
     if rng.random() < 0.5:
-        return GARBAGE + rng.randbytes(rng.randrange(64))
+        # DDS checks the header; what follows ends before any number would be complete.
+        return b"\x00\x01\x00\x00" + GARBAGE + rng.randbytes(rng.randrange(4))
     if topic is topics.EFFECTOR_POSITION:
         return PointStamped(header=Header(frame_id=TEXT), point=Point(x=NAN, y=rng.random()))
     if topic is topics.OPERATOR_PRESENCE:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 from deploy.chaos.findings import Evidence, Finding, percentile
 from deploy.chaos.history import ALL, OPERATOR, OUTPUTS, PROGRAMS, Fault, History, between
@@ -13,6 +14,7 @@ MEDIAN, SLOWEST = 1.0, 2.0  # s, L1
 SAMPLES = 3  # of fewer there is no median worth the name
 GAP = 0.25  # s, L2
 HUNG = 5.0  # s, L4
+GONE = 10.0  # s of silence that nothing excuses
 SETTLED = 0.5  # s after a recovery until everything downstream is right
 FLOWING = 1.2  # s within which a program's output came before it was hit, or it has none just now
 
@@ -48,9 +50,33 @@ def comes_back(history: History) -> Finding:
     for program, values in times.items():
         if len(values) >= SAMPLES and (median := percentile(values, 50)) > MEDIAN:
             evidence.append(Evidence(0.0, f"{program} takes {median:.2f} s in the median"))
+    evidence += _never_back(history)
     every = [time for values in times.values() for time in values]
     figures = f"p50 {percentile(every, 50):.2f} s, p99 {percentile(every, 99):.2f} s"
     return Finding("L1", len(every), figures if every else "", evidence, unknown, times)
+
+
+def _never_back(history: History) -> Iterator[Evidence]:
+    """Programs that say nothing any more after a fault of any kind, though nothing else holds them up."""
+    for fault in history.faults:
+        begin, end = fault.end, fault.end + GONE
+        if fault.kind == "silence" or end > history.end:
+            continue
+        for program in PROGRAMS if fault.target == ALL else (fault.target,):
+            if program not in PROGRAMS or between(history.output(program), begin, end):
+                continue
+            held_up = (
+                _disturbs(other, source, begin, end)
+                for other in history.faults
+                if other is not fault
+                for source in (program, *_sources(program))
+            )
+            if not any(held_up):
+                yield Evidence(end, f"{program} says nothing for {GONE:g} s after {fault.kind}")
+
+
+def _sources(program: str) -> list[str]:
+    return [source for source, targets in DOWNSTREAM.items() if program in targets]
 
 
 def others_flow_on(history: History) -> Finding:
@@ -144,12 +170,11 @@ def _flowed(history: History, program: str, time: float, within: float) -> bool:
 
 def _undisturbed(history: History, fault: Fault, begin: float, end: float) -> bool:
     """Whether nothing else kept the program from its output."""
-    sources = [source for source, targets in DOWNSTREAM.items() if fault.target in targets]
     return not any(
         _disturbs(other, program, begin, end)
         for other in history.faults
         if other is not fault
-        for program in (fault.target, *sources)
+        for program in (fault.target, *_sources(fault.target))
     )
 
 

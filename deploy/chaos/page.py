@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from html import escape
 
 from deploy.chaos.findings import UNKNOWN, VIOLATED, Finding, percentile
-from deploy.chaos.history import ALL, OPERATOR, PROGRAMS, Fault, History
+from deploy.chaos.history import ALL, NOTHING, PROGRAMS, Fault, History
 from deploy.chaos.liveness import HUNG, MEDIAN, SLOWEST
 from deploy.chaos.promises import meaning
 from deploy.chaos.report import TIMES
@@ -16,6 +16,7 @@ from interfaces.topics import ON
 
 LEFT, ROW, BAR = 150, 26, 14  # px: labels, rows, bars
 PER_SECOND, NARROWEST = 8.0, 1000.0  # px of a timeline
+OTHERS = "others"  # the row of what must not disturb anybody
 FLOW = 0.6  # s without a message that make a hole in a stream
 BIN = 0.1  # s
 LONGEST = 5.2  # s, the end of the histograms' axis
@@ -93,7 +94,7 @@ def _promises(findings: Sequence[Finding]) -> str:
 def timeline(history: History) -> str:
     """All programs over time: processes, output, faults; on top of them the operator and the engines."""
     scale = max(PER_SECOND if history.end < 240 else 3.0, (NARROWEST - LEFT) / max(history.end, 1.0))
-    rows = ["operator", "engines", "supervisord", *PROGRAMS]
+    rows = ["operator", "engines", OTHERS, "supervisord", *PROGRAMS]
     height = ROW * (len(rows) + 1)
     width = LEFT + scale * history.end + 20
 
@@ -125,6 +126,8 @@ def _bars(history: History, row: str) -> Iterator[tuple[float, float, str, int, 
     if row == "engines":
         on = [s.sent for s in history.stream(topics.ENGINES_STATE) if s.value == ON]
         yield from ((b, e, "on", 0, BAR) for b, e in _stretches(on))
+        return
+    if row == OTHERS:
         return
     program = "" if row == "supervisord" else row
     lives = [life for life in history.lives if life.program == program]
@@ -160,8 +163,8 @@ def _row_of(fault: Fault, row: str) -> bool:
     if fault.target == row:
         return True
     if fault.target == ALL:
-        return row == "supervisord" if fault.kind == "kill_supervisor" else row not in ("engines", OPERATOR)
-    return row == "supervisord" and fault.target not in (*PROGRAMS, OPERATOR)
+        return row == "supervisord" if fault.kind == "kill_supervisor" else row in PROGRAMS
+    return row == OTHERS and fault.target == NOTHING
 
 
 def _mark(fault: Fault, x: object, top: int) -> str:

@@ -28,4 +28,5 @@ def check(history: History) -> list[Finding]:
 
 def meaning(promise: str) -> str:
     """What is promised, in one sentence."""
-    return (CHECKERS[promise].__doc__ or "").partition(": ")[2].strip()
+    sentence = (CHECKERS[promise].__doc__ or "").partition(": ")[2].strip().replace("`", "")
+    return sentence[:1].upper() + sentence[1:]

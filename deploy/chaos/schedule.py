@@ -44,7 +44,8 @@ def monkey(
     :param targets: only these, besides what is done to the arm as a whole; empty for all.
     """
     rng = random.Random(seed)
-    kinds, wanted = sorted(kinds), set(targets)
+    kinds = [kind for kind in sorted(kinds) for _ in range(OFTEN.get(kind, 1))]
+    wanted = set(targets)
     planned = []
     for step in range(int((duration - FIRST) / every)):
         kind = rng.choice(kinds)
@@ -57,6 +58,9 @@ def monkey(
             planned.append(Planned(round(at, 3), kind, target, round(lasting, 3)))
     return planned
 
+
+OFTEN = {"kill": 6, "stop": 3, "hang": 2}
+"""How much more often the monkey does it than other things."""
 
 ORDER = (
     *("kinematics", "dead_mans_switch", "config_l1", "config_l2", "sentinel"),

@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from deploy.chaos.findings import HOLDS, UNKNOWN, VIOLATED, percentile
-from deploy.chaos.history import ALL, OPERATOR, Fault, History, Life, Sample
+from deploy.chaos.history import ALL, OPERATOR, PROGRAMS, Fault, History, Life, Sample
 from deploy.chaos.promises import CHECKERS, meaning
 from interfaces.topics import OFF, ON, TURN_OFF
 
@@ -205,6 +205,14 @@ def test_l1_catches_what_comes_back_late_or_never(back: float, what: str) -> Non
     finding = CHECKERS["L1"](history)
     assert finding.verdict == VIOLATED
     assert any(what in evidence.what for evidence in finding.evidence)
+
+
+def test_l1_catches_programs_that_never_come_back_after_whatever_fault() -> None:
+    history = good()
+    for topic in history.streams:
+        history = silent(history, topic, 20.0, END)
+    finding = CHECKERS["L1"](faulty(history, Fault("kill_supervisor", ALL, 20.0, 21.0)))
+    assert len(finding.evidence) == len(PROGRAMS)
 
 
 def test_l1_what_a_second_fault_held_up_is_unknown() -> None:

@@ -111,6 +111,13 @@ def test_supervisord_is_killed_and_nothing_lives_twice_afterwards(plays: dict[st
 
 
 @pytest.mark.parametrize("name", PLAYS)
+def test_in_the_end_everything_flows(plays: dict[str, Play], name: str) -> None:
+    history = plays[name].history
+    silent = {p for p in PROGRAMS if history.output(p)[-1].received < history.end - 3.0}
+    assert not silent
+
+
+@pytest.mark.parametrize("name", PLAYS)
 def test_the_exit_code_and_the_page_tell_the_verdict(plays: dict[str, Play], name: str) -> None:
     play = plays[name]
     assert play.code == 0, play.output
