@@ -71,10 +71,8 @@ def engine_state(
         abandoned = seen.switch_map(lambda at: rx.timer(at + timedelta(seconds=absence))).map(lambda _: OFF)
         return rx.merge(obeyed, abandoned)
 
-    def repeated(states: Observable[str]) -> Observable[str]:
-        return states.merge(states.switch_map(lambda state: rx.interval(repeat).map(lambda _: state)))
-
-    return last_seen(presences, now).publish(latch).start_with(OFF).distinct_until_changed().publish(repeated)
+    states = last_seen(presences, now).publish(latch).start_with(OFF).distinct_until_changed()
+    return states.publish(lambda s: s.merge(s.switch_map(lambda it: rx.interval(repeat).map(lambda _: it))))
 
 
 def wire(node: ServiceNode) -> None:

@@ -19,8 +19,7 @@ from interfaces.age import Timestamp
 from interfaces.service import ServiceNode
 from interfaces.topics import ENGINES, OPERATOR_HEARTBEAT, OPERATOR_PRESENCE, TURN_OFF
 
-Heartbeat = Timestamp[Any]
-"""A heartbeat and its source time."""
+Heartbeat = Timestamp[Any]  # with its source time
 
 
 def operator_activity(
