@@ -28,8 +28,7 @@ def last_seen(presences: Observable[datetime], now: Callable[[], datetime]) -> O
     One from the future, or of before the last one, counts for nothing.
     """
     arrivals = presences.timestamp().map(lambda presence: (presence.timestamp, now() - presence.value))
-    past = arrivals.filter(lambda arrival: arrival[1] >= timedelta(0))
-    return past.map(lambda arrival: arrival[0] - arrival[1]).scan(max)
+    return arrivals.filter(lambda it: it[1] >= timedelta(0)).map(lambda it: it[0] - it[1]).scan(max)
 
 
 def engine_state(

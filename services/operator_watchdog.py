@@ -69,7 +69,6 @@ def wire(node: ServiceNode) -> None:
     silence = node.declare("silence", 3.0, (0.1, 60.0), "so long a silence is a strike [s]")
     strikes = node.declare("strikes", 3, (1, 100), "the strike that turns the engines off")
     repeat = node.declare("repeat", 0.5, (0.05, 10.0), "turn_off is repeated this often [s]")
-
     node.declare_origin()
 
     presences: Subject[Heartbeat] = Subject()
