@@ -124,6 +124,8 @@ class Writer:
 
     def write(self, data: bytes) -> None:
         """Send CDR with its encapsulation header. May block where reliability asks for it."""
+        if len(data) & 3:  # RTPS pads to four octets; Cyclone would with whatever stands in its memory
+            data += bytes(-len(data) & 3)
         size = len(data)
         serdata = quick.ddsi_serdata_from_ser_iov(
             self._sertype, SERDATA_KIND_DATA, 1, IoVector(data, size), size
