@@ -11,7 +11,7 @@ SHELL := /bin/sh
 MAKEFLAGS += --no-print-directory
 PY := .venv/bin/python
 
-.PHONY: help setup run start stop status logs console chaos test check
+.PHONY: help setup run start stop status logs console chaos test check bench
 
 help:
 	@echo "make run      start the system, show it in this terminal, stop it with Ctrl-C"
@@ -22,6 +22,7 @@ help:
 	@echo "make stop     stop it"
 	@echo "make chaos    let a monkey break a system of its own, and judge  (MINUTES=5 SEED= CHAOS=--help for more)"
 	@echo "make test     run the tests                       (TESTS=tests/component for a part)"
+	@echo "make bench    measure what rclpy costs on this machine"
 	@echo "make check    ruff, mypy, shellcheck, yamllint"
 	@echo "make setup    only set up .venv                   (PYTHON= chooses the interpreter, 3.11 to 3.13)"
 
@@ -40,6 +41,9 @@ chaos: setup
 
 test: setup
 	@$(PY) -m pytest $(TESTS)
+
+bench: setup
+	@$(PY) -m tests.benchmarks.run
 
 check: setup
 	@$(PY) -m ruff check .

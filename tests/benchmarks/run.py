@@ -1,0 +1,87 @@
+"""What rclpy costs: ``make bench``, or ``python -m tests.benchmarks.run [--rounds 5] [NAME=COMMAND ...]``.
+
+Each COMMAND runs Python with an rclpy of its own, such as ``embedded=.venv/bin/python`` or a script that
+sources ROS 2 first and ends with ``exec python "$@"``; without any, the rclpy of this interpreter is measured.
+Every round measures all of them, so that a busy machine harms all alike; medians of the rounds are printed.
+CPU time is that of the whole process, with all its threads.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import shlex
+import statistics
+import subprocess
+import sys
+from collections import defaultdict
+from pathlib import Path
+
+from tests.conftest import DISCOVERY_RANGE, reserved_domain
+
+NODES = Path(__file__).with_name("nodes.py")
+PATIENCE = 120.0  # [s]
+
+# What is measured: the processes of each measurement, the last one with the word.
+MEASUREMENTS = (("echo", "ping"), ("flood", "sink"), ("publish",), ("timer",), ("idle",), ("start",))
+
+FIGURES = {
+    "ping.p50": ("echo round trip, p50", "µs"),
+    "ping.p99": ("echo round trip, p99", "µs"),
+    "sink.messages_per_second": ("flooded subscriber", "msg/s"),
+    "sink.cpu_us": ("flooded subscriber, CPU", "µs/msg"),
+    "publish.messages_per_second": ("publisher", "msg/s"),
+    "publish.cpu_us": ("publisher, CPU", "µs/msg"),
+    "timer.cpu_percent": ("100 Hz timer, CPU", "% of a core"),
+    "idle.cpu_percent": ("idle node, CPU", "% of a core"),
+    "start.seconds": ("import, init, node", "s"),
+    "start.megabytes": ("memory of a node", "MB"),
+    "start.threads": ("threads of a node", ""),
+}
+
+
+def measure(command: list[str], roles: tuple[str, ...], domain_id: int) -> dict[str, float]:
+    """Run the processes of one measurement and return what the last one reports."""
+    environment = {**os.environ, "ROS_DOMAIN_ID": str(domain_id), DISCOVERY_RANGE: "LOCALHOST"}
+    processes = [
+        subprocess.Popen([*command, str(NODES), role], env=environment, stdout=subprocess.PIPE, text=True)
+        for role in roles
+    ]
+    try:
+        outputs = [process.communicate(timeout=PATIENCE)[0] for process in reversed(processes)]
+    finally:
+        for process in processes:
+            process.kill()
+            process.wait()
+    return {f"{roles[-1]}.{name}": value for name, value in json.loads(outputs[0]).items()}
+
+
+def table(results: dict[str, dict[str, list[float]]]) -> str:
+    """Return a Markdown table of medians: a row for each figure, a column for each rclpy."""
+    lines = [f"| | | {' | '.join(results)} |", f"|---|---|{'---:|' * len(results)}"]
+    for key, (name, unit) in FIGURES.items():
+        medians = [statistics.median(figures[key]) for figures in results.values()]
+        values = " | ".join(f"{value:,.{0 if value >= 100 else 2}f}" for value in medians)
+        lines.append(f"| {name} | {unit} | {values} |")
+    return "\n".join(lines)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description="Measure what rclpy costs.")
+    parser.add_argument("--rounds", type=int, default=3, help="how often everything is measured")
+    parser.add_argument("commands", nargs="*", metavar="NAME=COMMAND", help="a Python with its rclpy")
+    arguments = parser.parse_args()
+    commands = dict(command.split("=", 1) for command in arguments.commands) or {"rclpy": sys.executable}
+    results: dict[str, dict[str, list[float]]] = {name: defaultdict(list) for name in commands}
+    for _ in range(arguments.rounds):
+        for roles in MEASUREMENTS:
+            for name, command in commands.items():
+                with reserved_domain() as domain_id:
+                    for figure, value in measure(shlex.split(command), roles, domain_id).items():
+                        results[name][figure].append(value)
+    print(table(results))
+
+
+if __name__ == "__main__":
+    main()
