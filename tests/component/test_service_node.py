@@ -287,6 +287,21 @@ def test_a_scenario_is_played_from_where_it_is_now(
     spin_until(lambda: values == [2.0, 3.0])
 
 
+def test_what_waits_for_the_origin_begins_there_or_at_once(make_node: Make, spin_until: SpinUntil) -> None:
+    begun: list[float] = []
+    origin = time.monotonic() + 0.2
+    for epoch in (origin, origin - 100.0):
+        node = overridden(make_node, scenario_epoch=epoch)
+        node.declare_origin()
+        node.from_origin(rx.defer(lambda _: rx.just(time.monotonic()))).subscribe(
+            begun.append, scheduler=node.scheduler
+        )
+
+    spin_until(lambda: len(begun) == 2)
+
+    assert begun[0] < origin <= begun[1] + 1e-3
+
+
 def test_a_mistake_in_a_scenario_is_an_error(make_node: Make) -> None:
     node = overridden(make_node, scenario="/nowhere.yaml")
 
