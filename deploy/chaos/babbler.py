@@ -18,7 +18,7 @@ from builtin_interfaces.msg import Time
 from geometry_msgs.msg import Point, PointStamped
 from rclpy.node import Node
 from rclpy.serialization import serialize_message
-from std_msgs.msg import Bool, Header
+from std_msgs.msg import Bool, Float64, Header
 
 from deploy.chaos.marks import GARBAGE, NAN, TEXT
 from interfaces import topics
@@ -31,8 +31,9 @@ _FRESH = (Time(sec=0), Time(sec=2**31 - 1))  # of a presence that counts for not
 def nonsense(topic: topics.Topic, rng: random.Random) -> Any:
     """A message, or serialized bytes, that no reader of the topic may take for good."""
     if rng.random() < 0.5:
-        # DDS checks the header; what follows ends before any number would be complete.
-        return b"\x00\x01\x00\x00" + GARBAGE + rng.randbytes(rng.randrange(4))
+        # DDS checks the header. What follows is too short for a number, also when it is padded to 4 bytes.
+        tail = b"" if topic.type is Float64 else rng.randbytes(rng.randrange(64))
+        return b"\x00\x01\x00\x00" + GARBAGE + tail
     if topic is topics.EFFECTOR_POSITION:
         return PointStamped(header=Header(frame_id=TEXT), point=Point(x=NAN, y=rng.random()))
     if topic is topics.OPERATOR_PRESENCE:

@@ -90,11 +90,11 @@ def test_every_killed_program_is_back_within_two_seconds(plays: dict[str, Play],
 def test_engines_go_off_in_time_though_the_watchdog_is_killed_every_two_seconds(
     plays: dict[str, Play],
 ) -> None:
-    assert plays["briefly"].finding("S1").cases == 1
+    assert plays["briefly"].finding("S1").cases >= 1
 
 
 def test_engines_go_off_in_time_though_the_controller_is_stopped(plays: dict[str, Play]) -> None:
-    assert plays["variously"].finding("S1").cases == 1
+    assert plays["variously"].finding("S1").cases >= 1
 
 
 def test_a_hung_kinematics_a_stopped_source_and_a_stopped_sentinel_are_replaced(
