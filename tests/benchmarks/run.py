@@ -1,7 +1,7 @@
 """What rclpy costs: ``make bench``, or ``python -m tests.benchmarks.run [--rounds 5] [NAME=COMMAND ...]``.
 
 Each COMMAND runs Python with an rclpy of its own, such as ``embedded=.venv/bin/python`` or a script that
-sources ROS 2 first and ends with ``exec python "$@"``; without any, the rclpy of this interpreter is measured.
+sources ROS 2 first and ends with ``exec python "$@"``; without any, this interpreter's rclpy is measured.
 Every round measures all of them, so that a busy machine harms all alike; medians of the rounds are printed.
 CPU time is that of the whole process, with all its threads.
 """

@@ -186,9 +186,12 @@ def test_a_destroyed_rate_lets_its_sleeper_go(make_node: MakeNode) -> None:
     ended: list[bool] = []
 
     def sleep() -> None:
-        with pytest.raises(RuntimeError, match="it has been destroyed"):
+        def for_ever() -> None:
             while True:
                 rate.sleep()
+
+        with pytest.raises(RuntimeError, match="it has been destroyed"):
+            for_ever()
         ended.append(True)
 
     sleeper = threading.Thread(target=sleep)
