@@ -33,7 +33,7 @@ class Publisher(Owner):
         self.topic = topic
         self.qos_profile = qos_profile
         self.event_handlers = event_callbacks.create_event_handlers(
-            callback_group, publisher_impl.writer, publisher_impl.name
+            callback_group, publisher_impl.writer, topic
         )
 
     @property

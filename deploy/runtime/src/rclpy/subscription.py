@@ -47,7 +47,7 @@ class Subscription(Owner):
         self.topic = topic
         self.qos_profile = qos_profile
         self.raw = raw
-        self.event_handlers = event_callbacks.create_event_handlers(callback_group, self._reader, self._name)
+        self.event_handlers = event_callbacks.create_event_handlers(callback_group, self._reader, topic)
 
     @property
     def handle(self) -> Reader:

@@ -1,0 +1,180 @@
+"""QoS events: what publishers and subscriptions are told of each other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from rclpy.duration import Duration
+from rclpy.event_handler import (
+    PublisherEventCallbacks,
+    QoSLivelinessChangedInfo,
+    QoSPublisherMatchedInfo,
+    QoSSubscriptionMatchedInfo,
+    SubscriptionEventCallbacks,
+)
+from rclpy.exceptions import UnsupportedEventTypeError
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import (
+    DurabilityPolicy,
+    LivelinessPolicy,
+    QoSPolicyKind,
+    QoSProfile,
+    ReliabilityPolicy,
+)
+from std_msgs.msg import Float64
+
+MakeNode = Callable[..., Node]
+SpinUntil = Callable[..., None]
+
+
+@pytest.fixture
+def node(make_node: MakeNode, executor: SingleThreadedExecutor) -> Node:
+    node = make_node()
+    executor.add_node(node)
+    return node
+
+
+def ignore(message: Float64) -> None:
+    """A subscription's callback where the messages do not matter."""
+
+
+def test_both_sides_hear_that_they_are_matched_and_are_no_more(node: Node, spin_until: SpinUntil) -> None:
+    offered: list[QoSPublisherMatchedInfo] = []
+    requested: list[QoSSubscriptionMatchedInfo] = []
+    publisher = node.create_publisher(
+        Float64, "x", 1, event_callbacks=PublisherEventCallbacks(matched=offered.append)
+    )
+    subscription = node.create_subscription(
+        Float64, "x", ignore, 1, event_callbacks=SubscriptionEventCallbacks(matched=requested.append)
+    )
+    spin_until(lambda: offered and requested)
+    assert offered == [QoSPublisherMatchedInfo(1, 1, 1, 1)]
+    assert requested == [QoSSubscriptionMatchedInfo(1, 1, 1, 1)]
+    node.destroy_subscription(subscription)
+    spin_until(lambda: len(offered) == 2)
+    assert offered[1] == QoSPublisherMatchedInfo(1, 0, 0, -1)
+    node.destroy_publisher(publisher)
+
+
+def test_both_sides_hear_of_incompatible_qos_and_of_the_policy(node: Node, spin_until: SpinUntil) -> None:
+    heard: list[Any] = []
+    node.create_publisher(
+        Float64, "x", 1, event_callbacks=PublisherEventCallbacks(incompatible_qos=heard.append)
+    )
+    node.create_subscription(
+        Float64,
+        "x",
+        ignore,
+        QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL),
+        event_callbacks=SubscriptionEventCallbacks(incompatible_qos=heard.append),
+    )
+    spin_until(lambda: len(heard) == 2)
+    assert {type(info).__name__ for info in heard} == {
+        "QoSOfferedIncompatibleQoSInfo",
+        "QoSRequestedIncompatibleQoSInfo",
+    }
+    assert [(info.total_count, info.last_policy_kind) for info in heard] == [
+        (1, QoSPolicyKind.DURABILITY)
+    ] * 2
+
+
+def test_incompatible_qos_is_logged_in_rclpys_words_unless_told_otherwise(
+    node: Node, spin_until: SpinUntil, capfd: pytest.CaptureFixture[str]
+) -> None:
+    best_effort = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+    node.create_publisher(Float64, "x", best_effort)
+    node.create_subscription(Float64, "x", ignore, 1)
+    text = ""
+
+    def logged() -> bool:
+        nonlocal text
+        text += capfd.readouterr().err
+        return text.count("Last incompatible policy") == 2
+
+    spin_until(logged)
+    for sentence in (
+        "New publisher discovered on topic 'x', offering incompatible QoS. No messages will be received "
+        "from it. Last incompatible policy: RELIABILITY",
+        "New subscription discovered on topic 'x', requesting incompatible QoS. No messages will be sent "
+        "to it. Last incompatible policy: RELIABILITY",
+    ):
+        assert f"[node]: {sentence}" in text
+    quiet = SubscriptionEventCallbacks(use_default_callbacks=False)
+    subscription = node.create_subscription(Float64, "x", ignore, 1, event_callbacks=quiet)
+    assert subscription.event_handlers == []
+
+
+def test_both_sides_hear_of_a_missed_deadline(node: Node, spin_until: SpinUntil) -> None:
+    profile = QoSProfile(depth=1, deadline=Duration(seconds=0.05))
+    offered: list[Any] = []
+    requested: list[Any] = []
+    publisher = node.create_publisher(
+        Float64, "x", profile, event_callbacks=PublisherEventCallbacks(deadline=offered.append)
+    )
+    node.create_subscription(
+        Float64, "x", ignore, profile, event_callbacks=SubscriptionEventCallbacks(deadline=requested.append)
+    )
+    spin_until(publisher.get_subscription_count)
+    publisher.publish(Float64())
+    spin_until(lambda: offered and requested)
+    assert offered[0].total_count >= 1
+    assert requested[0].total_count >= 1
+
+
+def test_a_publisher_that_does_not_assert_its_liveliness_is_missed(node: Node, spin_until: SpinUntil) -> None:
+    profile = QoSProfile(
+        depth=1,
+        liveliness=LivelinessPolicy.MANUAL_BY_TOPIC,
+        liveliness_lease_duration=Duration(seconds=0.2),
+    )
+    lost: list[Any] = []
+    changed: list[QoSLivelinessChangedInfo] = []
+    publisher = node.create_publisher(
+        Float64, "x", profile, event_callbacks=PublisherEventCallbacks(liveliness=lost.append)
+    )
+    node.create_subscription(
+        Float64, "x", ignore, profile, event_callbacks=SubscriptionEventCallbacks(liveliness=changed.append)
+    )
+    spin_until(publisher.get_subscription_count)
+    publisher.publish(Float64())
+    spin_until(lambda: lost and any(info.not_alive_count for info in changed))
+    count = len(changed)
+    publisher.publish(Float64())
+    spin_until(lambda: any(info.alive_count for info in changed[count:]))
+
+
+def test_a_message_whose_lifespan_is_over_is_not_delivered(
+    node: Node, make_node: MakeNode, spin_until: SpinUntil
+) -> None:
+    latched = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    brief = QoSProfile(
+        depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL, lifespan=Duration(nanoseconds=1000)
+    )
+    node.create_publisher(Float64, "x", brief).publish(Float64(data=1.0))
+    node.create_publisher(Float64, "x", latched).publish(Float64(data=2.0))
+    received: list[float] = []
+    node.create_subscription(Float64, "x", lambda message: received.append(message.data), latched)
+    spin_until(lambda: received)
+    assert received == [2.0]
+
+
+def test_an_event_callback_may_be_a_coroutine(node: Node, spin_until: SpinUntil) -> None:
+    heard: list[Any] = []
+
+    async def matched(info: QoSPublisherMatchedInfo) -> None:
+        heard.append(info)
+
+    events = PublisherEventCallbacks(matched=matched)  # type: ignore[arg-type]
+    node.create_publisher(Float64, "x", 1, event_callbacks=events)
+    node.create_subscription(Float64, "x", ignore, 1)
+    spin_until(lambda: heard)
+
+
+def test_an_event_that_cannot_happen_here_is_refused_by_name(node: Node) -> None:
+    events = SubscriptionEventCallbacks(incompatible_type=print)
+    with pytest.raises(UnsupportedEventTypeError, match="INCOMPATIBLE_TYPE"):
+        node.create_subscription(Float64, "x", ignore, 1, event_callbacks=events)
+    assert node.count_subscribers("x") == 0
