@@ -106,6 +106,10 @@ def _stamped(stamp: Path, fingerprint: str) -> Iterator[bool]:
 def make(ros: str) -> None:
     """Make .venv from nothing; with ROS 2 (the file of its rclpy) it sees the system's packages."""
     _refuse_while_running()
+    version = ".".join(map(str, sys.version_info[:3]))
+    if importlib.util.find_spec("ensurepip") is None:  # Debian and Ubuntu pack it apart
+        package = f"python{sys.version_info[0]}.{sys.version_info[1]}-venv"
+        raise SetupError(f"Python {version} ({sys.executable}) lacks ensurepip: apt-get install {package}")
     if ros:
         check = subprocess.run([sys.executable, "-c", "import rclpy"], capture_output=True, text=True)
         if check.returncode:
@@ -114,7 +118,6 @@ def make(ros: str) -> None:
                 f" {check.stderr.strip().splitlines()[-1]}\n"
                 "Choose its interpreter (make PYTHON=/usr/bin/python3), or use a shell without ROS 2"
             )
-    version = ".".join(map(str, sys.version_info[:3]))
     print(f"Setting up .venv with Python {version}, once; this takes about half a minute.", flush=True)
     venv = [sys.executable, "-m", "venv", "--clear", *(["--system-site-packages"] if ros else []), str(VENV)]
     _step("a virtual environment", venv, log=None)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import os
 import random
 import signal
@@ -13,6 +14,9 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import pytest
+
+# On the rclpy of ROS 2 there is no embedded runtime to test.
+collect_ignore = [] if importlib.util.find_spec("rosidl_runtime_embedded") else ["runtime"]
 
 MARK = f"REACTIVE_ARM_TESTS={uuid.uuid4()}"
 DISCOVERY_RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
