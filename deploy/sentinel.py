@@ -33,14 +33,6 @@ NAME = "sentinel"
 MEETING = 0.3  # s after its start until it is discovered: what it says before may be lost
 
 
-class Heard(NamedTuple):
-    """The last sign of life of a service."""
-
-    time: float
-    """when [s, monotonic clock]"""
-    pid: int
-
-
 @dataclass(frozen=True)
 class Sight:
     """All that the sentinel sees at one look."""
@@ -48,7 +40,8 @@ class Sight:
     time: float
     """[s, monotonic clock]"""
     programs: Iterable[Watched]
-    heard: Mapping[str, Heard] = field(default_factory=dict)
+    heard: Mapping[tuple[str, int], float] = field(default_factory=dict)
+    """when a program's process, by its pid, reported its health last [s, monotonic clock]"""
     stopped: frozenset[int] = frozenset()
     """pids of supervised processes that are stopped (SIGSTOP)"""
     doubles: frozenset[processes.Process] = frozenset()
@@ -133,11 +126,10 @@ class Judge:
             pid, since = self._since.get(program.name, (0, 0.0))
             if pid != program.pid:
                 pid, since = self._since[program.name] = (program.pid, sight.time)
-            heard = sight.heard.get(program.name)
-            known = heard is not None and heard.pid == pid
-            awaited += known or sight.time - since >= self._patience.start
-            limit = self._patience.silence if known else self._patience.start
-            last = max(heard.time if heard and known else since, self._awake_since)
+            heard = sight.heard.get((program.name, pid))
+            awaited += heard is not None or sight.time - since >= self._patience.start
+            limit = self._patience.start if heard is None else self._patience.silence
+            last = max(since if heard is None else heard, self._awake_since)
             if sight.time - last >= limit:
                 silent.append(Action("kill", program.name, pid, f"no health for {sight.time - last:.1f} s"))
         names = {action.program for action in silent}
@@ -184,7 +176,7 @@ class Eyes:
         self._next_search = 0.0
         self._doubles: frozenset[processes.Process] = frozenset()
 
-    def see(self, heard: Mapping[str, Heard]) -> Sight:
+    def see(self, heard: Mapping[tuple[str, int], float]) -> Sight:
         """One look. Raises DeploymentError where supervisord does not answer."""
         if os.getppid() != self._supervisor:
             raise DeploymentError("supervisord has died: nobody would replace what is killed")
@@ -268,7 +260,7 @@ def wire(node: ServiceNode) -> None:
     namespace = node.get_namespace().rstrip("/")
     eyes = Eyes(System(Path(os.environ[processes.MARK])), os.getppid())
     judge = Judge(patience)
-    heard: dict[str, Heard] = {}
+    heard: dict[tuple[str, int], float] = {}
     known: list[Watched] = []
 
     def listen(array: DiagnosticArray) -> None:
@@ -276,7 +268,7 @@ def wire(node: ServiceNode) -> None:
             path, _, name = status.name.rpartition("/")
             pid = next((pair.value for pair in status.values if pair.key == "pid"), "")
             if path == namespace and pid.isdecimal():
-                heard[name] = Heard(time.monotonic(), int(pid))
+                heard[name, int(pid)] = time.monotonic()
 
     def look(_: int) -> bool:
         """Look, and act; whether there is something new to tell."""
@@ -292,6 +284,8 @@ def wire(node: ServiceNode) -> None:
         if judge.confused:
             node.remark(NAME, f"does nothing: {judge.confused}")
         before, known = known, list(sight.programs)
+        for gone in heard.keys() - {(program.name, program.pid) for program in known}:
+            del heard[gone]  # also what is of other hosts
         return known != before
 
     def message(_: object) -> DiagnosticArray:

@@ -10,7 +10,7 @@ import subprocess
 import sys
 import time
 import xmlrpc.client
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple, cast
@@ -22,7 +22,7 @@ from deploy import processes
 CONFIGURATION = processes.ROOT / "deploy" / "supervisord.conf"
 SERVICE_GRACE = 1.0  # s from SIGTERM to SIGKILL of a service, as in supervisord.conf
 SUPERVISOR_GRACE = 2.5  # s that supervisord has to stop all of them
-WATCH_LIMIT = 1.0  # s that it has to answer the sentinel
+ANSWER_LIMIT = 1.5  # s that it has to answer the sentinel
 GROUP = "arm"  # of all programs, in supervisord.conf
 READY_GRACE = 20.0  # s that supervisord has to answer its first call
 
@@ -61,8 +61,10 @@ class Watched(NamedTuple):
 class System:
     """The system whose runtime files lie in one run directory, whether it runs or not."""
 
-    def __init__(self, run: Path | None = None) -> None:
+    def __init__(self, run: Path | None = None, within: Sequence[str] = ()) -> None:
+        """:param within: a command in front of supervisord's own, such as `ip netns exec NAME`"""
         self.run = run or processes.run_directory()
+        self._within = within
         self._supervisor: int | None = None  # a pidfd
         self._environment = dict(os.environ)
 
@@ -168,9 +170,13 @@ class System:
         """Start a program that supervisord has given up. Raises DeploymentError."""
         self._ask(supervisor, "supervisor.startProcess", f"{GROUP}:{program}", False)
 
+    def halt(self, program: str) -> None:
+        """Stop a program until the system starts anew. Raises DeploymentError."""
+        self._ask(self.supervisor() or 0, "supervisor.stopProcess", f"{GROUP}:{program}")
+
     def _ask(self, supervisor: int, method: str, *arguments: object) -> object:
         try:
-            return self._call(supervisor, method, *arguments, timeout=WATCH_LIMIT)
+            return self._call(supervisor, method, *arguments, timeout=ANSWER_LIMIT)
         except (OSError, http.client.HTTPException, xmlrpc.client.Error) as error:
             raise DeploymentError(f"supervisord (pid {supervisor}) does not answer: {error}") from error
 
@@ -195,7 +201,7 @@ class System:
         output = self.logs / "supervisord.out"
         with output.open("wb") as file:
             process = subprocess.Popen(
-                [sys.executable, "-m", "supervisor.supervisord", "-c", str(CONFIGURATION)],
+                [*self._within, sys.executable, "-m", "supervisor.supervisord", "-c", str(CONFIGURATION)],
                 cwd=self.run,
                 env=environment,
                 stdin=subprocess.DEVNULL,

@@ -1,7 +1,7 @@
 """`make chaos`: unleash the monkey, and tell what it found. Exit code 1 if a promise is violated.
 
 usage: python -m deploy.chaos [--minutes 5] [--seed N] [--scenario NAME] [--every 5] [--faults kill,stop]
-                              [--targets kinematics,velocity] [--replay RECORD]
+                              [--targets kinematics,velocity] [--loss PERCENT] [--replay RECORD]
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from deploy import processes
-from deploy.chaos import record, schedule
+from deploy.chaos import partition, record, schedule
 from deploy.chaos.arena import Arena
 from deploy.chaos.faults import FAULTS
 from deploy.chaos.findings import VIOLATED
@@ -31,6 +31,7 @@ from deploy.chaos.promises import check
 from deploy.chaos.report import text
 from deploy.system import DeploymentError, System
 
+SCENARIOS = ("monkey", "partition", *schedule.NAMED)
 KEPT = 10  # records
 
 
@@ -51,6 +52,7 @@ def main(arguments: Sequence[str]) -> int:
 
 def unleash(options: argparse.Namespace) -> int:
     """Start an arm, let the monkey play, and judge."""
+    kind: type[Arena] = Arena
     if options.scenario == "monkey":
         seed = random.randrange(10**6) if options.seed is None else options.seed
         length = 60 * options.minutes
@@ -58,16 +60,33 @@ def unleash(options: argparse.Namespace) -> int:
             seed, length, every=options.every, kinds=options.faults, targets=options.targets
         )
         title = f"Random monkey, seed {seed}, {options.minutes:g} min, a fault each {options.every:g} s"
+    elif options.scenario == "partition":
+        if reason := partition.missing():
+            raise DeploymentError(f"No partition here: {reason}")
+        kind, planned, length = partition.TwoHosts, partition.SCHEDULE, partition.LENGTH
+        title = "Scenario partition: the operator's host is cut off"
     else:
         planned = schedule.NAMED[options.scenario]()
         length = schedule.duration(planned)
         title = f"Scenario {options.scenario}, {length:.0f} s"
     print(title, flush=True)
     with _directory() as directory:
-        arena = Arena(directory, say=lambda text: print(text, flush=True), check=interruption.check)
+        arena = kind(
+            directory,
+            say=lambda text: print(text, flush=True),
+            check=interruption.check,
+            environment=_lossy(options.loss),
+        )
         with arena:
             arena.play(planned, length)
         return conclude(arena.record, title, arena.history())
+
+
+def _lossy(percent: float) -> dict[str, str]:
+    """The environment in which Cyclone DDS loses so many of its packets: not every kernel has netem."""
+    lossiness = f"<Internal><Test><XmitLossiness>{10 * percent:.0f}</XmitLossiness></Test></Internal>"
+    given = os.environ.get("CYCLONEDDS_URI")
+    return {"CYCLONEDDS_URI": ",".join(filter(None, [given, lossiness]))} if percent else {}
 
 
 def conclude(path: Path, title: str, history: History) -> int:
@@ -91,7 +110,8 @@ def _options(arguments: Sequence[str]) -> argparse.Namespace:
     parser.add_argument("--minutes", type=_positive, default=5.0)
     parser.add_argument("--seed", type=int, help="the same seed, the same faults; default: a new one")
     parser.add_argument("--every", type=_positive, default=5.0, help="seconds from fault to fault")
-    parser.add_argument("--scenario", choices=["monkey", *schedule.NAMED], default="monkey")
+    parser.add_argument("--scenario", choices=SCENARIOS, default="monkey")
+    parser.add_argument("--loss", type=float, default=0.0, help="percent of all DDS packets that are lost")
     parser.add_argument("--faults", type=_words(FAULTS), default=tuple(FAULTS), help=", ".join(FAULTS))
     parser.add_argument("--targets", type=_words(PROGRAMS), default=(), help=", ".join(PROGRAMS))
     parser.add_argument("--replay", type=Path, help="only judge a record")

@@ -20,7 +20,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from types import TracebackType
@@ -31,7 +31,7 @@ import yaml
 from deploy import processes
 from deploy.chaos import record
 from deploy.chaos.faults import FAULTS, INJECTED
-from deploy.chaos.history import ALL, OPERATOR, Fault, History
+from deploy.chaos.history import OPERATOR, PROGRAMS, Fault, History
 from deploy.chaos.schedule import AWAKE, FIRST, PERIOD, Schedule
 from deploy.system import DeploymentError, System
 from interfaces import topics
@@ -91,10 +91,12 @@ class Arena:
         scenario: Mapping[str, Any] = SCENARIO,
         say: Callable[[str], None] = lambda text: None,
         check: Callable[[], None] = lambda: None,
+        environment: Mapping[str, str] | None = None,
     ) -> None:
         """
         :param directory: for the record and the runtime files; does not exist yet
         :param say: is told what the monkey does
+        :param environment: of the systems, besides that of this process
         :param check: is called often, and raises what is to end the play
         """
         self.record = directory / "record.mcap"
@@ -106,8 +108,11 @@ class Arena:
         self._scenario = scenario
         self._say = say
         self._check = check
+        self.environment = environment or {}
         self._stack = ExitStack()
         self._epoch = 0.0
+        self.faults = FAULTS
+        self.observed_within: Sequence[str] = ()
 
     def __enter__(self) -> Arena:
         with ExitStack() as stack:
@@ -117,8 +122,12 @@ class Arena:
             environment = {
                 "ROS_DOMAIN_ID": str(stack.enter_context(_domain())),
                 "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+                **self.environment,
             }
-            self._observer = stack.enter_context(_observer(self.record, self.arms, environment))
+            self.prepare(stack)
+            self._observer = stack.enter_context(
+                _observer(self.record, self.arms, environment, self.observed_within)
+            )
             lines = _lines(self._observer)
             self._epoch = time.monotonic() + LEAD
             shared = {"scenario": str(scenario), "scenario_epoch": round(self._epoch, 3)}
@@ -128,10 +137,17 @@ class Arena:
             for arm in self.arms:
                 stack.callback(arm.system.stop)
                 with _environment(injected | {"REACTIVE_ARM_NAMESPACE": arm.namespace}):
-                    arm.system.start({"/**": {"ros__parameters": shared}})
+                    self.start(arm, {"/**": {"ros__parameters": shared}})
             self._await_up(lines)
             self._stack = stack.pop_all()
         return self
+
+    def prepare(self, stack: ExitStack) -> None:
+        """Make what the systems run in."""
+
+    def start(self, arm: ArmUnderTest, parameters: Mapping[str, object]) -> None:
+        """Start an arm."""
+        arm.system.start(parameters)
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
@@ -152,10 +168,10 @@ class Arena:
             heapq.heappush(agenda, (at, next(order), what))
 
         def start(arm: ArmUnderTest, kind: str, target: str, lasting: float) -> None:
-            pid = arm.pid(target) if target not in (ALL, "nothing") else 0
+            pid = arm.pid(target) if target in PROGRAMS else 0
             self._say(f"{time.monotonic() - begin:7.1f} s  {arm.namespace:7} {kind} {target}")
             at = time.monotonic()
-            undo = FAULTS[kind].do(arm, target)
+            undo = self.faults[kind].do(arm, target)
             self._tell(Fault(kind, target, at, at + lasting, pid), arm.namespace)
             if undo is not None:
                 once = _Once(undo)
@@ -222,10 +238,11 @@ class _Once:
 
 @contextmanager
 def _observer(
-    path: Path, arms: list[ArmUnderTest], environment: Mapping[str, str]
+    path: Path, arms: list[ArmUnderTest], environment: Mapping[str, str], within: Sequence[str]
 ) -> Iterator[subprocess.Popen[str]]:
     process = subprocess.Popen(
         [
+            *within,
             sys.executable,
             "-m",
             "deploy.chaos.observer",

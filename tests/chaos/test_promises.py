@@ -5,70 +5,22 @@ Two plays run side by side, each in a system and a domain of its own, and are ju
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
-from pathlib import Path
-
 import pytest
 
-from deploy import processes
-from deploy.chaos import record
-from deploy.chaos.findings import HOLDS, UNKNOWN, Finding
-from deploy.chaos.history import PROGRAMS, History
+from deploy.chaos.findings import HOLDS, UNKNOWN
+from deploy.chaos.history import PROGRAMS
 from deploy.chaos.promises import CHECKERS
+
+from .plays import Play, play
 
 PLAYS = ("briefly", "variously")
 pytestmark = pytest.mark.timeout(180)
 
 
-class Play:
-    """A play that is over."""
-
-    def __init__(self, directory: Path, output: str, code: int) -> None:
-        self.output = output
-        self.code = code
-        self.page = next(directory.glob("chaos/*/report.html"))
-        self.history: History = record.load(self.page.with_name("record.mcap"))
-        self.findings: dict[str, Finding] = {name: check(self.history) for name, check in CHECKERS.items()}
-
-    def finding(self, promise: str) -> Finding:
-        """The finding on a promise; all that is known of its violations goes into the report of the test."""
-        finding = self.findings[promise]
-        assert not finding.evidence, f"{promise}: {finding.evidence}"
-        return finding
-
-
 @pytest.fixture(scope="module")
 def plays(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Play]:
     """What came of each play."""
-    directories = {name: tmp_path_factory.mktemp(name) for name in PLAYS}
-    running = {
-        name: subprocess.Popen(
-            [sys.executable, "-m", "deploy.chaos", "--scenario", name],
-            cwd=processes.ROOT,
-            env=environment(directory),
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-        )
-        for name, directory in directories.items()
-    }
-    try:
-        outputs = {name: process.communicate(timeout=150.0)[0] for name, process in running.items()}
-    finally:
-        for process in running.values():
-            if process.poll() is None:
-                process.terminate()
-                process.wait(timeout=20.0)
-    for output in outputs.values():
-        assert "Report: " in output, output
-    return {name: Play(directories[name], outputs[name], running[name].returncode) for name in PLAYS}
-
-
-def environment(run: Path) -> dict[str, str]:
-    """The environment of a play with its own runtime files."""
-    return {**os.environ, "REACTIVE_ARM_RUN_DIR": str(run)}
+    return play({name: tmp_path_factory.mktemp(name) for name in PLAYS})
 
 
 @pytest.mark.parametrize("name", PLAYS)

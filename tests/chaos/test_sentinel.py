@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from diagnostic_msgs.msg import DiagnosticStatus
 
 from deploy.processes import Process
-from deploy.sentinel import NAME, Action, Heard, Judge, Sight, states
+from deploy.sentinel import NAME, Action, Judge, Sight, states
 from deploy.system import Watched
 
 SERVICES = ("engine_controller", "kinematics", "operator_watchdog", "velocity", NAME)
@@ -27,7 +27,7 @@ class Run:
     def __init__(self) -> None:
         self.judge = Judge()
         self.now = 0.0
-        self.heard: dict[str, Heard] = {}
+        self.heard: dict[tuple[str, int], float] = {}
         self.programs = {name: program(name) for name in SERVICES}
 
     def look(
@@ -45,7 +45,7 @@ class Run:
             if self.now % 1.0 == 0:
                 for each in self.programs.values():
                     if each.pid and each.name not in silent:
-                        self.heard[each.name] = Heard(self.now, each.pid)
+                        self.heard[each.name, each.pid] = self.now
             sight = Sight(
                 self.now, self.programs.values(), dict(self.heard), frozenset(stopped), frozenset(doubles)
             )
@@ -81,7 +81,7 @@ def test_the_health_of_another_process_of_that_name_counts_for_nothing() -> None
     run = Run()
     run.look(20.0)
     run.programs["velocity"] = program("velocity", pid=500)
-    run.heard["velocity"] = Heard(run.now, PIDS["velocity"])
+    run.heard["velocity", PIDS["velocity"]] = run.now
     decided = run.look(11.0, silent=["velocity"])
     assert {action.pid for _, action in decided} == {500}
 

@@ -1,0 +1,117 @@
+"""Two hosts that a network joins, and the scissors for it: network namespaces, which need root and iproute2.
+
+The robot's host runs the arm, the operator's host the dead man's switch; the observer sits on the robot. The
+bridge between them stands in a third namespace: the network of the machine itself is not touched.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+from deploy.chaos.arena import SCENARIO, Arena, ArmUnderTest
+from deploy.chaos.faults import FAULTS, Fault, Undo
+from deploy.chaos.faults import Arm as Victim
+from deploy.chaos.history import OPERATOR, PROGRAMS
+from deploy.chaos.schedule import Planned
+from deploy.system import System
+
+ROBOT, CONTROL, SWITCH = "robot", "operator", "switch"
+NETWORK = "10.86.86"  # of the namespaces only
+UNSEEN = "dead_mans_switch"  # runs on the operator's host
+
+CUT, LASTING = 5.0, 12.0  # s
+SCHEDULE = [Planned(CUT, "partition", OPERATOR, LASTING)]
+LENGTH = CUT + LASTING + 12.0  # s; Cyclone DDS needs up to 8 s to discover again what it had given up
+
+HELD: dict[str, Any] = {
+    **{key: value for key, value in SCENARIO.items() if key != "repeat"},
+    "operator": {"pressed": [{"from": 0.0}]},
+    "engines": [{"at": 1.5, "command": "turn_on"}],
+}
+"""The operator holds the switch all the time, and turns the engines on once."""
+
+
+def missing() -> str:
+    """What this machine lacks for it, in words; '' for nothing."""
+    if os.geteuid() != 0:
+        return "network namespaces need root"
+    if shutil.which("ip") is None:
+        return "network namespaces need iproute2"
+    try:
+        with namespaces():
+            return ""
+    except subprocess.CalledProcessError as error:
+        return f"this kernel has no network namespaces, veth or bridge: {error.stderr.strip()}"
+
+
+@contextmanager
+def namespaces() -> Iterator[Callable[[str], str]]:
+    """Both hosts and the switch, joined; gives the full name of each."""
+
+    def full(name: str) -> str:
+        return f"arm{os.getpid()}-{name}"
+
+    with ExitStack() as stack:
+        for name in (SWITCH, ROBOT, CONTROL):
+            _ip("netns", "add", full(name))
+            stack.callback(_ip, "netns", "delete", full(name))
+        _ip("-n", full(SWITCH), "link", "add", "bridge", "type", "bridge")
+        _ip("-n", full(SWITCH), "link", "set", "bridge", "up")
+        for number, name in enumerate((ROBOT, CONTROL), start=1):
+            pair = ("link", "add", "eth0", "type", "veth", "peer", "name", name, "netns", full(SWITCH))
+            _ip("-n", full(name), *pair)
+            _ip("-n", full(name), "address", "add", f"{NETWORK}.{number}/24", "dev", "eth0")
+            for device in ("lo", "eth0"):
+                _ip("-n", full(name), "link", "set", device, "up")
+            _ip("-n", full(SWITCH), "link", "set", name, "master", "bridge")
+            _ip("-n", full(SWITCH), "link", "set", name, "up")
+        yield full
+
+
+def _ip(*arguments: str) -> None:
+    subprocess.run(["ip", *arguments], check=True, capture_output=True, text=True)
+
+
+class TwoHosts(Arena):
+    """An arm on the robot's host, its dead man's switch on the operator's, and the fault `partition`."""
+
+    def __init__(self, directory: Path, environment: Mapping[str, str], **options: Any) -> None:
+        network = {**environment, "ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}
+        super().__init__(directory, scenario=HELD, environment=network, **options)
+        self._runs = directory
+        self._name: Callable[[str], str] = str
+        self.faults = {**FAULTS, "partition": Fault(self._cut, (OPERATOR,))}
+
+    def prepare(self, stack: ExitStack) -> None:
+        """Make the hosts and their network."""
+        self._name = stack.enter_context(namespaces())
+        within = {name: ("ip", "netns", "exec", self._name(name)) for name in (ROBOT, CONTROL)}
+        self.observed_within = within[ROBOT]
+        self.arms = [ArmUnderTest("/", System(self._runs / "run", within[ROBOT]))]
+        self._operator = System(self._runs / "run_operator", within[CONTROL])
+        stack.callback(self._operator.stop)
+
+    def start(self, arm: ArmUnderTest, parameters: Mapping[str, object]) -> None:
+        """Start both hosts, each with its programs."""
+        arm.system.start(parameters)
+        arm.system.halt(UNSEEN)
+        self._operator.start(parameters)
+        for program in PROGRAMS:
+            if program != UNSEEN:
+                self._operator.halt(program)
+
+    def _cut(self, arm: Victim, target: str) -> Undo:
+        """Take the operator's port of the switch down, and up again in the end."""
+        _ip("-n", self._name(SWITCH), "link", "set", CONTROL, "down")
+
+        def heal() -> None:
+            with suppress(subprocess.CalledProcessError):
+                _ip("-n", self._name(SWITCH), "link", "set", CONTROL, "up")
+
+        return heal

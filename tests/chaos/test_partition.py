@@ -1,0 +1,59 @@
+"""The operator's host is cut off from the robot's, and comes back."""
+
+from __future__ import annotations
+
+import os
+
+import pytest
+
+from deploy.chaos.findings import HOLDS
+from deploy.chaos.history import Fault, History, between
+from deploy.chaos.partition import missing
+from deploy.chaos.promises import CHECKERS
+from interfaces.topics import ENGINES_STATE, OFF, ON, OPERATOR_HEARTBEAT
+
+from .plays import play
+
+DISCOVERY = 10.0  # s until a host that was given up is known again
+pytestmark = pytest.mark.timeout(120)
+
+
+@pytest.fixture(scope="module")
+def history(tmp_path_factory: pytest.TempPathFactory) -> History:
+    """What the robot's side sees."""
+    if reason := missing():
+        assert not os.environ.get("CI"), reason
+        pytest.skip(reason)
+    return play({"partition": tmp_path_factory.mktemp("partition")})["partition"].history
+
+
+@pytest.fixture(scope="module")
+def cut(history: History) -> Fault:
+    """The partition."""
+    (fault,) = (fault for fault in history.faults if fault.kind == "partition")
+    return fault
+
+
+def test_engines_are_on_until_the_operator_is_cut_off(history: History, cut: Fault) -> None:
+    assert {s.value for s in between(history.stream(ENGINES_STATE), cut.begin - 1.0, cut.begin)} == {ON}
+
+
+def test_engines_go_off_in_time_when_the_operator_is_cut_off(history: History) -> None:
+    finding = CHECKERS["S1"](history)
+    assert finding.verdict == HOLDS, finding.evidence
+    assert finding.cases == 1
+
+
+def test_heartbeats_are_back_soon_after_the_network(history: History, cut: Fault) -> None:
+    heartbeats = history.stream(OPERATOR_HEARTBEAT)
+    assert not between(heartbeats, cut.begin + 0.5, cut.end - 0.5)
+    assert between(heartbeats, cut.end, cut.end + DISCOVERY)
+
+
+def test_engines_stay_off_when_the_operator_is_back(history: History, cut: Fault) -> None:
+    assert {s.value for s in between(history.stream(ENGINES_STATE), cut.end, history.end)} == {OFF}
+
+
+@pytest.mark.parametrize("promise", CHECKERS)
+def test_no_promise_is_broken(history: History, promise: str) -> None:
+    assert not CHECKERS[promise](history).evidence
