@@ -33,6 +33,7 @@
 #include <fastdds/dds/subscriber/Subscriber.hpp>
 #include <fastdds/dds/topic/TopicDataType.hpp>
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
+#include <fastrtps/utils/IPLocator.h>
 
 namespace fast = eprosima::fastdds::dds;
 namespace rtps = eprosima::fastrtps::rtps;
@@ -173,9 +174,14 @@ int main(int, char** argv)
 {
     auto transport = std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>();
     transport->interfaceWhiteList.emplace_back("127.0.0.1");
+    transport->maxInitialPeersRange = 32;
     fast::DomainParticipantQos participant_qos = fast::PARTICIPANT_QOS_DEFAULT;
     participant_qos.transport().use_builtin_transports = false;
     participant_qos.transport().user_transports.push_back(transport);
+    // As ROS 2 does it on a single host: ask every participant index on localhost, without multicast.
+    rtps::Locator_t localhost;
+    rtps::IPLocator::setIPv4(localhost, "127.0.0.1");
+    participant_qos.wire_protocol().builtin.initialPeersList.push_back(localhost);
     auto* factory = fast::DomainParticipantFactory::get_instance();
     auto* participant = factory->create_participant(std::stoul(argv[1]), participant_qos);
     auto* publisher = participant->create_publisher(fast::PUBLISHER_QOS_DEFAULT);

@@ -66,6 +66,13 @@ def test_settings_of_cyclonedds_uri_come_last_and_win() -> None:
     assert domain.configuration(environment).endswith(f",{own}")
 
 
+def test_network_interfaces_of_cyclonedds_uri_are_the_only_ones() -> None:
+    interfaces = '<Interfaces><NetworkInterface name="lo"/></Interfaces>'
+    own = f"<CycloneDDS><Domain><General>{interfaces}</General></Domain></CycloneDDS>"
+    environment = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", "CYCLONEDDS_URI": own}
+    assert domain.configuration(environment).count("<NetworkInterface") == 1
+
+
 def test_an_unknown_range_is_refused_in_one_line() -> None:
     with pytest.raises(ValueError, match=r"^ROS_AUTOMATIC_DISCOVERY_RANGE must be one of .*, not 'MOON'$"):
         domain.configuration({"ROS_AUTOMATIC_DISCOVERY_RANGE": "moon"})
