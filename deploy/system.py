@@ -23,6 +23,7 @@ CONFIGURATION = processes.ROOT / "deploy" / "supervisord.conf"
 SERVICE_GRACE = 1.0  # s from SIGTERM to SIGKILL of a service, as in supervisord.conf
 SUPERVISOR_GRACE = 2.5  # s that supervisord has to stop all of them
 ANSWER_LIMIT = 1.5  # s that it has to answer the sentinel
+NAMESPACE = "REACTIVE_ARM_NAMESPACE"  # the environment variable that tells of an arm's ROS namespace
 GROUP = "arm"  # of all programs, in supervisord.conf
 READY_GRACE = 20.0  # s that supervisord has to answer its first call
 
@@ -195,6 +196,7 @@ class System:
         self._end_members()
         environment = dict(self._environment)
         environment[processes.MARK] = str(self.run)
+        environment.setdefault(NAMESPACE, "/")
         environment["PYTHONUNBUFFERED"] = "1"
         _prepend(environment, "PATH", str(Path(sys.executable).parent))
         _prepend(environment, "PYTHONPATH", str(processes.ROOT))

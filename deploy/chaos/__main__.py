@@ -1,7 +1,8 @@
 """`make chaos`: unleash the monkey, and tell what it found. Exit code 1 if a promise is violated.
 
 usage: python -m deploy.chaos [--minutes 5] [--seed N] [--scenario NAME] [--every 5] [--faults kill,stop]
-                              [--targets kinematics,velocity] [--loss PERCENT] [--replay RECORD]
+                              [--targets kinematics,velocity] [--arms 10] [--loss PERCENT]
+                              [--replay RECORD]
 """
 
 from __future__ import annotations
@@ -19,10 +20,12 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from deploy import processes
 from deploy.chaos import partition, record, schedule
-from deploy.chaos.arena import Arena
+from deploy.chaos.arena import SCENARIO, Arena
+from deploy.chaos.cost import Cost
 from deploy.chaos.faults import FAULTS
 from deploy.chaos.findings import VIOLATED
 from deploy.chaos.history import PROGRAMS, History
@@ -30,6 +33,7 @@ from deploy.chaos.page import page
 from deploy.chaos.promises import check
 from deploy.chaos.report import text
 from deploy.system import DeploymentError, System
+from interfaces import topics
 
 SCENARIOS = ("monkey", "partition", *schedule.NAMED)
 KEPT = 10  # records
@@ -73,27 +77,53 @@ def unleash(options: argparse.Namespace) -> int:
     with _directory() as directory:
         arena = kind(
             directory,
+            **_fleet(options.arms),
             say=lambda text: print(text, flush=True),
             check=interruption.check,
-            environment=_lossy(options.loss),
+            environment=_dds(options),
         )
         with arena:
+            before = Cost.now(arena.arms)
             arena.play(planned, length)
-        return conclude(arena.record, title, arena.history())
+            cost = Cost.now(arena.arms).since(before)
+        print("\n" + cost)
+        codes = [
+            conclude(arena.record, f"{title}, {cost}", arena.history(arm.namespace), arm.namespace)
+            for arm in arena.arms
+        ]
+        return max(codes)
 
 
-def _lossy(percent: float) -> dict[str, str]:
-    """The environment in which Cyclone DDS loses so many of its packets: not every kernel has netem."""
-    lossiness = f"<Internal><Test><XmitLossiness>{10 * percent:.0f}</XmitLossiness></Test></Internal>"
-    given = os.environ.get("CYCLONEDDS_URI")
-    return {"CYCLONEDDS_URI": ",".join(filter(None, [given, lossiness]))} if percent else {}
+def _fleet(arms: int) -> dict[str, Any]:
+    """The options of an arena with so many arms, each in a namespace."""
+    if arms == 1:
+        return {}
+    # Slower, as befits many arms on one machine, but still a message of each stream every 100 ms.
+    slow = {name: {**SCENARIO[name], "rate": 10.0} for name in topics.CONFIGURATION}
+    return {
+        "namespaces": tuple(f"/arm{number}" for number in range(1, arms + 1)),
+        "scenario": {**SCENARIO, **slow},
+    }
 
 
-def conclude(path: Path, title: str, history: History) -> int:
+def _dds(options: argparse.Namespace) -> dict[str, str]:
+    """The environment that makes Cyclone DDS lose packets (not every kernel has netem), or serve a fleet."""
+    settings = []
+    if options.loss:
+        settings.append(
+            f"<Internal><Test><XmitLossiness>{10 * options.loss:.0f}</XmitLossiness></Test></Internal>"
+        )
+    if options.arms > 1:  # participants with an index would be 100 at most
+        settings.append("<Discovery><ParticipantIndex>none</ParticipantIndex></Discovery>")
+    given = os.environ.get("CYCLONEDDS_URI", "")
+    return {"CYCLONEDDS_URI": ",".join(filter(None, [given, *settings]))} if settings else {}
+
+
+def conclude(path: Path, title: str, history: History, namespace: str = "/") -> int:
     """Judge a history, print the verdict and write the page beside its record."""
     findings = check(history)
-    print("\n" + text(findings))
-    report = path.with_name("report.html")
+    print("\n" + (f"{namespace}\n" if namespace != "/" else "") + text(findings))
+    report = path.with_name(f"report{namespace.replace('/', '_').rstrip('_')}.html")
     faults = sum(fault.kind != "silence" for fault in history.faults)
     messages = sum(map(len, history.streams.values()))
     remarks = [
@@ -111,6 +141,7 @@ def _options(arguments: Sequence[str]) -> argparse.Namespace:
     parser.add_argument("--seed", type=int, help="the same seed, the same faults; default: a new one")
     parser.add_argument("--every", type=_positive, default=5.0, help="seconds from fault to fault")
     parser.add_argument("--scenario", choices=SCENARIOS, default="monkey")
+    parser.add_argument("--arms", type=int, default=1, help="a fleet, of which each arm has all the faults")
     parser.add_argument("--loss", type=float, default=0.0, help="percent of all DDS packets that are lost")
     parser.add_argument("--faults", type=_words(FAULTS), default=tuple(FAULTS), help=", ".join(FAULTS))
     parser.add_argument("--targets", type=_words(PROGRAMS), default=(), help=", ".join(PROGRAMS))

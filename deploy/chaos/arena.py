@@ -33,7 +33,7 @@ from deploy.chaos import record
 from deploy.chaos.faults import FAULTS, INJECTED
 from deploy.chaos.history import OPERATOR, PROGRAMS, Fault, History
 from deploy.chaos.schedule import AWAKE, FIRST, PERIOD, Schedule
-from deploy.system import DeploymentError, System
+from deploy.system import NAMESPACE, DeploymentError, System
 from interfaces import topics
 
 UP = 60.0  # s until the arms have to be up
@@ -136,7 +136,7 @@ class Arena:
             }
             for arm in self.arms:
                 stack.callback(arm.system.stop)
-                with _environment(injected | {"REACTIVE_ARM_NAMESPACE": arm.namespace}):
+                with _environment(injected | {NAMESPACE: arm.namespace}):
                     self.start(arm, {"/**": {"ros__parameters": shared}})
             self._await_up(lines)
             self._stack = stack.pop_all()
