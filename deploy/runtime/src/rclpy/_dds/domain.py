@@ -47,7 +47,7 @@ def configuration(environment: Mapping[str, str] = os.environ) -> str:
         raise ValueError(f"ROS_STATIC_PEERS must be addresses or host names with ';' between, not {peers}")
     general, discovery = "", ""
     if discovery_range == "LOCALHOST":
-        # Cyclone would add interfaces up, and fail on one that is named twice: who names some means these only.
+        # Cyclone would add interfaces up and fail on one named twice: who names some means only these.
         if "<NetworkInterface" not in environment.get("CYCLONEDDS_URI", ""):
             interface = '<NetworkInterface name="lo" multicast="true"/>'
             general = f"<General><Interfaces>{interface}</Interfaces></General>"
