@@ -12,6 +12,7 @@ from interfaces import topics
 
 MEDIAN, SLOWEST = 1.0, 2.0  # s, L1
 SAMPLES = 3  # of fewer there is no median worth the name
+KILLING = 1.0  # s from the monkey's decision to the death of the process
 GAP = 0.25  # s, L2
 HUNG = 5.0  # s, L4
 GONE = 10.0  # s of silence that nothing excuses
@@ -157,11 +158,24 @@ def _recovery(history: History, fault: Fault) -> float | None:
     output = history.output(fault.target)
     if not _flowed(history, fault.target, fault.begin, FLOWING):
         return None
-    following = [s.received for s in between(output, fault.begin + 0.02, history.end)]
+    begin = _death(history, fault)
+    following = [s.received for s in between(output, begin + 0.01, history.end)]
     if following:
-        return min(following) - fault.begin
+        return min(following) - begin
     # Nothing came: for good, if the record lasts long enough to say so.
-    return math.inf if history.end - fault.begin > HUNG else None
+    return math.inf if history.end - begin > HUNG else None
+
+
+def _death(history: History, fault: Fault) -> float:
+    """When a process ended that was killed; otherwise when the fault began."""
+    ends = (
+        life.ended
+        for life in history.lives
+        if life.pid == fault.pid and life.program == fault.target and life.ended is not None
+    )
+    if fault.kind in MOMENTARY:
+        return next((end for end in ends if 0.0 <= end - fault.begin <= KILLING), fault.begin)
+    return fault.begin
 
 
 def _flowed(history: History, program: str, time: float, within: float) -> bool:
