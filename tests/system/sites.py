@@ -138,6 +138,10 @@ class Site:
         """Begin a command of the launcher."""
         return self._begin([sys.executable, "-m", "deploy.launcher", *arguments])
 
+    def begin_command(self, *command: str) -> Command:
+        """Begin any command."""
+        return self._begin(list(command))
+
     def begin_in_terminal(self, *command: str) -> Command:
         """Begin any command in a terminal of its own, which closes when what is returned is killed."""
         return self._begin([sys.executable, "-c", "import pty, sys; pty.spawn(sys.argv[1:])", *command])

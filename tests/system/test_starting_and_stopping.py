@@ -176,3 +176,12 @@ def test_a_parameter_file_reaches_the_services(site: Site, tmp_path: Path) -> No
     file.write_text("dead_mans_switch: {ros__parameters: {pressed: true}}")
     command = site.begin("run", STEADY, str(file))
     command.await_line("Operator is alive")
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGKILL])
+def test_a_signal_to_make_alone_ends_everything(site: Site, number: int) -> None:
+    command = site.begin_command("make", "run", f"SCENARIO={STEADY}")
+    command.await_line("Engines are off")
+    os.kill(command.pid, number)
+    site.await_members(lambda left: not left)
+    command.wait(10)
