@@ -32,6 +32,12 @@ _NUMPY_TYPES = {"float": "float32", "double": "float64"}
 _TITLES = {"msg": "Messages", "srv": "Services"}
 
 
+def _literal(value: object) -> str:
+    """A value as source code in the quotes that formatters prefer."""
+    text = repr(value)
+    return text.replace("'", '"') if isinstance(value, (bytes, str)) and '"' not in text else text
+
+
 def stub(package: str, kind: str) -> str:
     """Text of the stub of a package's messages (kind ``msg``) or services (``srv``); empty if it has none."""
     classes: list[str] = []
@@ -75,9 +81,9 @@ def _message(definition: MessageDefinition) -> str:
     for field in definition.fields:
         if field.default is not None and not field.type.is_plural:
             default = python_value(field.type.base, field.default)
-            lines.append(f"    {field.name.upper()}__DEFAULT: Final = {default!r}")
+            lines.append(f"    {field.name.upper()}__DEFAULT: Final = {_literal(default)}")
     for constant in definition.constants:
-        lines.append(f"    {constant.name}: Final = {python_value(constant.type, constant.value)!r}")
+        lines.append(f"    {constant.name}: Final = {_literal(python_value(constant.type, constant.value))}")
     if definition.fields:
         types = ((field.name, _accepted(field, package, kind)) for field in definition.fields)
         arguments = [f"        {name}: {type_} = ...," for name, type_ in types]

@@ -21,10 +21,10 @@ class DiagnosticStatus(Message):
     message: str
     hardware_id: str
     values: list[KeyValue]
-    OK: Final = b'\x00'
-    WARN: Final = b'\x01'
-    ERROR: Final = b'\x02'
-    STALE: Final = b'\x03'
+    OK: Final = b"\x00"
+    WARN: Final = b"\x01"
+    ERROR: Final = b"\x02"
+    STALE: Final = b"\x03"
     def __init__(
         self,
         *,
