@@ -113,7 +113,7 @@ def _await_services(system: System, member: Member) -> None:
     deadline = time.monotonic() + START_LIMIT
     while missing := [program for program in system.programs() if not _reports(program, member)]:
         for program in missing:
-            if program.state in ("BACKOFF", "FATAL") or program.restarts > 1:
+            if program.state in ("BACKOFF", "FATAL"):
                 lines = (system.logs / f"{program.name}.log").read_text(errors="replace").splitlines()
                 raise DeploymentError("\n".join([f"{program.name} does not start:", *lines[-LOG_LINES:]]))
         if time.monotonic() > deadline:
