@@ -70,8 +70,22 @@ def engine_state(
         abandoned = seen.switch_map(lambda at: rx.timer(at + timedelta(seconds=absence))).map(lambda _: OFF)
         return rx.merge(obeyed, abandoned)
 
-    states = last_seen(presences, now).publish(latch).start_with(OFF).distinct_until_changed()
-    return states.publish(lambda s: s.merge(s.switch_map(lambda it: rx.interval(repeat).map(lambda _: it))))
+    def in_time(renewal: tuple[Timestamp[str], datetime | None]) -> bool:
+        state, seen = renewal
+        return state.value == OFF or (
+            seen is not None and state.timestamp < seen + timedelta(seconds=absence)
+        )
+
+    def renewed(seen: Observable[datetime]) -> Observable[str]:
+        states = latch(seen).start_with(OFF).distinct_until_changed().share()
+        renewals = states.switch_map(lambda it: rx.interval(repeat).map(lambda _: it)).timestamp()
+        # A process that was paused runs late: `on`, due before the absence was complete, may come after it.
+        in_order = (
+            renewals.with_latest_from(seen.start_with(None)).filter(in_time).map(lambda it: it[0].value)
+        )
+        return rx.merge(in_order, states)
+
+    return last_seen(presences, now).publish(renewed)
 
 
 def wire(node: ServiceNode) -> None:
