@@ -108,6 +108,10 @@ def decode(data: bytes) -> tuple[bytes, list[NodeEntities]]:
     return data[4:20], nodes
 
 
+# Of more peers than these it is asked which of them are still alive.
+_MANY_PEERS = 100
+
+
 class Graph:
     """A process' view of the graph, and what it tells the others about its own nodes."""
 
@@ -124,6 +128,7 @@ class Graph:
         self._own: dict[Node, NodeEntities] = {}
         self._deferred = 0
         self._peers: dict[bytes, list[NodeEntities]] = {}
+        self._many_peers = _MANY_PEERS
         self._discovery: Discovery | None = None  # made when somebody asks about the graph
         self._service_ids = 0
 
@@ -149,6 +154,7 @@ class Graph:
         with self._lock:
             if not self._deferred:
                 self._writer.write(encode(self.participant.gid, list(self._own.values())))
+                self._take()  # we hear ourselves: where nobody spins, it would pile up
 
     def add_node(self, node: Node) -> None:
         """Announce a node of this process."""
@@ -218,6 +224,13 @@ class Graph:
                 except ValueError:
                     continue  # not from a ROS 2 process: it has no nodes that could be named
                 self._peers[gid] = nodes
+            if len(self._peers) > self._many_peers:
+                self._forget_dead_peers()
+                self._many_peers = max(_MANY_PEERS, 2 * len(self._peers))
+
+    def _forget_dead_peers(self) -> None:
+        alive = self._discovered().participants()
+        self._peers = {gid: nodes for gid, nodes in self._peers.items() if gid in alive}
 
     def _execute(self, taken: Any) -> None:
         raise AssertionError("the graph runs no callback")
@@ -258,8 +271,7 @@ class Graph:
         """Every node that is known, with its participant's GUID."""
         with self._lock:
             self._take()
-            alive = self._discovered().participants()
-            self._peers = {gid: nodes for gid, nodes in self._peers.items() if gid in alive}
+            self._forget_dead_peers()
             known = {**self._peers, self.participant.gid: list(self._own.values())}
             for gid, nodes in known.items():
                 for node in nodes:

@@ -6,6 +6,7 @@ import inspect
 import threading
 import time
 from collections.abc import Callable, Coroutine
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from rclpy._bad_input import BadInput
@@ -13,6 +14,7 @@ from rclpy._dds import Reader
 from rclpy._endpoint import Owner, ServiceEndpoint
 from rclpy._service_wire import RequestId, client_is_matched, unwrap, wrap
 from rclpy.callback_groups import CallbackGroup
+from rclpy.exceptions import InvalidHandle
 from rclpy.qos import QoSProfile
 
 if TYPE_CHECKING:
@@ -69,7 +71,8 @@ class Service(Owner):
             raise TypeError(f"{self._name} must answer with {expected}, not {response!r}")
         data = wrap(header, self.srv_type.Response._serialize(response))
         self._wait_for_client(header.publication_handle)
-        if not self._destroyed:
+        # A service that another thread has destroyed meanwhile answers no more.
+        with suppress(InvalidHandle):
             self._replies.write(data)
 
     def _wait_for_client(self, publication_handle: int) -> None:

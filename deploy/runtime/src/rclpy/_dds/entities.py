@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes as ct
 from typing import NamedTuple
 
+from rclpy.exceptions import InvalidHandle
 from rclpy.qos import QoSProfile
 
 from . import domain, qos
@@ -117,23 +118,31 @@ class Writer:
         self.gid = _guid(handle)
         sertype = Pointer()
         checked(quick.dds_get_entity_sertype(handle, ct.byref(sertype)), "cannot read a writer's type")
-        self._sertype = sertype.value
+        self._sertype = sertype.value  # None after the end: it is gone with the writer
         instance = ct.c_uint64()
         checked(quick.dds_get_instance_handle(handle, ct.byref(instance)), "cannot read a writer's handle")
         self.instance_handle = instance.value
 
     def write(self, data: bytes) -> None:
-        """Send CDR with its encapsulation header. May block where reliability asks for it."""
+        """
+        Send CDR with its encapsulation header. May block where reliability asks for it.
+
+        :raises InvalidHandle: if another thread ends the writer meanwhile.
+        """
         if len(data) & 3:  # RTPS pads to four octets; Cyclone would with whatever stands in its memory
             data += bytes(-len(data) & 3)
         size = len(data)
-        serdata = quick.ddsi_serdata_from_ser_iov(
-            self._sertype, SERDATA_KIND_DATA, 1, IoVector(data, size), size
-        )
+        vector = IoVector(data, size)
+        sertype = self._sertype  # from here to the end of the call the interpreter lets no other thread in
+        if sertype is None:
+            raise InvalidHandle("cannot use a writer that was destroyed")
+        serdata = quick.ddsi_serdata_from_ser_iov(sertype, SERDATA_KIND_DATA, 1, vector, size)
         if not serdata:
             raise ValueError(f"DDS refuses these {size} octets: an encapsulation header and data are needed")
         result = blocking.dds_writecdr(self.handle, serdata)
         if result:
+            if self._sertype is None:
+                raise InvalidHandle("cannot use a writer that was destroyed")
             checked(result, "cannot write")
 
     def matched(self) -> int:
@@ -157,6 +166,7 @@ class Writer:
 
     def close(self) -> None:
         """End the writer; what reliable readers still miss is lost."""
+        self._sertype = None
         blocking.dds_delete(self.handle)
 
 

@@ -1,0 +1,151 @@
+"""Everything comes and goes a thousand times under traffic, on several threads, and nothing stays behind."""
+
+from __future__ import annotations
+
+import gc
+import threading
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+import rclpy
+from rclpy.context import Context
+from rclpy.executors import Executor, MultiThreadedExecutor, SingleThreadedExecutor
+from rclpy.node import Node
+from std_msgs.msg import Float64
+from std_srvs.srv import SetBool
+
+CYCLES = 1000
+THREADS = 4
+MEMORY = 8.0  # MB by which a process may grow; a lost reader or writer a cycle would cost some 20
+SECONDS = 60.0
+
+
+def memory() -> float:
+    """Resident memory of this process [MB]."""
+    gc.collect()
+    return int(Path("/proc/self/statm").read_text().split()[1]) * 4096 / 1e6
+
+
+def answer(request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
+    response.success = request.data
+    return response
+
+
+def endpoints(node: Node) -> tuple[int, int, int]:
+    """How many publishers and subscriptions of the flood there are, and how many topics of any kind."""
+    topics = node.get_topic_names_and_types(no_demangle=True)
+    return node.count_publishers("flood"), node.count_subscribers("flood"), len(topics)
+
+
+def churn(node: Node, cycles: int, failures: list[BaseException]) -> None:
+    try:
+        for number in range(cycles):
+            name = f"s{threading.get_ident()}"
+            subscription = node.create_subscription(Float64, "flood", lambda message: None, 10)
+            publisher = node.create_publisher(Float64, "flood", 10)
+            timer = node.create_timer(0.0005, lambda: None)
+            service = node.create_service(SetBool, name, answer)
+            client = node.create_client(SetBool, name)
+            publisher.publish(Float64())
+            future = client.call_async(SetBool.Request(data=True))
+            if number % 2:
+                future.cancel()
+            node.destroy_timer(timer)
+            node.destroy_client(client)
+            node.destroy_service(service)
+            node.destroy_publisher(publisher)
+            node.destroy_subscription(subscription)
+    except BaseException as error:
+        failures.append(error)
+
+
+@dataclass
+class Flood:
+    """A node under traffic: another participant publishes on ``flood`` all the time."""
+
+    node: Node
+    other: Node
+    executor: Executor
+    failures: list[BaseException]
+
+
+@pytest.fixture(params=[SingleThreadedExecutor, MultiThreadedExecutor])
+def flood(
+    request: pytest.FixtureRequest, make_node: Callable[..., Node], context: Context, domain_id: int
+) -> Iterator[Flood]:
+    other_context = Context()
+    rclpy.init(args=[], context=other_context, domain_id=domain_id)
+    other = Node("flooding", context=other_context)
+    flood = Flood(make_node("churned"), other, request.param(context=context), [])
+    flood.executor.add_node(flood.node)
+    publisher = other.create_publisher(Float64, "flood", 10)
+    end = threading.Event()
+
+    def spin() -> None:
+        try:
+            flood.executor.spin()
+        except BaseException as error:
+            flood.failures.append(error)
+
+    def pour() -> None:
+        with SingleThreadedExecutor(context=other_context) as executor:
+            executor.add_node(other)
+            while not end.wait(0.0005):
+                publisher.publish(Float64())
+                executor.spin_once(timeout_sec=0)
+
+    background = [threading.Thread(target=work) for work in (spin, pour)]
+    for thread in background:
+        thread.start()
+    yield flood
+    end.set()
+    ended = flood.executor.shutdown(SECONDS)
+    for thread in background:
+        thread.join(SECONDS)
+    other.destroy_node()
+    other_context.shutdown()
+    assert ended
+    assert not flood.failures
+
+
+@pytest.mark.timeout(180)
+def test_a_thousand_of_everything_leave_nothing_behind(flood: Flood, context: Context) -> None:
+    node, other = flood.node, flood.other
+
+    def come_to(condition: Callable[[], object]) -> None:
+        """Wait for discovery, which takes its own time."""
+        assert node._graph.wait_for(lambda: bool(condition()), SECONDS, context.ok)
+
+    def run(cycles: int) -> None:
+        threads = [
+            threading.Thread(target=churn, args=(node, cycles // THREADS, flood.failures))
+            for _ in range(THREADS)
+        ]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+
+    come_to(lambda: node.count_publishers("flood"))
+    come_to(lambda: endpoints(other) == endpoints(node))
+    before = endpoints(node)
+    run(CYCLES // 4)  # until everything has grown to its size
+    size, threads = memory(), threading.active_count()
+    run(CYCLES)
+    assert not flood.failures
+    assert threading.active_count() <= threads
+    assert memory() - size < MEMORY
+    come_to(lambda: endpoints(node) == before)
+    come_to(lambda: endpoints(other) == before)
+    assert [*node.subscriptions, *node.timers, *node.clients] == []
+
+    # Whoever waits is still woken.
+    received = threading.Event()
+    node.create_subscription(Float64, "flood", lambda message: received.set(), 10)
+    assert received.wait(SECONDS)
+    node.create_service(SetBool, "last", answer)
+    client = node.create_client(SetBool, "last")
+    assert client.wait_for_service(SECONDS)
+    assert client.call(SetBool.Request(data=True), SECONDS) == SetBool.Response(success=True)
