@@ -124,7 +124,7 @@ def conclude(path: Path, title: str, history: History, namespace: str = "/") -> 
     findings = check(history)
     print("\n" + (f"{namespace}\n" if namespace != "/" else "") + text(findings))
     report = path.with_name(f"report{namespace.replace('/', '_').rstrip('_')}.html")
-    faults = sum(fault.kind != "silence" for fault in history.faults)
+    faults = sum(fault.kind not in ("silence", "overload") for fault in history.faults)
     messages = sum(map(len, history.streams.values()))
     remarks = [
         f"{title} · {faults} faults · {messages} messages in {history.end:.0f} s",

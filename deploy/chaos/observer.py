@@ -26,10 +26,11 @@ from rclpy.qos import QoSProfile
 from rclpy.signals import SignalHandlerOptions
 
 from deploy import processes
-from deploy.chaos.history import Life
+from deploy.chaos.history import NOTHING, Fault, Life
 from deploy.chaos.record import FAULTS, PROCESSES, Recorder, qos_profiles
 from interfaces import topics
 
+STALL = 0.1  # s for a look: the machine is overloaded, and tells of itself more than of the arms
 LOOK = 0.02  # s between two looks for new processes
 UNNAMED = 0.5  # s within which a new process shows what program it runs
 FORK = 0.2  # s that a child of supervisord may look like it
@@ -84,9 +85,15 @@ def _writer(recorder: Recorder, name: str, topic: topics.Topic) -> Callable[[byt
 class Census:
     """Knows the processes of the arms: sees new ones within 20 ms, and the end of each at once."""
 
-    def __init__(self, arms: Iterable[Arm], report: Callable[[str, Life], None]) -> None:
+    def __init__(
+        self,
+        arms: Iterable[Arm],
+        report: Callable[[str, Life], None],
+        overload: Callable[[float, float], None],
+    ) -> None:
         self._arms = {str(arm.run): arm.namespace for arm in arms}
         self._report = report
+        self._overload = overload
         self._poll = select.poll()
         self._known: set[int] = set()
         self._pending: dict[int, float] = {}
@@ -95,8 +102,12 @@ class Census:
     def run(self, ended: threading.Event) -> None:
         """Take the census until the end."""
         while not ended.is_set():
+            before = time.monotonic()
             self.look()
-            for handle, _ in self._poll.poll(LOOK * 1000):
+            ready = self._poll.poll(LOOK * 1000)
+            if (now := time.monotonic()) - before > STALL:
+                self._overload(before, now)
+            for handle, _ in ready:
                 self._end(handle, time.monotonic())
         for handle in list(self._alive):
             os.close(handle)
@@ -165,6 +176,10 @@ def main(arguments: list[str]) -> int:
         event = relative(life._asdict(), "began", "ended") | {"namespace": namespace}
         recorder.event(PROCESSES, time.monotonic_ns(), event)
 
+    def overload(begin: float, end: float) -> None:
+        event = relative(Fault("overload", NOTHING, begin, end)._asdict(), "begin", "end")
+        recorder.event(FAULTS, time.monotonic_ns(), event)
+
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     node = Node(f"observer_{os.getpid()}")
     ended = threading.Event()
@@ -181,7 +196,7 @@ def main(arguments: list[str]) -> int:
 
     threads = [
         threading.Thread(target=obey, daemon=True),
-        threading.Thread(target=partial(Census(arms, report).run, ended)),
+        threading.Thread(target=partial(Census(arms, report, overload).run, ended)),
     ]
     for thread in threads:
         thread.start()
