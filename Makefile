@@ -50,6 +50,5 @@ check: setup
 	@$(PY) -m ruff format --check --quiet .
 	@$(PY) -m mypy
 	@$(PY) -m mypy --config-file deploy/runtime/pyproject.toml
-	@$(PY) -m mypy --config-file deploy/runtime/pyproject.toml
 	@.venv/bin/shellcheck deploy/setup.sh .ci/run
 	@$(PY) -m yamllint --strict deploy
