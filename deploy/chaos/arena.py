@@ -84,6 +84,8 @@ class ArmUnderTest:
 class Arena:
     """One or more arms, and an observer that records them until the end of the `with`."""
 
+    lead = LEAD
+
     def __init__(
         self,
         directory: Path,
@@ -129,7 +131,7 @@ class Arena:
                 _observer(self.record, self.arms, environment, self.observed_within)
             )
             lines = _lines(self._observer)
-            self._epoch = time.monotonic() + LEAD
+            self._epoch = time.monotonic() + self.lead
             shared = {"scenario": str(scenario), "scenario_epoch": round(self._epoch, 3)}
             injected = environment | {
                 "PYTHONPATH": os.pathsep.join([str(INJECTED), *filter(None, [os.environ.get("PYTHONPATH")])])

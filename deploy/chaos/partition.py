@@ -81,6 +81,8 @@ def _ip(*arguments: str) -> None:
 class TwoHosts(Arena):
     """An arm on the robot's host, its dead man's switch on the operator's, and the fault `partition`."""
 
+    lead = 6.0  # s: two systems have to start before the operator's only `turn_on`
+
     def __init__(self, directory: Path, environment: Mapping[str, str], **options: Any) -> None:
         network = {**environment, "ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}
         super().__init__(directory, scenario=HELD, environment=network, **options)
