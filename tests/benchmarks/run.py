@@ -23,7 +23,7 @@ from tests.conftest import DISCOVERY_RANGE, reserved_domain
 NODES = Path(__file__).with_name("nodes.py")
 PATIENCE = 120.0  # [s]
 
-# What is measured: the processes of each measurement, the last one with the word.
+# What is measured: the processes of each measurement, in the order of their start.
 MEASUREMENTS = (("echo", "ping"), ("flood", "sink"), ("publish",), ("timer",), ("idle",), ("start",))
 
 FIGURES = {
@@ -31,8 +31,9 @@ FIGURES = {
     "ping.p99": ("echo round trip, p99", "µs"),
     "sink.messages_per_second": ("flooded subscriber", "msg/s"),
     "sink.cpu_us": ("flooded subscriber, CPU", "µs/msg"),
-    "publish.messages_per_second": ("publisher", "msg/s"),
-    "publish.cpu_us": ("publisher, CPU", "µs/msg"),
+    "flood.messages_per_second": ("publisher that floods it", "msg/s"),
+    "publish.messages_per_second": ("publisher without subscribers", "msg/s"),
+    "publish.cpu_us": ("publisher without subscribers, CPU", "µs/msg"),
     "timer.cpu_percent": ("100 Hz timer, CPU", "% of a core"),
     "idle.cpu_percent": ("idle node, CPU", "% of a core"),
     "start.seconds": ("import, init, node", "s"),
@@ -42,7 +43,7 @@ FIGURES = {
 
 
 def measure(command: list[str], roles: tuple[str, ...], domain_id: int) -> dict[str, float]:
-    """Run the processes of one measurement and return what the last one reports."""
+    """Run the processes of one measurement and return what they report."""
     environment = {**os.environ, "ROS_DOMAIN_ID": str(domain_id), DISCOVERY_RANGE: "LOCALHOST"}
     processes = [
         subprocess.Popen([*command, str(NODES), role], env=environment, stdout=subprocess.PIPE, text=True)
@@ -54,7 +55,11 @@ def measure(command: list[str], roles: tuple[str, ...], domain_id: int) -> dict[
         for process in processes:
             process.kill()
             process.wait()
-    return {f"{roles[-1]}.{name}": value for name, value in json.loads(outputs[0]).items()}
+    return {
+        f"{role}.{name}": value
+        for role, output in zip(reversed(roles), outputs, strict=True)
+        for name, value in json.loads(output or "{}").items()
+    }
 
 
 def table(results: dict[str, dict[str, list[float]]]) -> str:
