@@ -6,6 +6,7 @@ import threading
 from collections.abc import Callable
 
 import pytest
+import rclpy
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
 from rclpy.clock import Clock, ClockType
 from rclpy.context import Context
@@ -213,6 +214,17 @@ def test_shutting_the_context_down_on_another_thread_ends_spinning_with_external
     threading.Timer(0.05, context.shutdown).start()
     with pytest.raises(ExternalShutdownException):
         executor.spin_once()
+
+
+def test_shutting_rclpy_down_on_another_thread_lets_spin_return(domain_id: int) -> None:
+    rclpy.init(args=[])
+    node = Node("node")
+    thread = threading.Thread(target=rclpy.shutdown)
+    node.create_guard_condition(thread.start).trigger()
+    rclpy.spin(node)
+    thread.join()
+    node.destroy_node()
+    assert not rclpy.ok()
 
 
 def test_shutting_the_executor_down_on_another_thread_ends_spinning(
