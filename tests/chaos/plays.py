@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from collections.abc import Mapping
 from pathlib import Path
 
 from deploy import processes
@@ -34,26 +33,21 @@ class Play:
         return finding
 
 
-def play(scenarios: Mapping[str, Path]) -> dict[str, Play]:
-    """Play named scenarios side by side, each with a directory for its runtime files."""
-    running = {
-        name: subprocess.Popen(
-            [sys.executable, "-m", "deploy.chaos", "--scenario", name],
-            cwd=processes.ROOT,
-            env={**os.environ, "REACTIVE_ARM_RUN_DIR": str(run)},
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-        )
-        for name, run in scenarios.items()
-    }
+def play(scenario: str, run: Path) -> Play:
+    """Play a named scenario, with a directory for its runtime files."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "deploy.chaos", "--scenario", scenario],
+        cwd=processes.ROOT,
+        env={**os.environ, "REACTIVE_ARM_RUN_DIR": str(run)},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
     try:
-        outputs = {name: process.communicate(timeout=LONGEST)[0] for name, process in running.items()}
+        output = process.communicate(timeout=LONGEST)[0]
     finally:
-        for process in running.values():
-            if process.poll() is None:
-                process.terminate()
-                process.wait(timeout=20.0)
-    for output in outputs.values():
-        assert "Report: " in output, output
-    return {name: Play(run, outputs[name], running[name].returncode) for name, run in scenarios.items()}
+        if process.poll() is None:
+            process.terminate()
+            process.wait(timeout=20.0)
+    assert "Report: " in output, output
+    return Play(run, output, process.returncode)
