@@ -1,8 +1,8 @@
 """The promises of the design, on what a monkey does to real systems; `make chaos` does it longer.
 
 The plays come one after the other: the flood of one would take the processor from the other's services. The
-promises are about time, so a play that broke one is played once more: a machine that is busy with something else
-breaks them now and then, a mistake in the system does so again.
+promises are about time, so a play that broke one is played once more: a machine that is busy with something
+else breaks them now and then, a mistake in the system does so again.
 """
 
 from __future__ import annotations
