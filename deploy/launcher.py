@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 START_LIMIT = 60.0  # s until all services have to report their health
 STATUS_LIMIT = 1.5  # s that they have when they are up: they report at 1 Hz
+START_ATTEMPTS = 3  # of a service, even where dying takes it so long that supervisord sees no early death
 LOG_LINES = 15  # of a service that does not start
 
 # rclpy takes its time to load: a command loads it when it is sure to need it.
@@ -113,7 +114,7 @@ def _await_services(system: System, member: Member) -> None:
     deadline = time.monotonic() + START_LIMIT
     while missing := [program for program in system.programs() if not _reports(program, member)]:
         for program in missing:
-            if program.state in ("BACKOFF", "FATAL"):
+            if program.state in ("BACKOFF", "FATAL") or program.restarts >= START_ATTEMPTS:
                 lines = (system.logs / f"{program.name}.log").read_text(errors="replace").splitlines()
                 raise DeploymentError("\n".join([f"{program.name} does not start:", *lines[-LOG_LINES:]]))
         if time.monotonic() > deadline:

@@ -30,9 +30,9 @@ def pytest_configure() -> None:
 
 
 def pytest_collection_finish() -> None:
-    """Let Ctrl-C end the tests, with clean-up: a service that a test module imports would end on the spot."""
+    """Let signals end the tests, with clean-up: who imports a service, as tests do, would end on the spot."""
     signal.signal(signal.SIGINT, signal.default_int_handler)
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:

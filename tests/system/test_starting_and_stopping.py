@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import sys
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -154,12 +155,12 @@ def test_an_impossible_domain_is_told(site: Site) -> None:
 def test_a_second_system_in_the_same_domain_is_told_and_the_first_goes_on(site: Site, tmp_path: Path) -> None:
     assert site.do("start", STEADY)[0] == 0
     before = site.members
-    second = Site(tmp_path / "second", site.domain)
-    code, printed = second.do("start", STEADY)
-    assert code == 1
-    assert "does not start" in printed
-    assert "runs already in domain" in printed
-    assert second.members == {}
+    with closing(Site(tmp_path / "second", site.domain)) as second:
+        code, printed = second.do("start", STEADY)
+        assert code == 1
+        assert "does not start" in printed
+        assert "runs already in domain" in printed
+        assert second.members == {}
     assert site.members == before
 
 
