@@ -116,6 +116,8 @@ def _instance_attributes(cls: Any) -> set[str]:
 
 
 def _callable_problem(found: Any, signature: str) -> str | None:
+    if isinstance(found, type) and issubclass(found, Enum):
+        return None  # how it is called is Python's choice, and differs between its versions
     if _only_raises_not_implemented_error(found):
         return "NotImplementedError"
     try:
