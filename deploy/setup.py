@@ -40,8 +40,9 @@ class SetupError(Exception):
 
 def main() -> int:
     """Make .venv unless it is up to date; the exit code."""
-    for number in (signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, _interrupt)
+    signal.signal(signal.SIGTERM, _interrupt)
+    if signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:  # which is what nohup asks for
+        signal.signal(signal.SIGHUP, _interrupt)
     try:
         with _alone():
             began = time.monotonic()

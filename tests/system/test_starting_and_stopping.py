@@ -62,6 +62,16 @@ def test_closing_the_terminal_ends_everything(site: Site) -> None:
     assert len(members) >= 10
 
 
+def test_nohup_lets_it_go_on_when_the_terminal_closes(site: Site) -> None:
+    command = site.begin_command("nohup", sys.executable, "-m", "deploy.launcher", "run", STEADY)
+    command.await_line("Engines are off")
+    command.signal(signal.SIGHUP)
+    command.type("turn_on\n")
+    command.await_line("Turning on engines")
+    command.type("quit\n")
+    assert command.wait(10) == 0
+
+
 def test_the_end_of_a_pipe_ends_everything(site: Site) -> None:
     run = f"'{sys.executable}' -m deploy.launcher run '{STEADY}'"
     reader = site.begin_in_terminal("sh", "-c", f"{run} | head -n 1")
