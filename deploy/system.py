@@ -21,7 +21,8 @@ from deploy import processes
 
 CONFIGURATION = processes.ROOT / "deploy" / "supervisord.conf"
 SERVICE_GRACE = 1.0  # s from SIGTERM to SIGKILL of a service, as in supervisord.conf
-SUPERVISOR_GRACE = 2.5  # s that supervisord has to stop all of them
+SUPERVISOR_GRACE = 1.4  # s that supervisord has to stop all of them
+OBEY_LIMIT = 0.4  # s that it has to say that it will; all of it ends within 2 s
 ANSWER_LIMIT = 1.5  # s that it has to answer the sentinel
 NAMESPACE = "REACTIVE_ARM_NAMESPACE"  # the environment variable that tells of an arm's ROS namespace
 GROUP = "arm"  # of all programs, in supervisord.conf
@@ -130,7 +131,7 @@ class System:
             if pid := self.supervisor():
                 handles = processes.open_handles(self.run, [p.pid for p in self.members()])
                 try:
-                    self._call(pid, "supervisor.shutdown", timeout=SUPERVISOR_GRACE)
+                    self._call(pid, "supervisor.shutdown", timeout=OBEY_LIMIT)
                     processes.await_end(handles, SUPERVISOR_GRACE)
                 except (OSError, http.client.HTTPException, xmlrpc.client.Error):
                     pass  # hung or just dying: then without its help
