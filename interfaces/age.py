@@ -14,7 +14,16 @@ from builtin_interfaces.msg import Time
 from reactivex import Observable
 from reactivex.operators._timestamp import Timestamp
 
-__all__ = ["Timestamp", "fresh", "from_message", "from_nanoseconds", "now", "to_message", "to_nanoseconds"]
+__all__ = [
+    "Timestamp",
+    "fresh",
+    "from_message",
+    "from_nanoseconds",
+    "latest",
+    "now",
+    "to_message",
+    "to_nanoseconds",
+]
 
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 _MICROSECOND = timedelta(microseconds=1)
@@ -67,3 +76,14 @@ def fresh(
         return False
 
     return items.filter(is_fresh)
+
+
+def latest(stamps: Observable[datetime], *, now: Callable[[], datetime] = now) -> Observable[datetime]:
+    """
+    Emit when the latest of what is stamped was, by the scheduler's clock, which nobody sets.
+
+    It is as old as its stamp says when it arrives, and ages by the scheduler's clock from then on. One from
+    the future, or of before the last one, counts for nothing.
+    """
+    arrivals = stamps.timestamp().map(lambda stamp: (stamp.timestamp, now() - stamp.value))
+    return arrivals.filter(lambda it: it[1] >= timedelta(0)).map(lambda it: it[0] - it[1]).scan(max)

@@ -20,17 +20,6 @@ from interfaces.service import ServiceNode
 from interfaces.topics import ENGINES, ENGINES_STATE, OFF, ON, OPERATOR_PRESENCE, TURN_OFF, TURN_ON
 
 
-def last_seen(presences: Observable[datetime], now: Callable[[], datetime]) -> Observable[datetime]:
-    """
-    Emit when the operator was seen last, by the scheduler's clock, which nobody sets.
-
-    A presence is as old as its stamp says when it arrives, and ages by the scheduler's clock from then on.
-    One from the future, or of before the last one, counts for nothing.
-    """
-    arrivals = presences.timestamp().map(lambda presence: (presence.timestamp, now() - presence.value))
-    return arrivals.filter(lambda it: it[1] >= timedelta(0)).map(lambda it: it[0] - it[1]).scan(max)
-
-
 def engine_state(
     commands: Observable[Timestamp[str]],
     presences: Observable[datetime],
@@ -51,6 +40,7 @@ def engine_state(
     :param now: the clock of source times and stamps.
     :param refused: is told why a ``turn_on`` is not obeyed.
     """
+    patience = timedelta(seconds=absence)
 
     def obey(request: tuple[Timestamp[Timestamp[str]], datetime | None]) -> str | None:
         arrived, seen = request
@@ -65,27 +55,23 @@ def engine_state(
         refused(f"{TURN_ON} refused: {why}")
         return None
 
-    def latch(seen: Observable[datetime]) -> Observable[str]:
+    def latched(seen: Observable[datetime]) -> Observable[str]:
         obeyed = commands.timestamp().with_latest_from(seen.start_with(None)).map(obey).filter(bool)
-        abandoned = seen.switch_map(lambda at: rx.timer(at + timedelta(seconds=absence))).map(lambda _: OFF)
-        return rx.merge(obeyed, abandoned)
+        abandoned = seen.switch_map(lambda at: rx.timer(at + patience)).map(lambda _: OFF)
+        return rx.merge(obeyed, abandoned).start_with(OFF).distinct_until_changed()
 
-    def in_time(renewal: tuple[Timestamp[str], datetime | None]) -> bool:
+    def is_in_time(renewal: tuple[Timestamp[str], datetime | None]) -> bool:
         state, seen = renewal
-        return state.value == OFF or (
-            seen is not None and state.timestamp < seen + timedelta(seconds=absence)
-        )
+        return state.value == OFF or (seen is not None and state.timestamp < seen + patience)
 
     def renewed(seen: Observable[datetime]) -> Observable[str]:
-        states = latch(seen).start_with(OFF).distinct_until_changed().share()
+        states = latched(seen).share()
         renewals = states.switch_map(lambda it: rx.interval(repeat).map(lambda _: it)).timestamp()
         # A process that was paused runs late: `on`, due before the absence was complete, may come after it.
-        in_order = (
-            renewals.with_latest_from(seen.start_with(None)).filter(in_time).map(lambda it: it[0].value)
-        )
-        return rx.merge(in_order, states)
+        in_time = renewals.with_latest_from(seen.start_with(None)).filter(is_in_time)
+        return rx.merge(in_time.map(lambda renewal: renewal[0].value), states)
 
-    return last_seen(presences, now).publish(renewed)
+    return age.latest(presences, now=now).publish(renewed)
 
 
 def wire(node: ServiceNode) -> None:

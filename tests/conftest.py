@@ -23,7 +23,7 @@ DISCOVERY_RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
 
 
 def pytest_configure() -> None:
-    """Mark everything that the tests start, keep its DDS traffic on loopback, and undo a nohup of the tests."""
+    """Mark what the tests start, keep its DDS traffic on loopback, and undo a nohup of the tests."""
     name, _, value = MARK.partition("=")
     os.environ[name] = value
     os.environ[DISCOVERY_RANGE] = "LOCALHOST"
