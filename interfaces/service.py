@@ -287,6 +287,7 @@ def run(name: str, wire: Callable[[ServiceNode], None]) -> NoReturn:
     :param name: name of the node, unless remapped.
     :param wire: declares the parameters, builds the recipe and connects it with topics.
     """
+    stopping.prepare()
     code = _live(name, wire)
     stopping.ending()
     sys.exit(code)

@@ -1,8 +1,8 @@
 """How a service ends: SIGTERM and Ctrl-C end it within a second, with exit code 0, whatever it is doing.
 
-Importing this module is the first thing a service does. Before the service spins nothing is worth waiting
-for, so the process ends on the spot. From :func:`spinning` on, rclpy shuts down and the service winds up in
-order; but if that takes too long, or a second signal comes, the process ends on the spot as well.
+Before it spins nothing is worth waiting for: from :func:`prepare` on a signal ends the process on the spot.
+From :func:`spinning` on, rclpy shuts down and the service winds up in order; but if that takes too long, or a
+second signal comes, the process ends on the spot as well.
 """
 
 from __future__ import annotations
@@ -32,6 +32,12 @@ def _handle(signum: int, frame: FrameType | None) -> None:
     last_resort.start()
 
 
+def prepare() -> None:
+    """From now on this process is a service, and a signal ends it on the spot."""
+    for number in SIGNALS:
+        signal.signal(number, _handle)
+
+
 def spinning() -> None:
     """From now on a signal lets the service wind up; rclpy has to handle signals by now."""
     global _spins
@@ -42,7 +48,3 @@ def ending() -> None:
     """From now on a signal changes nothing: the process is about to end, with an exit code of its own."""
     for number in SIGNALS:
         signal.signal(number, signal.SIG_IGN)
-
-
-for _number in SIGNALS:
-    signal.signal(_number, _handle)

@@ -1,3 +1,8 @@
 """The services: one reactive recipe and one process each."""
 
-import interfaces.stopping  # noqa: F401  before all else: from here on a signal ends the process in order
+import sys
+
+from interfaces import stopping
+
+if sys.argv[0] == "-m":  # Python is about to run one: a signal may come while it is still loading
+    stopping.prepare()

@@ -23,17 +23,12 @@ DISCOVERY_RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
 
 
 def pytest_configure() -> None:
-    """Mark what the tests start, keep its DDS traffic on loopback, and undo a nohup of the tests."""
+    """Mark what the tests start, keep its DDS traffic on loopback, and be signalled like any program."""
     name, _, value = MARK.partition("=")
     os.environ[name] = value
     os.environ[DISCOVERY_RANGE] = "LOCALHOST"
-    signal.signal(signal.SIGHUP, signal.SIG_DFL)
-
-
-def pytest_collection_finish() -> None:
-    """Let signals end the tests, with clean-up: who imports a service, as tests do, would end on the spot."""
-    signal.signal(signal.SIGINT, signal.default_int_handler)
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)  # also under nohup
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # with clean-up, too
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:

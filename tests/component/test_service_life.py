@@ -101,7 +101,8 @@ def service(name: str, announce: bool = False) -> tuple[str, ...]:
     """The command line of a service, which may say when its first line has run."""
     if not announce:
         return "-m", f"services.{name}"
-    announced = "import services; print('begun', flush=True); import runpy; "
+    # With -m, too, sys.argv[0] is "-m" until the module is found.
+    announced = "import sys; sys.argv[0] = '-m'; import services; print('begun', flush=True); import runpy; "
     return "-c", announced + f"runpy.run_module('services.{name}', run_name='__main__', alter_sys=True)"
 
 
