@@ -168,3 +168,11 @@ def test_other_threads_run_while_an_executor_waits(executor: SingleThreadedExecu
     executor.shutdown()
     waiting.join(10)
     assert not waiting.is_alive()
+
+
+def test_a_context_forgets_the_shutdown_callbacks_of_objects_that_are_gone(context: Context) -> None:
+    class Listener:
+        def hear(self) -> None: ...
+
+    context.on_shutdown(Listener().hear)
+    assert context._callbacks == []

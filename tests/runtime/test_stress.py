@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import gc
 import threading
+import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 import rclpy
+from rclpy._dds.library import blocking
 from rclpy.context import Context
 from rclpy.executors import Executor, MultiThreadedExecutor, SingleThreadedExecutor
 from rclpy.node import Node
@@ -71,13 +73,20 @@ class Flood:
     failures: list[BaseException]
 
 
+@pytest.fixture
+def other(domain_id: int) -> Iterator[Node]:
+    """A node of another participant."""
+    context = Context()
+    rclpy.init(args=[], context=context, domain_id=domain_id)
+    with Node("flooding", context=context) as node:
+        yield node
+    context.shutdown()
+
+
 @pytest.fixture(params=[SingleThreadedExecutor, MultiThreadedExecutor])
 def flood(
-    request: pytest.FixtureRequest, make_node: Callable[..., Node], context: Context, domain_id: int
+    request: pytest.FixtureRequest, make_node: Callable[..., Node], context: Context, other: Node
 ) -> Iterator[Flood]:
-    other_context = Context()
-    rclpy.init(args=[], context=other_context, domain_id=domain_id)
-    other = Node("flooding", context=other_context)
     flood = Flood(make_node("churned"), other, request.param(context=context), [])
     flood.executor.add_node(flood.node)
     publisher = other.create_publisher(Float64, "flood", 10)
@@ -90,7 +99,7 @@ def flood(
             flood.failures.append(error)
 
     def pour() -> None:
-        with SingleThreadedExecutor(context=other_context) as executor:
+        with SingleThreadedExecutor(context=other.context) as executor:
             executor.add_node(other)
             while not end.wait(0.0005):
                 publisher.publish(Float64())
@@ -104,8 +113,6 @@ def flood(
     ended = flood.executor.shutdown(SECONDS)
     for thread in background:
         thread.join(SECONDS)
-    other.destroy_node()
-    other_context.shutdown()
     assert ended
     assert not flood.failures
 
@@ -149,3 +156,20 @@ def test_a_thousand_of_everything_leave_nothing_behind(flood: Flood, context: Co
     client = node.create_client(SetBool, "last")
     assert client.wait_for_service(SECONDS)
     assert client.call(SetBool.Request(data=True), SECONDS) == SetBool.Response(success=True)
+
+
+@pytest.mark.parametrize("asks", [False, True])
+def test_who_never_spins_keeps_nothing_of_what_peers_announced(
+    make_node: Callable[..., Node], other: Node, asks: bool
+) -> None:
+    node = make_node("deaf")
+    if asks:
+        assert node.wait_for_node("flooding", SECONDS)
+    for _ in range(CYCLES):
+        other.destroy_publisher(other.create_publisher(Float64, "flood", 10))
+    graph = node._graph
+    held = [graph._reader.condition, *(graph._discovery.gone if graph._discovery else ())]
+    deadline = time.monotonic() + SECONDS
+    while any(blocking.dds_triggered(condition) for condition in held):
+        assert time.monotonic() < deadline, "DDS still holds what nobody has taken"
+        time.sleep(0.01)

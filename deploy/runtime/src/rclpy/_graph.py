@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from rclpy import _names
-from rclpy._dds import Participant, Reader, WaitSet, Writer
+from rclpy._dds import INFINITY, GuardCondition, Participant, Reader, WaitSet, Writer
 from rclpy._dds.discovery import Discovery, Endpoint
 from rclpy._dds.qos import user_data_value
 from rclpy.exceptions import NodeNameNonExistentError
@@ -115,26 +115,28 @@ _MANY_PEERS = 100
 class Graph:
     """A process' view of the graph, and what it tells the others about its own nodes."""
 
-    # As far as an executor is concerned: something to wait for that runs no callback.
-    callback_group = None
-
     def __init__(self, domain_id: int, enclave: str) -> None:
         self._lock = threading.RLock()
         self.participant = Participant(domain_id, f"enclave={enclave};")
         hash_ = f"typehash={_TYPE_HASH};"
         self._writer = self.participant.create_writer(_TOPIC, _TYPE, _WRITER_QOS, hash_)
         self._reader = self.participant.create_reader(_TOPIC, _TYPE, _READER_QOS, hash_)
-        self._handles = (self._reader.condition,)
         self._own: dict[Node, NodeEntities] = {}
         self._deferred = 0
         self._peers: dict[bytes, list[NodeEntities]] = {}
         self._many_peers = _MANY_PEERS
         self._discovery: Discovery | None = None  # made when somebody asks about the graph
         self._service_ids = 0
+        self._waiting: set[GuardCondition] = set()
+        self._waitset = WaitSet()
+        self._waitset.attach(self._reader.condition, 0)
+        threading.Thread(target=self._listen, name="rclpy-graph", daemon=True).start()
 
     def close(self) -> None:
         """Leave the domain."""
-        self.participant.close()
+        with self._lock:  # in which the listening thread does what it does
+            self._waitset.close()
+            self.participant.close()
 
     # What this process tells
 
@@ -154,7 +156,6 @@ class Graph:
         with self._lock:
             if not self._deferred:
                 self._writer.write(encode(self.participant.gid, list(self._own.values())))
-                self._take()  # we hear ourselves: where nobody spins, it would pile up
 
     def add_node(self, node: Node) -> None:
         """Announce a node of this process."""
@@ -215,6 +216,22 @@ class Graph:
 
     # What the others tell
 
+    def _listen(self) -> None:
+        """Take what peers announce as it comes: where nobody spins or asks, it would pile up.
+
+        So there is a thread of its own for it, as in ROS 2.
+        """
+        while True:
+            self._waitset.wait(INFINITY)
+            with self._lock:
+                if self._waitset.closed:
+                    return
+                self._take()
+                if self._discovery is not None:
+                    self._discovery.forget_gone()
+                for guard in self._waiting:
+                    guard.trigger()
+
     def _take(self) -> None:
         """Note what peers have announced."""
         with self._lock:
@@ -232,13 +249,12 @@ class Graph:
         alive = self._discovered().participants()
         self._peers = {gid: nodes for gid, nodes in self._peers.items() if gid in alive}
 
-    def _execute(self, taken: Any) -> None:
-        raise AssertionError("the graph runs no callback")
-
     def _discovered(self) -> Discovery:
         with self._lock:
             if self._discovery is None:
                 self._discovery = Discovery(self.participant.handle)
+                for condition in self._discovery.gone:
+                    self._waitset.attach(condition, 0)
             return self._discovery
 
     def wait_for(
@@ -252,20 +268,25 @@ class Graph:
         :return: whether the condition came true.
         """
         deadline = None if timeout is None or timeout < 0 else time.monotonic() + timeout
-        waitset = WaitSet()
+        waitset, guard = WaitSet(), GuardCondition()
+        with self._lock:
+            self._waiting.add(guard)
         try:
-            for handle in (*self._discovered().news, self._reader.condition):
-                waitset.attach(handle, 1)
+            for handle in (*self._discovered().news, guard.handle):
+                waitset.attach(handle, 0)
             while not condition():
                 remaining = 0.1 if deadline is None else min(0.1, deadline - time.monotonic())
                 if remaining <= 0 or not alive():
                     return False
                 waitset.wait(int(remaining * 1e9))
-                self._take()
+                guard.take()
                 self._discovered().refresh()
             return True
         finally:
+            with self._lock:
+                self._waiting.discard(guard)
             waitset.close()
+            guard.close()
 
     def _nodes(self) -> Iterator[tuple[bytes, NodeEntities]]:
         """Every node that is known, with its participant's GUID."""

@@ -6,7 +6,7 @@ import atexit
 import threading
 import weakref
 from collections.abc import Callable
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, suppress
 from types import TracebackType
 from typing import TYPE_CHECKING, Protocol
 
@@ -48,7 +48,7 @@ class Context(AbstractContextManager["Context"]):
         self._logging = False
         self._domain_id = 0
         self._arguments = RosArguments()
-        self._callbacks: list[Callable[[], None]] = []
+        self._callbacks: list[Callable[[], Callable[[], None] | None]] = []  # as references to them
         self._nodes: weakref.WeakSet[Node] = weakref.WeakSet()
         self._executors: weakref.WeakSet[Executor] = weakref.WeakSet()
         self._events: weakref.WeakSet[threading.Event] = weakref.WeakSet()
@@ -115,10 +115,13 @@ class Context(AbstractContextManager["Context"]):
             if not self._valid:
                 callback()
             elif hasattr(callback, "__self__") and not isinstance(callback.__self__, type):
-                reference = weakref.WeakMethod(callback)
-                self._callbacks.append(lambda: (method := reference()) and method())
+                self._callbacks.append(weakref.WeakMethod(callback, self._forget_callback))
             else:
-                self._callbacks.append(callback)
+                self._callbacks.append(lambda: callback)
+
+    def _forget_callback(self, reference: Callable[[], Callable[[], None] | None]) -> None:
+        with suppress(ValueError):  # the shutdown has taken them all
+            self._callbacks.remove(reference)
 
     def shutdown(self) -> None:
         """
@@ -148,8 +151,9 @@ class Context(AbstractContextManager["Context"]):
             event.set()
         for executor in list(self._executors):
             executor.wake()
-        for callback in callbacks:
-            callback()
+        for reference in callbacks:
+            if (callback := reference()) is not None:
+                callback()
         if self._logging:
             global g_logging_ref_count
             with _logging_lock:

@@ -235,7 +235,6 @@ class Node(NodeParameters, NodeGraph):
     def _waitables(self) -> list[Any]:
         """What an executor waits for in DDS."""
         return [
-            self._graph,
             *list(self._subscriptions),
             *list(self._services),
             *list(self._clients),
@@ -244,7 +243,7 @@ class Node(NodeParameters, NodeGraph):
 
     def _entities(self) -> list[Any]:
         """Everything that runs a callback."""
-        return [*self._waitables()[1:], *list(self._timers), *list(self._guards)]
+        return [*self._waitables(), *list(self._timers), *list(self._guards)]
 
     # What it has
 

@@ -57,6 +57,7 @@ class _BuiltinReader:
         self._known: list[Any] | None = None
         self.handle = checked(blocking.dds_create_reader(participant, topic, None, None), "built-in reader")
         self.news = checked(blocking.dds_create_readcondition(self.handle, _NOT_READ), "read condition")
+        self.gone = checked(blocking.dds_create_readcondition(self.handle, _NOT_ALIVE), "read condition")
 
     def _loan(self, operation: str, mask: int) -> Iterator[tuple[Any, SampleInfo]]:
         read = getattr(blocking, operation)
@@ -80,14 +81,18 @@ class _BuiltinReader:
         """What exists now, each as ``convert`` makes it from the C structure."""
         with self._lock:
             if self._known is None or blocking.dds_triggered(self.news):
-                for _ in self._loan("dds_take_mask", _NOT_ALIVE):
-                    pass  # what has gone is not kept
                 self._known = [
                     convert(structure)
                     for structure, info in self._loan("dds_read_mask", ANY_STATE)
                     if info.valid_data and info.instance_state == _ALIVE
                 ]
             return self._known
+
+    def forget_gone(self) -> None:
+        """Do not keep what exists no more."""
+        with self._lock:
+            for _ in self._loan("dds_take_mask", _NOT_ALIVE):
+                self._known = None
 
 
 class Discovery:
@@ -102,6 +107,17 @@ class Discovery:
     def news(self) -> list[int]:
         """The DDS conditions that are true while there is something new."""
         return [self._participants.news, self._writers.news, self._readers.news]
+
+    @property
+    def gone(self) -> list[int]:
+        """The DDS conditions that are true until :meth:`forget_gone`."""
+        return [self._participants.gone, self._writers.gone, self._readers.gone]
+
+    def forget_gone(self) -> None:
+        """Give up what DDS keeps of entities that exist no more."""
+        self._participants.forget_gone()
+        self._writers.forget_gone()
+        self._readers.forget_gone()
 
     def refresh(self) -> None:
         """Read all the news, so that only further ones trigger the conditions."""

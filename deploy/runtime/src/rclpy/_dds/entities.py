@@ -244,7 +244,7 @@ class WaitSet:
         self._capacity = 0
         self._tokens = (ct.c_ssize_t * 0)()
         self._attached = 0
-        self._closed = False
+        self.closed = False
 
     def attach(self, handle: int, token: int) -> bool:
         """Wait on ``handle`` from now on; ``wait`` reports it as ``token``. False if it is gone already."""
@@ -264,11 +264,11 @@ class WaitSet:
     def wait(self, timeout: int) -> list[int]:
         """The tokens of what is triggered, after at most ``timeout`` [ns]; empty if nothing was."""
         count = blocking.dds_waitset_wait(self.handle, self._tokens, self._capacity, timeout)
-        if self._closed:
+        if self.closed:
             return []
         return self._tokens[: min(checked(count, "cannot wait"), self._capacity)]
 
     def close(self) -> None:
         """End it, and every wait; what was attached lives on."""
-        self._closed = True
+        self.closed = True
         blocking.dds_delete(self.handle)
