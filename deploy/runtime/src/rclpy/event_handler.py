@@ -13,7 +13,6 @@ from typing import Any
 from rclpy import logging
 from rclpy._dds import Reader, Writer, status
 from rclpy.callback_groups import CallbackGroup
-from rclpy.exceptions import UnsupportedEventTypeError
 from rclpy.qos import QoSPolicyKind, qos_policy_name_from_kind
 from rclpy.waitable import NumberOfEntities, Waitable
 
@@ -113,7 +112,10 @@ _POLICY_KINDS = {
     21: QoSPolicyKind.LIFESPAN,
 }
 
-# The DDS status that tells of an event, and what the callback gets. Types are not compared by DDS here.
+# Cyclone DDS never says that types differ; rmw_cyclonedds takes a callback for it all the same.
+_NEVER = ""
+
+# The DDS status that tells of an event, and what the callback gets.
 _PUBLISHER_EVENTS: dict[int, tuple[str, Callable[..., Any]]] = {
     QoSPublisherEventType.RCL_PUBLISHER_OFFERED_DEADLINE_MISSED: (
         "offered_deadline_missed",
@@ -124,6 +126,7 @@ _PUBLISHER_EVENTS: dict[int, tuple[str, Callable[..., Any]]] = {
         "offered_incompatible_qos",
         QoSOfferedIncompatibleQoSInfo,
     ),
+    QoSPublisherEventType.RCL_PUBLISHER_INCOMPATIBLE_TYPE: (_NEVER, IncompatibleTypeInfo),
     QoSPublisherEventType.RCL_PUBLISHER_MATCHED: ("publication_matched", QoSPublisherMatchedInfo),
 }
 _SUBSCRIPTION_EVENTS: dict[int, tuple[str, Callable[..., Any]]] = {
@@ -140,6 +143,7 @@ _SUBSCRIPTION_EVENTS: dict[int, tuple[str, Callable[..., Any]]] = {
         QoSRequestedIncompatibleQoSInfo,
     ),
     QoSSubscriptionEventType.RCL_SUBSCRIPTION_MESSAGE_LOST: ("sample_lost", QoSMessageLostInfo),
+    QoSSubscriptionEventType.RCL_SUBSCRIPTION_INCOMPATIBLE_TYPE: (_NEVER, IncompatibleTypeInfo),
     QoSSubscriptionEventType.RCL_SUBSCRIPTION_MATCHED: ("subscription_matched", QoSSubscriptionMatchedInfo),
 }
 
@@ -163,15 +167,9 @@ class EventHandler(Waitable):
         event_type: IntEnum,
         parent_impl: Writer | Reader,
     ) -> None:
-        """
-        Create a handler; publishers and subscriptions make theirs from their event callbacks.
-
-        :raises UnsupportedEventTypeError: if the middleware cannot tell of such events.
-        """
+        """Create a handler; publishers and subscriptions make theirs from their event callbacks."""
         super().__init__(callback_group)
         events = _PUBLISHER_EVENTS if isinstance(event_type, QoSPublisherEventType) else _SUBSCRIPTION_EVENTS
-        if event_type not in events:
-            raise UnsupportedEventTypeError(f"Cyclone DDS cannot report {event_type.name}")
         self.callback = callback
         self.event_type = event_type
         self._status, self._make_info = events[event_type]
@@ -196,7 +194,9 @@ class EventHandler(Waitable):
 
     def take_data(self) -> Any:
         """What happened since it was last asked for, ``None`` if nothing did."""
-        found = None if self._destroyed else status.changed(self._parent.handle, self._status)
+        if self._destroyed or self._status == _NEVER:
+            return None
+        found = status.changed(self._parent.handle, self._status)
         return None if found is None else _info(self._make_info, found)
 
 
@@ -218,7 +218,7 @@ def _handlers(
         for event, callback in callbacks.items()
         if callback is not None
     ]
-    status.watch(parent.handle, [handler._status for handler in handlers])
+    status.watch(parent.handle, [handler._status for handler in handlers if handler._status != _NEVER])
     return handlers
 
 
