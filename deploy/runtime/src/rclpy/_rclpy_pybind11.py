@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import NoReturn
 
+from rclpy import service_introspection
 from rclpy.clock_type import ClockType
 from rclpy.exceptions import (
     InvalidHandle,
@@ -30,6 +31,7 @@ __all__ = [
     "SignalHandlerOptions",
     "UnknownROSArgsError",
     "UnsupportedEventTypeError",
+    "service_introspection",
 ]
 
 

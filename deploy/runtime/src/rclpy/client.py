@@ -6,20 +6,20 @@ import itertools
 import threading
 from typing import TYPE_CHECKING, Any
 
-from rclpy._bad_input import BadInput
 from rclpy._dds import Writer
-from rclpy._endpoint import Owner, ServiceEndpoint
+from rclpy._endpoint import ServiceEndpoint
+from rclpy._service_side import ServiceSide
 from rclpy._service_wire import RequestId, server_is_matched, unwrap, wrap
 from rclpy.callback_groups import CallbackGroup
 from rclpy.qos import QoSProfile
 from rclpy.task import Future
+from service_msgs.msg import ServiceEventInfo
 
 if TYPE_CHECKING:
-    from rclpy.clock import Clock
     from rclpy.context import Context
 
 
-class Client(Owner):
+class Client(ServiceSide):
     """Calls one service; :meth:`rclpy.node.Node.create_client` makes them."""
 
     def __init__(
@@ -31,30 +31,18 @@ class Client(Owner):
         qos_profile: QoSProfile,
         callback_group: CallbackGroup,
     ) -> None:
-        super().__init__(client_impl.node, client_impl.name, client_impl.writer, client_impl.reader)
+        super().__init__(client_impl, srv_type, srv_name, callback_group, qos_profile)
         self._requests = client_impl.writer
         self._replies = client_impl.reader
-        self._handles = (self._replies.condition,)
-        self._bad_input = BadInput(self._node, self._name)
         self._sequence_numbers = itertools.count(1)
         self._pending_requests: dict[int, Future] = {}
-        self._lock = threading.Lock()
         self.context = context
-        self.srv_type = srv_type
-        self.srv_name = srv_name
-        self.qos_profile = qos_profile
-        self.callback_group = callback_group
 
     @property
     def handle(self) -> Writer:
         """The DDS writer of the requests. Raises InvalidHandle when the client was destroyed."""
         self._check_usable()
         return self._requests
-
-    @property
-    def service_name(self) -> str:
-        """The fully qualified, remapped name."""
-        return self._name
 
     def call(self, request: Any, timeout_sec: float | None = None) -> Any:
         """
@@ -90,6 +78,7 @@ class Client(Owner):
         # Not as a done callback: it would need the executor to run it.
         future._call_when_complete(lambda: self.remove_pending_request(future))
         self.handle.write(wrap(RequestId(self._requests.instance_handle, number), data))
+        self._tell(ServiceEventInfo.REQUEST_SENT, self._requests.gid, number, request=request)
         return future
 
     def get_pending_request(self, sequence_number: int) -> Future:
@@ -112,12 +101,6 @@ class Client(Owner):
         """Wait until a server is there; ``False`` if that takes longer than ``timeout_sec``."""
         return self._node._graph.wait_for(self.service_is_ready, timeout_sec, self.context.ok)
 
-    def configure_introspection(
-        self, clock: Clock, service_event_qos_profile: QoSProfile, introspection_state: Any
-    ) -> None:
-        """Not supported: raises NotImplementedError."""
-        raise NotImplementedError("rclpy.client.Client.configure_introspection")
-
     # What the executor asks of everything it waits for.
 
     def _take(self) -> tuple[Future, Any] | None:
@@ -126,13 +109,16 @@ class Client(Owner):
                 request_id, data = unwrap(sample.data)
                 if request_id.client != self._requests.instance_handle:
                     continue  # all clients of a service share one topic: this is another one's reply
-                with self._lock:
-                    future = self._pending_requests.get(request_id.sequence_number)
-                if future is None:
-                    continue  # nobody waits for it any more
-                return future, self.srv_type.Response._deserialize(data)
+                response = self.srv_type.Response._deserialize(data)
             except ValueError as error:
                 self._bad_input.drop(sample, error)
+                continue
+            number = request_id.sequence_number
+            self._tell(ServiceEventInfo.RESPONSE_RECEIVED, self._requests.gid, number, response=response)
+            with self._lock:
+                future = self._pending_requests.get(number)
+            if future is not None:  # else nobody waits for it any more
+                return future, response
         return None
 
     def _execute(self, taken: tuple[Future, Any]) -> None:

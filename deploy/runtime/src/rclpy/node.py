@@ -146,8 +146,7 @@ class Node(NodeParameters, NodeGraph):
             self._graph.add_node(self)
             self._rosout_publisher: Publisher | None = None
             if enable_rosout and self._context.arguments.rosout_logs:
-                self._rosout_publisher = self.create_publisher(Log, "/rosout", _ROSOUT_QOS)
-                self._publishers.remove(self._rosout_publisher)  # it is not the user's
+                self._rosout_publisher = self._create_own_publisher(Log, "/rosout", _ROSOUT_QOS)
                 _logging_output.add_rosout_publisher(self._logger.name, self._publish_log)
             self._parameter_event_publisher = self.create_publisher(
                 ParameterEvent, "/parameter_events", qos_profile_parameter_events
@@ -346,6 +345,13 @@ class Node(NodeParameters, NodeGraph):
         if publisher.event_handlers:
             self._events[publisher] = EndpointEvents(publisher.event_handlers, writer)
         self._add(self._publishers, publisher)
+        return publisher
+
+    def _create_own_publisher(self, msg_type: Any, topic: str, qos_profile: QoSProfile) -> Publisher:
+        """A publisher that is not the user's: it is not listed, and nobody hears of its events."""
+        silent = PublisherEventCallbacks(use_default_callbacks=False)
+        publisher = self.create_publisher(msg_type, topic, qos_profile, event_callbacks=silent)
+        self._publishers.remove(publisher)
         return publisher
 
     def create_subscription(
@@ -591,7 +597,6 @@ class Node(NodeParameters, NodeGraph):
         with self._graph.one_announcement():
             if self._rosout_publisher is not None:
                 _logging_output.remove_rosout_publisher(self._publish_log)
-                self._events.pop(self._rosout_publisher, None)
                 self._rosout_publisher.destroy()
             self._destroyed = True
             for entities in (

@@ -3,28 +3,26 @@
 from __future__ import annotations
 
 import inspect
-import threading
+import struct
 import time
 from collections.abc import Callable, Coroutine
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from rclpy._bad_input import BadInput
 from rclpy._dds import Reader
-from rclpy._endpoint import Owner, ServiceEndpoint
+from rclpy._endpoint import ServiceEndpoint
+from rclpy._service_side import ServiceSide
 from rclpy._service_wire import RequestId, client_is_matched, unwrap, wrap
 from rclpy.callback_groups import CallbackGroup
 from rclpy.exceptions import InvalidHandle
 from rclpy.qos import QoSProfile
-
-if TYPE_CHECKING:
-    from rclpy.clock import Clock
+from service_msgs.msg import ServiceEventInfo
 
 # A client may be heard before discovery has told us of its reader: so long a reply waits for it [s].
 _PATIENCE = 0.1
 
 
-class Service(Owner):
+class Service(ServiceSide):
     """Answers requests by its callback; :meth:`rclpy.node.Node.create_service` makes them."""
 
     def __init__(
@@ -36,29 +34,17 @@ class Service(Owner):
         callback_group: CallbackGroup,
         qos_profile: QoSProfile,
     ) -> None:
-        super().__init__(service_impl.node, service_impl.name, service_impl.writer, service_impl.reader)
+        super().__init__(service_impl, srv_type, srv_name, callback_group, qos_profile)
         self._replies = service_impl.writer
         self._requests = service_impl.reader
-        self._handles = (self._requests.condition,)
-        self._bad_input = BadInput(self._node, self._name)
         self._known_clients: set[int] = set()
-        self._lock = threading.Lock()
-        self.srv_type = srv_type
-        self.srv_name = srv_name
         self.callback = callback
-        self.callback_group = callback_group
-        self.qos_profile = qos_profile
 
     @property
     def handle(self) -> Reader:
         """The DDS reader of the requests. Raises InvalidHandle when the service was destroyed."""
         self._check_usable()
         return self._requests
-
-    @property
-    def service_name(self) -> str:
-        """The fully qualified, remapped name."""
-        return self._name
 
     def send_response(self, response: Any, header: RequestId) -> None:
         """
@@ -74,6 +60,12 @@ class Service(Owner):
         # A service that another thread has destroyed meanwhile answers no more.
         with suppress(InvalidHandle):
             self._replies.write(data)
+        self._tell_of(ServiceEventInfo.RESPONSE_SENT, header, response=response)
+
+    def _tell_of(self, event_type: int, request_id: RequestId, **message: Any) -> None:
+        # A server does not know the client's GID: it takes the request's for it, as rmw_cyclonedds does.
+        client = struct.pack("<QQ", request_id.client, request_id.publication_handle)
+        self._tell(event_type, client, request_id.sequence_number, **message)
 
     def _wait_for_client(self, publication_handle: int) -> None:
         with self._lock:
@@ -90,12 +82,6 @@ class Service(Owner):
                     self._known_clients.clear()
                 self._known_clients.add(publication_handle)
 
-    def configure_introspection(
-        self, clock: Clock, service_event_qos_profile: QoSProfile, introspection_state: Any
-    ) -> None:
-        """Not supported: raises NotImplementedError."""
-        raise NotImplementedError("rclpy.service.Service.configure_introspection")
-
     # What the executor asks of everything it waits for.
 
     def _take(self) -> tuple[Any, RequestId] | None:
@@ -106,7 +92,9 @@ class Service(Owner):
             except ValueError as error:
                 self._bad_input.drop(sample, error)
                 continue
-            return request, request_id._replace(publication_handle=sample.publication_handle)
+            request_id = request_id._replace(publication_handle=sample.publication_handle)
+            self._tell_of(ServiceEventInfo.REQUEST_RECEIVED, request_id, request=request)
+            return request, request_id
         return None
 
     def _execute(self, taken: tuple[Any, RequestId]) -> Coroutine[Any, Any, None] | None:

@@ -1,0 +1,106 @@
+"""What services and clients have in common: names, and the events by which others watch their calls."""
+
+from __future__ import annotations
+
+import threading
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+from rclpy._bad_input import BadInput
+from rclpy._endpoint import Owner, ServiceEndpoint
+from rclpy.callback_groups import CallbackGroup
+from rclpy.exceptions import InvalidHandle
+from rclpy.qos import QoSProfile
+from rclpy.service_introspection import ServiceIntrospectionState
+
+if TYPE_CHECKING:
+    from rclpy.clock import Clock
+    from rclpy.publisher import Publisher
+
+
+@dataclass(frozen=True)
+class _Introspection:
+    publisher: Publisher
+    clock: Clock
+    state: ServiceIntrospectionState
+
+
+class ServiceSide(Owner):
+    """A service or a client of one."""
+
+    def __init__(
+        self,
+        endpoint: ServiceEndpoint,
+        srv_type: Any,
+        srv_name: str,
+        callback_group: CallbackGroup,
+        qos_profile: QoSProfile,
+    ) -> None:
+        super().__init__(endpoint.node, endpoint.name, endpoint.writer, endpoint.reader)
+        self._handles = (endpoint.reader.condition,)
+        self._bad_input = BadInput(self._node, self._name)
+        self._lock = threading.Lock()
+        self._introspection: _Introspection | None = None
+        self.srv_type = srv_type
+        self.srv_name = srv_name
+        self.callback_group = callback_group
+        self.qos_profile = qos_profile
+
+    @property
+    def service_name(self) -> str:
+        """The fully qualified, remapped name."""
+        return self._name
+
+    def configure_introspection(
+        self,
+        clock: Clock,
+        service_event_qos_profile: QoSProfile,
+        introspection_state: ServiceIntrospectionState,
+    ) -> None:
+        """
+        Tell on ``<service>/_service_event`` what happens to calls, from now on.
+
+        Clock and QoS stay as they are until it was OFF in between, as in rclpy.
+
+        :param clock: by which the events are stamped.
+        :param service_event_qos_profile: the QoS of the topic.
+        :param introspection_state: how much to tell.
+        :raises InvalidHandle: if the service or client was destroyed.
+        """
+        self._check_usable()
+        if introspection_state == ServiceIntrospectionState.OFF:
+            self._end_introspection()
+        elif self._introspection is not None:
+            self._introspection = replace(self._introspection, state=introspection_state)
+        else:
+            publisher = self._node._create_own_publisher(
+                self.srv_type.Event, f"{self._name}/_service_event", service_event_qos_profile
+            )
+            self._introspection = _Introspection(publisher, clock, introspection_state)
+
+    def _end_introspection(self) -> None:
+        introspection, self._introspection = self._introspection, None
+        if introspection is not None:
+            introspection.publisher.destroy()
+
+    def _tell(self, event_type: int, client_gid: bytes, sequence_number: int, **message: Any) -> None:
+        """Tell of an event, if that is wanted; ``message`` is the ``request`` or the ``response``."""
+        introspection = self._introspection
+        if introspection is None:
+            return
+        event = self.srv_type.Event()
+        event.info.event_type = event_type
+        event.info.stamp = introspection.clock.now().to_msg()
+        event.info.client_gid = client_gid
+        event.info.sequence_number = sequence_number
+        if introspection.state == ServiceIntrospectionState.CONTENTS:
+            for name, value in message.items():
+                setattr(event, name, [value])
+        with suppress(InvalidHandle):  # another thread may have switched it off meanwhile
+            introspection.publisher.publish(event)
+
+    def destroy(self) -> None:
+        """End it; whoever created it should use the node's method for that."""
+        self._end_introspection()
+        super().destroy()
