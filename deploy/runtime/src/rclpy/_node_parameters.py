@@ -16,6 +16,7 @@ from rcl_interfaces.msg import (
     SetParametersResult,
 )
 from rcl_interfaces.msg import Parameter as ParameterMsg
+from rclpy._node_names import NodeNames
 from rclpy._parameter_checks import objection
 from rclpy.exceptions import (
     InvalidParameterTypeException,
@@ -35,7 +36,7 @@ _DEPTH_RECURSIVE = 0
 """`rcl_interfaces/srv/ListParameters`: list names however deep they are."""
 
 
-class NodeParameters:
+class NodeParameters(NodeNames):
     """
     Parameters by name, each with a descriptor, and the callbacks that have a say in them.
 
@@ -71,10 +72,6 @@ class NodeParameters:
 
     def _publish_parameter_event(self, event: ParameterEvent) -> None:
         """Tell the world what has changed: the node publishes on `/parameter_events`."""
-        raise NotImplementedError
-
-    def get_fully_qualified_name(self) -> str:
-        """Return the name of the node with its namespace."""
         raise NotImplementedError
 
     def get_clock(self) -> Clock:

@@ -12,6 +12,7 @@ from enum import IntEnum
 from types import TracebackType
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
+from rclpy._handle import Handle
 from rclpy.clock_type import ClockType
 from rclpy.constants import S_TO_NS
 from rclpy.duration import Duration
@@ -168,7 +169,7 @@ class _Listener(NamedTuple):
         return (0 < self.min_forward <= delta) or (0 > self.min_backward >= delta)
 
 
-class _ClockSource:
+class _ClockSource(Handle):
     """The one implementation of ClockHandle: reads the machine, or the time a simulator has set."""
 
     def __init__(self, clock_type: ClockType) -> None:

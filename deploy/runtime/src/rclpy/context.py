@@ -8,11 +8,12 @@ import weakref
 from collections.abc import Callable
 from contextlib import AbstractContextManager, suppress
 from types import TracebackType
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 from rclpy import logging
 from rclpy._arguments import RosArguments, parse
 from rclpy._dds import domain
+from rclpy._handle import Handle
 from rclpy.exceptions import NotInitializedException, RCLError
 
 if TYPE_CHECKING:
@@ -24,14 +25,23 @@ g_logging_ref_count = 0
 _logging_lock = threading.Lock()
 
 
-class ContextHandle(Protocol):
-    """What rclpy's C layer keeps of a context."""
+class ContextHandle(Handle):
+    """What stands for a context."""
 
-    def ok(self) -> bool: ...
+    def __init__(self, context: Context) -> None:
+        self._context = context
 
-    def get_domain_id(self) -> int: ...
+    def ok(self) -> bool:
+        """Whether the context runs."""
+        return self._context.ok()
 
-    def shutdown(self) -> None: ...
+    def get_domain_id(self) -> int:
+        """The DDS domain."""
+        return self._context.get_domain_id()
+
+    def shutdown(self) -> None:
+        """End the context. Raises RCLError if it does not run."""
+        self._context.shutdown()
 
 
 class Context(AbstractContextManager["Context"]):
@@ -55,11 +65,14 @@ class Context(AbstractContextManager["Context"]):
         self._graph: Graph | None = None
 
     @property
-    def handle(self) -> Context:
-        """The context itself. Raises NotInitializedException before ``init``."""
+    def handle(self) -> ContextHandle:
+        """What stands for the context. Raises NotInitializedException before ``init``."""
+        self._check_initialized()
+        return ContextHandle(self)
+
+    def _check_initialized(self) -> None:
         if not self._initialized:
             raise NotInitializedException("Context.init() must be called first")
-        return self
 
     def init(
         self,
@@ -104,8 +117,9 @@ class Context(AbstractContextManager["Context"]):
         return self._valid
 
     def get_domain_id(self) -> int:
-        """The DDS domain."""
-        return self.handle._domain_id
+        """The DDS domain. Raises NotInitializedException before ``init``."""
+        self._check_initialized()
+        return self._domain_id
 
     def on_shutdown(self, callback: Callable[[], None]) -> None:
         """Call ``callback`` at shutdown; a bound method does not keep its object alive."""

@@ -6,6 +6,7 @@ import threading
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
+from rclpy._handle import Handle
 from rclpy.callback_groups import CallbackGroup
 from rclpy.exceptions import InvalidHandle
 
@@ -13,7 +14,7 @@ if TYPE_CHECKING:
     from rclpy.context import Context
 
 
-class GuardCondition:
+class GuardCondition(Handle):
     """Runs its callback on the executor after each :meth:`trigger`; several triggers may become one."""
 
     def __init__(

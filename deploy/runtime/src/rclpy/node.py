@@ -23,8 +23,7 @@ from rclpy.event_handler import (
     PublisherEventCallbacks,
     SubscriptionEventCallbacks,
 )
-from rclpy.exceptions import InvalidHandle, NotInitializedException
-from rclpy.expand_topic_name import expand_topic_name
+from rclpy.exceptions import NotInitializedException
 from rclpy.guard_condition import GuardCondition
 from rclpy.impl import _logging_output
 from rclpy.impl.rcutils_logger import RcutilsLogger
@@ -47,7 +46,6 @@ from rclpy.timer import Rate, Timer
 from rclpy.type_description_service import TypeDescriptionService
 from rclpy.type_support import check_is_valid_msg_type, check_is_valid_srv_type
 from rclpy.utilities import get_default_context
-from rclpy.validate_full_topic_name import validate_full_topic_name
 from rclpy.validate_namespace import validate_namespace
 from rclpy.validate_node_name import validate_node_name
 from rclpy.validate_topic_name import validate_topic_name
@@ -125,7 +123,6 @@ class Node(NodeParameters, NodeGraph):
         self._logger = get_logger(self._fully_qualified_name.lstrip("/").replace("/", "."))
         self._clock = ROSClock()
         self._executor: weakref.ref[Executor] | None = None
-        self._destroyed = False
         self._publishers: list[Publisher] = []
         self._subscriptions: list[Subscription] = []
         self._services: list[Service] = []
@@ -164,33 +161,9 @@ class Node(NodeParameters, NodeGraph):
     # Who it is
 
     @property
-    def context(self) -> Context:
-        """The context it belongs to."""
-        return self._context
-
-    @property
-    def handle(self) -> Node:
-        """The node itself. Raises InvalidHandle when it was destroyed."""
-        if self._destroyed:
-            raise InvalidHandle("cannot use a node that was destroyed")
-        return self
-
-    @property
     def default_callback_group(self) -> CallbackGroup:
         """The group of everything that is created without one: its callbacks run one at a time."""
         return self._default_callback_group
-
-    def get_name(self) -> str:
-        """Return its name."""
-        return self._name
-
-    def get_namespace(self) -> str:
-        """Return its namespace."""
-        return self._namespace
-
-    def get_fully_qualified_name(self) -> str:
-        """Return its namespace and name."""
-        return self._fully_qualified_name
 
     def get_clock(self) -> Clock:
         """Return its clock, which tells ROS time."""
@@ -292,22 +265,6 @@ class Node(NodeParameters, NodeGraph):
         """Not supported: raises NotImplementedError."""
         raise NotImplementedError("rclpy.node.Node.remove_waitable")
 
-    # Names
-
-    def resolve_topic_name(self, topic: str, *, only_expand: bool = False) -> str:
-        """Return the fully qualified name of a topic, remapped unless ``only_expand``."""
-        validate_topic_name(topic)
-        name = expand_topic_name(topic, self._name, self._namespace)
-        validate_full_topic_name(name)
-        return name if only_expand else self._arguments.remap_topic(name, self._name, self._namespace)
-
-    def resolve_service_name(self, service: str, *, only_expand: bool = False) -> str:
-        """Return the fully qualified name of a service, remapped unless ``only_expand``."""
-        validate_topic_name(service, is_service=True)
-        name = expand_topic_name(service, self._name, self._namespace)
-        validate_full_topic_name(name, is_service=True)
-        return name if only_expand else self._arguments.remap_service(name, self._name, self._namespace)
-
     # Creating
 
     def create_publisher(
@@ -333,7 +290,7 @@ class Node(NodeParameters, NodeGraph):
             Publisher, msg_type, topic, qos_profile, qos_overriding_options
         )
         dds_name = _names.topic_to_dds(name, avoid_conventions=profile.avoid_ros_namespace_conventions)
-        writer = self.handle._graph.create_writer(self, dds_name, msg_type, profile)
+        writer = self._graph.create_writer(self, dds_name, msg_type, profile)
         publisher = publisher_class(
             PublisherEndpoint(self, name, writer),
             msg_type,
@@ -380,7 +337,7 @@ class Node(NodeParameters, NodeGraph):
             Subscription, msg_type, topic, qos_profile, qos_overriding_options
         )
         dds_name = _names.topic_to_dds(name, avoid_conventions=profile.avoid_ros_namespace_conventions)
-        reader = self.handle._graph.create_reader(self, dds_name, msg_type, profile)
+        reader = self._graph.create_reader(self, dds_name, msg_type, profile)
         group = callback_group or self._default_callback_group
         try:
             subscription = Subscription(
@@ -411,6 +368,7 @@ class Node(NodeParameters, NodeGraph):
         overriding: QoSOverridingOptions | None,
     ) -> tuple[QoSProfile, str]:
         """The profile, with its overrides, and the fully qualified name of a new endpoint's topic."""
+        self._check_usable()
         check_is_valid_msg_type(msg_type)
         if isinstance(qos_profile, QoSProfile):
             profile = qos_profile
@@ -420,7 +378,8 @@ class Node(NodeParameters, NodeGraph):
             profile = QoSProfile(depth=qos_profile)
         else:
             raise TypeError(f"Expected QoSProfile or int, but received {type(qos_profile)!r}")
-        name = self.resolve_topic_name(topic)
+        validate_topic_name(topic)
+        name = self._remapped(topic)
         if overriding is not None:
             _declare_qos_parameters(kind, self, name, profile, overriding)
         return profile, name
@@ -470,9 +429,11 @@ class Node(NodeParameters, NodeGraph):
     def _service_endpoint(
         self, srv_type: Any, srv_name: str, profile: QoSProfile, *, is_server: bool
     ) -> ServiceEndpoint:
+        self._check_usable()
         check_is_valid_srv_type(srv_type)
-        graph = self.handle._graph
-        name = self.resolve_service_name(srv_name)
+        validate_topic_name(srv_name, is_service=True)
+        name = self._remapped(srv_name, is_service=True)
+        graph = self._graph
         identity = f"{'serviceid' if is_server else 'clientid'}={graph.next_service_id()};"
         requests = (_names.request_to_dds(name), srv_type.Request, profile, identity)
         replies = (_names.reply_to_dds(name), srv_type.Response, profile, identity)
@@ -496,6 +457,7 @@ class Node(NodeParameters, NodeGraph):
         :param clock: the clock it runs by; the node's if ``None``.
         :param autostart: whether it runs at once, or waits for :meth:`rclpy.timer.Timer.reset`.
         """
+        self._check_usable()
         group = callback_group or self._default_callback_group
         timer = Timer(
             callback,
@@ -514,6 +476,7 @@ class Node(NodeParameters, NodeGraph):
         self, callback: Callable[[], Any], callback_group: CallbackGroup | None = None
     ) -> GuardCondition:
         """Create a guard condition, whose callback runs after each trigger."""
+        self._check_usable()
         group = callback_group or self._default_callback_group
         guard = GuardCondition(callback, group, context=self._context)
         guard._on_change = self._wake_executor

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from rclpy._dds import INFINITY
+from rclpy._handle import Handle
 from rclpy.callback_groups import CallbackGroup
 from rclpy.clock import Clock, ClockChange, JumpThreshold, TimeJump
 from rclpy.clock_type import ClockType
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 TimerCallbackType = Callable[[], Any]
 
 
-class Timer:
+class Timer(Handle):
     """Calls back once a period by its clock. The periods do not drift; missed ones are skipped."""
 
     def __init__(

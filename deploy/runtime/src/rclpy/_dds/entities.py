@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes as ct
 from typing import NamedTuple
 
+from rclpy._handle import Handle
 from rclpy.exceptions import InvalidHandle
 from rclpy.qos import QoSProfile
 
@@ -109,7 +110,7 @@ class Participant:
             blocking.dds_delete(handle)
 
 
-class Writer:
+class Writer(Handle):
     """A DDS writer of CDR."""
 
     def __init__(self, handle: int) -> None:
@@ -170,7 +171,7 @@ class Writer:
         blocking.dds_delete(self.handle)
 
 
-class Reader:
+class Reader(Handle):
     """A DDS reader of CDR. ``condition`` is what a wait set waits on."""
 
     def __init__(self, handle: int) -> None:

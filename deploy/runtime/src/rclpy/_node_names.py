@@ -1,0 +1,102 @@
+"""Who a node is, and what names mean in its mouth: the part of `Node` that concerns names."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from rclpy._handle import Handle
+from rclpy.exceptions import InvalidHandle, NameValidationException, RCLError
+from rclpy.expand_topic_name import expand_topic_name
+from rclpy.validate_full_topic_name import validate_full_topic_name
+
+if TYPE_CHECKING:
+    from rclpy._arguments import RosArguments
+    from rclpy.context import Context
+
+
+class NodeNames:
+    """The node's own name, and those that it gives to topics and services."""
+
+    _context: Context
+    _arguments: RosArguments
+    _name: str
+    _namespace: str
+    _fully_qualified_name: str
+    _destroyed = False
+
+    @property
+    def context(self) -> Context:
+        """The context it belongs to."""
+        return self._context
+
+    @property
+    def handle(self) -> Handle:
+        """What stands for the node. Raises InvalidHandle when it was destroyed."""
+        self._check_exists()
+        return Handle()
+
+    def _check_exists(self) -> None:
+        if self._destroyed:
+            raise InvalidHandle(f"cannot use node {self._fully_qualified_name}: it was destroyed")
+
+    def _check_usable(self) -> None:
+        """
+        Check that it can be used in its domain.
+
+        :raises InvalidHandle: if it was destroyed.
+        :raises RCLError: if the context was shut down.
+        """
+        self._check_exists()
+        if not self._context.ok():
+            raise RCLError(f"cannot use node {self._fully_qualified_name}: the context was shut down")
+
+    def get_name(self) -> str:
+        """Return its name."""
+        return self._name
+
+    def get_namespace(self) -> str:
+        """Return its namespace."""
+        return self._namespace
+
+    def get_fully_qualified_name(self) -> str:
+        """Return its namespace and name."""
+        return self._fully_qualified_name
+
+    def resolve_topic_name(self, topic: str, *, only_expand: bool = False) -> str:
+        """
+        Return the fully qualified name of a topic, remapped unless ``only_expand``.
+
+        :raises RCLError: if the name is invalid.
+        """
+        return self._resolve(topic, only_expand, is_service=False)
+
+    def resolve_service_name(self, service: str, *, only_expand: bool = False) -> str:
+        """
+        Return the fully qualified name of a service, remapped unless ``only_expand``.
+
+        :raises RCLError: if the name is invalid.
+        """
+        return self._resolve(service, only_expand, is_service=True)
+
+    def _resolve(self, name: str, only_expand: bool, *, is_service: bool) -> str:
+        try:
+            expand = self._expanded if only_expand else self._remapped
+            return expand(name, is_service=is_service)
+        except (ValueError, NameValidationException) as error:
+            raise RCLError(f"failed to resolve name: {error}") from error
+
+    def _expanded(self, name: str, *, is_service: bool = False) -> str:
+        """
+        Return the fully qualified name of a topic or service.
+
+        :raises ValueError: if the name as it stands is invalid.
+        :raises InvalidTopicNameException, InvalidServiceNameException: if it is once expanded.
+        """
+        expanded = expand_topic_name(name, self._name, self._namespace)
+        validate_full_topic_name(expanded, is_service=is_service)
+        return expanded
+
+    def _remapped(self, name: str, *, is_service: bool = False) -> str:
+        """Return the fully qualified name as the arguments remap it. Raises what :meth:`_expanded` does."""
+        remap = self._arguments.remap_service if is_service else self._arguments.remap_topic
+        return remap(self._expanded(name, is_service=is_service), self._name, self._namespace)
