@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Callable
 from typing import Any
 
@@ -187,3 +188,9 @@ def test_who_asks_for_incompatible_types_hears_of_the_rest(node: Node, spin_unti
     node.create_subscription(Float64, "x", ignore, 1, event_callbacks=requesting)
     spin_until(lambda: len(heard) == 2)
     assert {type(info) for info in heard} == {QoSPublisherMatchedInfo, QoSSubscriptionMatchedInfo}
+
+
+def test_the_old_name_of_the_module_still_works_with_a_warning() -> None:
+    with pytest.warns(UserWarning, match="deprecated"):
+        qos_event = importlib.import_module("rclpy.qos_event")
+    assert qos_event.SubscriptionEventCallbacks is SubscriptionEventCallbacks

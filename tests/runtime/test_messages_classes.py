@@ -25,6 +25,17 @@ from rcl_interfaces.msg import (
     ParameterValue,
 )
 from rmw_dds_common.msg import Gid
+from rosidl_parser.definition import (
+    AbstractType,
+    Array,
+    BasicType,
+    BoundedSequence,
+    BoundedString,
+    NamespacedType,
+    UnboundedSequence,
+    UnboundedString,
+)
+from rosidl_runtime_embedded import Message
 from sensor_msgs.msg import Image, JointState, NavSatStatus
 from service_msgs.msg import ServiceEventInfo
 from shape_msgs.msg import MeshTriangle, SolidPrimitive
@@ -288,6 +299,40 @@ def test_a_constructors_signature_shows_the_fields() -> None:
         "z": 0.0,
         "w": 1.0,
     }
+
+
+@pytest.mark.parametrize(
+    ("cls", "types"),
+    [
+        (Empty, ()),
+        (Header, (NamespacedType(["builtin_interfaces", "msg"], "Time"), UnboundedString())),
+        (Gid, (Array(BasicType("uint8"), 16),)),
+        (
+            UInt8MultiArray,
+            (NamespacedType(["std_msgs", "msg"], "MultiArrayLayout"), UnboundedSequence(BasicType("uint8"))),
+        ),
+        (
+            SetBool.Event,
+            (
+                NamespacedType(["service_msgs", "msg"], "ServiceEventInfo"),
+                BoundedSequence(NamespacedType(["std_srvs", "srv"], "SetBool_Request"), 1),
+                BoundedSequence(NamespacedType(["std_srvs", "srv"], "SetBool_Response"), 1),
+            ),
+        ),
+    ],
+)
+def test_a_class_tells_the_types_of_its_fields_as_rosidl_parser_does(
+    cls: type[Message], types: tuple[AbstractType, ...]
+) -> None:
+    assert types == cls.SLOT_TYPES
+
+
+def test_a_type_tells_whether_its_size_is_bounded() -> None:
+    number = BasicType("double")
+    assert all(
+        type_.has_maximum_size() for type_ in (Array(number, 2), BoundedSequence(number, 2), BoundedString(2))
+    )
+    assert not any(type_.has_maximum_size() for type_ in (UnboundedSequence(number), UnboundedString()))
 
 
 def test_a_module_of_messages_lists_its_classes() -> None:

@@ -12,6 +12,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from typing import Self
 
+    from rosidl_parser.definition import AbstractType
+
     from .definition import MessageDefinition
 
 
@@ -78,6 +80,12 @@ def _make_type_hash(cls: type[Message]) -> str:
     return type_hash(cls._TYPE_NAME)
 
 
+def _make_slot_types(cls: type[Message]) -> tuple[AbstractType, ...]:
+    from .slot_types import slot_type
+
+    return tuple(slot_type(field.type) for field in cls._DEFINITION.fields)
+
+
 class Message:
     """Base of all message classes.
 
@@ -96,6 +104,8 @@ class Message:
     if TYPE_CHECKING:
         _TYPE_HASH: ClassVar[str]
         """``RIHS01_…``"""
+        SLOT_TYPES: ClassVar[tuple[AbstractType, ...]]
+        """The types of the fields, in order."""
 
         @staticmethod
         def _serialize(message: Any) -> bytes:
@@ -114,6 +124,7 @@ class Message:
         _serialize = _OnFirstUse(_make_serializer)
         _deserialize = _OnFirstUse(_make_deserializer)
         _TYPE_HASH = _OnFirstUse(_make_type_hash)
+        SLOT_TYPES = _OnFirstUse(_make_slot_types)
 
     @classmethod
     def get_fields_and_field_types(cls) -> dict[str, str]:

@@ -1,0 +1,7 @@
+"""The name that :mod:`rclpy.event_handler` had before ROS 2 Iron."""
+
+import warnings
+
+from rclpy.event_handler import *  # noqa: F403
+
+warnings.warn("rclpy.qos_event is deprecated: import rclpy.event_handler instead", stacklevel=2)
