@@ -10,9 +10,10 @@ from __future__ import annotations
 from array import array
 from struct import Struct
 from struct import error as struct_error
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from .fields import ARRAY_CODES, slot_of
+from .generator import Generator
 from .layout import (
     CODES,
     HEADER_SIZE,
@@ -34,7 +35,7 @@ if TYPE_CHECKING:
 
 def make_deserializer(cls: type[Message]) -> Callable[[bytes], Message]:
     """Function from bytes to a message of the class; for all else it raises ValueError and nothing else."""
-    return _Generator(cls).compile()
+    return _DeserializerGenerator(cls).compile()
 
 
 def _malformed(cls: type[Message], data: bytes, reason: object) -> ValueError:
@@ -64,26 +65,22 @@ def _wide_text(data: bytes) -> str:
     return units.tobytes().decode("utf-16-le")
 
 
-class _Generator:
+class _DeserializerGenerator(Generator):
+    """The variable ``p`` has the position where it is known at run time only."""
+
     def __init__(self, cls: type[Message]) -> None:
-        self._cls = cls
-        self._names: dict[str, Any] = {
-            "cls": cls,
-            "array": array,
-            "booleans": _bools,
-            "error": struct_error,
-            "malformed": _malformed,
-            "new": object.__new__,
-            "octets": _octets,
-            "text": _text,
-            "wide_text": _wide_text,
-        }
-        self._lines: list[str] = []
-        self._indent = 2
-        self._variables = 0
-        self._run: list[Item] = []
+        super().__init__(
+            cls,
+            array=array,
+            booleans=_bools,
+            error=struct_error,
+            malformed=_malformed,
+            new=object.__new__,
+            octets=_octets,
+            text=_text,
+            wide_text=_wide_text,
+        )
         self._after: list[str] = []  # what can be done once the run is read
-        self._position: int | None = 0  # None: variable p has it
 
     def compile(self) -> Callable[[bytes], Message]:
         self._run.append(Item("H2x", HEADER_SIZE, 1, "h"))
@@ -103,22 +100,7 @@ class _Generator:
         ]
         if not any("end" in line for line in self._lines):
             code.remove("  end = len(data)")
-        exec("\n".join(code), self._names)
-        function: Callable[[bytes], Message] = self._names["deserialize"]
-        function.__qualname__ = f"{self._cls.__name__}._deserialize"
-        return function
-
-    def _emit(self, line: str) -> None:
-        self._lines.append(" " * self._indent + line)
-
-    def _name(self, value: object) -> str:
-        name = f"g{len(self._names)}"
-        self._names[name] = value
-        return name
-
-    def _variable(self) -> str:
-        self._variables += 1
-        return f"v{self._variables}"
+        return self._compiled("deserialize", code)
 
     def _message(self, cls: type[Message], definition: MessageDefinition) -> str:
         """Read a message; the name of the variable that holds it."""

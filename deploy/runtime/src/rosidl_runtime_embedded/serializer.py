@@ -14,6 +14,7 @@ from struct import error as struct_error
 from typing import TYPE_CHECKING, Any
 
 from .fields import ARRAY_CODES, slot_of
+from .generator import Generator
 from .layout import CODES, HEADER_SIZE, SIZES, Item, run_alignment, run_format
 from .packages import message_class
 from .validation import validate
@@ -37,24 +38,13 @@ _NUL = Item("x", 1)
 
 def make_serializer(cls: type[Message]) -> Callable[[Any], bytes]:
     """Function from a message to its bytes; raises TypeError or ValueError naming type, field and value."""
-    return _Generator(cls).compile()
+    return _SerializerGenerator(cls).compile()
 
 
-class _Generator:
+class _SerializerGenerator(Generator):
     def __init__(self, cls: type[Message]) -> None:
-        self._cls = cls
-        self._names: dict[str, Any] = {
-            "array": array,
-            "validate": validate,
-            "error": struct_error,
-            "cls": cls,
-        }
-        self._lines: list[str] = []
-        self._indent = 2
-        self._variables = 0
-        self._run: list[Item] = []
-        self._checks: list[str] = []
-        self._position: int | None = 0  # None: known at run time only
+        super().__init__(cls, array=array, validate=validate, error=struct_error)
+        self._checks: list[str] = []  # what must not be true of the values in the run
 
     def compile(self) -> Callable[[Any], bytes]:
         self._checks.append("type(m) is not cls")
@@ -76,22 +66,7 @@ class _Generator:
             " validate(m, cls)",
             " raise problem",
         ]
-        exec("\n".join(code), self._names)
-        function: Callable[[Any], bytes] = self._names["serialize"]
-        function.__qualname__ = f"{self._cls.__name__}._serialize"
-        return function
-
-    def _emit(self, line: str) -> None:
-        self._lines.append(" " * self._indent + line)
-
-    def _name(self, value: object) -> str:
-        name = f"g{len(self._names)}"
-        self._names[name] = value
-        return name
-
-    def _variable(self) -> str:
-        self._variables += 1
-        return f"v{self._variables}"
+        return self._compiled("serialize", code)
 
     def _message(self, message: str, definition: MessageDefinition) -> None:
         if not definition.fields:

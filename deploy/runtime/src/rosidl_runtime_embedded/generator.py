@@ -1,0 +1,46 @@
+"""What the makers of serializers and deserializers share: lines of code, and the names that they use."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from .layout import Item
+    from .message import Message
+
+
+class Generator:
+    """Writes the code of a function for the messages of one class, and compiles it."""
+
+    def __init__(self, cls: type[Message], **names: object) -> None:
+        """Begin; ``names`` are global to the code."""
+        self._cls = cls
+        self._names: dict[str, Any] = {"cls": cls, **names}
+        self._lines: list[str] = []
+        self._indent = 2
+        self._variables = 0
+        self._run: list[Item] = []  # values of fixed size that one call of struct will do
+        self._position: int | None = 0  # in the sample; None: known at run time only
+
+    def _emit(self, line: str) -> None:
+        self._lines.append(" " * self._indent + line)
+
+    def _name(self, value: object) -> str:
+        """A name by which the code finds a value."""
+        name = f"g{len(self._names)}"
+        self._names[name] = value
+        return name
+
+    def _variable(self) -> str:
+        """A name that no other variable of the code has."""
+        self._variables += 1
+        return f"v{self._variables}"
+
+    def _compiled(self, name: str, code: list[str]) -> Callable[[Any], Any]:
+        """The function ``name`` that the code defines."""
+        exec("\n".join(code), self._names)
+        function: Callable[[Any], Any] = self._names[name]
+        function.__qualname__ = f"{self._cls.__name__}._{name}"
+        return function
