@@ -223,21 +223,17 @@ class Executor(AbstractContextManager["Executor"]):
         """Run callbacks until ``future`` is done or cancelled, but no longer than ``timeout_sec``."""
         future._call_when_complete(self.wake)
         deadline = _deadline(timeout_sec)
-
-        def complete() -> bool:
-            return future.done() or future.cancelled()
-
-        while self._context.ok() and not self._is_shutdown and not complete():
+        while self._context.ok() and not self._is_shutdown and not future._is_over():
             if deadline is not None and time.monotonic_ns() >= deadline:
                 return
-            self._spin_once(deadline, complete)
+            self._spin_once(deadline, future._is_over)
 
     def spin_once_until_future_complete(
         self, future: Future, timeout_sec: float | TimeoutObject | None = None
     ) -> None:
         """Run one callback, unless ``future`` is or gets done before one is ready."""
         future._call_when_complete(self.wake)
-        self._spin_once(_deadline(timeout_sec), lambda: future.done() or future.cancelled())
+        self._spin_once(_deadline(timeout_sec), future._is_over)
 
     def _spin_once(self, deadline: int | None, condition: Callable[[], bool] | None) -> None:
         """Run one callback, unless the time is over or the condition true before one is ready."""
@@ -304,33 +300,36 @@ class Executor(AbstractContextManager["Executor"]):
         while self._tasks:
             timeout = 0
             self._ready.append((self._tasks.popleft(), 0))
-        next_timer = self._collect_timers()
-        if next_timer < timeout:
-            timeout = next_timer
         for guard in self._guards:
             if guard.is_ready() and self.can_execute(guard):
                 timeout = 0
                 self._ready.append((guard, 0))
-        for token in self._waitset.wait(timeout):
+        next_timer, wait = self._collect_timers()
+        if wait < timeout:
+            timeout = wait
+        else:
+            next_timer = None
+        tokens = self._waitset.wait(timeout)
+        if not tokens and next_timer is not None:
+            self._ready.append((next_timer, 0))  # its time has come
+        for token in tokens:
             if token == _WAKE:
                 self._guard.take()
             elif token in self._attached:
                 self._ready.append((self._attached[token][0], _MESSAGES_A_TURN - 1))
-        if 0 < next_timer == timeout:
-            self._collect_timers()  # it is time for one of them, unless something else woke us
 
-    def _collect_timers(self) -> int:
-        """Note the timers that are due; return the time [ns] until the next one is, 0 if any is."""
-        wait = INFINITY
+    def _collect_timers(self) -> tuple[Timer | None, int]:
+        """Note the timers that are due; return the next one to be, and how long [ns] to wait for it."""
+        next_timer, wait = None, INFINITY
         for timer in self._timers:
             remaining = timer._remaining()
             if remaining <= 0:
                 if self.can_execute(timer):
-                    wait = 0
+                    next_timer, wait = None, 0
                     self._ready.append((timer, 0))
             elif remaining < wait:
-                wait = remaining
-        return wait
+                next_timer, wait = timer, remaining
+        return next_timer, wait
 
     # What is waited for
 

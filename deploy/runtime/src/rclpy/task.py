@@ -40,7 +40,7 @@ class Future:
             print(f"The following exception was never retrieved: {self._exception}", file=sys.stderr)
 
     def __await__(self) -> Generator[Future, None, Any]:
-        while not (self._done or self._cancelled):
+        while not self._is_over():
             yield self
         return self.result()
 
@@ -62,6 +62,10 @@ class Future:
     def done(self) -> bool:
         """Tell whether there is a result or an exception."""
         return self._done
+
+    def _is_over(self) -> bool:
+        """Tell whether nobody needs to wait for it any more."""
+        return self._done or self._cancelled
 
     def result(self) -> Any:
         """
@@ -120,7 +124,7 @@ class Future:
     def _call_when_complete(self, waiter: Callable[[], None]) -> None:
         """Call `waiter` once, on the completing thread: when done or cancelled, at once if that is so."""
         with self._lock:
-            if not (self._done or self._cancelled):
+            if not self._is_over():
                 # Who waits with a timeout comes again and again.
                 if waiter not in self._waiters:
                     self._waiters.append(waiter)

@@ -265,7 +265,7 @@ class WaitSet:
     def wait(self, timeout: int) -> list[int]:
         """The tokens of what is triggered, after at most ``timeout`` [ns]; empty if nothing was."""
         count = blocking.dds_waitset_wait(self.handle, self._tokens, self._capacity, timeout)
-        if self.closed:
+        if not count or self.closed:
             return []
         return self._tokens[: min(checked(count, "cannot wait"), self._capacity)]
 
