@@ -24,7 +24,7 @@ from supervisor.states import ProcessStates, getProcessStateDescription
 LONGEST_WAIT = 0.1  # s
 _ENDS = (events.ProcessStateExitedEvent, events.ProcessStateBackoffEvent)
 SENTINEL = "sentinel"
-SENTINEL_START = 10.0  # s until it has to ask for the first time
+SENTINEL_START = 30.0  # s until it has to ask for the first time, on a machine that is just starting a fleet
 SENTINEL_PATIENCE = 3.0  # s that it may be silent then
 
 

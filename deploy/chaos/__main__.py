@@ -63,14 +63,16 @@ def unleash(options: argparse.Namespace) -> int:
         planned = schedule.monkey(
             seed, length, every=options.every, kinds=options.faults, targets=options.targets
         )
+        schedules = [planned[arm :: options.arms] for arm in range(options.arms)]
         title = f"Random monkey, seed {seed}, {options.minutes:g} min, a fault each {options.every:g} s"
     elif options.scenario == "partition":
         if reason := partition.missing():
             raise DeploymentError(f"No partition here: {reason}")
-        kind, planned, length = partition.TwoHosts, partition.SCHEDULE, partition.LENGTH
+        kind, schedules, length = partition.TwoHosts, [partition.SCHEDULE], partition.LENGTH
         title = "Scenario partition: the operator's host is cut off"
     else:
         planned = schedule.NAMED[options.scenario]()
+        schedules = [planned] * options.arms
         length = schedule.duration(planned)
         title = f"Scenario {options.scenario}, {length:.0f} s"
     print(title, flush=True)
@@ -84,7 +86,7 @@ def unleash(options: argparse.Namespace) -> int:
         )
         with arena:
             before = Cost.now(arena.arms)
-            arena.play(planned, length)
+            arena.play(schedules, length)
             cost = Cost.now(arena.arms).since(before)
         print("\n" + cost)
         codes = [
@@ -115,8 +117,9 @@ def _dds(options: argparse.Namespace) -> dict[str, str]:
         )
     if options.arms > 1:  # participants with an index would be 100 at most
         settings.append("<Discovery><ParticipantIndex>none</ParticipantIndex></Discovery>")
-    given = os.environ.get("CYCLONEDDS_URI", "")
-    return {"CYCLONEDDS_URI": ",".join(filter(None, [given, *settings]))} if settings else {}
+    if not settings:
+        return {}
+    return {"CYCLONEDDS_URI": ",".join(filter(None, [os.environ.get("CYCLONEDDS_URI"), *settings]))}
 
 
 def conclude(path: Path, title: str, history: History, namespace: str = "/") -> int:
@@ -141,7 +144,12 @@ def _options(arguments: Sequence[str]) -> argparse.Namespace:
     parser.add_argument("--seed", type=int, help="the same seed, the same faults; default: a new one")
     parser.add_argument("--every", type=_positive, default=5.0, help="seconds from fault to fault")
     parser.add_argument("--scenario", choices=SCENARIOS, default="monkey")
-    parser.add_argument("--arms", type=int, default=1, help="a fleet, of which each arm has all the faults")
+    parser.add_argument(
+        "--arms",
+        type=int,
+        default=1,
+        help="a fleet; the monkey turns to one after the other, a scenario is played to each",
+    )
     parser.add_argument("--loss", type=float, default=0.0, help="percent of all DDS packets that are lost")
     parser.add_argument("--faults", type=_words(FAULTS), default=tuple(FAULTS), help=", ".join(FAULTS))
     parser.add_argument("--targets", type=_words(PROGRAMS), default=(), help=", ".join(PROGRAMS))

@@ -3,7 +3,7 @@
 ::
 
     with Arena(directory) as arena:
-        arena.play(schedule)
+        arena.play([schedule])
     history = arena.history()
 """
 
@@ -22,6 +22,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
+from functools import partial
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -32,11 +33,11 @@ from deploy import processes
 from deploy.chaos import record
 from deploy.chaos.faults import FAULTS, INJECTED
 from deploy.chaos.history import OPERATOR, PROGRAMS, Fault, History
-from deploy.chaos.schedule import AWAKE, FIRST, PERIOD, Schedule
+from deploy.chaos.schedule import AWAKE, FIRST, PERIOD, Planned, Schedule
 from deploy.system import NAMESPACE, DeploymentError, System
 from interfaces import topics
 
-UP = 60.0  # s until the arms have to be up
+UP = 60.0  # s until an arm has to be up
 LEAD = 1.0  # s from the start to the origin of the scenario
 READY = 2.0  # s that a fault waits for a victim that is just being restarted
 AWAITED = [t for t in topics.CONTRACT if t not in (topics.ENGINES, topics.DIAGNOSTICS)]
@@ -140,7 +141,9 @@ class Arena:
                 stack.callback(arm.system.stop)
                 with _environment(injected | {NAMESPACE: arm.namespace}):
                     self.start(arm, {"/**": {"ros__parameters": shared}})
-            self._await_up(lines)
+                self._await_up(
+                    arm, lines
+                )  # one after the other, as they would start on machines of their own
             self._stack = stack.pop_all()
         return self
 
@@ -156,12 +159,15 @@ class Arena:
     ) -> None:
         self._stack.close()
 
-    def play(self, schedule: Schedule, until: float = 0.0) -> None:
-        """Do what is planned, to every arm, and wait until so many seconds after the scenario's origin."""
+    def play(self, schedules: Sequence[Schedule], until: float = 0.0) -> None:
+        """Do to each arm what is planned for it, and wait until so many seconds of the scenario are over."""
         begin = self._epoch
         while time.monotonic() > begin + FIRST - 1.0:
             begin += PERIOD  # it took so long until all was up: on the next day, then
-        self._tell_silences(begin, max([until, *(p.at + p.lasting for p in schedule)]) + 60.0)
+        last = max(
+            (planned.at + planned.lasting for schedule in schedules for planned in schedule), default=0.0
+        )
+        self._tell_silences(begin, max(until, last) + 60.0)
         order = itertools.count()
         agenda: list[tuple[float, int, Callable[[], None]]] = []
         undone = ExitStack()
@@ -169,7 +175,8 @@ class Arena:
         def add(at: float, what: Callable[[], None]) -> None:
             heapq.heappush(agenda, (at, next(order), what))
 
-        def start(arm: ArmUnderTest, kind: str, target: str, lasting: float) -> None:
+        def start(arm: ArmUnderTest, planned: Planned) -> None:
+            _, kind, target, lasting = planned
             pid = arm.pid(target) if target in PROGRAMS else 0
             self._say(f"{time.monotonic() - begin:7.1f} s  {arm.namespace:7} {kind} {target}")
             at = time.monotonic()
@@ -180,9 +187,9 @@ class Arena:
                 undone.callback(once)
                 add(at + lasting, once)
 
-        for planned in schedule:
-            for arm in self.arms:
-                add(begin + planned.at, lambda arm=arm, p=planned: start(arm, p.kind, p.target, p.lasting))  # type: ignore[misc]
+        for arm, schedule in zip(self.arms, schedules, strict=True):
+            for planned in schedule:
+                add(begin + planned.at, partial(start, arm, planned))
         add(begin + until, lambda: None)
         with undone:
             while agenda:
@@ -214,8 +221,8 @@ class Arena:
             for arm in self.arms:
                 self._tell(Fault("silence", OPERATOR, dawn + pressed["to"], dawn + period), arm.namespace)
 
-    def _await_up(self, lines: queue.Queue[str]) -> None:
-        missing = {f"{arm.namespace.rstrip('/')}/{topic.name}" for arm in self.arms for topic in AWAITED}
+    def _await_up(self, arm: ArmUnderTest, lines: queue.Queue[str]) -> None:
+        missing = {f"{arm.namespace.rstrip('/')}/{topic.name}" for topic in AWAITED}
         deadline = time.monotonic() + UP
         while missing:
             try:
@@ -224,6 +231,7 @@ class Arena:
                 )
             except queue.Empty:
                 raise DeploymentError(f"Nothing is seen of {', '.join(sorted(missing))}") from None
+            self._check()
 
 
 class _Once:
@@ -242,6 +250,10 @@ class _Once:
 def _observer(
     path: Path, arms: list[ArmUnderTest], environment: Mapping[str, str], within: Sequence[str]
 ) -> Iterator[subprocess.Popen[str]]:
+    # What has two readers is sent by multicast, and every process of the domain gets it.
+    unicast = "<General><AllowMulticast>spdp</AllowMulticast></General>"
+    environment = {**os.environ, **environment}
+    settings = filter(None, [environment.get("CYCLONEDDS_URI"), unicast])
     process = subprocess.Popen(
         [
             *within,
@@ -252,7 +264,7 @@ def _observer(
             *(f"{arm.namespace}={arm.system.run}" for arm in arms),
         ],
         cwd=processes.ROOT,
-        env={**os.environ, **environment},
+        env=environment | {"CYCLONEDDS_URI": ",".join(settings)},
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,

@@ -10,7 +10,7 @@ import struct
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any
 
 from rclpy import _names
@@ -110,6 +110,7 @@ def decode(data: bytes) -> tuple[bytes, list[NodeEntities]]:
 
 # Of more peers than these it is asked which of them are still alive.
 _MANY_PEERS = 100
+_REST = 0.1  # s between two looks at what peers announce, where nobody waits for it
 
 
 class Graph:
@@ -123,6 +124,7 @@ class Graph:
         self._reader = self.participant.create_reader(_TOPIC, _TYPE, _READER_QOS, hash_)
         self._own: dict[Node, NodeEntities] = {}
         self._deferred = 0
+        self._announced: dict[bytes, bytes] = {}  # by a participant's GUID, until somebody asks
         self._peers: dict[bytes, list[NodeEntities]] = {}
         self._many_peers = _MANY_PEERS
         self._discovery: Discovery | None = None  # made when somebody asks about the graph
@@ -223,6 +225,8 @@ class Graph:
         """
         while True:
             self._waitset.wait(INFINITY)
+            if not self._waiting:  # peers announce themselves often while they start: all of it at once, then
+                time.sleep(_REST)
             with self._lock:
                 if self._waitset.closed:
                     return
@@ -236,18 +240,16 @@ class Graph:
         """Note what peers have announced."""
         with self._lock:
             while (sample := self._reader.take()) is not None:
-                try:
-                    gid, nodes = decode(sample.data)
-                except ValueError:
-                    continue  # not from a ROS 2 process: it has no nodes that could be named
-                self._peers[gid] = nodes
-            if len(self._peers) > self._many_peers:
+                self._announced[sample.data[4:20]] = sample.data
+            if len(self._announced) + len(self._peers) > self._many_peers:
                 self._forget_dead_peers()
-                self._many_peers = max(_MANY_PEERS, 2 * len(self._peers))
+                self._many_peers = max(_MANY_PEERS, 2 * (len(self._announced) + len(self._peers)))
 
     def _forget_dead_peers(self) -> None:
         alive = self._discovered().participants()
-        self._peers = {gid: nodes for gid, nodes in self._peers.items() if gid in alive}
+        for gid in (self._announced.keys() | self._peers.keys()) - alive.keys():
+            self._announced.pop(gid, None)
+            self._peers.pop(gid, None)
 
     def _discovered(self) -> Discovery:
         with self._lock:
@@ -293,6 +295,10 @@ class Graph:
         with self._lock:
             self._take()
             self._forget_dead_peers()
+            while self._announced:
+                with suppress(ValueError):  # not from a ROS 2 process: it has no nodes that could be named
+                    gid, nodes = decode(self._announced.popitem()[1])
+                    self._peers[gid] = nodes
             known = {**self._peers, self.participant.gid: list(self._own.values())}
             for gid, nodes in known.items():
                 for node in nodes:

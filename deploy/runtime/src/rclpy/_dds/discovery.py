@@ -12,7 +12,6 @@ from rclpy.qos import QoSProfile
 
 from . import qos
 from .library import (
-    ANY_STATE,
     BUILTIN_PARTICIPANTS,
     BUILTIN_PUBLICATIONS,
     BUILTIN_SUBSCRIPTIONS,
@@ -27,7 +26,7 @@ from .library import (
 _NOT_READ = 0x7E  # ANY_STATE without the sample state "read"
 _ALIVE = 16
 _NOT_ALIVE = 3 | 12 | 32 | 64  # any sample and view state, instance disposed or without writers
-_INITIAL_CAPACITY = 64
+_BATCH = 64
 
 
 @dataclass(frozen=True)
@@ -48,60 +47,63 @@ class Endpoint:
 
 
 class _BuiltinReader:
-    """A reader of one of Cyclone's built-in topics, and what it has read, kept until there is news."""
+    """A reader of one of Cyclone's built-in topics, and all that exists of what it tells about.
 
-    def __init__(self, participant: int, topic: int, structure: type[ct.Structure]) -> None:
+    Each thing is looked at once, when it is new: in a large domain to look at all of them is work.
+    """
+
+    def __init__(
+        self, participant: int, topic: int, structure: type[ct.Structure], convert: Callable[[Any], Any]
+    ) -> None:
         self._structure = ct.POINTER(structure)
-        self._capacity = _INITIAL_CAPACITY
+        self._convert = convert
         self._lock = threading.Lock()
-        self._known: list[Any] | None = None
+        self._known: dict[int, Any] = {}
         self.handle = checked(blocking.dds_create_reader(participant, topic, None, None), "built-in reader")
         self.news = checked(blocking.dds_create_readcondition(self.handle, _NOT_READ), "read condition")
         self.gone = checked(blocking.dds_create_readcondition(self.handle, _NOT_ALIVE), "read condition")
 
-    def _loan(self, operation: str, mask: int) -> Iterator[tuple[Any, SampleInfo]]:
+    def _samples(self, operation: str, mask: int) -> Iterator[tuple[Any, SampleInfo]]:
         read = getattr(blocking, operation)
-        while True:
-            capacity = self._capacity
-            samples = (Pointer * capacity)()
-            infos = (SampleInfo * capacity)()
-            count = checked(read(self.handle, samples, infos, capacity, capacity, mask), "discovery")
-            if count < capacity:
-                break
-            blocking.dds_return_loan(self.handle, samples, count)
-            self._capacity *= 2  # there may be more: once more, with room for it
-        try:
-            for index in range(count):
-                yield ct.cast(samples[index] or 0, self._structure).contents, infos[index]
-        finally:
-            if count:
-                blocking.dds_return_loan(self.handle, samples, count)
+        count = _BATCH
+        while count == _BATCH:
+            samples = (Pointer * _BATCH)()
+            infos = (SampleInfo * _BATCH)()
+            count = checked(read(self.handle, samples, infos, _BATCH, _BATCH, mask), "discovery")
+            try:
+                for index in range(count):
+                    yield ct.cast(samples[index] or 0, self._structure).contents, infos[index]
+            finally:
+                if count:
+                    blocking.dds_return_loan(self.handle, samples, count)
 
-    def alive(self, convert: Callable[[Any], Any]) -> list[Any]:
-        """What exists now, each as ``convert`` makes it from the C structure."""
+    def alive(self) -> list[Any]:
+        """What exists now, each as it was converted from the C structure."""
         with self._lock:
-            if self._known is None or blocking.dds_triggered(self.news):
-                self._known = [
-                    convert(structure)
-                    for structure, info in self._loan("dds_read_mask", ANY_STATE)
-                    if info.valid_data and info.instance_state == _ALIVE
-                ]
-            return self._known
+            if blocking.dds_triggered(self.news):
+                for structure, info in self._samples("dds_read_mask", _NOT_READ):
+                    if info.instance_state != _ALIVE:
+                        self._known.pop(info.instance_handle, None)
+                    elif info.valid_data:
+                        self._known[info.instance_handle] = self._convert(structure)
+            return list(self._known.values())
 
     def forget_gone(self) -> None:
         """Do not keep what exists no more."""
         with self._lock:
-            for _ in self._loan("dds_take_mask", _NOT_ALIVE):
-                self._known = None
+            for _, info in self._samples("dds_take_mask", _NOT_ALIVE):
+                self._known.pop(info.instance_handle, None)
 
 
 class Discovery:
     """The graph of DDS entities, as this participant has discovered it."""
 
     def __init__(self, participant: int) -> None:
-        self._participants = _BuiltinReader(participant, BUILTIN_PARTICIPANTS, BuiltinParticipant)
-        self._writers = _BuiltinReader(participant, BUILTIN_PUBLICATIONS, BuiltinEndpoint)
-        self._readers = _BuiltinReader(participant, BUILTIN_SUBSCRIPTIONS, BuiltinEndpoint)
+        self._participants = _BuiltinReader(
+            participant, BUILTIN_PARTICIPANTS, BuiltinParticipant, _participant
+        )
+        self._writers = _BuiltinReader(participant, BUILTIN_PUBLICATIONS, BuiltinEndpoint, _endpoint)
+        self._readers = _BuiltinReader(participant, BUILTIN_SUBSCRIPTIONS, BuiltinEndpoint, _endpoint)
 
     @property
     def news(self) -> list[int]:
@@ -127,15 +129,15 @@ class Discovery:
 
     def participants(self) -> dict[bytes, str]:
         """The GUID of every participant and its USER_DATA."""
-        return dict(self._participants.alive(_participant))
+        return dict(self._participants.alive())
 
     def writers(self) -> list[Endpoint]:
         """Every writer."""
-        return [found for found in self._writers.alive(_endpoint) if not found.is_builtin]
+        return [found for found in self._writers.alive() if not found.is_builtin]
 
     def readers(self) -> list[Endpoint]:
         """Every reader."""
-        return [found for found in self._readers.alive(_endpoint) if not found.is_builtin]
+        return [found for found in self._readers.alive() if not found.is_builtin]
 
 
 def _participant(found: BuiltinParticipant) -> tuple[bytes, str]:
