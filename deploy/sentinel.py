@@ -16,7 +16,7 @@ import socket
 import time
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -89,17 +89,12 @@ class Judge:
         self._double_since: dict[int, float] = {}
         self._revivals: dict[str, tuple[int, float]] = {}  # how often, and when the next is due
         self._looked: float | None = None
-        self._awake_since = float("-inf")
+        self._lost = 0.0  # [s] that it was kept from looking
+        self._heard: dict[tuple[str, int], tuple[float, float]] = {}  # by the clocks of the sight and its own
 
     def judge(self, sight: Sight) -> list[Action]:
         """What is to be done now."""
-        patience = self._patience
-        if self._looked is not None and sight.time - self._looked > max(1.0, 4 * patience.look):
-            # It was the sentinel, or the whole machine, that was stopped.
-            self._awake_since = sight.time
-            self._stopped_since.clear()
-            self._double_since.clear()
-        self._looked = sight.time
+        sight = self._in_own_time(sight)
         running = [program for program in sight.programs if program.state in ("STARTING", "RUNNING")]
         actions = self._kill_stopped(sight, running)
         actions += self._kill_silent(sight, [p for p in running if p.pid not in sight.stopped])
@@ -108,6 +103,22 @@ class Judge:
         for action in actions:
             self.reasons[action.program] = action.why
         return actions
+
+    def _in_own_time(self, sight: Sight) -> Sight:
+        """
+        The sight by a clock that stands still while the sentinel is kept from looking.
+
+        A paused or overloaded machine keeps the services from reporting, too: that makes none of them silent.
+        """
+        if self._looked is not None:
+            self._lost += max(0.0, sight.time - self._looked - 2 * self._patience.look)
+        self._looked = sight.time
+        before, self._heard = self._heard, {}
+        for process, when in sight.heard.items():
+            known = before.get(process)
+            self._heard[process] = known if known and known[0] == when else (when, when - self._lost)
+        heard = {process: when for process, (_, when) in self._heard.items()}
+        return replace(sight, time=sight.time - self._lost, heard=heard)
 
     def _kill_stopped(self, sight: Sight, running: list[Watched]) -> list[Action]:
         """The kernel says that they are stopped: no network can err about that."""
@@ -129,7 +140,7 @@ class Judge:
             heard = sight.heard.get((program.name, pid))
             awaited += heard is not None or sight.time - since >= self._patience.start
             limit = self._patience.start if heard is None else self._patience.silence
-            last = max(since if heard is None else heard, self._awake_since)
+            last = since if heard is None else heard
             if sight.time - last >= limit:
                 silent.append(Action("kill", program.name, pid, f"no health for {sight.time - last:.1f} s"))
         names = {action.program for action in silent}

@@ -37,6 +37,8 @@ class ArmInterface:
         self._changed = False
         self._exits: dict[str, str] = {}
         self._guarded = (0, 0.0)  # the sentinel's pid, and until when it has to ask
+        self._clock = 0.0  # [s]; stands still while supervisord is kept from running, as the sentinel may be
+        self._polled = time.monotonic()
         self._poll = supervisord.options.poller.poll
         supervisord.options.poller.poll = self._poll_briefly
         events.subscribe(events.ProcessStateEvent, self._on_change)
@@ -50,7 +52,7 @@ class ArmInterface:
         rows = []
         for name, process in self._processes().items():
             if name == SENTINEL:
-                self._guarded = (process.pid, time.monotonic() + SENTINEL_PATIENCE)
+                self._guarded = (process.pid, self._clock + SENTINEL_PATIENCE)
             rows.append(
                 {
                     "name": name,
@@ -74,9 +76,9 @@ class ArmInterface:
             return
         pid, deadline = self._guarded
         if pid != sentinel.pid:
-            self._guarded = (sentinel.pid, time.monotonic() + SENTINEL_START)
-        elif time.monotonic() > deadline:
-            self._guarded = (sentinel.pid, time.monotonic() + SENTINEL_START)
+            self._guarded = (sentinel.pid, self._clock + SENTINEL_START)
+        elif self._clock > deadline:
+            self._guarded = (sentinel.pid, self._clock + SENTINEL_START)
             with suppress(ProcessLookupError):
                 os.kill(sentinel.pid, signal.SIGKILL)
 
@@ -93,6 +95,9 @@ class ArmInterface:
 
     def _poll_briefly(self, timeout: float) -> Any:
         # supervisord acts on a change only after its next poll: a change must not wait for one to time out.
+        now = time.monotonic()
+        self._clock += min(now - self._polled, 2 * LONGEST_WAIT)
+        self._polled = now
         self._guard()
         wait = 0.0 if self._changed else min(timeout, LONGEST_WAIT)
         self._changed = False

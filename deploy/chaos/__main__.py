@@ -115,8 +115,12 @@ def _dds(options: argparse.Namespace) -> dict[str, str]:
         settings.append(
             f"<Internal><Test><XmitLossiness>{10 * options.loss:.0f}</XmitLossiness></Test></Internal>"
         )
-    if options.arms > 1:  # participants with an index would be 100 at most
+    if options.arms > 1:
+        # Participants with an index would be 100 at most. Each heartbeat of a hundred processes' built-in writers
+        # makes all the others answer: by default they come so fast that starting a fleet keeps it from starting.
         settings.append("<Discovery><ParticipantIndex>none</ParticipantIndex></Discovery>")
+        interval = '<HeartbeatInterval min="1 s" minsched="1 s">2 s</HeartbeatInterval>'
+        settings.append(f"<Internal>{interval}</Internal>")
     if not settings:
         return {}
     return {"CYCLONEDDS_URI": ",".join(filter(None, [os.environ.get("CYCLONEDDS_URI"), *settings]))}
