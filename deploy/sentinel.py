@@ -194,7 +194,7 @@ class Eyes:
         programs = self._system.watch(self._supervisor)
         now = time.monotonic()
         if now >= self._next_search:
-            self._next_search = now + 0.5
+            self._next_search = now + 1.0
             self._doubles = self._find_doubles(programs)
         stopped = frozenset(p.pid for p in programs if p.pid and _state_of(p.pid)[0] == "T")
         return Sight(now, programs, dict(heard), stopped, self._doubles)

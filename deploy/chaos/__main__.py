@@ -38,6 +38,17 @@ from interfaces import topics
 SCENARIOS = ("monkey", "partition", *schedule.NAMED)
 KEPT = 10  # records
 
+FLEET = (
+    # With an index there would be 100 participants at most.
+    "<Discovery><ParticipantIndex>none</ParticipantIndex></Discovery>",
+    # By multicast every process would get what is for one of a hundred.
+    "<General><AllowMulticast>spdp</AllowMulticast></General>",
+    # Each process that starts meets all others, which acknowledge each of its heartbeats: where these come
+    # faster than a busy machine answers, they keep it busy.
+    '<Internal><HeartbeatInterval min="5 s" minsched="5 s">8 s</HeartbeatInterval></Internal>',
+)
+"""What Cyclone DDS needs for so many processes on one machine."""
+
 
 def main(arguments: Sequence[str]) -> int:
     """Obey the command line; the exit code."""
@@ -116,11 +127,7 @@ def _dds(options: argparse.Namespace) -> dict[str, str]:
             f"<Internal><Test><XmitLossiness>{10 * options.loss:.0f}</XmitLossiness></Test></Internal>"
         )
     if options.arms > 1:
-        # Participants with an index would be 100 at most. Each heartbeat of a hundred processes' built-in writers
-        # makes all the others answer: by default they come so fast that starting a fleet keeps it from starting.
-        settings.append("<Discovery><ParticipantIndex>none</ParticipantIndex></Discovery>")
-        interval = '<HeartbeatInterval min="1 s" minsched="1 s">2 s</HeartbeatInterval>'
-        settings.append(f"<Internal>{interval}</Internal>")
+        settings += FLEET
     if not settings:
         return {}
     return {"CYCLONEDDS_URI": ",".join(filter(None, [os.environ.get("CYCLONEDDS_URI"), *settings]))}

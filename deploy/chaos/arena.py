@@ -141,9 +141,8 @@ class Arena:
                 stack.callback(arm.system.stop)
                 with _environment(injected | {NAMESPACE: arm.namespace}):
                     self.start(arm, {"/**": {"ros__parameters": shared}})
-                self._await_up(
-                    arm, lines
-                )  # one after the other, as they would start on machines of their own
+                # One after the other: together they would keep each other from starting.
+                self._await_up(arm, lines)
             self._stack = stack.pop_all()
         return self
 
