@@ -330,6 +330,8 @@ def _spin(node: ServiceNode, wire: Callable[[ServiceNode], None]) -> int:
         except _MISTAKES:
             raise
         except Exception:
+            if not node.context.ok():  # a signal came while it was about to publish, which is no error
+                return 0
             node.get_logger().fatal(traceback.format_exc())
             return 1
     return 0

@@ -50,6 +50,20 @@ def wire(node):
 service.run("failing", wire)
 """
 
+SPEAKING = """
+from interfaces import service
+
+def wire(node):
+    def speak():
+        print("speaks", flush=True)
+        while node.context.ok():
+            pass
+        node.report_health()
+    node.create_timer(0.01, speak)
+
+service.run("speaking", wire)
+"""
+
 READY = """
 from interfaces import service
 
@@ -125,6 +139,16 @@ def test_a_signal_ends_a_service_in_order_at_every_moment(
 def test_a_signal_ends_a_service_that_hangs(start: Start, number: signal.Signals) -> None:
     process = start("-c", HANGING)
     assert process.wait_for_line() == "hangs"
+
+    assert process.end(by=number) == (0, "")
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_signal_ends_a_service_in_order_that_is_about_to_publish(
+    start: Start, number: signal.Signals
+) -> None:
+    process = start("-c", SPEAKING)
+    assert process.wait_for_line() == "speaks"
 
     assert process.end(by=number) == (0, "")
 
