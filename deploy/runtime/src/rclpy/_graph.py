@@ -132,13 +132,18 @@ class Graph:
         self._waiting: set[GuardCondition] = set()
         self._waitset = WaitSet()
         self._waitset.attach(self._reader.condition, 0)
-        threading.Thread(target=self._listen, name="rclpy-graph", daemon=True).start()
+        self._closing = threading.Event()
+        self._listener = threading.Thread(target=self._listen, name="rclpy-graph", daemon=True)
+        self._listener.start()
 
     def close(self) -> None:
         """Leave the domain."""
+        self._closing.set()
         with self._lock:  # in which the listening thread does what it does
             self._waitset.close()
             self.participant.close()
+        # Its end is at hand, unless a signal has interrupted who holds the lock: that must not wait for itself.
+        self._listener.join(_REST)
 
     # What this process tells
 
@@ -226,7 +231,7 @@ class Graph:
         while True:
             self._waitset.wait(INFINITY)
             if not self._waiting:  # peers announce themselves often while they start: all of it at once, then
-                time.sleep(_REST)
+                self._closing.wait(_REST)
             with self._lock:
                 if self._waitset.closed:
                     return
