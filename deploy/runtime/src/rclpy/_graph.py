@@ -142,7 +142,7 @@ class Graph:
         with self._lock:  # in which the listening thread does what it does
             self._waitset.close()
             self.participant.close()
-        # Its end is at hand, unless a signal has interrupted who holds the lock, and who cannot wait for itself.
+        # Its end is at hand, unless a signal interrupted who holds the lock: that cannot wait for itself.
         self._listener.join(_REST)
 
     # What this process tells
