@@ -169,9 +169,11 @@ def follow(parameter: Observable[T], timeline: Observable[T] | None) -> Observab
     Return what a virtual source does that has a parameter and may have a timeline.
 
     Without a timeline that is the parameter's value at once, then what is set. With one, it is the timeline,
-    and nothing before it begins; until somebody sets the parameter. Whoever spoke last is right.
+    and nothing before it begins; until somebody sets the parameter, who has taken over from then on.
     """
-    return parameter if timeline is None else rx.merge(timeline, parameter.skip(1))
+    if timeline is None:
+        return parameter
+    return parameter.skip(1).publish(lambda settings: rx.merge(timeline.take_until(settings), settings))
 
 
 def load(path: str | Path) -> Scenario:

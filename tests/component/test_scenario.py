@@ -14,7 +14,7 @@ from reactivex.testing import ReactiveTest, TestScheduler
 from interfaces.scenario import Events, Scenario, ScenarioError, Sweep, follow, load, play
 from interfaces.topics import TURN_ON
 
-on_next, on_completed = ReactiveTest.on_next, ReactiveTest.on_completed
+on_next, on_completed, subscribe = ReactiveTest.on_next, ReactiveTest.on_completed, ReactiveTest.subscribe
 
 SCENARIOS = Path(__file__).parents[2] / "deploy" / "scenarios"
 
@@ -249,4 +249,5 @@ def test_a_source_follows_its_scenario_until_its_parameter_is_set(scheduler: Tes
 
     results = scheduler.start(lambda: follow(parameter, timeline))
 
-    assert results.messages == [on_next(250, 7.0), on_next(300, 2.0), on_next(350, 8.0)]
+    assert results.messages == [on_next(250, 7.0), on_next(300, 2.0)]
+    assert timeline.subscriptions == [subscribe(200, 300)]

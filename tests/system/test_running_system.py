@@ -9,6 +9,7 @@ import signal
 import stat
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -168,6 +169,17 @@ def test_the_operator_commands_switch_and_engines_from_the_console(module_site: 
     console.type("quit\n")
     assert console.wait() == 0
     assert module_site.members.keys() >= SERVICES
+
+
+def test_who_lets_go_of_the_switch_in_the_demo_has_the_engines_stopped(site: Site) -> None:
+    command = site.begin("run", "demo")
+    command.await_line("Engines are on")
+    released = time.monotonic()
+    command.type("release\n")
+    command.await_line("Turning off engines")
+    assert command.lines[-1][0] - released < 10.5
+    command.type("quit\n")
+    assert command.wait() == 0
 
 
 def test_the_service_of_the_readme_works(module_site: Site, peer: Peer, tmp_path: Path) -> None:
