@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from deploy.chaos.findings import HOLDS, UNKNOWN, VIOLATED, percentile
-from deploy.chaos.history import ALL, OPERATOR, PROGRAMS, Fault, History, Life, Sample
+from deploy.chaos.history import ALL, NOTHING, OPERATOR, PROGRAMS, Fault, History, Life, Sample
 from deploy.chaos.promises import CHECKERS, meaning
 from interfaces.topics import OFF, ON, TURN_OFF
 
@@ -239,6 +239,15 @@ def test_l2_catches_a_stream_that_pauses_meanwhile() -> None:
     history = silent(killed(good(), "kinematics", 20.0, 0.6), "theta1", 20.1, 20.5)
     (evidence,) = CHECKERS["L2"](history).evidence
     assert "config_theta1 is silent" in evidence.what
+
+
+def test_l2_a_pause_of_the_whole_machine_stays_unknown_and_hides_no_other() -> None:
+    history = silent(killed(good(), "kinematics", 20.0, 0.6), "theta1", 20.1, 20.5)
+    stalled = faulty(history, Fault("overload", NOTHING, 20.2, 20.4))
+    finding = CHECKERS["L2"](stalled)
+    assert (finding.verdict, finding.cases, finding.unknown) == (HOLDS, 5, 1)
+    (evidence,) = CHECKERS["L2"](silent(stalled, "l1", 20.5, 20.9)).evidence
+    assert "config_l1 is silent" in evidence.what
 
 
 def test_l2_speed_may_pause_when_positions_do() -> None:
