@@ -243,10 +243,10 @@ def test_l2_catches_a_stream_that_pauses_meanwhile() -> None:
 
 def test_l2_a_pause_of_the_whole_machine_stays_unknown_and_hides_no_other() -> None:
     history = silent(killed(good(), "kinematics", 20.0, 0.6), "theta1", 20.1, 20.5)
-    stalled = faulty(history, Fault("overload", NOTHING, 20.2, 20.4))
+    stalled = faulty(history, Fault("overload", NOTHING, 20.05, 20.12))
     finding = CHECKERS["L2"](stalled)
     assert (finding.verdict, finding.cases, finding.unknown) == (HOLDS, 5, 1)
-    (evidence,) = CHECKERS["L2"](silent(stalled, "l1", 20.5, 20.9)).evidence
+    (evidence,) = CHECKERS["L2"](silent(stalled, "l1", 20.2, 20.55)).evidence
     assert "config_l1 is silent" in evidence.what
 
 
