@@ -1,7 +1,7 @@
 """`make chaos`: unleash the monkey, and tell what it found. Exit code 1 if a promise is violated.
 
 usage: python -m deploy.chaos [--minutes 5] [--seed N] [--scenario NAME] [--every 5] [--faults kill,stop]
-                              [--targets kinematics,velocity] [--arms 10] [--loss PERCENT]
+                              [--targets kinematics,velocity] [--arms 5] [--loss PERCENT]
                               [--replay RECORD]
 """
 
