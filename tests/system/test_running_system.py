@@ -186,14 +186,17 @@ def test_the_service_of_the_readme_works(module_site: Site, peer: Peer, tmp_path
     (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), re.DOTALL)
     (tmp_path / "speed_guard.py").write_text(code)
     commands, speed = peer.collect(topics.ENGINES), peer.publisher(topics.EFFECTOR_SPEED)
+    reports = peer.collect(topics.DIAGNOSTICS)
     guard = module_site.begin_python(str(tmp_path / "speed_guard.py"), "--ros-args", "-p", "limit:=3.0")
 
-    def is_commanded() -> bool:
+    def it_has_commanded() -> bool:  # the operator watchdog may do so, too
         speed.publish(Float64(data=2.9))
         speed.publish(Float64(data=3.1))
-        return bool(commands)
+        health = [status for report in reports for status in report.status if status.name == "/speed_guard"]
+        published = (int(pair.value) for status in health for pair in status.values if pair.key == "published")
+        return bool(commands) and any(published)
 
-    peer.spin_until(is_commanded)
+    peer.spin_until(it_has_commanded)
     assert commands[0].data == topics.TURN_OFF
     guard.signal(signal.SIGTERM)
     assert guard.wait() == 0
