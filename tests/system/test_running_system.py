@@ -193,7 +193,9 @@ def test_the_service_of_the_readme_works(module_site: Site, peer: Peer, tmp_path
         speed.publish(Float64(data=2.9))
         speed.publish(Float64(data=3.1))
         health = [status for report in reports for status in report.status if status.name == "/speed_guard"]
-        published = (int(pair.value) for status in health for pair in status.values if pair.key == "published")
+        published = (
+            int(pair.value) for status in health for pair in status.values if pair.key == "published"
+        )
         return bool(commands) and any(published)
 
     peer.spin_until(it_has_commanded)
