@@ -69,7 +69,7 @@ class MutuallyExclusiveCallbackGroup(CallbackGroup):
 
     def beginning_execution(self, entity: Any) -> bool:
         """Permit to run `entity` if no other callback of the group is running."""
-        if not self._running.acquire(blocking=False):
+        if not self._running.acquire(False):
             return False
         self._active_entity = entity
         return True

@@ -107,7 +107,7 @@ class Executor(AbstractContextManager["Executor"]):
         """Create an executor of ``context``'s nodes. Raises NotInitializedException if it does not run."""
         super().__init__()
         self._context = get_default_context() if context is None else context
-        if not self._context.ok():
+        if not self._context._valid:
             raise NotInitializedException
         self._nodes: list[Node] = []
         self._nodes_lock = threading.RLock()
@@ -212,7 +212,7 @@ class Executor(AbstractContextManager["Executor"]):
 
     def spin(self) -> None:
         """Run callbacks until the context, or this executor, is shut down."""
-        while self._context.ok() and not self._is_shutdown:
+        while self._context._valid and not self._is_shutdown:
             self.spin_once()
 
     def spin_once(self, timeout_sec: float | None = None) -> None:
@@ -223,7 +223,7 @@ class Executor(AbstractContextManager["Executor"]):
         """Run callbacks until ``future`` is done or cancelled, but no longer than ``timeout_sec``."""
         future._call_when_complete(self.wake)
         deadline = _deadline(timeout_sec)
-        while self._context.ok() and not self._is_shutdown and not future._is_over():
+        while self._context._valid and not self._is_shutdown and not future._is_over():
             if deadline is not None and time.monotonic_ns() >= deadline:
                 return
             self._spin_once(deadline, future._is_over)
@@ -263,7 +263,7 @@ class Executor(AbstractContextManager["Executor"]):
         """Wait for work: an entity and what was taken from it; for a task, the task and ``None``."""
         waited = False
         while True:
-            if not self._context.ok():
+            if not self._context._valid:
                 raise ShutdownException if self._told_to_end else ExternalShutdownException
             if self._is_shutdown:
                 raise ShutdownException

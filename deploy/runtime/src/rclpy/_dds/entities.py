@@ -15,6 +15,8 @@ from .library import (
     LIBRARY_HANDLE,
     SERDATA_KIND_DATA,
     TIMEOUT,
+    Duration,
+    Entity,
     Guid,
     IoVector,
     Pointer,
@@ -242,10 +244,17 @@ class WaitSet:
 
     def __init__(self) -> None:
         self.handle = checked(blocking.dds_create_waitset(LIBRARY_HANDLE), "cannot create a wait set")
-        self._capacity = 0
-        self._tokens = (ct.c_ssize_t * 0)()
         self._attached = 0
+        self._make_room(0)
         self.closed = False
+
+    def _make_room(self, capacity: int) -> None:
+        self._capacity = capacity
+        self._tokens = (ct.c_ssize_t * capacity)()
+        self._timeout = Duration()
+        # Made once: a wait comes after each callback, and to convert them each time costs more than the call.
+        tokens = Pointer(ct.addressof(self._tokens))
+        self._arguments = Entity(self.handle), tokens, ct.c_size_t(capacity), self._timeout
 
     def attach(self, handle: int, token: int) -> bool:
         """Wait on ``handle`` from now on; ``wait`` reports it as ``token``. False if it is gone already."""
@@ -253,8 +262,7 @@ class WaitSet:
             return False
         self._attached += 1
         if self._attached > self._capacity:
-            self._capacity = 2 * self._attached + 8
-            self._tokens = (ct.c_ssize_t * self._capacity)()
+            self._make_room(2 * self._attached + 8)
         return True
 
     def detach(self, handle: int) -> None:
@@ -264,7 +272,8 @@ class WaitSet:
 
     def wait(self, timeout: int) -> list[int]:
         """The tokens of what is triggered, after at most ``timeout`` [ns]; empty if nothing was."""
-        count = blocking.dds_waitset_wait(self.handle, self._tokens, self._capacity, timeout)
+        self._timeout.value = timeout
+        count = blocking.dds_waitset_wait(*self._arguments)
         if not count or self.closed:
             return []
         return self._tokens[: min(checked(count, "cannot wait"), self._capacity)]
