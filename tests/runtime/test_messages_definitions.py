@@ -329,3 +329,13 @@ def test_stubs_of_a_users_package_can_be_written(
     with pytest.raises(SystemExit):
         stubs.main()
     assert "there is no message package 'user_msgs_nowhere'" in capsys.readouterr().err
+
+
+def test_a_field_may_have_any_name(define: Define) -> None:
+    names = "cls", "data", "default", "end", "error", "initial_pose", "m", "new", "p", "pose", "unset"
+    text = "".join(f"geometry_msgs/Pose {name}\nuint8[] numbers_{name}\n" for name in names)
+    arm = load(define({"Arm.msg": text}), "Arm")
+    message = arm()
+    message.initial_pose.position.x = 2.0
+    again = arm(**{name: getattr(message, name) for name in names})
+    assert arm._deserialize(arm._serialize(again)) == message

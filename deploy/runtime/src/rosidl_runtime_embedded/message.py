@@ -42,15 +42,16 @@ def _message_class(cls: type[Message]) -> type[Message]:
 
 def _make_constructor(cls: type[Message]) -> Callable[..., None]:
     """Compile ``__init__``: a keyword for each field, with the field's initial value as default."""
-    names: dict[str, Any] = {"unset": object()}
+    # no field begins with an underscore: so the names of fields hide none of these
+    names: dict[str, Any] = {"_unset": object()}
     parameters, body = [], []
     for field in cls._DEFINITION.fields:
-        name, initial = field.name, f"initial_{field.name}"
+        name, initial = field.name, f"_initial_{field.name}"
         names[initial], is_factory = initial_value(field, message_class)
         if is_factory:
-            parameters.append(f"{name}=unset")
+            parameters.append(f"{name}=_unset")
             body.append(
-                f"if {name} is unset: self.{slot_of(field)} = {initial}()\n else: self.{name} = {name}"
+                f"if {name} is _unset: self.{slot_of(field)} = {initial}()\n else: self.{name} = {name}"
             )
         else:
             parameters.append(f"{name}={initial}")
