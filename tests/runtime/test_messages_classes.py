@@ -298,6 +298,7 @@ def test_a_constructors_signature_shows_the_fields() -> None:
         "y": 0.0,
         "z": 0.0,
         "w": 1.0,
+        "check_fields": False,
     }
 
 

@@ -7,8 +7,10 @@ from __future__ import annotations
 
 import itertools
 import math
+import os
 import random
 import struct
+import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -220,6 +222,22 @@ def test_a_count_that_the_sample_is_too_short_for_is_refused_at_once(count: int)
     }.items():
         with pytest.raises(ValueError, match=name):
             message_class(name)._deserialize(sample)
+
+
+def test_a_string_longer_than_its_bound_is_malformed_only_where_messages_check_fields() -> None:
+    code = (
+        "from type_description_interfaces.msg import IndividualTypeDescription as Description\n"
+        "data = bytes.fromhex('00010000 04010000') + b'x' * 259 + bytes(5)\n"
+        "assert len(Description._deserialize(data).type_name) == 259"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+    checked = subprocess.run(
+        [sys.executable, "-c", code],
+        env={**os.environ, "ROS_PYTHON_CHECK_FIELDS": "1"},
+        capture_output=True,
+        text=True,
+    )
+    assert "ValueError: 272 bytes are no type_description_interfaces/msg/Indiv" in checked.stderr
 
 
 def test_a_sequence_longer_than_its_bound_is_refused() -> None:

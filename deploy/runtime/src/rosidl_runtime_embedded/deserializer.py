@@ -2,7 +2,8 @@
 
 The counterpart of :mod:`.serializer`. A sample comes from anywhere: nothing is allocated or repeated on the
 word of a count that the sample is too short for, and whatever is malformed raises ValueError. Only the bounds
-of strings are not checked, as no ROS 2 checks them: C++ sends longer ones.
+of strings are not checked, as no ROS 2 checks them: C++ sends longer ones. An
+AssertionError is of a message that checks its fields.
 """
 
 from __future__ import annotations
@@ -94,7 +95,7 @@ class _DeserializerGenerator(Generator):
             " try:",
             "  end = len(data)",
             *self._lines,
-            " except (error, IndexError, ValueError) as reason:",
+            " except (error, IndexError, ValueError, AssertionError) as reason:",
             "  raise malformed(cls, data, reason) from None",
             f" return {result}",
         ]

@@ -92,10 +92,29 @@ def initial_value(field: Field, message_class: Callable[[str], type]) -> tuple[A
     return values.copy, True
 
 
+def converter(type_name: str, field: Field) -> Callable[[Any], array[Any]]:
+    """Function that makes of a value what an array or sequence of numbers holds, or refuses it."""
+    type_ = field.type
+    code, size, bound = ARRAY_CODES[type_.base], type_.array_size, type_.sequence_bound
+
+    def convert(value: Any) -> array[Any]:
+        try:
+            numbers = _to_array(code, value)
+            if (size and len(numbers) != size) or len(numbers) > bound > 0:
+                raise ValueError(f"it has {len(numbers)} elements")
+        except (TypeError, ValueError, OverflowError) as error:
+            kind = TypeError if isinstance(error, TypeError) else ValueError
+            raise kind(
+                f"{type_name}: field '{field.name}' must be {type_}, not {shown(value)}: {error}"
+            ) from None
+        return numbers
+
+    return convert
+
+
 def numeric_field(type_name: str, field: Field) -> property:
     """Property of an array or sequence of numbers: what is assigned is converted or refused with a reason."""
-    slot, type_ = slot_of(field), field.type
-    code, size, bound = ARRAY_CODES[type_.base], type_.array_size, type_.sequence_bound
+    slot, code, convert = slot_of(field), ARRAY_CODES[field.type.base], converter(type_name, field)
 
     def get_array(self: object) -> Any:
         value = getattr(self, slot)
@@ -107,18 +126,9 @@ def numeric_field(type_name: str, field: Field) -> property:
         return value
 
     def set_numbers(self: object, value: Any) -> None:
-        try:
-            numbers = _to_array(code, value)
-            if (size and len(numbers) != size) or len(numbers) > bound > 0:
-                raise ValueError(f"it has {len(numbers)} elements")
-        except (TypeError, ValueError, OverflowError) as error:
-            kind = TypeError if isinstance(error, TypeError) else ValueError
-            raise kind(
-                f"{type_name}: field '{field.name}' must be {type_}, not {shown(value)}: {error}"
-            ) from None
-        setattr(self, slot, numbers)
+        setattr(self, slot, convert(value))
 
-    return property(get_array if size else attrgetter(slot), set_numbers)
+    return property(get_array if field.type.array_size else attrgetter(slot), set_numbers)
 
 
 def _to_array(code: str, value: Any) -> array[Any]:

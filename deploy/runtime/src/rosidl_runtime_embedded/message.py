@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import os
 from array import array
+from functools import cache
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from .fields import initial_value, is_numeric, numeric_field, python_value, slot_of
+from .fields import converter, initial_value, is_numeric, numeric_field, python_value, slot_of
 from .packages import message_class
+from .validation import validate_assignment
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -14,7 +17,10 @@ if TYPE_CHECKING:
 
     from rosidl_parser.definition import AbstractType
 
-    from .definition import MessageDefinition
+    from .definition import Field, MessageDefinition
+
+_CHECK_FIELDS = os.environ.get("ROS_PYTHON_CHECK_FIELDS") == "1"
+"""Whether messages check what they are assigned if their constructors are not told."""
 
 
 class _OnFirstUse:
@@ -40,24 +46,59 @@ def _message_class(cls: type[Message]) -> type[Message]:
     return next(base for base in cls.__mro__ if "_DEFINITION" in vars(base))
 
 
+@cache
+def _check_assignments(cls: type[Message]) -> None:
+    """Let messages of the class check what they are assigned, those that are to.
+
+    Fields are plain slots until the first message of the class is to check: so the others pay nothing for it.
+    """
+    for field in cls._DEFINITION.fields:
+        setattr(cls, field.name, _checked(getattr(cls, field.name), cls._TYPE_NAME, field))
+
+
+def _checked(unchecked: Any, type_name: str, field: Field) -> property:
+    """The property of a field that checks values for messages that check fields."""
+
+    def set_checked(self: object, value: object) -> None:
+        if not getattr(self, "_check_fields", _CHECK_FIELDS):
+            unchecked.__set__(self, value)
+            return
+        try:
+            validate_assignment(value, field, type_name)
+            unchecked.__set__(self, value)
+        except (TypeError, ValueError) as error:
+            raise AssertionError(error) from None
+
+    return property(unchecked.__get__, set_checked, unchecked.__delete__)
+
+
 def _make_constructor(cls: type[Message]) -> Callable[..., None]:
     """Compile ``__init__``: a keyword for each field, with the field's initial value as default."""
     # no field begins with an underscore: so the names of fields hide none of these
-    names: dict[str, Any] = {"_unset": object()}
-    parameters, body = [], []
+    names: dict[str, Any] = {
+        "_unset": object(),
+        "_default": _CHECK_FIELDS,
+        "_check_assignments": _check_assignments,
+        "_cls": cls,
+    }
+    parameters: list[str] = []
+    body = ["if check_fields is not _default: self._check_fields = check_fields; _check_assignments(_cls)"]
     for field in cls._DEFINITION.fields:
         name, initial = field.name, f"_initial_{field.name}"
         names[initial], is_factory = initial_value(field, message_class)
         if is_factory:
+            given = name
+            if is_numeric(field):
+                # as in rclpy: converted before it could be checked
+                given = f"_convert_{name}({name})"
+                names[f"_convert_{name}"] = converter(cls._TYPE_NAME, field)
             parameters.append(f"{name}=_unset")
-            body.append(
-                f"if {name} is _unset: self.{slot_of(field)} = {initial}()\n else: self.{name} = {name}"
-            )
+            body.append(f"self.{slot_of(field)} = {initial}() if {name} is _unset else {given}")
         else:
             parameters.append(f"{name}={initial}")
             body.append(f"self.{name} = {name}")
-    arguments = ", ".join(["self", "*", *parameters] if parameters else ["self"])
-    exec(f"def __init__({arguments}):\n " + "\n ".join(body or ["pass"]), names)
+    arguments = ", ".join(["self", "*", *parameters, "check_fields=_default"])
+    exec(f"def __init__({arguments}):\n " + "\n ".join(body), names)
     constructor: Callable[..., None] = names["__init__"]
     constructor.__qualname__ = f"{cls.__name__}.__init__"
     return constructor
@@ -91,7 +132,9 @@ class Message:
     """Base of all message classes.
 
     As in rclpy of Jazzy by default, fields are checked when a message is serialized: at publish. Arrays
-    and sequences of numbers are checked when they are assigned, since they are converted then.
+    and sequences of numbers are checked when they are assigned, since they are converted then. A message
+    made with ``check_fields=True``, or with ROS_PYTHON_CHECK_FIELDS=1 in the environment, checks all fields
+    when they are assigned: what is wrong is an AssertionError.
     """
 
     __slots__ = ()
@@ -159,7 +202,7 @@ def make_message_class(definition: MessageDefinition) -> type[Message]:
     namespace: dict[str, Any] = {
         "__module__": f"{package}.{kind}",
         "__doc__": f"Message {definition.name}.",
-        "__slots__": tuple(slot_of(field) for field in definition.fields),
+        "__slots__": (*(slot_of(field) for field in definition.fields), "_check_fields"),
         "_DEFINITION": definition,
         "_TYPE_NAME": definition.name,
         "_DDS_TYPE_NAME": f"{package}::{kind}::dds_::{name}_",
@@ -173,4 +216,7 @@ def make_message_class(definition: MessageDefinition) -> type[Message]:
             namespace[f"{field.name.upper()}__DEFAULT"] = initial() if is_factory else initial
     for constant in definition.constants:
         namespace[constant.name] = python_value(constant.type, constant.value)
-    return type(name, (Message,), namespace)
+    cls = type(name, (Message,), namespace)
+    if _CHECK_FIELDS:
+        _check_assignments(cls)
+    return cls

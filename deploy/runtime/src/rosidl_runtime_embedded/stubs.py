@@ -84,12 +84,9 @@ def _message(definition: MessageDefinition) -> str:
             lines.append(f"    {field.name.upper()}__DEFAULT: Final = {_literal(default)}")
     for constant in definition.constants:
         lines.append(f"    {constant.name}: Final = {_literal(python_value(constant.type, constant.value))}")
-    if definition.fields:
-        types = ((field.name, _accepted(field, package, kind)) for field in definition.fields)
-        arguments = [f"        {name}: {type_} = ...," for name, type_ in types]
-        lines += ["    def __init__(", "        self,", "        *,", *arguments, "    ) -> None: ..."]
-    else:
-        lines.append("    def __init__(self) -> None: ...")
+    types = [(field.name, _accepted(field, package, kind)) for field in definition.fields]
+    arguments = [f"        {name}: {type_} = ...," for name, type_ in [*types, ("check_fields", "bool")]]
+    lines += ["    def __init__(", "        self,", "        *,", *arguments, "    ) -> None: ..."]
     return "\n".join([f"class {name}(Message):", *lines])
 
 

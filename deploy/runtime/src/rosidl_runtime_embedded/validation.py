@@ -1,18 +1,19 @@
-"""Why a message cannot be serialized: the slow, exact check behind the fast ones."""
+"""Why a message cannot be serialized, or a field not be assigned a value: the slow, exact checks."""
 
 from __future__ import annotations
 
+from array import array
 from collections import UserList, UserString
 from collections.abc import Sequence, Set
 from struct import Struct
 from typing import TYPE_CHECKING, Any
 
 from .definition import integer_range
-from .fields import is_numeric, shown
+from .fields import ARRAY_CODES, is_numeric, shown
 from .packages import message_class
 
 if TYPE_CHECKING:
-    from .definition import FieldType
+    from .definition import Field, FieldType
     from .message import Message
 
 
@@ -21,6 +22,30 @@ def validate(message: object, cls: type[Message]) -> None:
     if not isinstance(message, cls):
         raise TypeError(f"a {cls._TYPE_NAME} is expected, not {shown(message)}")
     _message(message, cls, cls._TYPE_NAME, "")
+
+
+def validate_assignment(value: object, field: Field, top: str) -> None:
+    """Raise TypeError or ValueError if a field may not be assigned the value where fields are checked.
+
+    A nested message has to be of the right class: its own fields are its own affair.
+    """
+    type_ = field.type
+    if not type_.is_plural:
+        _single(value, type_, top, field.name, nested=False)
+    elif not (is_numeric(field) and _is_array(value, type_, top, field.name)):
+        _list(value, type_, top, field.name, nested=False)
+
+
+def _is_array(value: object, type_: FieldType, top: str, where: str) -> bool:
+    """Whether it is what rclpy holds such numbers in, and not to be looked at one by one."""
+    code = ARRAY_CODES[type_.base]
+    if type_.array_size:
+        import numpy
+
+        return isinstance(value, numpy.ndarray) and value.dtype == numpy.dtype(code)
+    if isinstance(value, array) and value.typecode != code:
+        raise _wrong(TypeError, top, where, type_, value, f"its type code is not '{code}'")
+    return isinstance(value, array)
 
 
 def _message(message: Message, cls: type[Message], top: str, path: str) -> None:
@@ -46,23 +71,24 @@ def _wrong(
     return kind(f"{top}: field '{where}' must be {type_}, not {shown(value)}{reason and ': ' + reason}")
 
 
-def _list(value: Any, type_: FieldType, top: str, where: str) -> None:
+def _list(value: Any, type_: FieldType, top: str, where: str, nested: bool = True) -> None:
     if not isinstance(value, (Sequence, Set, UserList)) or isinstance(value, (str, UserString)):
         raise _wrong(TypeError, top, where, type_, value, "it is no list")
     if (type_.array_size and len(value) != type_.array_size) or len(value) > type_.sequence_bound > 0:
         raise _wrong(ValueError, top, where, type_, value, f"it has {len(value)} elements")
     element_type = type_._replace(array_size=0, is_sequence=False, sequence_bound=0)
     for number, element in enumerate(value):
-        _single(element, element_type, top, f"{where}[{number}]")
+        _single(element, element_type, top, f"{where}[{number}]", nested)
 
 
-def _single(value: Any, type_: FieldType, top: str, where: str) -> None:
+def _single(value: Any, type_: FieldType, top: str, where: str, nested: bool = True) -> None:
     base = type_.base
     if type_.is_message:
         cls = message_class(base)
         if not isinstance(value, cls):
             raise _wrong(TypeError, top, where, type_, value)
-        _message(value, cls, top, f"{where}.")
+        if nested:
+            _message(value, cls, top, f"{where}.")
     elif base in ("string", "wstring"):
         _string(value, type_, top, where)
     elif base == "boolean":

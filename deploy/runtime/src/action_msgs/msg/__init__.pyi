@@ -14,6 +14,7 @@ class GoalInfo(Message):
         *,
         goal_id: unique_identifier_msgs.msg.UUID = ...,
         stamp: builtin_interfaces.msg.Time = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class GoalStatus(Message):
@@ -31,6 +32,7 @@ class GoalStatus(Message):
         *,
         goal_info: GoalInfo = ...,
         status: int = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class GoalStatusArray(Message):
@@ -39,4 +41,5 @@ class GoalStatusArray(Message):
         self,
         *,
         status_list: list[GoalStatus] = ...,
+        check_fields: bool = ...,
     ) -> None: ...

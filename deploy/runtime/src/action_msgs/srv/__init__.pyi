@@ -12,6 +12,7 @@ class CancelGoal_Request(Message):
         self,
         *,
         goal_info: action_msgs.msg.GoalInfo = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class CancelGoal_Response(Message):
@@ -26,6 +27,7 @@ class CancelGoal_Response(Message):
         *,
         return_code: int = ...,
         goals_canceling: list[action_msgs.msg.GoalInfo] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class CancelGoal_Event(Message):
@@ -38,6 +40,7 @@ class CancelGoal_Event(Message):
         info: service_msgs.msg.ServiceEventInfo = ...,
         request: list[CancelGoal_Request] = ...,
         response: list[CancelGoal_Response] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class CancelGoal(Service):

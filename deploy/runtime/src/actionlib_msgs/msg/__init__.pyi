@@ -14,6 +14,7 @@ class GoalID(Message):
         *,
         stamp: builtin_interfaces.msg.Time = ...,
         id: str = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class GoalStatus(Message):
@@ -36,6 +37,7 @@ class GoalStatus(Message):
         goal_id: GoalID = ...,
         status: int = ...,
         text: str = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class GoalStatusArray(Message):
@@ -46,4 +48,5 @@ class GoalStatusArray(Message):
         *,
         header: std_msgs.msg.Header = ...,
         status_list: list[GoalStatus] = ...,
+        check_fields: bool = ...,
     ) -> None: ...

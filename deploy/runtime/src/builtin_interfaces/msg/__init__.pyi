@@ -10,6 +10,7 @@ class Duration(Message):
         *,
         sec: int = ...,
         nanosec: int = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class Time(Message):
@@ -20,4 +21,5 @@ class Time(Message):
         *,
         sec: int = ...,
         nanosec: int = ...,
+        check_fields: bool = ...,
     ) -> None: ...

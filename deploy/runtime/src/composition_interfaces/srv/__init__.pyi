@@ -9,7 +9,11 @@ import service_msgs.msg
 from rosidl_runtime_embedded import Message, Service
 
 class ListNodes_Request(Message):
-    def __init__(self) -> None: ...
+    def __init__(
+        self,
+        *,
+        check_fields: bool = ...,
+    ) -> None: ...
 
 class ListNodes_Response(Message):
     full_node_names: list[str]
@@ -22,6 +26,7 @@ class ListNodes_Response(Message):
         *,
         full_node_names: list[str] = ...,
         unique_ids: Iterable[int] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class ListNodes_Event(Message):
@@ -34,6 +39,7 @@ class ListNodes_Event(Message):
         info: service_msgs.msg.ServiceEventInfo = ...,
         request: list[ListNodes_Request] = ...,
         response: list[ListNodes_Response] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class ListNodes(Service):
@@ -61,6 +67,7 @@ class LoadNode_Request(Message):
         remap_rules: list[str] = ...,
         parameters: list[rcl_interfaces.msg.Parameter] = ...,
         extra_arguments: list[rcl_interfaces.msg.Parameter] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class LoadNode_Response(Message):
@@ -75,6 +82,7 @@ class LoadNode_Response(Message):
         error_message: str = ...,
         full_node_name: str = ...,
         unique_id: int = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class LoadNode_Event(Message):
@@ -87,6 +95,7 @@ class LoadNode_Event(Message):
         info: service_msgs.msg.ServiceEventInfo = ...,
         request: list[LoadNode_Request] = ...,
         response: list[LoadNode_Response] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class LoadNode(Service):
@@ -100,6 +109,7 @@ class UnloadNode_Request(Message):
         self,
         *,
         unique_id: int = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class UnloadNode_Response(Message):
@@ -110,6 +120,7 @@ class UnloadNode_Response(Message):
         *,
         success: bool = ...,
         error_message: str = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class UnloadNode_Event(Message):
@@ -122,6 +133,7 @@ class UnloadNode_Event(Message):
         info: service_msgs.msg.ServiceEventInfo = ...,
         request: list[UnloadNode_Request] = ...,
         response: list[UnloadNode_Response] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class UnloadNode(Service):

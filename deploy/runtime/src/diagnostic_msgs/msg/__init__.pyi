@@ -13,6 +13,7 @@ class DiagnosticArray(Message):
         *,
         header: std_msgs.msg.Header = ...,
         status: list[DiagnosticStatus] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class DiagnosticStatus(Message):
@@ -33,6 +34,7 @@ class DiagnosticStatus(Message):
         message: str = ...,
         hardware_id: str = ...,
         values: list[KeyValue] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class KeyValue(Message):
@@ -43,4 +45,5 @@ class KeyValue(Message):
         *,
         key: str = ...,
         value: str = ...,
+        check_fields: bool = ...,
     ) -> None: ...

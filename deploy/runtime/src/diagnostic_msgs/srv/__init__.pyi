@@ -12,6 +12,7 @@ class AddDiagnostics_Request(Message):
         self,
         *,
         load_namespace: str = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class AddDiagnostics_Response(Message):
@@ -22,6 +23,7 @@ class AddDiagnostics_Response(Message):
         *,
         success: bool = ...,
         message: str = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class AddDiagnostics_Event(Message):
@@ -34,6 +36,7 @@ class AddDiagnostics_Event(Message):
         info: service_msgs.msg.ServiceEventInfo = ...,
         request: list[AddDiagnostics_Request] = ...,
         response: list[AddDiagnostics_Response] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class AddDiagnostics(Service):
@@ -42,7 +45,11 @@ class AddDiagnostics(Service):
     Event: TypeAlias = AddDiagnostics_Event
 
 class SelfTest_Request(Message):
-    def __init__(self) -> None: ...
+    def __init__(
+        self,
+        *,
+        check_fields: bool = ...,
+    ) -> None: ...
 
 class SelfTest_Response(Message):
     id: str
@@ -54,6 +61,7 @@ class SelfTest_Response(Message):
         id: str = ...,
         passed: bytes = ...,
         status: list[diagnostic_msgs.msg.DiagnosticStatus] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class SelfTest_Event(Message):
@@ -66,6 +74,7 @@ class SelfTest_Event(Message):
         info: service_msgs.msg.ServiceEventInfo = ...,
         request: list[SelfTest_Request] = ...,
         response: list[SelfTest_Response] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class SelfTest(Service):

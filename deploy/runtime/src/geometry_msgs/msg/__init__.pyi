@@ -17,6 +17,7 @@ class Accel(Message):
         *,
         linear: Vector3 = ...,
         angular: Vector3 = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class AccelStamped(Message):
@@ -27,6 +28,7 @@ class AccelStamped(Message):
         *,
         header: std_msgs.msg.Header = ...,
         accel: Accel = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class AccelWithCovariance(Message):
@@ -40,6 +42,7 @@ class AccelWithCovariance(Message):
         *,
         accel: Accel = ...,
         covariance: Iterable[float] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class AccelWithCovarianceStamped(Message):
@@ -50,6 +53,7 @@ class AccelWithCovarianceStamped(Message):
         *,
         header: std_msgs.msg.Header = ...,
         accel: AccelWithCovariance = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class Inertia(Message):
@@ -72,6 +76,7 @@ class Inertia(Message):
         iyy: float = ...,
         iyz: float = ...,
         izz: float = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class InertiaStamped(Message):
@@ -82,6 +87,7 @@ class InertiaStamped(Message):
         *,
         header: std_msgs.msg.Header = ...,
         inertia: Inertia = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class Point(Message):
@@ -94,6 +100,7 @@ class Point(Message):
         x: float = ...,
         y: float = ...,
         z: float = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class Point32(Message):
@@ -106,6 +113,7 @@ class Point32(Message):
         x: float = ...,
         y: float = ...,
         z: float = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class PointStamped(Message):
@@ -116,6 +124,7 @@ class PointStamped(Message):
         *,
         header: std_msgs.msg.Header = ...,
         point: Point = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class Polygon(Message):
@@ -124,6 +133,7 @@ class Polygon(Message):
         self,
         *,
         points: list[Point32] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class PolygonInstance(Message):
@@ -134,6 +144,7 @@ class PolygonInstance(Message):
         *,
         polygon: Polygon = ...,
         id: int = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class PolygonInstanceStamped(Message):
@@ -144,6 +155,7 @@ class PolygonInstanceStamped(Message):
         *,
         header: std_msgs.msg.Header = ...,
         polygon: PolygonInstance = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class PolygonStamped(Message):
@@ -154,6 +166,7 @@ class PolygonStamped(Message):
         *,
         header: std_msgs.msg.Header = ...,
         polygon: Polygon = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class Pose(Message):
@@ -164,6 +177,7 @@ class Pose(Message):
         *,
         position: Point = ...,
         orientation: Quaternion = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class Pose2D(Message):
@@ -176,6 +190,7 @@ class Pose2D(Message):
         x: float = ...,
         y: float = ...,
         theta: float = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class PoseArray(Message):
@@ -186,6 +201,7 @@ class PoseArray(Message):
         *,
         header: std_msgs.msg.Header = ...,
         poses: list[Pose] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class PoseStamped(Message):
@@ -196,6 +212,7 @@ class PoseStamped(Message):
         *,
         header: std_msgs.msg.Header = ...,
         pose: Pose = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class PoseWithCovariance(Message):
@@ -209,6 +226,7 @@ class PoseWithCovariance(Message):
         *,
         pose: Pose = ...,
         covariance: Iterable[float] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class PoseWithCovarianceStamped(Message):
@@ -219,6 +237,7 @@ class PoseWithCovarianceStamped(Message):
         *,
         header: std_msgs.msg.Header = ...,
         pose: PoseWithCovariance = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class Quaternion(Message):
@@ -237,6 +256,7 @@ class Quaternion(Message):
         y: float = ...,
         z: float = ...,
         w: float = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class QuaternionStamped(Message):
@@ -247,6 +267,7 @@ class QuaternionStamped(Message):
         *,
         header: std_msgs.msg.Header = ...,
         quaternion: Quaternion = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class Transform(Message):
@@ -257,6 +278,7 @@ class Transform(Message):
         *,
         translation: Vector3 = ...,
         rotation: Quaternion = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class TransformStamped(Message):
@@ -269,6 +291,7 @@ class TransformStamped(Message):
         header: std_msgs.msg.Header = ...,
         child_frame_id: str = ...,
         transform: Transform = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class Twist(Message):
@@ -279,6 +302,7 @@ class Twist(Message):
         *,
         linear: Vector3 = ...,
         angular: Vector3 = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class TwistStamped(Message):
@@ -289,6 +313,7 @@ class TwistStamped(Message):
         *,
         header: std_msgs.msg.Header = ...,
         twist: Twist = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class TwistWithCovariance(Message):
@@ -302,6 +327,7 @@ class TwistWithCovariance(Message):
         *,
         twist: Twist = ...,
         covariance: Iterable[float] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class TwistWithCovarianceStamped(Message):
@@ -312,6 +338,7 @@ class TwistWithCovarianceStamped(Message):
         *,
         header: std_msgs.msg.Header = ...,
         twist: TwistWithCovariance = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class Vector3(Message):
@@ -324,6 +351,7 @@ class Vector3(Message):
         x: float = ...,
         y: float = ...,
         z: float = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class Vector3Stamped(Message):
@@ -334,6 +362,7 @@ class Vector3Stamped(Message):
         *,
         header: std_msgs.msg.Header = ...,
         vector: Vector3 = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class VelocityStamped(Message):
@@ -348,6 +377,7 @@ class VelocityStamped(Message):
         body_frame_id: str = ...,
         reference_frame_id: str = ...,
         velocity: Twist = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class Wrench(Message):
@@ -358,6 +388,7 @@ class Wrench(Message):
         *,
         force: Vector3 = ...,
         torque: Vector3 = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class WrenchStamped(Message):
@@ -368,4 +399,5 @@ class WrenchStamped(Message):
         *,
         header: std_msgs.msg.Header = ...,
         wrench: Wrench = ...,
+        check_fields: bool = ...,
     ) -> None: ...

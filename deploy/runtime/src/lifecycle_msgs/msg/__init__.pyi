@@ -23,6 +23,7 @@ class State(Message):
         *,
         id: int = ...,
         label: str = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class Transition(Message):
@@ -63,6 +64,7 @@ class Transition(Message):
         *,
         id: int = ...,
         label: str = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class TransitionDescription(Message):
@@ -75,6 +77,7 @@ class TransitionDescription(Message):
         transition: Transition = ...,
         start_state: State = ...,
         goal_state: State = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class TransitionEvent(Message):
@@ -89,4 +92,5 @@ class TransitionEvent(Message):
         transition: Transition = ...,
         start_state: State = ...,
         goal_state: State = ...,
+        check_fields: bool = ...,
     ) -> None: ...

@@ -12,6 +12,7 @@ class ChangeState_Request(Message):
         self,
         *,
         transition: lifecycle_msgs.msg.Transition = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class ChangeState_Response(Message):
@@ -20,6 +21,7 @@ class ChangeState_Response(Message):
         self,
         *,
         success: bool = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class ChangeState_Event(Message):
@@ -32,6 +34,7 @@ class ChangeState_Event(Message):
         info: service_msgs.msg.ServiceEventInfo = ...,
         request: list[ChangeState_Request] = ...,
         response: list[ChangeState_Response] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class ChangeState(Service):
@@ -40,7 +43,11 @@ class ChangeState(Service):
     Event: TypeAlias = ChangeState_Event
 
 class GetAvailableStates_Request(Message):
-    def __init__(self) -> None: ...
+    def __init__(
+        self,
+        *,
+        check_fields: bool = ...,
+    ) -> None: ...
 
 class GetAvailableStates_Response(Message):
     available_states: list[lifecycle_msgs.msg.State]
@@ -48,6 +55,7 @@ class GetAvailableStates_Response(Message):
         self,
         *,
         available_states: list[lifecycle_msgs.msg.State] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class GetAvailableStates_Event(Message):
@@ -60,6 +68,7 @@ class GetAvailableStates_Event(Message):
         info: service_msgs.msg.ServiceEventInfo = ...,
         request: list[GetAvailableStates_Request] = ...,
         response: list[GetAvailableStates_Response] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class GetAvailableStates(Service):
@@ -68,7 +77,11 @@ class GetAvailableStates(Service):
     Event: TypeAlias = GetAvailableStates_Event
 
 class GetAvailableTransitions_Request(Message):
-    def __init__(self) -> None: ...
+    def __init__(
+        self,
+        *,
+        check_fields: bool = ...,
+    ) -> None: ...
 
 class GetAvailableTransitions_Response(Message):
     available_transitions: list[lifecycle_msgs.msg.TransitionDescription]
@@ -76,6 +89,7 @@ class GetAvailableTransitions_Response(Message):
         self,
         *,
         available_transitions: list[lifecycle_msgs.msg.TransitionDescription] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class GetAvailableTransitions_Event(Message):
@@ -88,6 +102,7 @@ class GetAvailableTransitions_Event(Message):
         info: service_msgs.msg.ServiceEventInfo = ...,
         request: list[GetAvailableTransitions_Request] = ...,
         response: list[GetAvailableTransitions_Response] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class GetAvailableTransitions(Service):
@@ -96,7 +111,11 @@ class GetAvailableTransitions(Service):
     Event: TypeAlias = GetAvailableTransitions_Event
 
 class GetState_Request(Message):
-    def __init__(self) -> None: ...
+    def __init__(
+        self,
+        *,
+        check_fields: bool = ...,
+    ) -> None: ...
 
 class GetState_Response(Message):
     current_state: lifecycle_msgs.msg.State
@@ -104,6 +123,7 @@ class GetState_Response(Message):
         self,
         *,
         current_state: lifecycle_msgs.msg.State = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class GetState_Event(Message):
@@ -116,6 +136,7 @@ class GetState_Event(Message):
         info: service_msgs.msg.ServiceEventInfo = ...,
         request: list[GetState_Request] = ...,
         response: list[GetState_Response] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class GetState(Service):

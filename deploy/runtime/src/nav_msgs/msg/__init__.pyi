@@ -20,6 +20,7 @@ class GridCells(Message):
         cell_width: float = ...,
         cell_height: float = ...,
         cells: list[geometry_msgs.msg.Point] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class MapMetaData(Message):
@@ -36,6 +37,7 @@ class MapMetaData(Message):
         width: int = ...,
         height: int = ...,
         origin: geometry_msgs.msg.Pose = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class OccupancyGrid(Message):
@@ -51,6 +53,7 @@ class OccupancyGrid(Message):
         header: std_msgs.msg.Header = ...,
         info: MapMetaData = ...,
         data: Iterable[int] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class Odometry(Message):
@@ -65,6 +68,7 @@ class Odometry(Message):
         child_frame_id: str = ...,
         pose: geometry_msgs.msg.PoseWithCovariance = ...,
         twist: geometry_msgs.msg.TwistWithCovariance = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class Path(Message):
@@ -75,4 +79,5 @@ class Path(Message):
         *,
         header: std_msgs.msg.Header = ...,
         poses: list[geometry_msgs.msg.PoseStamped] = ...,
+        check_fields: bool = ...,
     ) -> None: ...

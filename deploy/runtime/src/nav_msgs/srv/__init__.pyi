@@ -8,7 +8,11 @@ import service_msgs.msg
 from rosidl_runtime_embedded import Message, Service
 
 class GetMap_Request(Message):
-    def __init__(self) -> None: ...
+    def __init__(
+        self,
+        *,
+        check_fields: bool = ...,
+    ) -> None: ...
 
 class GetMap_Response(Message):
     map: nav_msgs.msg.OccupancyGrid
@@ -16,6 +20,7 @@ class GetMap_Response(Message):
         self,
         *,
         map: nav_msgs.msg.OccupancyGrid = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class GetMap_Event(Message):
@@ -28,6 +33,7 @@ class GetMap_Event(Message):
         info: service_msgs.msg.ServiceEventInfo = ...,
         request: list[GetMap_Request] = ...,
         response: list[GetMap_Response] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class GetMap(Service):
@@ -45,6 +51,7 @@ class GetPlan_Request(Message):
         start: geometry_msgs.msg.PoseStamped = ...,
         goal: geometry_msgs.msg.PoseStamped = ...,
         tolerance: float = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class GetPlan_Response(Message):
@@ -53,6 +60,7 @@ class GetPlan_Response(Message):
         self,
         *,
         plan: nav_msgs.msg.Path = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class GetPlan_Event(Message):
@@ -65,6 +73,7 @@ class GetPlan_Event(Message):
         info: service_msgs.msg.ServiceEventInfo = ...,
         request: list[GetPlan_Request] = ...,
         response: list[GetPlan_Response] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class GetPlan(Service):
@@ -78,6 +87,7 @@ class LoadMap_Request(Message):
         self,
         *,
         map_url: str = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class LoadMap_Response(Message):
@@ -93,6 +103,7 @@ class LoadMap_Response(Message):
         *,
         map: nav_msgs.msg.OccupancyGrid = ...,
         result: int = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class LoadMap_Event(Message):
@@ -105,6 +116,7 @@ class LoadMap_Event(Message):
         info: service_msgs.msg.ServiceEventInfo = ...,
         request: list[LoadMap_Request] = ...,
         response: list[LoadMap_Response] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class LoadMap(Service):
@@ -120,6 +132,7 @@ class SetMap_Request(Message):
         *,
         map: nav_msgs.msg.OccupancyGrid = ...,
         initial_pose: geometry_msgs.msg.PoseWithCovarianceStamped = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class SetMap_Response(Message):
@@ -128,6 +141,7 @@ class SetMap_Response(Message):
         self,
         *,
         success: bool = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class SetMap_Event(Message):
@@ -140,6 +154,7 @@ class SetMap_Event(Message):
         info: service_msgs.msg.ServiceEventInfo = ...,
         request: list[SetMap_Request] = ...,
         response: list[SetMap_Response] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class SetMap(Service):

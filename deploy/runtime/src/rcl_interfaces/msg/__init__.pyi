@@ -17,6 +17,7 @@ class FloatingPointRange(Message):
         from_value: float = ...,
         to_value: float = ...,
         step: float = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class IntegerRange(Message):
@@ -29,6 +30,7 @@ class IntegerRange(Message):
         from_value: int = ...,
         to_value: int = ...,
         step: int = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class ListParametersResult(Message):
@@ -39,6 +41,7 @@ class ListParametersResult(Message):
         *,
         names: list[str] = ...,
         prefixes: list[str] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class Log(Message):
@@ -64,6 +67,7 @@ class Log(Message):
         file: str = ...,
         function: str = ...,
         line: int = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class LoggerLevel(Message):
@@ -80,6 +84,7 @@ class LoggerLevel(Message):
         *,
         name: str = ...,
         level: int = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class Parameter(Message):
@@ -90,6 +95,7 @@ class Parameter(Message):
         *,
         name: str = ...,
         value: ParameterValue = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class ParameterDescriptor(Message):
@@ -114,6 +120,7 @@ class ParameterDescriptor(Message):
         dynamic_typing: bool = ...,
         floating_point_range: list[FloatingPointRange] = ...,
         integer_range: list[IntegerRange] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class ParameterEvent(Message):
@@ -130,6 +137,7 @@ class ParameterEvent(Message):
         new_parameters: list[Parameter] = ...,
         changed_parameters: list[Parameter] = ...,
         deleted_parameters: list[Parameter] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class ParameterEventDescriptors(Message):
@@ -142,6 +150,7 @@ class ParameterEventDescriptors(Message):
         new_parameters: list[ParameterDescriptor] = ...,
         changed_parameters: list[ParameterDescriptor] = ...,
         deleted_parameters: list[ParameterDescriptor] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class ParameterType(Message):
@@ -155,7 +164,11 @@ class ParameterType(Message):
     PARAMETER_INTEGER_ARRAY: Final = 7
     PARAMETER_DOUBLE_ARRAY: Final = 8
     PARAMETER_STRING_ARRAY: Final = 9
-    def __init__(self) -> None: ...
+    def __init__(
+        self,
+        *,
+        check_fields: bool = ...,
+    ) -> None: ...
 
 class ParameterValue(Message):
     type: int
@@ -187,6 +200,7 @@ class ParameterValue(Message):
         integer_array_value: Iterable[int] = ...,
         double_array_value: Iterable[float] = ...,
         string_array_value: list[str] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class SetLoggerLevelsResult(Message):
@@ -197,6 +211,7 @@ class SetLoggerLevelsResult(Message):
         *,
         successful: bool = ...,
         reason: str = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class SetParametersResult(Message):
@@ -207,4 +222,5 @@ class SetParametersResult(Message):
         *,
         successful: bool = ...,
         reason: str = ...,
+        check_fields: bool = ...,
     ) -> None: ...

@@ -14,6 +14,7 @@ class DescribeParameters_Request(Message):
         self,
         *,
         names: list[str] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class DescribeParameters_Response(Message):
@@ -22,6 +23,7 @@ class DescribeParameters_Response(Message):
         self,
         *,
         descriptors: list[rcl_interfaces.msg.ParameterDescriptor] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class DescribeParameters_Event(Message):
@@ -34,6 +36,7 @@ class DescribeParameters_Event(Message):
         info: service_msgs.msg.ServiceEventInfo = ...,
         request: list[DescribeParameters_Request] = ...,
         response: list[DescribeParameters_Response] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class DescribeParameters(Service):
@@ -47,6 +50,7 @@ class GetLoggerLevels_Request(Message):
         self,
         *,
         names: list[str] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class GetLoggerLevels_Response(Message):
@@ -55,6 +59,7 @@ class GetLoggerLevels_Response(Message):
         self,
         *,
         levels: list[rcl_interfaces.msg.LoggerLevel] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class GetLoggerLevels_Event(Message):
@@ -67,6 +72,7 @@ class GetLoggerLevels_Event(Message):
         info: service_msgs.msg.ServiceEventInfo = ...,
         request: list[GetLoggerLevels_Request] = ...,
         response: list[GetLoggerLevels_Response] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class GetLoggerLevels(Service):
@@ -80,6 +86,7 @@ class GetParameterTypes_Request(Message):
         self,
         *,
         names: list[str] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class GetParameterTypes_Response(Message):
@@ -91,6 +98,7 @@ class GetParameterTypes_Response(Message):
         self,
         *,
         types: Iterable[int] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class GetParameterTypes_Event(Message):
@@ -103,6 +111,7 @@ class GetParameterTypes_Event(Message):
         info: service_msgs.msg.ServiceEventInfo = ...,
         request: list[GetParameterTypes_Request] = ...,
         response: list[GetParameterTypes_Response] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class GetParameterTypes(Service):
@@ -116,6 +125,7 @@ class GetParameters_Request(Message):
         self,
         *,
         names: list[str] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class GetParameters_Response(Message):
@@ -124,6 +134,7 @@ class GetParameters_Response(Message):
         self,
         *,
         values: list[rcl_interfaces.msg.ParameterValue] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class GetParameters_Event(Message):
@@ -136,6 +147,7 @@ class GetParameters_Event(Message):
         info: service_msgs.msg.ServiceEventInfo = ...,
         request: list[GetParameters_Request] = ...,
         response: list[GetParameters_Response] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class GetParameters(Service):
@@ -152,6 +164,7 @@ class ListParameters_Request(Message):
         *,
         prefixes: list[str] = ...,
         depth: int = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class ListParameters_Response(Message):
@@ -160,6 +173,7 @@ class ListParameters_Response(Message):
         self,
         *,
         result: rcl_interfaces.msg.ListParametersResult = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class ListParameters_Event(Message):
@@ -172,6 +186,7 @@ class ListParameters_Event(Message):
         info: service_msgs.msg.ServiceEventInfo = ...,
         request: list[ListParameters_Request] = ...,
         response: list[ListParameters_Response] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class ListParameters(Service):
@@ -185,6 +200,7 @@ class SetLoggerLevels_Request(Message):
         self,
         *,
         levels: list[rcl_interfaces.msg.LoggerLevel] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class SetLoggerLevels_Response(Message):
@@ -193,6 +209,7 @@ class SetLoggerLevels_Response(Message):
         self,
         *,
         results: list[rcl_interfaces.msg.SetLoggerLevelsResult] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class SetLoggerLevels_Event(Message):
@@ -205,6 +222,7 @@ class SetLoggerLevels_Event(Message):
         info: service_msgs.msg.ServiceEventInfo = ...,
         request: list[SetLoggerLevels_Request] = ...,
         response: list[SetLoggerLevels_Response] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class SetLoggerLevels(Service):
@@ -218,6 +236,7 @@ class SetParameters_Request(Message):
         self,
         *,
         parameters: list[rcl_interfaces.msg.Parameter] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class SetParameters_Response(Message):
@@ -226,6 +245,7 @@ class SetParameters_Response(Message):
         self,
         *,
         results: list[rcl_interfaces.msg.SetParametersResult] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class SetParameters_Event(Message):
@@ -238,6 +258,7 @@ class SetParameters_Event(Message):
         info: service_msgs.msg.ServiceEventInfo = ...,
         request: list[SetParameters_Request] = ...,
         response: list[SetParameters_Response] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class SetParameters(Service):
@@ -251,6 +272,7 @@ class SetParametersAtomically_Request(Message):
         self,
         *,
         parameters: list[rcl_interfaces.msg.Parameter] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class SetParametersAtomically_Response(Message):
@@ -259,6 +281,7 @@ class SetParametersAtomically_Response(Message):
         self,
         *,
         result: rcl_interfaces.msg.SetParametersResult = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class SetParametersAtomically_Event(Message):
@@ -271,6 +294,7 @@ class SetParametersAtomically_Event(Message):
         info: service_msgs.msg.ServiceEventInfo = ...,
         request: list[SetParametersAtomically_Request] = ...,
         response: list[SetParametersAtomically_Response] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class SetParametersAtomically(Service):

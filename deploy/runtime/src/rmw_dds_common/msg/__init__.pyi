@@ -16,6 +16,7 @@ class Gid(Message):
         self,
         *,
         data: Iterable[int] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class NodeEntitiesInfo(Message):
@@ -30,6 +31,7 @@ class NodeEntitiesInfo(Message):
         node_name: str = ...,
         reader_gid_seq: list[Gid] = ...,
         writer_gid_seq: list[Gid] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class ParticipantEntitiesInfo(Message):
@@ -40,4 +42,5 @@ class ParticipantEntitiesInfo(Message):
         *,
         gid: Gid = ...,
         node_entities_info_seq: list[NodeEntitiesInfo] = ...,
+        check_fields: bool = ...,
     ) -> None: ...

@@ -9,4 +9,5 @@ class Clock(Message):
         self,
         *,
         clock: builtin_interfaces.msg.Time = ...,
+        check_fields: bool = ...,
     ) -> None: ...

@@ -77,6 +77,7 @@ class BatteryState(Message):
         cell_temperature: Iterable[float] = ...,
         location: str = ...,
         serial_number: str = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class CameraInfo(Message):
@@ -117,6 +118,7 @@ class CameraInfo(Message):
         binning_x: int = ...,
         binning_y: int = ...,
         roi: RegionOfInterest = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class ChannelFloat32(Message):
@@ -130,6 +132,7 @@ class ChannelFloat32(Message):
         *,
         name: str = ...,
         values: Iterable[float] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class CompressedImage(Message):
@@ -145,6 +148,7 @@ class CompressedImage(Message):
         header: std_msgs.msg.Header = ...,
         format: str = ...,
         data: Iterable[int] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class FluidPressure(Message):
@@ -157,6 +161,7 @@ class FluidPressure(Message):
         header: std_msgs.msg.Header = ...,
         fluid_pressure: float = ...,
         variance: float = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class Illuminance(Message):
@@ -169,6 +174,7 @@ class Illuminance(Message):
         header: std_msgs.msg.Header = ...,
         illuminance: float = ...,
         variance: float = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class Image(Message):
@@ -192,6 +198,7 @@ class Image(Message):
         is_bigendian: int = ...,
         step: int = ...,
         data: Iterable[int] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class Imu(Message):
@@ -221,6 +228,7 @@ class Imu(Message):
         angular_velocity_covariance: Iterable[float] = ...,
         linear_acceleration: geometry_msgs.msg.Vector3 = ...,
         linear_acceleration_covariance: Iterable[float] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class JointState(Message):
@@ -246,6 +254,7 @@ class JointState(Message):
         position: Iterable[float] = ...,
         velocity: Iterable[float] = ...,
         effort: Iterable[float] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class Joy(Message):
@@ -264,6 +273,7 @@ class Joy(Message):
         header: std_msgs.msg.Header = ...,
         axes: Iterable[float] = ...,
         buttons: Iterable[int] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class JoyFeedback(Message):
@@ -279,6 +289,7 @@ class JoyFeedback(Message):
         type: int = ...,
         id: int = ...,
         intensity: float = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class JoyFeedbackArray(Message):
@@ -287,6 +298,7 @@ class JoyFeedbackArray(Message):
         self,
         *,
         array: list[JoyFeedback] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class LaserEcho(Message):
@@ -298,6 +310,7 @@ class LaserEcho(Message):
         self,
         *,
         echoes: Iterable[float] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class LaserScan(Message):
@@ -330,6 +343,7 @@ class LaserScan(Message):
         range_max: float = ...,
         ranges: Iterable[float] = ...,
         intensities: Iterable[float] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class MagneticField(Message):
@@ -345,6 +359,7 @@ class MagneticField(Message):
         header: std_msgs.msg.Header = ...,
         magnetic_field: geometry_msgs.msg.Vector3 = ...,
         magnetic_field_covariance: Iterable[float] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class MultiDOFJointState(Message):
@@ -361,6 +376,7 @@ class MultiDOFJointState(Message):
         transforms: list[geometry_msgs.msg.Transform] = ...,
         twist: list[geometry_msgs.msg.Twist] = ...,
         wrench: list[geometry_msgs.msg.Wrench] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class MultiEchoLaserScan(Message):
@@ -387,6 +403,7 @@ class MultiEchoLaserScan(Message):
         range_max: float = ...,
         ranges: list[LaserEcho] = ...,
         intensities: list[LaserEcho] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class NavSatFix(Message):
@@ -414,6 +431,7 @@ class NavSatFix(Message):
         altitude: float = ...,
         position_covariance: Iterable[float] = ...,
         position_covariance_type: int = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class NavSatStatus(Message):
@@ -435,6 +453,7 @@ class NavSatStatus(Message):
         *,
         status: int = ...,
         service: int = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class PointCloud(Message):
@@ -447,6 +466,7 @@ class PointCloud(Message):
         header: std_msgs.msg.Header = ...,
         points: list[geometry_msgs.msg.Point32] = ...,
         channels: list[ChannelFloat32] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class PointCloud2(Message):
@@ -474,6 +494,7 @@ class PointCloud2(Message):
         row_step: int = ...,
         data: Iterable[int] = ...,
         is_dense: bool = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class PointField(Message):
@@ -496,6 +517,7 @@ class PointField(Message):
         offset: int = ...,
         datatype: int = ...,
         count: int = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class Range(Message):
@@ -518,6 +540,7 @@ class Range(Message):
         max_range: float = ...,
         range: float = ...,
         variance: float = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class RegionOfInterest(Message):
@@ -534,6 +557,7 @@ class RegionOfInterest(Message):
         height: int = ...,
         width: int = ...,
         do_rectify: bool = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class RelativeHumidity(Message):
@@ -546,6 +570,7 @@ class RelativeHumidity(Message):
         header: std_msgs.msg.Header = ...,
         relative_humidity: float = ...,
         variance: float = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class Temperature(Message):
@@ -558,6 +583,7 @@ class Temperature(Message):
         header: std_msgs.msg.Header = ...,
         temperature: float = ...,
         variance: float = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class TimeReference(Message):
@@ -570,4 +596,5 @@ class TimeReference(Message):
         header: std_msgs.msg.Header = ...,
         time_ref: builtin_interfaces.msg.Time = ...,
         source: str = ...,
+        check_fields: bool = ...,
     ) -> None: ...

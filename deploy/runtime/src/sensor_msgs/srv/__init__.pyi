@@ -12,6 +12,7 @@ class SetCameraInfo_Request(Message):
         self,
         *,
         camera_info: sensor_msgs.msg.CameraInfo = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class SetCameraInfo_Response(Message):
@@ -22,6 +23,7 @@ class SetCameraInfo_Response(Message):
         *,
         success: bool = ...,
         status_message: str = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class SetCameraInfo_Event(Message):
@@ -34,6 +36,7 @@ class SetCameraInfo_Event(Message):
         info: service_msgs.msg.ServiceEventInfo = ...,
         request: list[SetCameraInfo_Request] = ...,
         response: list[SetCameraInfo_Response] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class SetCameraInfo(Service):

@@ -28,4 +28,5 @@ class ServiceEventInfo(Message):
         stamp: builtin_interfaces.msg.Time = ...,
         client_gid: Iterable[int] = ...,
         sequence_number: int = ...,
+        check_fields: bool = ...,
     ) -> None: ...

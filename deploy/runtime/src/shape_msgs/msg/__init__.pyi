@@ -18,6 +18,7 @@ class Mesh(Message):
         *,
         triangles: list[MeshTriangle] = ...,
         vertices: list[geometry_msgs.msg.Point] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class MeshTriangle(Message):
@@ -29,6 +30,7 @@ class MeshTriangle(Message):
         self,
         *,
         vertex_indices: Iterable[int] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class Plane(Message):
@@ -40,6 +42,7 @@ class Plane(Message):
         self,
         *,
         coef: Iterable[float] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class SolidPrimitive(Message):
@@ -69,4 +72,5 @@ class SolidPrimitive(Message):
         type: int = ...,
         dimensions: Iterable[float] = ...,
         polygon: geometry_msgs.msg.Polygon = ...,
+        check_fields: bool = ...,
     ) -> None: ...

@@ -21,6 +21,7 @@ class MetricsMessage(Message):
         window_start: builtin_interfaces.msg.Time = ...,
         window_stop: builtin_interfaces.msg.Time = ...,
         statistics: list[StatisticDataPoint] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class StatisticDataPoint(Message):
@@ -31,6 +32,7 @@ class StatisticDataPoint(Message):
         *,
         data_type: int = ...,
         data: float = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class StatisticDataType(Message):
@@ -40,4 +42,8 @@ class StatisticDataType(Message):
     STATISTICS_DATA_TYPE_MAXIMUM: Final = 3
     STATISTICS_DATA_TYPE_STDDEV: Final = 4
     STATISTICS_DATA_TYPE_SAMPLE_COUNT: Final = 5
-    def __init__(self) -> None: ...
+    def __init__(
+        self,
+        *,
+        check_fields: bool = ...,
+    ) -> None: ...

@@ -12,6 +12,7 @@ class Bool(Message):
         self,
         *,
         data: bool = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class Byte(Message):
@@ -20,6 +21,7 @@ class Byte(Message):
         self,
         *,
         data: bytes = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class ByteMultiArray(Message):
@@ -30,6 +32,7 @@ class ByteMultiArray(Message):
         *,
         layout: MultiArrayLayout = ...,
         data: list[bytes] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class Char(Message):
@@ -38,6 +41,7 @@ class Char(Message):
         self,
         *,
         data: int = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class ColorRGBA(Message):
@@ -52,10 +56,15 @@ class ColorRGBA(Message):
         g: float = ...,
         b: float = ...,
         a: float = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class Empty(Message):
-    def __init__(self) -> None: ...
+    def __init__(
+        self,
+        *,
+        check_fields: bool = ...,
+    ) -> None: ...
 
 class Float32(Message):
     data: float
@@ -63,6 +72,7 @@ class Float32(Message):
         self,
         *,
         data: float = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class Float32MultiArray(Message):
@@ -76,6 +86,7 @@ class Float32MultiArray(Message):
         *,
         layout: MultiArrayLayout = ...,
         data: Iterable[float] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class Float64(Message):
@@ -84,6 +95,7 @@ class Float64(Message):
         self,
         *,
         data: float = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class Float64MultiArray(Message):
@@ -97,6 +109,7 @@ class Float64MultiArray(Message):
         *,
         layout: MultiArrayLayout = ...,
         data: Iterable[float] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class Header(Message):
@@ -107,6 +120,7 @@ class Header(Message):
         *,
         stamp: builtin_interfaces.msg.Time = ...,
         frame_id: str = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class Int16(Message):
@@ -115,6 +129,7 @@ class Int16(Message):
         self,
         *,
         data: int = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class Int16MultiArray(Message):
@@ -128,6 +143,7 @@ class Int16MultiArray(Message):
         *,
         layout: MultiArrayLayout = ...,
         data: Iterable[int] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class Int32(Message):
@@ -136,6 +152,7 @@ class Int32(Message):
         self,
         *,
         data: int = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class Int32MultiArray(Message):
@@ -149,6 +166,7 @@ class Int32MultiArray(Message):
         *,
         layout: MultiArrayLayout = ...,
         data: Iterable[int] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class Int64(Message):
@@ -157,6 +175,7 @@ class Int64(Message):
         self,
         *,
         data: int = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class Int64MultiArray(Message):
@@ -170,6 +189,7 @@ class Int64MultiArray(Message):
         *,
         layout: MultiArrayLayout = ...,
         data: Iterable[int] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class Int8(Message):
@@ -178,6 +198,7 @@ class Int8(Message):
         self,
         *,
         data: int = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class Int8MultiArray(Message):
@@ -191,6 +212,7 @@ class Int8MultiArray(Message):
         *,
         layout: MultiArrayLayout = ...,
         data: Iterable[int] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class MultiArrayDimension(Message):
@@ -203,6 +225,7 @@ class MultiArrayDimension(Message):
         label: str = ...,
         size: int = ...,
         stride: int = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class MultiArrayLayout(Message):
@@ -213,6 +236,7 @@ class MultiArrayLayout(Message):
         *,
         dim: list[MultiArrayDimension] = ...,
         data_offset: int = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class String(Message):
@@ -221,6 +245,7 @@ class String(Message):
         self,
         *,
         data: str = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class UInt16(Message):
@@ -229,6 +254,7 @@ class UInt16(Message):
         self,
         *,
         data: int = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class UInt16MultiArray(Message):
@@ -242,6 +268,7 @@ class UInt16MultiArray(Message):
         *,
         layout: MultiArrayLayout = ...,
         data: Iterable[int] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class UInt32(Message):
@@ -250,6 +277,7 @@ class UInt32(Message):
         self,
         *,
         data: int = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class UInt32MultiArray(Message):
@@ -263,6 +291,7 @@ class UInt32MultiArray(Message):
         *,
         layout: MultiArrayLayout = ...,
         data: Iterable[int] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class UInt64(Message):
@@ -271,6 +300,7 @@ class UInt64(Message):
         self,
         *,
         data: int = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class UInt64MultiArray(Message):
@@ -284,6 +314,7 @@ class UInt64MultiArray(Message):
         *,
         layout: MultiArrayLayout = ...,
         data: Iterable[int] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class UInt8(Message):
@@ -292,6 +323,7 @@ class UInt8(Message):
         self,
         *,
         data: int = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class UInt8MultiArray(Message):
@@ -305,4 +337,5 @@ class UInt8MultiArray(Message):
         *,
         layout: MultiArrayLayout = ...,
         data: Iterable[int] = ...,
+        check_fields: bool = ...,
     ) -> None: ...

@@ -6,10 +6,18 @@ import service_msgs.msg
 from rosidl_runtime_embedded import Message, Service
 
 class Empty_Request(Message):
-    def __init__(self) -> None: ...
+    def __init__(
+        self,
+        *,
+        check_fields: bool = ...,
+    ) -> None: ...
 
 class Empty_Response(Message):
-    def __init__(self) -> None: ...
+    def __init__(
+        self,
+        *,
+        check_fields: bool = ...,
+    ) -> None: ...
 
 class Empty_Event(Message):
     info: service_msgs.msg.ServiceEventInfo
@@ -21,6 +29,7 @@ class Empty_Event(Message):
         info: service_msgs.msg.ServiceEventInfo = ...,
         request: list[Empty_Request] = ...,
         response: list[Empty_Response] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class Empty(Service):
@@ -34,6 +43,7 @@ class SetBool_Request(Message):
         self,
         *,
         data: bool = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class SetBool_Response(Message):
@@ -44,6 +54,7 @@ class SetBool_Response(Message):
         *,
         success: bool = ...,
         message: str = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class SetBool_Event(Message):
@@ -56,6 +67,7 @@ class SetBool_Event(Message):
         info: service_msgs.msg.ServiceEventInfo = ...,
         request: list[SetBool_Request] = ...,
         response: list[SetBool_Response] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class SetBool(Service):
@@ -64,7 +76,11 @@ class SetBool(Service):
     Event: TypeAlias = SetBool_Event
 
 class Trigger_Request(Message):
-    def __init__(self) -> None: ...
+    def __init__(
+        self,
+        *,
+        check_fields: bool = ...,
+    ) -> None: ...
 
 class Trigger_Response(Message):
     success: bool
@@ -74,6 +90,7 @@ class Trigger_Response(Message):
         *,
         success: bool = ...,
         message: str = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class Trigger_Event(Message):
@@ -86,6 +103,7 @@ class Trigger_Event(Message):
         info: service_msgs.msg.ServiceEventInfo = ...,
         request: list[Trigger_Request] = ...,
         response: list[Trigger_Response] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class Trigger(Service):

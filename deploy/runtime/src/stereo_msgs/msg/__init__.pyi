@@ -24,4 +24,5 @@ class DisparityImage(Message):
         min_disparity: float = ...,
         max_disparity: float = ...,
         delta_d: float = ...,
+        check_fields: bool = ...,
     ) -> None: ...

@@ -18,6 +18,7 @@ class JointTrajectory(Message):
         header: std_msgs.msg.Header = ...,
         joint_names: list[str] = ...,
         points: list[JointTrajectoryPoint] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class JointTrajectoryPoint(Message):
@@ -46,6 +47,7 @@ class JointTrajectoryPoint(Message):
         accelerations: Iterable[float] = ...,
         effort: Iterable[float] = ...,
         time_from_start: builtin_interfaces.msg.Duration = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class MultiDOFJointTrajectory(Message):
@@ -58,6 +60,7 @@ class MultiDOFJointTrajectory(Message):
         header: std_msgs.msg.Header = ...,
         joint_names: list[str] = ...,
         points: list[MultiDOFJointTrajectoryPoint] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class MultiDOFJointTrajectoryPoint(Message):
@@ -72,4 +75,5 @@ class MultiDOFJointTrajectoryPoint(Message):
         velocities: list[geometry_msgs.msg.Twist] = ...,
         accelerations: list[geometry_msgs.msg.Twist] = ...,
         time_from_start: builtin_interfaces.msg.Duration = ...,
+        check_fields: bool = ...,
     ) -> None: ...

@@ -14,6 +14,7 @@ class Field(Message):
         name: str = ...,
         type: FieldType = ...,
         default_value: str = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class FieldType(Message):
@@ -118,6 +119,7 @@ class FieldType(Message):
         capacity: int = ...,
         string_capacity: int = ...,
         nested_type_name: str = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class IndividualTypeDescription(Message):
@@ -128,6 +130,7 @@ class IndividualTypeDescription(Message):
         *,
         type_name: str = ...,
         fields: list[Field] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class KeyValue(Message):
@@ -138,6 +141,7 @@ class KeyValue(Message):
         *,
         key: str = ...,
         value: str = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class TypeDescription(Message):
@@ -148,6 +152,7 @@ class TypeDescription(Message):
         *,
         type_description: IndividualTypeDescription = ...,
         referenced_type_descriptions: list[IndividualTypeDescription] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class TypeSource(Message):
@@ -160,4 +165,5 @@ class TypeSource(Message):
         type_name: str = ...,
         encoding: str = ...,
         raw_file_contents: str = ...,
+        check_fields: bool = ...,
     ) -> None: ...

@@ -17,6 +17,7 @@ class GetTypeDescription_Request(Message):
         type_name: str = ...,
         type_hash: str = ...,
         include_type_sources: bool = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class GetTypeDescription_Response(Message):
@@ -33,6 +34,7 @@ class GetTypeDescription_Response(Message):
         type_description: type_description_interfaces.msg.TypeDescription = ...,
         type_sources: list[type_description_interfaces.msg.TypeSource] = ...,
         extra_information: list[type_description_interfaces.msg.KeyValue] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class GetTypeDescription_Event(Message):
@@ -45,6 +47,7 @@ class GetTypeDescription_Event(Message):
         info: service_msgs.msg.ServiceEventInfo = ...,
         request: list[GetTypeDescription_Request] = ...,
         response: list[GetTypeDescription_Response] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class GetTypeDescription(Service):

@@ -16,4 +16,5 @@ class UUID(Message):
         self,
         *,
         uuid: Iterable[int] = ...,
+        check_fields: bool = ...,
     ) -> None: ...

@@ -47,6 +47,7 @@ class ImageMarker(Message):
         lifetime: builtin_interfaces.msg.Duration = ...,
         points: list[geometry_msgs.msg.Point] = ...,
         outline_colors: list[std_msgs.msg.ColorRGBA] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class InteractiveMarker(Message):
@@ -67,6 +68,7 @@ class InteractiveMarker(Message):
         scale: float = ...,
         menu_entries: list[MenuEntry] = ...,
         controls: list[InteractiveMarkerControl] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class InteractiveMarkerControl(Message):
@@ -102,6 +104,7 @@ class InteractiveMarkerControl(Message):
         markers: list[Marker] = ...,
         independent_marker_orientation: bool = ...,
         description: str = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class InteractiveMarkerFeedback(Message):
@@ -132,6 +135,7 @@ class InteractiveMarkerFeedback(Message):
         menu_entry_id: int = ...,
         mouse_point: geometry_msgs.msg.Point = ...,
         mouse_point_valid: bool = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class InteractiveMarkerInit(Message):
@@ -144,6 +148,7 @@ class InteractiveMarkerInit(Message):
         server_id: str = ...,
         seq_num: int = ...,
         markers: list[InteractiveMarker] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class InteractiveMarkerPose(Message):
@@ -156,6 +161,7 @@ class InteractiveMarkerPose(Message):
         header: std_msgs.msg.Header = ...,
         pose: geometry_msgs.msg.Pose = ...,
         name: str = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class InteractiveMarkerUpdate(Message):
@@ -176,6 +182,7 @@ class InteractiveMarkerUpdate(Message):
         markers: list[InteractiveMarker] = ...,
         poses: list[InteractiveMarkerPose] = ...,
         erases: list[str] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class Marker(Message):
@@ -237,6 +244,7 @@ class Marker(Message):
         mesh_resource: str = ...,
         mesh_file: MeshFile = ...,
         mesh_use_embedded_materials: bool = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class MarkerArray(Message):
@@ -245,6 +253,7 @@ class MarkerArray(Message):
         self,
         *,
         markers: list[Marker] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class MenuEntry(Message):
@@ -264,6 +273,7 @@ class MenuEntry(Message):
         title: str = ...,
         command: str = ...,
         command_type: int = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class MeshFile(Message):
@@ -277,6 +287,7 @@ class MeshFile(Message):
         *,
         filename: str = ...,
         data: Iterable[int] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class UVCoordinate(Message):
@@ -287,4 +298,5 @@ class UVCoordinate(Message):
         *,
         u: float = ...,
         v: float = ...,
+        check_fields: bool = ...,
     ) -> None: ...

@@ -7,7 +7,11 @@ import visualization_msgs.msg
 from rosidl_runtime_embedded import Message, Service
 
 class GetInteractiveMarkers_Request(Message):
-    def __init__(self) -> None: ...
+    def __init__(
+        self,
+        *,
+        check_fields: bool = ...,
+    ) -> None: ...
 
 class GetInteractiveMarkers_Response(Message):
     sequence_number: int
@@ -17,6 +21,7 @@ class GetInteractiveMarkers_Response(Message):
         *,
         sequence_number: int = ...,
         markers: list[visualization_msgs.msg.InteractiveMarker] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class GetInteractiveMarkers_Event(Message):
@@ -29,6 +34,7 @@ class GetInteractiveMarkers_Event(Message):
         info: service_msgs.msg.ServiceEventInfo = ...,
         request: list[GetInteractiveMarkers_Request] = ...,
         response: list[GetInteractiveMarkers_Response] = ...,
+        check_fields: bool = ...,
     ) -> None: ...
 
 class GetInteractiveMarkers(Service):
