@@ -36,18 +36,25 @@ def run_directory() -> Path:
 
 def environment_of(pid: int) -> dict[str, str]:
     """The environment that a process was started with; empty when it has ended or is somebody else's."""
-    try:
-        entries = Path(f"/proc/{pid}/environ").read_bytes().split(b"\0")
-    except OSError:
-        return {}
-    pairs = (os.fsdecode(entry).partition("=") for entry in entries if entry)
+    pairs = (os.fsdecode(entry).partition("=") for entry in _environ(pid).split(b"\0") if entry)
     return {key: value for key, _, value in pairs}
+
+
+def _environ(pid: int) -> bytes:
+    try:
+        with open(f"/proc/{pid}/environ", "rb") as file:
+            return file.read()
+    except OSError:
+        return b""
 
 
 def of_system(run: Path) -> list[Process]:
     """The live processes of the system with this run directory, supervisord first."""
+    mark = os.fsencode(f"{MARK}={run}")
     found = []
     for pid in (int(name) for name in os.listdir("/proc") if name.isdigit()):
+        if mark not in _environ(pid):
+            continue  # without a look at each variable: a machine has many processes
         environment = environment_of(pid)
         if environment.get(MARK) == str(run):
             found.append(Process(pid, environment.get("SUPERVISOR_PROCESS_NAME", "")))

@@ -40,7 +40,7 @@ KEPT = 10  # records
 
 FLEET = (
     # With an index there would be 100 participants at most.
-    "<Discovery><ParticipantIndex>none</ParticipantIndex></Discovery>",
+    "<Discovery><ParticipantIndex>none</ParticipantIndex><LeaseDuration>60 s</LeaseDuration></Discovery>",
     # By multicast every process would get what is for one of a hundred.
     "<General><AllowMulticast>spdp</AllowMulticast></General>",
     # Each process that starts meets all others, which acknowledge each of its heartbeats: where these come

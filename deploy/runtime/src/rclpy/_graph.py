@@ -317,12 +317,12 @@ class Graph:
             for gid, node in self._nodes()
         ]
 
-    def _owner(self, gid: bytes) -> tuple[str, str]:
-        """Name and namespace of the node that has this endpoint, as ROS 2 names what it does not know."""
-        for _, node in self._nodes():
-            if gid in node.readers or gid in node.writers:
-                return node.name, node.namespace
-        return "_NODE_NAME_UNKNOWN_", "_NODE_NAMESPACE_UNKNOWN_"
+    def _with_owners(self, endpoints: list[Endpoint]) -> list[tuple[Endpoint, str, str]]:
+        """Each with name and namespace of its node, as ROS 2 names what it does not know."""
+        nodes: dict[bytes, list[NodeEntities]] = {}
+        for gid, node in self._nodes():
+            nodes.setdefault(gid, []).append(node)
+        return [(endpoint, *_owner(endpoint, nodes.get(endpoint.participant, []))) for endpoint in endpoints]
 
     def _writers_and_readers(self) -> list[Endpoint]:
         return self._discovered().writers() + self._discovered().readers()
@@ -368,13 +368,11 @@ class Graph:
 
     def writers_of(self, dds_topic: str) -> list[tuple[Endpoint, str, str]]:
         """The writers on a topic, each with its node's name and namespace."""
-        found = [writer for writer in self._discovered().writers() if writer.topic == dds_topic]
-        return [(endpoint, *self._owner(endpoint.gid)) for endpoint in found]
+        return self._with_owners([w for w in self._discovered().writers() if w.topic == dds_topic])
 
     def readers_of(self, dds_topic: str) -> list[tuple[Endpoint, str, str]]:
         """The readers on a topic, each with its node's name and namespace."""
-        found = [reader for reader in self._discovered().readers() if reader.topic == dds_topic]
-        return [(endpoint, *self._owner(endpoint.gid)) for endpoint in found]
+        return self._with_owners([r for r in self._discovered().readers() if r.topic == dds_topic])
 
     def count_writers(self, dds_topic: str) -> int:
         """How many writers a topic has."""
@@ -383,6 +381,14 @@ class Graph:
     def count_readers(self, dds_topic: str) -> int:
         """How many readers a topic has."""
         return sum(reader.topic == dds_topic for reader in self._discovered().readers())
+
+
+def _owner(endpoint: Endpoint, nodes: list[NodeEntities]) -> tuple[str, str]:
+    """Name and namespace of that node of the endpoint's participant which has it."""
+    for node in nodes:
+        if endpoint.gid in node.readers or endpoint.gid in node.writers:
+            return node.name, node.namespace
+    return "_NODE_NAME_UNKNOWN_", "_NODE_NAMESPACE_UNKNOWN_"
 
 
 def _sorted(found: dict[str, set[str]]) -> NamesAndTypes:

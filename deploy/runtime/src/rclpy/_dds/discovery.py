@@ -40,11 +40,6 @@ class Endpoint:
     user_data: str
     profile: QoSProfile
 
-    @property
-    def is_builtin(self) -> bool:
-        """Whether it is one of our own readers below: Cyclone lists them, but announces them to nobody."""
-        return self.type_name.startswith("org::eclipse::cyclonedds::builtin::")
-
 
 class _BuiltinReader:
     """A reader of one of Cyclone's built-in topics, and all that exists of what it tells about.
@@ -78,14 +73,14 @@ class _BuiltinReader:
                     blocking.dds_return_loan(self.handle, samples, count)
 
     def alive(self) -> list[Any]:
-        """What exists now, each as it was converted from the C structure."""
+        """What exists now, each as it was converted from the C structure, but for what became None."""
         with self._lock:
             if blocking.dds_triggered(self.news):
                 for structure, info in self._samples("dds_read_mask", _NOT_READ):
                     if info.instance_state != _ALIVE:
                         self._known.pop(info.instance_handle, None)
-                    elif info.valid_data:
-                        self._known[info.instance_handle] = self._convert(structure)
+                    elif info.valid_data and (found := self._convert(structure)) is not None:
+                        self._known[info.instance_handle] = found
             return list(self._known.values())
 
     def forget_gone(self) -> None:
@@ -133,18 +128,20 @@ class Discovery:
 
     def writers(self) -> list[Endpoint]:
         """Every writer."""
-        return [found for found in self._writers.alive() if not found.is_builtin]
+        return self._writers.alive()
 
     def readers(self) -> list[Endpoint]:
         """Every reader."""
-        return [found for found in self._readers.alive() if not found.is_builtin]
+        return self._readers.alive()
 
 
 def _participant(found: BuiltinParticipant) -> tuple[bytes, str]:
     return bytes(found.key.bytes), qos.user_data(found.qos)
 
 
-def _endpoint(found: BuiltinEndpoint) -> Endpoint:
+def _endpoint(found: BuiltinEndpoint) -> Endpoint | None:
+    if found.type_name.startswith(b"org::eclipse::cyclonedds::builtin::"):
+        return None  # one of our own readers above: Cyclone lists them, but announces them to nobody
     return Endpoint(
         gid=bytes(found.key.bytes),
         participant=bytes(found.participant_key.bytes),
