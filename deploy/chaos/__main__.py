@@ -38,17 +38,6 @@ from interfaces import topics
 SCENARIOS = ("monkey", "partition", *schedule.NAMED)
 KEPT = 10  # records
 
-FLEET = (
-    # With an index there would be 100 participants at most.
-    "<Discovery><ParticipantIndex>none</ParticipantIndex><LeaseDuration>60 s</LeaseDuration></Discovery>",
-    # By multicast every process would get what is for one of a hundred.
-    "<General><AllowMulticast>spdp</AllowMulticast></General>",
-    # Each process that starts meets all others, which acknowledge each of its heartbeats: where these come
-    # faster than a busy machine answers, they keep it busy.
-    '<Internal><HeartbeatInterval min="5 s" minsched="5 s">8 s</HeartbeatInterval></Internal>',
-)
-"""What Cyclone DDS needs for so many processes on one machine."""
-
 
 def main(arguments: Sequence[str]) -> int:
     """Obey the command line; the exit code."""
@@ -93,7 +82,7 @@ def unleash(options: argparse.Namespace) -> int:
             **_fleet(options.arms),
             say=lambda text: print(text, flush=True),
             check=interruption.check,
-            environment=_dds(options),
+            loss=options.loss,
         )
         with arena:
             before = Cost.now(arena.arms)
@@ -104,11 +93,15 @@ def unleash(options: argparse.Namespace) -> int:
             conclude(arena.record, f"{title}, {cost}", arena.history(arm.namespace), arm.namespace)
             for arm in arena.arms
         ]
+        if options.arms > 1:
+            broken = ", ".join(arm.namespace for arm, code in zip(arena.arms, codes, strict=True) if code)
+            verdict = f"promises are broken for {broken}" if broken else "no promise is broken"
+            print(f"\n{options.arms} arms: {verdict}")
         return max(codes)
 
 
 def _fleet(arms: int) -> dict[str, Any]:
-    """The options of an arena with so many arms, each in a namespace."""
+    """The options of an arena with so many arms, each in a namespace of its own."""
     if arms == 1:
         return {}
     # Slower, as befits many arms on one machine, but still a message of each stream every 100 ms.
@@ -117,20 +110,6 @@ def _fleet(arms: int) -> dict[str, Any]:
         "namespaces": tuple(f"/arm{number}" for number in range(1, arms + 1)),
         "scenario": {**SCENARIO, **slow},
     }
-
-
-def _dds(options: argparse.Namespace) -> dict[str, str]:
-    """The environment that makes Cyclone DDS lose packets (not every kernel has netem), or serve a fleet."""
-    settings = []
-    if options.loss:
-        settings.append(
-            f"<Internal><Test><XmitLossiness>{10 * options.loss:.0f}</XmitLossiness></Test></Internal>"
-        )
-    if options.arms > 1:
-        settings += FLEET
-    if not settings:
-        return {}
-    return {"CYCLONEDDS_URI": ",".join(filter(None, [os.environ.get("CYCLONEDDS_URI"), *settings]))}
 
 
 def conclude(path: Path, title: str, history: History, namespace: str = "/") -> int:

@@ -1,4 +1,7 @@
-"""Where the monkey plays: arms of its own in a ROS domain of its own, under observation. Never the user's.
+"""Where the monkey plays: arms of its own, each in a ROS domain of its own, under observation.
+
+An arm has eleven processes, and in a domain each process meets every other one: a fleet in one domain would
+keep a small machine busy with nothing else.
 
 ::
 
@@ -86,6 +89,7 @@ class Arena:
     """One or more arms, and an observer that records them until the end of the `with`."""
 
     lead = LEAD
+    discovery = "LOCALHOST"  # ROS_AUTOMATIC_DISCOVERY_RANGE
 
     def __init__(
         self,
@@ -94,13 +98,13 @@ class Arena:
         scenario: Mapping[str, Any] = SCENARIO,
         say: Callable[[str], None] = lambda text: None,
         check: Callable[[], None] = lambda: None,
-        environment: Mapping[str, str] | None = None,
+        loss: float = 0.0,
     ) -> None:
         """
         :param directory: for the record and the runtime files; does not exist yet
         :param say: is told what the monkey does
-        :param environment: of the systems, besides that of this process
         :param check: is called often, and raises what is to end the play
+        :param loss: of the packets that a process sends [%]; by Cyclone DDS, as not every kernel has netem
         """
         self.record = directory / "record.mcap"
         self.arms = [
@@ -111,7 +115,7 @@ class Arena:
         self._scenario = scenario
         self._say = say
         self._check = check
-        self.environment = environment or {}
+        self._loss = loss
         self._stack = ExitStack()
         self._epoch = 0.0
         self.faults = FAULTS
@@ -122,24 +126,22 @@ class Arena:
             self._directory.mkdir(parents=True)
             scenario = self._directory / "scenario.yaml"
             scenario.write_text(yaml.safe_dump(dict(self._scenario)))
-            environment = {
-                "ROS_DOMAIN_ID": str(stack.enter_context(_domain())),
-                "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
-                **self.environment,
-            }
             self.prepare(stack)
+            domains = [stack.enter_context(_domain()) for _ in self.arms]
+            observed = [f"{a.namespace}={d}={a.system.run}" for a, d in zip(self.arms, domains, strict=True)]
+            environment = {"ROS_AUTOMATIC_DISCOVERY_RANGE": self.discovery, **_losing(self._loss)}
             self._observer = stack.enter_context(
-                _observer(self.record, self.arms, environment, self.observed_within)
+                _observer(self.record, observed, environment, self.observed_within)
             )
             lines = _lines(self._observer)
             self._epoch = time.monotonic() + self.lead
             shared = {"scenario": str(scenario), "scenario_epoch": round(self._epoch, 3)}
-            injected = environment | {
-                "PYTHONPATH": os.pathsep.join([str(INJECTED), *filter(None, [os.environ.get("PYTHONPATH")])])
-            }
-            for arm in self.arms:
+            environment["PYTHONPATH"] = os.pathsep.join(
+                [str(INJECTED), *filter(None, [os.environ.get("PYTHONPATH")])]
+            )
+            for arm, domain in zip(self.arms, domains, strict=True):
                 stack.callback(arm.system.stop)
-                with _environment(injected | {NAMESPACE: arm.namespace}):
+                with _environment(environment | {NAMESPACE: arm.namespace, "ROS_DOMAIN_ID": str(domain)}):
                     self.start(arm, {"/**": {"ros__parameters": shared}})
                 # One after the other: together they would keep each other from starting.
                 self._await_up(arm, lines)
@@ -245,25 +247,28 @@ class _Once:
             do()
 
 
+def _losing(percent: float) -> dict[str, str]:
+    """The environment that makes Cyclone DDS lose packets."""
+    if not percent:
+        return {}
+    return _configured(f"<Internal><Test><XmitLossiness>{10 * percent:.0f}</XmitLossiness></Test></Internal>")
+
+
+def _configured(setting: str) -> dict[str, str]:
+    """The environment in which Cyclone DDS has one setting more."""
+    return {"CYCLONEDDS_URI": ",".join(filter(None, [os.environ.get("CYCLONEDDS_URI"), setting]))}
+
+
 @contextmanager
 def _observer(
-    path: Path, arms: list[ArmUnderTest], environment: Mapping[str, str], within: Sequence[str]
+    path: Path, arms: Sequence[str], environment: Mapping[str, str], within: Sequence[str]
 ) -> Iterator[subprocess.Popen[str]]:
     # What has two readers is sent by multicast, and every process of the domain gets it.
-    unicast = "<General><AllowMulticast>spdp</AllowMulticast></General>"
-    environment = {**os.environ, **environment}
-    settings = filter(None, [environment.get("CYCLONEDDS_URI"), unicast])
+    unicast = _configured("<General><AllowMulticast>spdp</AllowMulticast></General>")
     process = subprocess.Popen(
-        [
-            *within,
-            sys.executable,
-            "-m",
-            "deploy.chaos.observer",
-            str(path),
-            *(f"{arm.namespace}={arm.system.run}" for arm in arms),
-        ],
+        [*within, sys.executable, "-m", "deploy.chaos.observer", str(path), *arms],
         cwd=processes.ROOT,
-        env=environment | {"CYCLONEDDS_URI": ",".join(settings)},
+        env={**os.environ, **environment, **unicast},
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,

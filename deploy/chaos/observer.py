@@ -3,7 +3,7 @@
 A process of its own, of which the system knows nothing. The monkey tells it its faults on standard input, a
 JSON object a line; the end of standard input ends the record. ::
 
-    python -m deploy.chaos.observer RECORD NAMESPACE=RUN_DIRECTORY ...
+    python -m deploy.chaos.observer RECORD NAMESPACE=DOMAIN=RUN_DIRECTORY ...
 """
 
 from __future__ import annotations
@@ -14,12 +14,14 @@ import select
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import ExitStack, contextmanager
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import rclpy
+from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
@@ -42,24 +44,39 @@ class Arm(NamedTuple):
     """What is observed."""
 
     namespace: str
+    domain: int
     run: Path
 
     @classmethod
     def parse(cls, text: str) -> Arm:
-        """From `NAMESPACE=RUN_DIRECTORY`."""
-        namespace, _, run = text.partition("=")
-        return cls(namespace, Path(run))
+        """From `NAMESPACE=DOMAIN=RUN_DIRECTORY`."""
+        namespace, domain, run = text.split("=", 2)
+        return cls(namespace, int(domain), Path(run))
 
 
-def listen(node: Node, recorder: Recorder, arms: Iterable[Arm]) -> None:
+@contextmanager
+def listening(arm: Arm, recorder: Recorder) -> Iterator[None]:
+    """Record, on a thread of its own, what is said in an arm's domain."""
+    context = Context()
+    rclpy.init(args=[], context=context, domain_id=arm.domain, signal_handler_options=SignalHandlerOptions.NO)
+    executor = SingleThreadedExecutor(context=context)
+    node = Node(f"observer_{os.getpid()}", context=context, namespace=arm.namespace)
+    executor.add_node(node)
+    listen(node, recorder)
+    thread = threading.Thread(target=executor.spin)
+    thread.start()
+    try:
+        yield
+    finally:
+        executor.shutdown()
+        thread.join()
+        rclpy.try_shutdown(context=context)
+
+
+def listen(node: Node, recorder: Recorder) -> None:
     """Record every topic of the contract; say `seen NAME` on standard output when one comes first."""
-    names = {
-        name: topic
-        for arm in arms
-        for topic in topics.CONTRACT
-        for name in [topic.name if topic.name[0] == "/" else f"{arm.namespace.rstrip('/')}/{topic.name}"]
-    }
-    for name, topic in names.items():
+    for topic in topics.CONTRACT:
+        name = node.resolve_topic_name(topic.name)
         depth = THINNED if topic is topics.OPERATOR_HEARTBEAT else DEPTH
         qos = QoSProfile(depth=depth, reliability=topic.qos.reliability, durability=topic.qos.durability)
         callback = _writer(recorder, name, topic)
@@ -180,12 +197,7 @@ def main(arguments: list[str]) -> int:
         event = relative(Fault("overload", NOTHING, begin, end)._asdict(), "begin", "end")
         recorder.event(FAULTS, time.monotonic_ns(), event)
 
-    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
-    node = Node(f"observer_{os.getpid()}")
     ended = threading.Event()
-    executor = SingleThreadedExecutor()
-    executor.add_node(node)
-    listen(node, recorder, arms)
 
     def obey() -> None:
         print("observing", flush=True)
@@ -194,20 +206,16 @@ def main(arguments: list[str]) -> int:
             recorder.event(FAULTS, time.monotonic_ns(), event)
         ended.set()
 
-    threads = [
-        threading.Thread(target=obey, daemon=True),
-        threading.Thread(target=partial(Census(arms, report, overload).run, ended)),
-    ]
-    for thread in threads:
-        thread.start()
+    census = threading.Thread(target=partial(Census(arms, report, overload).run, ended))
     try:
-        while not ended.is_set():
-            executor.spin_once(timeout_sec=0.1)
+        with ExitStack() as stack:
+            for arm in arms:
+                stack.enter_context(listening(arm, recorder))
+            census.start()
+            obey()
+            census.join()
     finally:
-        ended.set()
-        threads[1].join()
         recorder.close()
-        rclpy.try_shutdown()
     return 0
 
 

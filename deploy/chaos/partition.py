@@ -83,9 +83,10 @@ class TwoHosts(Arena):
 
     lead = 6.0  # s: two systems have to start before the operator's only `turn_on`
 
-    def __init__(self, directory: Path, environment: Mapping[str, str], **options: Any) -> None:
-        network = {**environment, "ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}
-        super().__init__(directory, scenario=HELD, environment=network, **options)
+    discovery = "SUBNET"
+
+    def __init__(self, directory: Path, **options: Any) -> None:
+        super().__init__(directory, scenario=HELD, **options)
         self._runs = directory
         self._name: Callable[[str], str] = str
         self.faults = {**FAULTS, "partition": Fault(self._cut, (OPERATOR,))}

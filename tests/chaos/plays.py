@@ -17,13 +17,13 @@ LONGEST = 150.0  # s
 
 
 class Play:
-    """A play that is over."""
+    """What became of an arm in a play that is over."""
 
-    def __init__(self, directory: Path, output: str, code: int) -> None:
+    def __init__(self, directory: Path, output: str, code: int, namespace: str = "/") -> None:
         self.output = output
         self.code = code
-        self.page = next(directory.glob("chaos/*/report.html"))
-        self.history: History = record.load(self.page.with_name("record.mcap"))
+        self.page = next(directory.glob(f"chaos/*/report{namespace.replace('/', '_').rstrip('_')}.html"))
+        self.history: History = record.load(self.page.with_name("record.mcap"), namespace)
         self.findings: dict[str, Finding] = {name: check(self.history) for name, check in CHECKERS.items()}
 
     def finding(self, promise: str) -> Finding:
@@ -33,10 +33,15 @@ class Play:
         return finding
 
 
-def play(scenario: str, run: Path) -> Play:
-    """Play a named scenario, with a directory for its runtime files."""
+def play(run: Path, *options: str) -> Play:
+    """Play with one arm and a directory for its runtime files."""
+    return Play(run, *unleash(run, *options))
+
+
+def unleash(run: Path, *options: str) -> tuple[str, int]:
+    """Let the monkey play; what it said, and its exit code."""
     process = subprocess.Popen(
-        [sys.executable, "-m", "deploy.chaos", "--scenario", scenario],
+        [sys.executable, "-m", "deploy.chaos", *options],
         cwd=processes.ROOT,
         env={**os.environ, "REACTIVE_ARM_RUN_DIR": str(run)},
         stdout=subprocess.PIPE,
@@ -50,4 +55,4 @@ def play(scenario: str, run: Path) -> Play:
             process.terminate()
             process.wait(timeout=20.0)
     assert "Report: " in output, output
-    return Play(run, output, process.returncode)
+    return output, process.returncode

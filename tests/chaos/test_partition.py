@@ -21,7 +21,7 @@ def history(tmp_path_factory: pytest.TempPathFactory) -> History:
     """What the robot's side sees."""
     if reason := missing():
         pytest.skip(reason)
-    return play("partition", tmp_path_factory.mktemp("partition")).history
+    return play(tmp_path_factory.mktemp("partition"), "--scenario", "partition").history
 
 
 @pytest.fixture(scope="module")
