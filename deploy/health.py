@@ -25,10 +25,11 @@ class Health(NamedTuple):
 
 
 class HealthMonitor:
-    """Listens to /diagnostics: the latest health of each service, by program."""
+    """Listens to /diagnostics: the latest health of each service in a node's namespace, by program."""
 
     def __init__(self, node: Node) -> None:
         self.latest: dict[str, Health] = {}
+        self._namespace = node.get_namespace().rstrip("/")
         topic = topics.DIAGNOSTICS
         node.create_subscription(topic.type, topic.name, self._on_message, topic.qos)
 
@@ -39,8 +40,9 @@ class HealthMonitor:
     def _on_message(self, message: DiagnosticArray) -> None:
         for status in message.status:
             values = {pair.key: pair.value for pair in status.values}
-            if "pid" in values and "published" in values:
-                self.latest[status.name.rpartition("/")[2]] = _health(status, values)
+            namespace, _, program = status.name.rpartition("/")
+            if namespace == self._namespace and "pid" in values and "published" in values:
+                self.latest[program] = _health(status, values)
 
 
 def _health(status: DiagnosticStatus, values: dict[str, str]) -> Health:

@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING
 
-from deploy.system import DeploymentError, Program, System
+from deploy.system import NAMESPACE, DeploymentError, Program, System
 
 if TYPE_CHECKING:
     from deploy.member import Member
@@ -96,8 +96,10 @@ def _started(system: System, scenario: str, parameter_file: str) -> Iterator[tup
         interruption.check()
         system.start(given)
         try:
-            domain = os.environ.get("ROS_DOMAIN_ID") or "0"
-            print(f"Starting the services, scenario {scenario}, ROS domain {domain} ...", flush=True)
+            place = f"ROS domain {os.environ.get('ROS_DOMAIN_ID') or 0}"
+            if namespace := os.environ.get(NAMESPACE):
+                place += f", namespace {namespace}"
+            print(f"Starting the services, scenario {scenario}, {place} ...", flush=True)
             _await_services(system, member)
             epoch = parameters.epoch_of(system)
             print(f"All services are up after {time.monotonic() - began:.1f} s.", flush=True)
@@ -162,7 +164,7 @@ def _adopt_environment(system: System) -> bool:
     """Look where the running system communicates, whatever the environment here; whether one runs."""
     environment = system.environment()
     for name in (*os.environ, *environment):
-        if name.startswith(("ROS_", "RMW_", "CYCLONEDDS_", "FASTRTPS_", "FASTDDS_")):
+        if name.startswith(("ROS_", "RMW_", "CYCLONEDDS_", "FASTRTPS_", "FASTDDS_", NAMESPACE)):
             os.environ.pop(name, None)
             if name in environment:
                 os.environ[name] = environment[name]

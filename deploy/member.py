@@ -10,6 +10,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 
 from deploy.health import Health, HealthMonitor
+from deploy.system import NAMESPACE
 from interfaces.reactive_node import ReactiveNode
 
 
@@ -18,7 +19,8 @@ class Member:
 
     def __init__(self) -> None:
         rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
-        self.node = ReactiveNode(f"console_{os.getpid()}")
+        namespace = os.environ.get(NAMESPACE) or "/"
+        self.node = ReactiveNode(f"console_{os.getpid()}", namespace=namespace)
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self.node)
         self._monitor = HealthMonitor(self.node)

@@ -10,9 +10,11 @@ from pathlib import Path
 from typing import Any
 
 import yaml
+from rclpy.exceptions import InvalidNamespaceException
+from rclpy.validate_namespace import validate_namespace
 
 from deploy.processes import ROOT
-from deploy.system import DeploymentError, System
+from deploy.system import NAMESPACE, DeploymentError, System
 from interfaces import scenario
 
 SCENARIOS = ROOT / "deploy" / "scenarios"
@@ -68,3 +70,9 @@ def check_environment() -> None:
     domain = os.environ.get("ROS_DOMAIN_ID") or "0"
     if not domain.isdecimal() or int(domain) > 232:
         raise DeploymentError(f"ROS_DOMAIN_ID={domain} is not a number from 0 to 232")
+    namespace = os.environ.get(NAMESPACE) or "/"
+    try:
+        validate_namespace(namespace)
+    except InvalidNamespaceException as error:
+        reason = str(error).splitlines()[0]
+        raise DeploymentError(f"{NAMESPACE}={namespace} is no namespace such as /arm1: {reason}") from None

@@ -197,7 +197,7 @@ class System:
         self._end_members()
         environment = dict(self._environment)
         environment[processes.MARK] = str(self.run)
-        environment.setdefault(NAMESPACE, "/")
+        environment[NAMESPACE] = environment.get(NAMESPACE) or "/"
         environment["PYTHONUNBUFFERED"] = "1"
         _prepend(environment, "PATH", str(Path(sys.executable).parent))
         _prepend(environment, "PYTHONPATH", str(processes.ROOT))

@@ -117,17 +117,22 @@ class Command:
 
 
 class Site:
-    """A run directory and a DDS domain for one system."""
+    """A run directory, a DDS domain and a ROS namespace for one system."""
 
-    def __init__(self, run: Path, domain: int) -> None:
+    def __init__(self, run: Path, domain: int, namespace: str = "") -> None:
         self.run = run
         self.domain = domain
+        self.namespace = namespace
         self._commands = ExitStack()
 
     @property
     def environment(self) -> dict[str, str]:
         """What a user would set to have a second system beside the usual one."""
-        return os.environ | {"REACTIVE_ARM_RUN_DIR": str(self.run), "ROS_DOMAIN_ID": str(self.domain)}
+        return os.environ | {
+            "REACTIVE_ARM_RUN_DIR": str(self.run),
+            "REACTIVE_ARM_NAMESPACE": self.namespace,
+            "ROS_DOMAIN_ID": str(self.domain),
+        }
 
     def begin_python(self, script: str, *arguments: str) -> Command:
         """Begin a script that uses the checkout."""

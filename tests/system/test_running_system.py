@@ -11,6 +11,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -180,6 +181,22 @@ def test_who_lets_go_of_the_switch_in_the_demo_has_the_engines_stopped(site: Sit
     assert command.lines[-1][0] - released < 10.5
     command.type("quit\n")
     assert command.wait() == 0
+
+
+def test_a_second_arm_lives_in_the_same_domain_in_a_namespace_of_its_own(
+    module_site: Site, tmp_path: Path
+) -> None:
+    first = module_site.members
+    with closing(Site(tmp_path / "run", module_site.domain, "/second")) as second:
+        command = second.begin("run", STEADY)
+        command.await_line(f"ROS domain {second.domain}, namespace /second ...")
+        command.await_line("Position x")
+        second.namespace = ""  # another terminal, which does not know of it
+        healths = {row[-1] for row in rows(second.do("status")[1]).values()}
+        assert healths == {"ok"}
+        command.type("quit\n")
+        assert command.wait() == 0
+    assert module_site.members == first
 
 
 def test_the_service_of_the_readme_works(module_site: Site, peer: Peer, tmp_path: Path) -> None:

@@ -165,6 +165,14 @@ def test_an_impossible_domain_is_told(site: Site) -> None:
     assert site.do("run", STEADY) == (1, "ROS_DOMAIN_ID=233 is not a number from 0 to 232")
 
 
+def test_an_impossible_namespace_is_told(site: Site) -> None:
+    site.namespace = "arm 1"
+    code, printed = site.do("run", STEADY)
+    assert code == 1
+    assert printed.startswith("REACTIVE_ARM_NAMESPACE=arm 1 is no namespace such as /arm1: ")
+    assert "\n" not in printed
+
+
 def test_a_second_system_in_the_same_domain_is_told_and_the_first_goes_on(site: Site, tmp_path: Path) -> None:
     assert site.do("start", STEADY)[0] == 0
     before = site.members
