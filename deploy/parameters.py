@@ -74,5 +74,5 @@ def check_environment() -> None:
     try:
         validate_namespace(namespace)
     except InvalidNamespaceException as error:
-        reason = str(error).splitlines()[0]
+        reason = str(error).splitlines()[0].rstrip(":")
         raise DeploymentError(f"{NAMESPACE}={namespace} is no namespace such as /arm1: {reason}") from None
