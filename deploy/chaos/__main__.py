@@ -35,7 +35,7 @@ from deploy.chaos.report import text
 from deploy.system import DeploymentError, System
 from interfaces import topics
 
-SCENARIOS = ("monkey", "partition", *schedule.NAMED)
+SCENARIOS = ("monkey", *partition.SCHEDULES, *schedule.NAMED)
 KEPT = 10  # records
 
 
@@ -65,11 +65,12 @@ def unleash(options: argparse.Namespace) -> int:
         )
         schedules = [planned[arm :: options.arms] for arm in range(options.arms)]
         title = f"Random monkey, seed {seed}, {options.minutes:g} min, a fault each {options.every:g} s"
-    elif options.scenario == "partition":
-        if reason := partition.missing():
-            raise DeploymentError(f"No partition here: {reason}")
-        kind, schedules, length = partition.TwoHosts, [partition.SCHEDULE], partition.LENGTH
-        title = "Scenario partition: the operator's host is cut off"
+    elif options.scenario in partition.SCHEDULES:
+        if reason := partition.missing(options.scenario):
+            raise DeploymentError(f"No {options.scenario} here: {reason}")
+        kind, length = partition.TwoHosts, partition.LENGTH
+        schedules = [partition.SCHEDULES[options.scenario]]
+        title = f"Scenario {options.scenario}: the network between the operator's host and the robot's"
     else:
         planned = schedule.NAMED[options.scenario]()
         schedules = [planned] * options.arms

@@ -1,4 +1,4 @@
-"""Two hosts that a network joins, and the scissors for it: network namespaces, which need root and iproute2.
+"""Two hosts that a network joins, and what happens to it: network namespaces, which need root and iproute2.
 
 The robot's host runs the arm, the operator's host the dead man's switch; the observer sits on the robot. The
 bridge between them stands in a third namespace: the network of the machine itself is not touched.
@@ -26,8 +26,12 @@ NETWORK = "10.86.86"  # of the namespaces only
 UNSEEN = "dead_mans_switch"  # runs on the operator's host
 
 CUT, LASTING = 5.0, 12.0  # s
-SCHEDULE = [Planned(CUT, "partition", OPERATOR, LASTING)]
+SCHEDULES = {name: [Planned(CUT, name, OPERATOR, LASTING)] for name in ("partition", "bad_line")}
+"""The named scenarios."""
 LENGTH = CUT + LASTING + 12.0  # s; Cyclone DDS needs up to 8 s to discover again what it had given up
+
+NETEM = ("netem", "loss", "20%", "delay", "100ms", "50ms", "reorder", "25%", "50%")
+"""A bad line, for tc; not every kernel has it."""
 
 HELD: dict[str, Any] = {
     **{key: value for key, value in SCENARIO.items() if key != "repeat"},
@@ -37,17 +41,20 @@ HELD: dict[str, Any] = {
 """The operator holds the switch all the time, and turns the engines on once."""
 
 
-def missing() -> str:
-    """What this machine lacks for it, in words; '' for nothing."""
+def missing(scenario: str = "partition") -> str:
+    """What this machine lacks for a scenario, in words; '' for nothing."""
     if os.geteuid() != 0:
         return "network namespaces need root"
     if shutil.which("ip") is None:
         return "network namespaces need iproute2"
     try:
-        with namespaces():
+        with namespaces() as full:
+            if scenario == "bad_line":
+                _queue(full(SWITCH), "replace", *NETEM)
             return ""
     except subprocess.CalledProcessError as error:
-        return f"this kernel has no network namespaces, veth or bridge: {error.stderr.strip()}"
+        what = "netem" if error.cmd[0] == "tc" else "network namespaces, veth or bridge"
+        return f"this kernel has no {what}: {error.stderr.strip()}"
 
 
 @contextmanager
@@ -78,8 +85,15 @@ def _ip(*arguments: str) -> None:
     subprocess.run(["ip", *arguments], check=True, capture_output=True, text=True)
 
 
+def _queue(switch: str, verb: str, *kind: str) -> None:
+    """Change how packets wait in the switch for the hosts."""
+    for host in (ROBOT, CONTROL):
+        command = ["tc", "-n", switch, "qdisc", verb, "dev", host, "root", *kind]
+        subprocess.run(command, check=True, capture_output=True, text=True)
+
+
 class TwoHosts(Arena):
-    """An arm on the robot's host, its dead man's switch on the operator's, and the fault `partition`."""
+    """An arm on the robot's host, its dead man's switch on the operator's, and what befalls the network."""
 
     lead = 6.0  # s: two systems have to start before the operator's only `turn_on`
 
@@ -89,7 +103,11 @@ class TwoHosts(Arena):
         super().__init__(directory, scenario=HELD, **options)
         self._runs = directory
         self._name: Callable[[str], str] = str
-        self.faults = {**FAULTS, "partition": Fault(self._cut, (OPERATOR,))}
+        self.faults = {
+            **FAULTS,
+            "partition": Fault(self._cut, (OPERATOR,)),
+            "bad_line": Fault(self._worsen, (OPERATOR,)),
+        }
 
     def prepare(self, stack: ExitStack) -> None:
         """Make the hosts and their network."""
@@ -118,3 +136,13 @@ class TwoHosts(Arena):
                 _ip("-n", self._name(SWITCH), "link", "set", CONTROL, "up")
 
         return heal
+
+    def _worsen(self, arm: Victim, target: str) -> Undo:
+        """Lose, delay and reorder what the hosts send to each other."""
+        _queue(self._name(SWITCH), "replace", *NETEM)
+
+        def mend() -> None:
+            with suppress(subprocess.CalledProcessError):
+                _queue(self._name(SWITCH), "delete")
+
+        return mend

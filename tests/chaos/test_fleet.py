@@ -2,24 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import pytest
 
 from deploy.chaos.promises import CHECKERS
 from interfaces.topics import ENGINES_STATE, ON
 
-from .plays import Play, unleash
+from .plays import Play
 
 NAMESPACES = ("/arm1", "/arm2")
-SHORTLY = ("--arms", "2", "--minutes", "0.3", "--every", "4", "--faults", "kill,terminate", "--seed", "1")
 pytestmark = pytest.mark.timeout(120)
 
 
 @pytest.fixture(scope="module")
-def arms(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Play]:
+def arms(light_plays: dict[str, Callable[..., Play]]) -> dict[str, Play]:
     """What became of each arm."""
-    run = tmp_path_factory.mktemp("fleet")
-    result = unleash(run, *SHORTLY)
-    return {namespace: Play(run, *result, namespace) for namespace in NAMESPACES}
+    return {namespace: light_plays["fleet"](namespace) for namespace in NAMESPACES}
 
 
 @pytest.mark.parametrize("namespace", NAMESPACES)

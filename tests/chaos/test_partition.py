@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import pytest
 
 from deploy.chaos.findings import HOLDS
@@ -10,18 +12,18 @@ from deploy.chaos.partition import missing
 from deploy.chaos.promises import CHECKERS
 from interfaces.topics import ENGINES_STATE, OFF, ON, OPERATOR_HEARTBEAT
 
-from .plays import play
+from .plays import Play, play
 
 DISCOVERY = 10.0  # s until a host that was given up is known again
 pytestmark = pytest.mark.timeout(120)
 
 
 @pytest.fixture(scope="module")
-def history(tmp_path_factory: pytest.TempPathFactory) -> History:
+def history(light_plays: dict[str, Callable[..., Play]]) -> History:
     """What the robot's side sees."""
     if reason := missing():
         pytest.skip(reason)
-    return play(tmp_path_factory.mktemp("partition"), "--scenario", "partition").history
+    return light_plays["partition"]().history
 
 
 @pytest.fixture(scope="module")
@@ -54,3 +56,17 @@ def test_engines_stay_off_when_the_operator_is_back(history: History, cut: Fault
 @pytest.mark.parametrize("promise", CHECKERS)
 def test_no_promise_is_broken(history: History, promise: str) -> None:
     assert not CHECKERS[promise](history).evidence
+
+
+def test_no_promise_is_broken_by_a_bad_line_and_the_engines_stay_on(
+    tmp_path_factory: pytest.TempPathFactory,
+) -> None:
+    if reason := missing() or missing("bad_line"):
+        # The words of the kernel, not of tc about how it is used.
+        assert "Specified qdisc kind is unknown" in reason or reason == missing()
+        pytest.skip(f"platform: {reason}")
+    bad = play(tmp_path_factory.mktemp("bad_line"), "--scenario", "bad_line")
+    (fault,) = (fault for fault in bad.history.faults if fault.kind == "bad_line")
+    assert {s.value for s in between(bad.history.stream(ENGINES_STATE), fault.begin, fault.end)} == {ON}
+    for promise in CHECKERS:
+        bad.finding(promise)
