@@ -55,10 +55,9 @@ def _caught_by_make() -> int:
 
 
 for _number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-    if (
-        _number != signal.SIGHUP or signal.getsignal(_number) != signal.SIG_IGN
-    ):  # which is what nohup asks for
-        signal.signal(_number, _note)
+    if _number == signal.SIGHUP and signal.getsignal(_number) == signal.SIG_IGN:
+        continue  # which is what nohup asks for
+    signal.signal(_number, _note)
 # In the background, reading the terminal shall fail and not stop the process.
 signal.signal(signal.SIGTTIN, signal.SIG_IGN)
 _caught_at_first = _caught_by_make()
