@@ -21,6 +21,7 @@ from std_msgs.msg import Bool, Float64, Header, String
 
 TURN_ON, TURN_OFF = "turn_on", "turn_off"
 ON, OFF = "on", "off"
+DRIVE = 0.4  # s for which the engines' drive takes an `on`
 FRAME = "base"
 
 
@@ -134,7 +135,7 @@ ENGINES_STATE = Topic(
     _STATE,
     "",
     ("engine_controller",),
-    f"`{ON}` or `{OFF}`, on every change and at 10 Hz: the drive takes an `{ON}` for 400 ms",
+    f"`{ON}` or `{OFF}`, on every change and at 10 Hz: the drive takes an `{ON}` for {1000 * DRIVE:.0f} ms",
     _not_one_of(ON, OFF),
 )
 DIAGNOSTICS = Topic("/diagnostics", DiagnosticArray, _EVENTS, "", ("every service",), "1 Hz health")

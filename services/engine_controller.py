@@ -17,7 +17,7 @@ from std_msgs.msg import String
 from interfaces import age, service
 from interfaces.age import Timestamp
 from interfaces.service import ServiceNode
-from interfaces.topics import ENGINES, ENGINES_STATE, OFF, ON, OPERATOR_PRESENCE, TURN_OFF, TURN_ON
+from interfaces.topics import DRIVE, ENGINES, ENGINES_STATE, OFF, ON, OPERATOR_PRESENCE, TURN_OFF, TURN_ON
 
 
 def engine_state(
@@ -27,6 +27,7 @@ def engine_state(
     presence: float = 1.0,
     absence: float = 10.0,
     repeat: float = 0.1,
+    drive: float = DRIVE,
     now: Callable[[], datetime] = age.now,
     refused: Callable[[str], None] = lambda why: None,
 ) -> Observable[str]:
@@ -37,10 +38,11 @@ def engine_state(
     :param presences: the stamps of the operator's presences.
     :param presence: ``turn_on`` is obeyed if it and the last sight of the operator are younger [s].
     :param absence: when nobody was seen for so long [s], the engines turn off; not less than ``presence``.
+    :param drive: the engines stop by themselves when ``on`` is not repeated for so long [s].
     :param now: the clock of source times and stamps.
     :param refused: is told why a ``turn_on`` is not obeyed.
     """
-    patience = timedelta(seconds=absence)
+    patience, hold = timedelta(seconds=absence), timedelta(seconds=drive)
 
     def obey(request: tuple[Timestamp[Timestamp[str]], datetime | None]) -> str | None:
         arrived, seen = request
@@ -55,31 +57,29 @@ def engine_state(
         refused(f"{TURN_ON} refused: {why}")
         return None
 
-    def latched(seen: Observable[datetime]) -> Observable[str]:
+    def latched(seen: Observable[datetime], late: Observable[bool]) -> Observable[str]:
         obeyed = commands.timestamp().with_latest_from(seen.start_with(None)).map(obey).filter(bool)
         abandoned = seen.switch_map(lambda at: rx.timer(at + patience)).map(lambda _: OFF)
-        return rx.merge(obeyed, abandoned).start_with(OFF).distinct_until_changed()
+        # While this process was paused, the engines have stopped: to repeat `on` would start them.
+        stopped = late.filter(bool).map(lambda _: OFF)
+        return rx.merge(stopped, obeyed, abandoned).start_with(OFF).distinct_until_changed()
 
-    def is_in_time(renewal: tuple[Timestamp[str], datetime | None]) -> bool:
-        state, seen = renewal
-        return state.value == OFF or (seen is not None and state.timestamp < seen + patience)
+    def repeated(seen: Observable[datetime]) -> Observable[str]:
+        beats = rx.timer(0.0, repeat).timestamp().pairwise()
+        late = beats.map(lambda two: two[1].timestamp - two[0].timestamp > hold).share()
+        states = latched(seen, late).share()
+        renewals = late.filter(lambda it: not it).with_latest_from(states).map(lambda it: it[1])
+        return rx.merge(renewals, states)
 
-    def renewed(seen: Observable[datetime]) -> Observable[str]:
-        states = latched(seen).share()
-        renewals = states.switch_map(lambda it: rx.interval(repeat).map(lambda _: it)).timestamp()
-        # A process that was paused runs late: `on`, due before the absence was complete, may come after it.
-        in_time = renewals.with_latest_from(seen.start_with(None)).filter(is_in_time)
-        return rx.merge(in_time.map(lambda renewal: renewal[0].value), states)
-
-    return age.latest(presences, now=now).publish(renewed)
+    return age.latest(presences, now=now).publish(repeated)
 
 
 def wire(node: ServiceNode) -> None:
     """Connect the recipe with its topics."""
     presence = node.declare("presence", 1.0, (0.1, 1.0), "turn_on needs an operator seen within [s]")
     absence = node.declare("absence", 10.0, (1.0, 60.0), "off when no operator was seen for [s]")
-    # The engines' drive lets go when `on` is not renewed: so they stop also when this process does.
-    repeat = node.declare("repeat", 0.1, (0.02, 1.0), "the state is repeated this often [s]")
+    # The engines' drive lets go when `on` is not repeated: so they stop also when this process does.
+    repeat = node.declare("repeat", 0.1, (0.02, 0.2), "the state is repeated this often [s]")
     states = engine_state(
         node.observe(ENGINES, timestamped=True).map(lambda item: Timestamp(item.value.data, item.timestamp)),
         node.observe(OPERATOR_PRESENCE).map(lambda header: age.from_message(header.stamp)),

@@ -8,12 +8,10 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Iterator, Sequence
 
 from deploy.chaos.findings import Evidence, Finding
-from deploy.chaos.history import History, Life, Sample, between, gaps
+from deploy.chaos.history import ALL, History, Life, Sample, between, gaps
 from interfaces import topics
-from interfaces.topics import OFF, ON, TURN_OFF, TURN_ON
+from interfaces.topics import DRIVE, OFF, ON, TURN_OFF, TURN_ON
 
-DRIVE = 0.4
-"""[s] The engines' drive lets go when the controller's `on` is not renewed for so long (deploy/SAFETY.md)."""
 OFF_WITHIN = 10.5  # s, S1
 STRIKE, STRIKES = 3.0, 3  # s; silences after which the operator watchdog turns the engines off
 SAMPLING = 0.5  # s by which it may notice the begin of a silence early
@@ -52,7 +50,7 @@ def stays_on(history: History) -> Finding:
     evidence, explained, held = [], 0, 0
     for on, off in _changes(history, ON, OFF):
         absent = _absences(history, off.sent) >= STRIKES
-        if absent or _controller_died(history, on, off) or _commanded_by_others(history, off):
+        if absent or _controller_was_away(history, on, off) or _commanded_by_others(history, off):
             explained += 1
         else:
             evidence.append(Evidence(off.sent, "engines turned off though the operator was there"))
@@ -69,7 +67,7 @@ def turned_on_by_the_present(history: History) -> Finding:
     commands = [s for s in history.stream(topics.ENGINES) if s.value == TURN_ON]
     heartbeats = [s for s in history.stream(topics.OPERATOR_HEARTBEAT) if s.value is True]
     evidence, cases, unknown, oldest = [], 0, 0, 0.0
-    for _, on in _changes(history, OFF, ON):
+    for stopped, on in _starts(history):
         command = between(commands, on.sent - SEEN_WITHIN - TRANSPORT, on.sent + 0.01)
         seen = between(heartbeats, on.sent - SEEN_WITHIN - TRANSPORT, on.sent + 0.01)
         if command and seen:
@@ -80,6 +78,8 @@ def turned_on_by_the_present(history: History) -> Finding:
             for life in history.lives
         ):
             unknown += 1  # a command of a new publisher, which the observer did not know yet
+        elif any(f.kind == "overload" and f.begin < on.sent and f.end > stopped for f in history.faults):
+            unknown += 1  # the observer may have missed what kept them on
         else:
             missing = "a turn_on" if not command else "a sign of life"
             evidence.append(Evidence(on.sent, f"engines went on without {missing} in the last second"))
@@ -191,18 +191,35 @@ def _running(history: History) -> Iterator[tuple[float, float]]:
             yield state.sent, min(following.sent if following else history.end, state.sent + DRIVE)
 
 
+def _starts(history: History) -> Iterator[tuple[float, Sample]]:
+    """Each `on` that sets the engines going, and since when they stood still: also without an `off`."""
+    stopped = -math.inf
+    states = {state.sent: state for state in history.stream(topics.ENGINES_STATE)}
+    for begin, end in _running(history):
+        if begin > stopped:
+            yield stopped, states[begin]
+        stopped = end
+
+
 def _changes(history: History, before: str, after: str) -> Iterator[tuple[Sample, Sample]]:
     for one, two in itertools.pairwise(history.stream(topics.ENGINES_STATE)):
         if (one.value, two.value) == (before, after):
             yield one, two
 
 
-def _controller_died(history: History, on: Sample, off: Sample) -> bool:
-    """Whether another process than the one that said `on` may have said `off`."""
-    return any(
+def _controller_was_away(history: History, on: Sample, off: Sample) -> bool:
+    """Whether another process than that which said `on` may have said `off`, or it was paused in between."""
+    died = any(
         life.program == "engine_controller" and on.sent - 0.02 < life.began <= off.sent
         for life in history.lives
     )
+    paused = off.sent - on.sent > DRIVE and any(
+        (fault.kind == "overload" or (fault.kind in BLINDING and fault.target in ("engine_controller", ALL)))
+        and fault.begin < off.sent
+        and fault.end > on.sent
+        for fault in history.faults
+    )
+    return died or paused
 
 
 def _absences(history: History, time: float) -> float:
@@ -217,13 +234,13 @@ def _absences(history: History, time: float) -> float:
     blind = [
         (fault.begin, fault.end)
         for fault in history.faults
-        if fault.kind in BLINDING and fault.target in ("operator_watchdog", "all") and fault.end <= time + 1.0
+        if fault.kind in BLINDING and fault.target in ("operator_watchdog", ALL) and fault.end <= time + 1.0
     ]
     silences = [*gaps([t for t in heartbeats if begin < t <= time], begin, time), *blind]
     return sum((end - begin + SAMPLING) // STRIKE for begin, end in silences)
 
 
-BLINDING = ("stop", "hang", "hog", "partition")
+BLINDING = ("stop", "hang", "hog")
 """Faults that keep a process from hearing."""
 
 

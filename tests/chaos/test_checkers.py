@@ -117,6 +117,12 @@ def test_s2_three_silences_are_a_good_reason_and_two_are_none() -> None:
     assert verdict("S2", says(history, "engines/state", OFF, 44.0)) != VIOLATED
 
 
+def test_s2_a_controller_that_was_stopped_is_a_good_reason() -> None:
+    history = says(silent(good(), "engines/state", 30.0, 31.55), "engines/state", OFF, 31.5)
+    assert verdict("S2", history) == VIOLATED
+    assert verdict("S2", faulty(history, Fault("stop", "engine_controller", 30.0, 31.5))) != VIOLATED
+
+
 # S3
 
 
@@ -130,6 +136,21 @@ def test_s3_catches_engines_that_go_on_without_a_command() -> None:
 
 def test_s3_catches_engines_that_go_on_without_an_operator() -> None:
     assert verdict("S3", silent(good(), "operator_heartbeat", 3.0, 6.0)) == VIOLATED
+
+
+def test_s3_catches_engines_that_start_again_after_a_pause_without_a_command() -> None:
+    assert verdict("S3", silent(good(), "engines/state", 20.0, 21.5)) == VIOLATED
+    assert verdict("S3", silent(good(), "engines/state", 20.0, 20.35)) == HOLDS
+
+
+def test_s3_catches_a_controller_that_comes_back_on() -> None:
+    assert verdict("S3", killed(good(), "engine_controller", 20.0, 0.6)) == VIOLATED
+
+
+def test_s3_what_an_overloaded_observer_may_have_missed_stays_unknown() -> None:
+    history = faulty(silent(good(), "engines/state", 20.0, 21.5), Fault("overload", "", 20.0, 21.4))
+    finding = CHECKERS["S3"](history)
+    assert (finding.verdict, finding.unknown) == (HOLDS, 1)
 
 
 def test_s3_a_command_that_the_observer_may_have_missed_stays_unknown() -> None:

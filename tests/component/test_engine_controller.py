@@ -59,7 +59,12 @@ class Engines:
         )
         results = self.scheduler.start(
             lambda: engine_state(
-                self.commands, self.presences, repeat=1.0, now=self.now, refused=self.refusals.append
+                self.commands,
+                self.presences,
+                repeat=1.0,
+                drive=4.0,
+                now=self.now,
+                refused=self.refusals.append,
             ),
             created=0.001,
             subscribed=0.002,
@@ -159,6 +164,20 @@ def test_a_controller_that_was_paused_does_not_renew_what_has_ended_meanwhile(en
     states = engines.states([(1.2, TURN_ON, 1.2)], [(1.0, 1.0)], 20.0)
     assert ON in {state for time, state in states if time < 10.15}
     assert {state for time, state in states if time > 10.15} == {OFF}
+
+
+def test_a_controller_that_was_paused_does_not_start_engines_that_have_stopped_meanwhile(
+    engines: Engines,
+) -> None:
+    engines.scheduler.schedule_absolute(5.1, lambda *_: engines.scheduler.sleep(4.0))
+    states = engines.states([(1.2, TURN_ON, 1.2)], seen_until(20), 20.0)
+    assert {state for time, state in states if 1.3 < time < 5.15} == {ON}
+    assert {state for time, state in states if time > 5.15} == {OFF}
+
+
+def test_a_pause_that_the_drive_does_not_notice_changes_nothing(engines: Engines) -> None:
+    engines.scheduler.schedule_absolute(5.1, lambda *_: engines.scheduler.sleep(2.0))
+    assert engines.run([(1.2, TURN_ON, 1.2)], seen_until(12), 12.0) == [(0.002, OFF), (1.2, ON)]
 
 
 def test_after_a_restart_they_are_off_though_the_operator_is_there(engines: Engines) -> None:

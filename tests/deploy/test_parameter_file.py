@@ -32,7 +32,7 @@ def test_the_parameters_of_every_service_are_known() -> None:
     [
         "operator_watchdog: {ros__parameters: {silence: 2.0, strikes: 5}}",
         "/dead_mans_switch: {ros__parameters: {pressed: true}}",
-        "/**: {ros__parameters: {repeat: 1.0}}",
+        "/**: {ros__parameters: {repeat: 0.2}}",
         "{}",
     ],
 )
