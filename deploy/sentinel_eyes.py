@@ -8,41 +8,10 @@ import time
 from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import NamedTuple
 
 from deploy import processes
 from deploy.sentinel_judge import Action, Sight
 from deploy.system import DeploymentError, System, Watched
-
-
-class Spent(NamedTuple):
-    """What a process's main thread, in a service the executor's, has done up to a moment (proc(5))."""
-
-    time: float
-    """the moment [s, monotonic clock]"""
-    ran: float
-    """[s] on a processor"""
-    waited: float
-    """[s] for a processor"""
-    turns: int
-    """how often it got one"""
-
-    @classmethod
-    def by(cls, pid: int) -> Spent | None:
-        """What it has done up to now; None if it has ended or the kernel keeps no such accounts."""
-        try:
-            ran, waited, turns = map(int, Path(f"/proc/{pid}/schedstat").read_text().split())
-        except (OSError, ValueError):
-            return None
-        return cls(time.monotonic(), ran / 1e9, waited / 1e9, turns)
-
-    def has_rested_since(self, before: Spent | None) -> bool:
-        """Whether it has woken, and slept for longer than it ran: unlike one in an endless loop, or stuck."""
-        if before is None or self.turns == before.turns:
-            return False
-        ran = self.ran - before.ran
-        slept = (self.time - before.time) - ran - (self.waited - before.waited)
-        return slept > ran
 
 
 class Eyes:
@@ -53,7 +22,6 @@ class Eyes:
         self._supervisor = supervisor
         self._next_search = 0.0
         self._doubles: frozenset[processes.Process] = frozenset()
-        self._spent: dict[int, Spent] = {}
 
     def see(self, heard: Mapping[tuple[str, int], float]) -> Sight:
         """One look. Raises DeploymentError where supervisord does not answer."""
@@ -65,10 +33,7 @@ class Eyes:
             self._next_search = now + 1.0
             self._doubles = self._find_doubles(programs)
         stopped = frozenset(p.pid for p in programs if p.pid and _state_of(p.pid)[0] == "T")
-        before = self._spent
-        self._spent = {p.pid: spent for p in programs if p.pid and (spent := Spent.by(p.pid))}
-        awake = frozenset(pid for pid, now in self._spent.items() if now.has_rested_since(before.get(pid)))
-        return Sight(now, programs, dict(heard), stopped, awake, self._doubles)
+        return Sight(now, programs, dict(heard), stopped, self._doubles)
 
     def act(self, action: Action) -> None:
         """Do it, unless it is not so any more."""

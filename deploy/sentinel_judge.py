@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
@@ -24,8 +23,6 @@ class Sight:
     """when a program's process, by its pid, reported its health last [s, monotonic clock]"""
     stopped: frozenset[int] = frozenset()
     """pids of supervised processes that are stopped (SIGSTOP)"""
-    awake: frozenset[int] = frozenset()
-    """pids of supervised processes whose executor's thread has woken and rested since the last look"""
     doubles: frozenset[processes.Process] = frozenset()
     """live processes of programs that are not those which supervisord has started"""
 
@@ -47,9 +44,9 @@ class Patience:
     look: float = 0.25
     """between two looks"""
     silence: float = 2.7
-    """for a service, which has to report its health once a second, and does not even wake"""
+    """for a service, which has to report its health once a second"""
     start: float = 10.0
-    """for a new process until its first report, and for one that is only not heard"""
+    """for a new process, until its first report"""
     double: float = 1.0
     """for a double, which has to notice itself that it is one"""
     revival: float = 1.0
@@ -68,7 +65,6 @@ class Judge:
         self._patience = patience or Patience()
         self._since: dict[str, tuple[int, float]] = {}  # pid, and when it was seen first
         self._stopped_since: dict[int, float] = {}
-        self._awake: dict[int, float] = {}  # when it was seen awake last, by pid
         self._double_since: dict[int, float] = {}
         self._revivals: dict[str, tuple[int, float]] = {}  # how often, and when the next is due
         self._looked: float | None = None
@@ -114,14 +110,6 @@ class Judge:
         ]
 
     def _kill_silent(self, sight: Sight, running: list[Watched]) -> list[Action]:
-        """
-        Who hangs neither reports nor wakes. Who wakes may only not be heard: on a network that is just
-        meeting a hundred processes a report is late, or lost, and to start one more makes that worse.
-        """
-        pids = {program.pid for program in running}
-        self._awake = {pid: when for pid, when in self._awake.items() if pid in pids}
-        self._awake |= dict.fromkeys(sight.awake, sight.time)
-        patience = self._patience
         silent = []
         awaited = 0
         for program in running:
@@ -130,10 +118,10 @@ class Judge:
                 pid, since = self._since[program.name] = (program.pid, sight.time)
             heard = sight.heard.get((program.name, pid))
             awaited += heard is not None or sight.time - since >= self._patience.start
-            quiet = sight.time - (since if heard is None else heard)
-            hangs = sight.time - self._awake.get(pid, -math.inf) >= patience.silence and heard is not None
-            if quiet >= (patience.silence if hangs else patience.start):
-                silent.append(Action("kill", program.name, pid, f"no health for {quiet:.1f} s"))
+            limit = self._patience.start if heard is None else self._patience.silence
+            last = since if heard is None else heard
+            if sight.time - last >= limit:
+                silent.append(Action("kill", program.name, pid, f"no health for {sight.time - last:.1f} s"))
         names = {action.program for action in silent}
         self.confused = ""
         if NAME in names:

@@ -44,9 +44,12 @@ class Cost:
         return cls(time.monotonic(), busy, len(arms), processes, memory, threads)
 
     def since(self, before: Cost) -> str:
-        """In words, for each arm."""
+        """In words, for each arm; in brackets what memory and threads have grown by."""
         cores = (self.busy - before.busy) / (self.time - before.time) / self.arms
+        memory, threads = self.memory / self.arms, self.threads / self.arms
         return (
-            f"{cores:.2f} cores (with observer and monkey), {self.memory / self.arms:.0f} MB, "
-            f"{self.threads / self.arms:.0f} threads in {self.processes / self.arms:.0f} processes an arm"
+            f"{cores:.2f} cores (with observer and monkey), "
+            f"{memory:.0f} MB ({memory - before.memory / self.arms:+.0f}), "
+            f"{threads:.0f} threads ({threads - before.threads / self.arms:+.0f}) "
+            f"in {self.processes / self.arms:.0f} processes an arm"
         )

@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
-import time
 from collections.abc import Iterable
 
-import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
 
 from deploy.processes import Process
 from deploy.sentinel import states
-from deploy.sentinel_eyes import Spent
 from deploy.sentinel_judge import NAME, Action, Judge, Sight
 from deploy.system import Watched
 
@@ -42,7 +37,6 @@ class Run:
         *,
         silent: Iterable[str] = (),
         stopped: Iterable[int] = (),
-        awake: Iterable[int] = (),
         doubles: Iterable[Process] = (),
     ) -> list[tuple[float, Action]]:
         """What it decides within so many seconds, and when."""
@@ -58,7 +52,6 @@ class Run:
                 self.programs.values(),
                 dict(self.heard),
                 frozenset(stopped),
-                frozenset(awake),
                 frozenset(doubles),
             )
             decided += [(self.now, action) for action in self.judge.judge(sight)]
@@ -78,57 +71,6 @@ def test_kills_a_service_whose_health_stops_within_three_seconds_and_not_before_
     assert action[:3] == ("kill", "kinematics", PIDS["kinematics"])
     assert "no health" in action.why
     assert 22.0 < when < 23.0
-
-
-def test_is_more_patient_with_one_that_is_not_heard_but_seen_to_wake() -> None:
-    run = Run()
-    run.look(20.0)
-    assert run.look(9.0, silent=["kinematics"], awake=PIDS.values()) == []
-    (when, action), *_ = run.look(2.0, silent=["kinematics"], awake=PIDS.values())
-    assert action.program == "kinematics"
-    assert 30.0 <= when <= 30.25
-
-
-def test_kills_one_that_hangs_within_three_seconds_though_it_was_awake_before() -> None:
-    run = Run()
-    run.look(20.0, awake=PIDS.values())
-    (when, action), *_ = run.look(5.0, silent=["kinematics"])
-    assert action.program == "kinematics"
-    assert 22.0 < when < 23.0
-
-
-@pytest.mark.parametrize(
-    ("code", "awake"),
-    [
-        ("import time\nwhile True: time.sleep(0.01)", True),
-        ("while True: pass", False),
-        ("import threading; threading.Lock().acquire(); threading.Event().wait()", False),
-    ],
-    ids=["works", "loops", "blocks"],
-)
-def test_sees_from_outside_whether_a_process_wakes_and_rests(code: str, awake: bool) -> None:
-    program = f"print('up', flush=True)\n{code}"
-    with subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE) as process:
-        try:
-            assert process.stdout is not None
-            assert process.stdout.readline() == b"up\n"
-            before = _later(process.pid, None)
-            looks = []
-            for _ in range(3):
-                now = _later(process.pid, before)
-                looks.append(now.has_rested_since(before))
-                before = now
-            assert looks == 3 * [awake]
-        finally:
-            process.kill()
-
-
-def _later(pid: int, before: Spent | None) -> Spent:
-    """What it has spent a look later."""
-    time.sleep(LOOK)
-    spent = Spent.by(pid)
-    assert spent is not None
-    return spent
 
 
 def test_gives_a_new_process_time_to_start() -> None:
