@@ -47,7 +47,8 @@ class Console:
         }
         elapsed = time.monotonic() - epoch
         self._origin = age.now() - timedelta(seconds=elapsed)
-        terminal.view(self._seen, max(0.0, -elapsed)).subscribe(self._show, scheduler=node.scheduler)
+        lines = terminal.view(self._seen, max(0.0, -elapsed), node.get_namespace())
+        lines.subscribe(self._show, scheduler=node.scheduler)
 
     def read_commands(self) -> None:
         """Do what was typed since; never waits for input."""

@@ -36,9 +36,9 @@ class Line(NamedTuple):
     text: str
 
 
-def view(seen: Seen, begin: float = 0.0) -> Observable[Line]:
-    """All lines; the operator is expected from `begin` [s from now] on."""
-    return rx.merge(measurements(seen), operator(seen, begin), engines(seen), services(seen)).pipe(
+def view(seen: Seen, begin: float = 0.0, namespace: str = "/") -> Observable[Line]:
+    """All lines of the arm in a namespace; the operator is expected from `begin` [s from now] on."""
+    return rx.merge(measurements(seen), operator(seen, begin), engines(seen), services(seen, namespace)).pipe(
         ops.publish(in_order), ops.filter(Allowance().covers)
     )
 
@@ -99,16 +99,16 @@ def engines(seen: Seen) -> Observable[Line]:
     )
 
 
-def services(seen: Seen) -> Observable[Line]:
-    """What services have to complain about."""
+def services(seen: Seen, namespace: str) -> Observable[Line]:
+    """What services have to complain about; /diagnostics tells of other arms, too."""
     complaints: dict[str, str] = {}
 
     def news(diagnostics: Any) -> Observable[Line]:
         lines = []
         for status in diagnostics.value.status:
+            path, _, service = status.name.rpartition("/")
             complaint = "" if status.level == type(status).OK else status.message
-            if complaint and complaint != complaints.get(status.name):
-                service = status.name.rpartition("/")[2]
+            if complaint != complaints.get(status.name, "") and complaint and path == namespace.rstrip("/"):
                 lines.append(Line(diagnostics.timestamp, "service", f"{service}: {complaint}"))
             complaints[status.name] = complaint
         return rx.from_iterable(lines)

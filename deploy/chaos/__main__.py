@@ -28,7 +28,7 @@ from deploy.chaos.arena import SCENARIO, Arena
 from deploy.chaos.cost import Cost
 from deploy.chaos.faults import FAULTS
 from deploy.chaos.findings import VIOLATED
-from deploy.chaos.history import PROGRAMS, History
+from deploy.chaos.history import PROGRAMS
 from deploy.chaos.page import page
 from deploy.chaos.promises import check
 from deploy.chaos.report import text
@@ -44,7 +44,7 @@ def main(arguments: Sequence[str]) -> int:
     options = _options(arguments)
     try:
         if options.replay:
-            return conclude(options.replay, f"Record {options.replay}", record.load(options.replay))
+            return conclude(options.replay, f"Record {options.replay}")
         return unleash(options)
     except interruption.Interrupted:
         print("Interrupted: everything has been stopped.")
@@ -90,15 +90,7 @@ def unleash(options: argparse.Namespace) -> int:
             arena.play(schedules, length)
             cost = Cost.now(arena.arms).since(before)
         print("\n" + cost)
-        codes = [
-            conclude(arena.record, f"{title}, {cost}", arena.history(arm.namespace), arm.namespace)
-            for arm in arena.arms
-        ]
-        if options.arms > 1:
-            broken = ", ".join(arm.namespace for arm, code in zip(arena.arms, codes, strict=True) if code)
-            verdict = f"promises are broken for {broken}" if broken else "no promise is broken"
-            print(f"\n{options.arms} arms: {verdict}")
-        return max(codes)
+        return conclude(arena.record, f"{title}, {cost}")
 
 
 def _fleet(arms: int) -> dict[str, Any]:
@@ -113,8 +105,21 @@ def _fleet(arms: int) -> dict[str, Any]:
     }
 
 
-def conclude(path: Path, title: str, history: History, namespace: str = "/") -> int:
-    """Judge a history, print the verdict and write the page beside its record."""
+def conclude(path: Path, title: str) -> int:
+    """Judge what a record tells of each of its arms; the exit code."""
+    namespaces = record.namespaces(path)
+    if not namespaces:
+        raise DeploymentError(f"{path} tells of no arm")
+    broken = [namespace for namespace in namespaces if not _keeps_its_promises(path, title, namespace)]
+    if len(namespaces) > 1:
+        verdict = f"promises are broken for {', '.join(broken)}" if broken else "no promise is broken"
+        print(f"\n{len(namespaces)} arms: {verdict}")
+    return int(bool(broken))
+
+
+def _keeps_its_promises(path: Path, title: str, namespace: str) -> bool:
+    """Judge an arm, print the verdict and write the page beside its record."""
+    history = record.load(path, namespace)
     findings = check(history)
     print("\n" + (f"{namespace}\n" if namespace != "/" else "") + text(findings))
     report = path.with_name(f"report{namespace.replace('/', '_').rstrip('_')}.html")
@@ -126,7 +131,7 @@ def conclude(path: Path, title: str, history: History, namespace: str = "/") -> 
     ]
     report.write_text(page(title, remarks, findings, history), encoding="utf-8")
     print(f"\nReport: {report}\nRecord: {path}")
-    return int(any(finding.verdict == VIOLATED for finding in findings))
+    return not any(finding.verdict == VIOLATED for finding in findings)
 
 
 def _options(arguments: Sequence[str]) -> argparse.Namespace:
@@ -137,15 +142,32 @@ def _options(arguments: Sequence[str]) -> argparse.Namespace:
     parser.add_argument("--scenario", choices=SCENARIOS, default="monkey")
     parser.add_argument(
         "--arms",
-        type=int,
+        type=_count,
         default=1,
         help="a fleet; the monkey turns to one after the other, a scenario is played to each",
     )
-    parser.add_argument("--loss", type=float, default=0.0, help="percent of all DDS packets that are lost")
+    parser.add_argument("--loss", type=_percent, default=0.0, help="percent of all DDS packets that are lost")
     parser.add_argument("--faults", type=_words(FAULTS), default=tuple(FAULTS), help=", ".join(FAULTS))
     parser.add_argument("--targets", type=_words(PROGRAMS), default=(), help=", ".join(PROGRAMS))
     parser.add_argument("--replay", type=Path, help="only judge a record")
-    return parser.parse_args(arguments)
+    options = parser.parse_args(arguments)
+    if options.arms > 1 and options.scenario in partition.SCHEDULES:
+        parser.error(f"{options.scenario} is played with one arm")
+    return options
+
+
+def _count(text: str) -> int:
+    number = int(text)
+    if number < 1:
+        raise argparse.ArgumentTypeError(f"{text} is less than 1")
+    return number
+
+
+def _percent(text: str) -> float:
+    number = float(text)
+    if not 0 <= number <= 100:
+        raise argparse.ArgumentTypeError(f"{text} is not from 0 to 100")
+    return number
 
 
 def _positive(text: str) -> float:

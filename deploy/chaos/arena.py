@@ -7,7 +7,7 @@ keep a small machine busy with nothing else.
 
     with Arena(directory) as arena:
         arena.play([schedule])
-    history = arena.history()
+    history = record.load(arena.record)
 """
 
 from __future__ import annotations
@@ -33,15 +33,15 @@ from typing import Any
 import yaml
 
 from deploy import processes
-from deploy.chaos import record
 from deploy.chaos.faults import FAULTS, INJECTED
-from deploy.chaos.history import OPERATOR, PROGRAMS, Fault, History
+from deploy.chaos.history import OPERATOR, PROGRAMS, Fault
 from deploy.chaos.schedule import AWAKE, FIRST, PERIOD, Planned, Schedule
 from deploy.system import NAMESPACE, DeploymentError, System
 from interfaces import topics
 
 UP = 60.0  # s until an arm has to be up
 LEAD = 1.0  # s from the start to the origin of the scenario
+COMPLETION = 30.0  # s that the observer has to complete its record
 READY = 2.0  # s that a fault waits for a victim that is just being restarted
 AWAITED = [t for t in topics.CONTRACT if t not in (topics.ENGINES, topics.DIAGNOSTICS)]
 """What is seen of an arm that is up; its operator holds the switch from the beginning."""
@@ -64,6 +64,7 @@ class ArmUnderTest:
     def __init__(self, namespace: str, system: System) -> None:
         self.namespace = namespace
         self.system = system
+        self._environment: dict[str, str] = {}
 
     def pid(self, program: str) -> int:
         """The process of a program; waits a little for one that is just being restarted, 0 if in vain."""
@@ -81,8 +82,9 @@ class ArmUnderTest:
         return next((p.pid for p in self.system.members() if p.program == program), 0)
 
     def environment(self) -> dict[str, str]:
-        """The environment of the arm's processes."""
-        return self.system.environment()
+        """The environment of the arm's processes, also while none lives."""
+        self._environment = self.system.environment() or self._environment
+        return self._environment
 
 
 class Arena:
@@ -143,6 +145,7 @@ class Arena:
                 stack.callback(arm.system.stop)
                 with _environment(environment | {NAMESPACE: arm.namespace, "ROS_DOMAIN_ID": str(domain)}):
                     self.start(arm, {"/**": {"ros__parameters": shared}})
+                arm.environment()
                 # One after the other: together they would keep each other from starting.
                 self._await_up(arm, lines)
             self._stack = stack.pop_all()
@@ -199,10 +202,6 @@ class Arena:
                     time.sleep(min(wait, 0.1))
                     self._check()
                 what()
-
-    def history(self, namespace: str = "/") -> History:
-        """What happened to an arm; after the `with`."""
-        return record.load(self.record, namespace)
 
     def _tell(self, fault: Fault, namespace: str) -> None:
         assert self._observer.stdin is not None
@@ -276,7 +275,14 @@ def _observer(
     )
     try:
         yield process
-        process.communicate(timeout=30.0)
+        try:
+            process.communicate(timeout=COMPLETION)
+        except subprocess.TimeoutExpired:
+            raise DeploymentError(
+                f"The observer has not completed its record within {COMPLETION:g} s"
+            ) from None
+        if process.returncode:
+            raise DeploymentError(f"The observer has failed: exit code {process.returncode}")
     finally:
         process.kill()
         process.wait()

@@ -18,7 +18,7 @@ from typing import NamedTuple, Protocol
 import yaml
 
 from deploy import processes
-from deploy.chaos.history import ALL, NOTHING, OUTPUTS, PROGRAMS
+from deploy.chaos.history import ALL, NOTHING, PROGRAMS
 from deploy.system import System
 
 INJECTED = Path(__file__).parent / "inject"
@@ -115,15 +115,16 @@ def kill_supervisor(arm: Arm, target: str) -> Undo:
 
 def double(arm: Arm, program: str) -> Undo:
     """Start a second instance of a service, as somebody who does not know that it runs."""
-    pid = arm.pid(program)
-    if not pid:
+    command = []
+    with suppress(OSError):  # it has just ended
+        command = Path(f"/proc/{arm.pid(program)}/cmdline").read_bytes().decode().split("\0")[1:-1]
+    if not command:
         return lambda: None
-    command = Path(f"/proc/{pid}/cmdline").read_bytes().decode().split("\0")[1:-1]
-    environment = arm.environment() | {"SUPERVISOR_PROCESS_NAME": program}
     process = subprocess.Popen(
         [sys.executable, *command],
         cwd=arm.system.run,
-        env=environment,
+        env=arm.environment() | {"SUPERVISOR_PROCESS_NAME": program},
+        stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
     )
@@ -133,31 +134,34 @@ def double(arm: Arm, program: str) -> Undo:
 def crash_loop(arm: Arm, program: str) -> Undo:
     """A parameter of the wrong type, which the program refuses from its next start on."""
     parameters = arm.system.parameters
-    good = parameters.read_text()
-    bad = yaml.safe_load(good)
-    bad[f"{arm.namespace.rstrip('/')}/{program}"] = {"ros__parameters": {PARAMETERS[program]: "a few"}}
-    parameters.write_text(yaml.safe_dump(bad))
+    node = f"{arm.namespace.rstrip('/')}/{program}"
+    bad = {node: {"ros__parameters": {PARAMETERS[program]: "a few"}}}
+    parameters.write_text(yaml.safe_dump(yaml.safe_load(parameters.read_text()) | bad))
     _send(arm, arm.pid(program), signal.SIGKILL)
 
     def repair() -> None:
-        if parameters.exists():
-            parameters.write_text(good)
+        with suppress(FileNotFoundError):  # the system was stopped
+            # Another program may have a bad parameter now.
+            left = yaml.safe_load(parameters.read_text())
+            left.pop(node, None)
+            parameters.write_text(yaml.safe_dump(left))
 
     return repair
 
 
 def full_disk(arm: Arm, target: str) -> Undo:
     """No log can be written any more."""
-    supervisor = arm.system.supervisor() or 0
-    with suppress(OSError):
-        _, hard = resource.prlimit(supervisor, resource.RLIMIT_FSIZE)
-        resource.prlimit(supervisor, resource.RLIMIT_FSIZE, (1, hard))
+    supervisor = arm.system.supervisor()
+    if supervisor is None:
+        return lambda: None
 
-    def make_room() -> None:
+    def limit(size: int | None) -> None:
         with suppress(OSError):
-            resource.prlimit(supervisor, resource.RLIMIT_FSIZE, (hard, hard))
+            _, hard = resource.prlimit(supervisor, resource.RLIMIT_FSIZE)
+            resource.prlimit(supervisor, resource.RLIMIT_FSIZE, (hard if size is None else size, hard))
 
-    return make_room
+    limit(1)
+    return lambda: limit(None)
 
 
 def _babbler(*arguments: str) -> Callable[[Arm, str], Undo]:
@@ -190,7 +194,7 @@ FAULTS: dict[str, Fault] = {
     "hog": Fault(hog, PROGRAMS),
     "kill_all": Fault(kill_all, (ALL,)),
     "kill_supervisor": Fault(kill_supervisor, (ALL,), (0.5, 5.0)),
-    "double": Fault(double, tuple(OUTPUTS), (5.0, 8.0)),
+    "double": Fault(double, PROGRAMS, (5.0, 8.0)),
     "crash_loop": Fault(crash_loop, tuple(PARAMETERS), (3.0, 6.0)),
     "full_disk": Fault(full_disk, (NOTHING,), (3.0, 10.0)),
     "flood": Fault(_babbler("flood"), (NOTHING,), (3.0, 6.0)),

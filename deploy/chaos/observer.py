@@ -15,8 +15,8 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
-from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -55,6 +55,19 @@ class Arm(NamedTuple):
 
 
 @contextmanager
+def meanwhile(work: Callable[[threading.Event], None]) -> Iterator[None]:
+    """Do it on a thread of its own until the end of the `with`, which raises what it has raised."""
+    ended = threading.Event()
+    with ThreadPoolExecutor(1) as pool:
+        done = pool.submit(work, ended)
+        try:
+            yield
+        finally:
+            ended.set()
+        done.result()
+
+
+@contextmanager
 def listening(arm: Arm, recorder: Recorder) -> Iterator[None]:
     """Record, on a thread of its own, what is said in an arm's domain."""
     context = Context()
@@ -63,14 +76,16 @@ def listening(arm: Arm, recorder: Recorder) -> Iterator[None]:
     node = Node(f"observer_{os.getpid()}", context=context, namespace=arm.namespace)
     executor.add_node(node)
     listen(node, recorder)
-    thread = threading.Thread(target=executor.spin)
-    thread.start()
-    try:
+
+    def spin(ended: threading.Event) -> None:
+        while not ended.is_set():
+            executor.spin_once(timeout_sec=0.1)
+
+    with meanwhile(spin):
         yield
-    finally:
-        executor.shutdown()
-        thread.join()
-        rclpy.try_shutdown(context=context)
+    executor.shutdown()
+    node.destroy_node()
+    rclpy.try_shutdown(context=context)
 
 
 def listen(node: Node, recorder: Recorder) -> None:
@@ -91,7 +106,8 @@ def _writer(recorder: Recorder, name: str, topic: topics.Topic) -> Callable[[byt
         nonlocal seen
         if not seen:
             seen = True
-            print("seen", name, flush=True)
+            sys.stdout.write(f"seen {name}\n")  # at once, as other arms are seen by other threads
+            sys.stdout.flush()
         now = time.monotonic_ns()
         age = time.time_ns() - info["source_timestamp"]
         recorder.message(name, topic.type_name, qos, data, now, now - age)
@@ -197,25 +213,18 @@ def main(arguments: list[str]) -> int:
         event = relative(Fault("overload", NOTHING, begin, end)._asdict(), "begin", "end")
         recorder.event(FAULTS, time.monotonic_ns(), event)
 
-    ended = threading.Event()
-
     def obey() -> None:
         print("observing", flush=True)
         for line in sys.stdin:
             event = relative(json.loads(line), "begin", "end")
             recorder.event(FAULTS, time.monotonic_ns(), event)
-        ended.set()
 
-    census = threading.Thread(target=partial(Census(arms, report, overload).run, ended))
-    try:
-        with ExitStack() as stack:
-            for arm in arms:
-                stack.enter_context(listening(arm, recorder))
-            census.start()
-            obey()
-            census.join()
-    finally:
-        recorder.close()
+    with ExitStack() as stack:
+        stack.callback(recorder.close)
+        for arm in arms:
+            stack.enter_context(listening(arm, recorder))
+        stack.enter_context(meanwhile(Census(arms, report, overload).run))
+        obey()
     return 0
 
 

@@ -45,7 +45,7 @@ def missing(scenario: str = "partition") -> str:
     """What this machine lacks for a scenario, in words; '' for nothing."""
     if os.geteuid() != 0:
         return "network namespaces need root"
-    if shutil.which("ip") is None:
+    if shutil.which("ip") is None or shutil.which("tc") is None:
         return "network namespaces need iproute2"
     try:
         with namespaces() as full:

@@ -96,6 +96,16 @@ def qos_profiles(topic: topics.Topic) -> str:
     return str(yaml.safe_dump([profile]))
 
 
+def namespaces(path: Path) -> list[str]:
+    """The namespaces of the arms that a record tells of."""
+    with path.open("rb") as file:
+        events = make_reader(file).iter_messages(topics=[PROCESSES])
+        told = {
+            json.loads(deserialize_message(message.data, String).data)["namespace"] for *_, message in events
+        }
+    return sorted(told, key=lambda namespace: (len(namespace), namespace))
+
+
 def load(path: Path, namespace: str = "/") -> History:
     """What happened to the arm in a namespace, according to a record."""
     prefix = namespace.rstrip("/") + "/"

@@ -150,8 +150,9 @@ def test_the_engines_are_shown_when_they_change(play: Play) -> None:
 def test_a_service_is_shown_when_it_complains_about_something_new(play: Play) -> None:
     def health(time: float, complaint: str) -> Message:
         level = DiagnosticStatus.WARN if complaint else DiagnosticStatus.OK
-        status = DiagnosticStatus(name="/arm1/velocity", level=level, message=complaint or "running")
-        return time, topics.DIAGNOSTICS, DiagnosticArray(status=[status])
+        mine = DiagnosticStatus(name="/velocity", level=level, message=complaint or "running")
+        others = DiagnosticStatus(name="/arm2/velocity", level=DiagnosticStatus.WARN, message=f"at {time} s")
+        return time, topics.DIAGNOSTICS, DiagnosticArray(status=[mine, others])
 
     script = [
         health(time, complaint) for time, complaint in enumerate(["", "bad", "bad", "worse", "", "worse"], 1)
