@@ -28,7 +28,7 @@ from deploy.chaos.arena import SCENARIO, Arena
 from deploy.chaos.cost import Cost
 from deploy.chaos.faults import FAULTS
 from deploy.chaos.findings import VIOLATED
-from deploy.chaos.history import PROGRAMS
+from deploy.chaos.history import CIRCUMSTANCES, PROGRAMS
 from deploy.chaos.page import page
 from deploy.chaos.promises import check
 from deploy.chaos.report import text
@@ -123,7 +123,7 @@ def _keeps_its_promises(path: Path, title: str, namespace: str) -> bool:
     findings = check(history)
     print("\n" + (f"{namespace}\n" if namespace != "/" else "") + text(findings))
     report = path.with_name(f"report{namespace.replace('/', '_').rstrip('_')}.html")
-    faults = sum(fault.kind not in ("silence", "overload") for fault in history.faults)
+    faults = sum(fault.kind not in CIRCUMSTANCES for fault in history.faults)
     messages = sum(map(len, history.streams.values()))
     remarks = [
         f"{title} · {faults} faults · {messages} messages in {history.end:.0f} s",

@@ -34,7 +34,7 @@ import yaml
 
 from deploy import processes
 from deploy.chaos.faults import FAULTS, INJECTED
-from deploy.chaos.history import OPERATOR, PROGRAMS, Fault
+from deploy.chaos.history import LOSS, NOTHING, OPERATOR, PROGRAMS, SILENCE, Fault
 from deploy.chaos.schedule import AWAKE, FIRST, PERIOD, Planned, Schedule
 from deploy.system import NAMESPACE, DeploymentError, System
 from interfaces import topics
@@ -171,7 +171,7 @@ class Arena:
         last = max(
             (planned.at + planned.lasting for schedule in schedules for planned in schedule), default=0.0
         )
-        self._tell_silences(begin, max(until, last) + 60.0)
+        self._tell_circumstances(begin, max(until, last) + 60.0)
         order = itertools.count()
         agenda: list[tuple[float, int, Callable[[], None]]] = []
         undone = ExitStack()
@@ -208,8 +208,11 @@ class Arena:
         self._observer.stdin.write(json.dumps(fault._asdict() | {"namespace": namespace}) + "\n")
         self._observer.stdin.flush()
 
-    def _tell_silences(self, begin: float, duration: float) -> None:
-        """The operator's sleep is a fault too: whoever reads the record has to know it."""
+    def _tell_circumstances(self, begin: float, duration: float) -> None:
+        """A lossy network and the operator's sleep are faults too: whoever reads the record has to know."""
+        if self._loss:
+            for arm in self.arms:
+                self._tell(Fault(LOSS, NOTHING, self._epoch - self.lead, begin + duration), arm.namespace)
         pressed = self._scenario["operator"]["pressed"][-1]
         period = self._scenario.get("repeat")
         if period is None or "to" not in pressed:
@@ -219,7 +222,7 @@ class Arena:
         ):
             dawn = self._epoch + day * period
             for arm in self.arms:
-                self._tell(Fault("silence", OPERATOR, dawn + pressed["to"], dawn + period), arm.namespace)
+                self._tell(Fault(SILENCE, OPERATOR, dawn + pressed["to"], dawn + period), arm.namespace)
 
     def _await_up(self, arm: ArmUnderTest, lines: queue.Queue[str]) -> None:
         missing = {f"{arm.namespace.rstrip('/')}/{topic.name}" for topic in AWAITED}

@@ -16,6 +16,10 @@ SENTINEL = "sentinel"
 OPERATOR, ALL, NOTHING = "operator", "all", "nothing"
 """What a fault may be done to besides a program; `nothing` is what must not be able to disturb anything."""
 
+OVERLOAD, LOSS, SILENCE = "overload", "loss", "silence"
+CIRCUMSTANCES = (OVERLOAD, LOSS, SILENCE)
+"""Told like faults, but of no process: a machine or network that loses messages; an operator asleep."""
+
 
 class Sample(NamedTuple):
     """A message as the observer got it."""
@@ -71,13 +75,9 @@ class History:
             return self.stream(topic)
         return [s for s in self.stream(topics.DIAGNOSTICS) if s.value[0] == program]
 
-    def deaths(self, program: str, begin: float, end: float) -> list[Life]:
-        """The processes of a program that ended between two times."""
-        return [
-            life
-            for life in self.lives
-            if life.program == program and life.ended is not None and begin <= life.ended <= end
-        ]
+    def may_have_missed(self, begin: float, end: float) -> bool:
+        """Whether the observer may not know all that was said between two times."""
+        return any(f.kind in (OVERLOAD, LOSS) and f.begin < end and f.end > begin for f in self.faults)
 
 
 OUTPUTS = {

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 
 from deploy.chaos.findings import Evidence, Finding, percentile
-from deploy.chaos.history import ALL, OPERATOR, OUTPUTS, PROGRAMS, Fault, History, between
+from deploy.chaos.history import ALL, CIRCUMSTANCES, OPERATOR, OUTPUTS, PROGRAMS, Fault, History, between
 from deploy.chaos.safety import Published
 from interfaces import topics
 
@@ -61,7 +61,7 @@ def _never_back(history: History) -> Iterator[Evidence]:
     """Programs that say nothing any more after a fault of any kind, though nothing else holds them up."""
     for fault in history.faults:
         begin, end = fault.end, fault.end + GONE
-        if fault.kind in ("silence", "overload") or end > history.end:
+        if fault.kind in CIRCUMSTANCES or end > history.end:
             continue
         for program in PROGRAMS if fault.target == ALL else (fault.target,):
             if program not in PROGRAMS or between(history.output(program), begin, end):
@@ -111,11 +111,9 @@ def others_flow_on(history: History) -> Finding:
 
 
 def _overloaded(history: History, begin: float, end: float) -> bool:
-    """Whether the observer itself was not scheduled, or most steady streams paused at the same time."""
+    """Whether the observer may have missed something, or most steady streams paused at the same time."""
     paused = sum(not between(history.output(program), begin + 0.02, end - 0.02) for program in STEADY)
-    return any(
-        fault.kind == "overload" and fault.begin < end and fault.end > begin for fault in history.faults
-    ) or 2 * paused > len(STEADY)
+    return history.may_have_missed(begin, end) or 2 * paused > len(STEADY)
 
 
 def right_after_return(history: History) -> Finding:

@@ -28,7 +28,7 @@ from rclpy.qos import QoSProfile
 from rclpy.signals import SignalHandlerOptions
 
 from deploy import processes
-from deploy.chaos.history import NOTHING, Fault, Life
+from deploy.chaos.history import NOTHING, OVERLOAD, Fault, Life
 from deploy.chaos.record import FAULTS, PROCESSES, Recorder, qos_profiles
 from interfaces import topics
 
@@ -210,7 +210,7 @@ def main(arguments: list[str]) -> int:
         recorder.event(PROCESSES, time.monotonic_ns(), event)
 
     def overload(begin: float, end: float) -> None:
-        event = relative(Fault("overload", NOTHING, begin, end)._asdict(), "begin", "end")
+        event = relative(Fault(OVERLOAD, NOTHING, begin, end)._asdict(), "begin", "end")
         recorder.event(FAULTS, time.monotonic_ns(), event)
 
     def obey() -> None:

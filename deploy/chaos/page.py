@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from html import escape
 
 from deploy.chaos.findings import UNKNOWN, VIOLATED, Finding, percentile
-from deploy.chaos.history import ALL, NOTHING, PROGRAMS, Fault, History
+from deploy.chaos.history import ALL, LOSS, NOTHING, PROGRAMS, SILENCE, Fault, History
 from deploy.chaos.liveness import HUNG, MEDIAN, SLOWEST
 from deploy.chaos.promises import meaning
 from deploy.chaos.report import TIMES
@@ -158,7 +158,7 @@ def _stretches(times: Sequence[float]) -> Iterator[tuple[float, float]]:
 
 
 def _row_of(fault: Fault, row: str) -> bool:
-    if fault.kind == "silence":
+    if fault.kind in (SILENCE, LOSS):
         return False
     if fault.target == row:
         return True

@@ -78,8 +78,8 @@ def turned_on_by_the_present(history: History) -> Finding:
             for life in history.lives
         ):
             unknown += 1  # a command of a new publisher, which the observer did not know yet
-        elif any(f.kind == "overload" and f.begin < on.sent and f.end > stopped for f in history.faults):
-            unknown += 1  # the observer may have missed what kept them on
+        elif history.may_have_missed(max(stopped, on.sent - SEEN_WITHIN), on.sent):
+            unknown += 1  # what kept them on, or the command
         else:
             missing = "a turn_on" if not command else "a sign of life"
             evidence.append(Evidence(on.sent, f"engines went on without {missing} in the last second"))
@@ -99,7 +99,9 @@ def speeds_and_positions_are_true(history: History) -> Finding:
     for position in positions:
         if published.explains(position, within=LONGEST_PAUSE):
             continue
-        if _a_source_was_new(history, position.sent):
+        if _a_source_was_new(history, position.sent) or history.may_have_missed(
+            position.sent - MEETING, position.sent
+        ):
             unknown += 1
         else:
             evidence.append(Evidence(position.sent, f"position {position.value} of no published values"))
@@ -213,13 +215,14 @@ def _controller_was_away(history: History, on: Sample, off: Sample) -> bool:
         life.program == "engine_controller" and on.sent - 0.02 < life.began <= off.sent
         for life in history.lives
     )
-    paused = off.sent - on.sent > DRIVE and any(
-        (fault.kind == "overload" or (fault.kind in BLINDING and fault.target in ("engine_controller", ALL)))
+    paused = history.may_have_missed(on.sent, off.sent) or any(
+        fault.kind in BLINDING
+        and fault.target in ("engine_controller", ALL)
         and fault.begin < off.sent
         and fault.end > on.sent
         for fault in history.faults
     )
-    return died or paused
+    return died or (paused and off.sent - on.sent > DRIVE)
 
 
 def _absences(history: History, time: float) -> float:

@@ -185,6 +185,12 @@ def test_s4_a_value_that_the_observer_may_have_missed_leaves_a_position_unknown(
     assert finding.unknown >= 1
 
 
+def test_s4_what_an_observer_on_a_lossy_network_may_have_missed_stays_unknown() -> None:
+    history = added(good(), "effector/position", (30.0, (1.0, 9.0)))
+    finding = CHECKERS["S4"](faulty(history, Fault("loss", NOTHING, 0.0, END)))
+    assert (finding.verdict, finding.unknown) == (HOLDS, 1)
+
+
 # S5
 
 
