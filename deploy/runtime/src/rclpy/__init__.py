@@ -134,7 +134,9 @@ def shutdown(*, context: Context | None = None, uninstall_handlers: bool | None 
     if _executor is not None and _executor.context is (context or get_default_context()):
         _executor._told_to_end = True  # so that spin() on another thread just returns
     _shutdown(context=context)
-    if uninstall_handlers or (uninstall_handlers is None and context is None):
+    if uninstall_handlers is None:
+        uninstall_handlers = context is None or context is get_default_context()
+    if uninstall_handlers:
         uninstall_signal_handlers()
 
 

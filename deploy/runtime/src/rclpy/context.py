@@ -122,11 +122,11 @@ class Context(AbstractContextManager["Context"]):
         return self._domain_id
 
     def on_shutdown(self, callback: Callable[[], None]) -> None:
-        """Call ``callback`` at shutdown; a bound method does not keep its object alive."""
+        """Call ``callback`` at shutdown, at once after it; a bound method does not keep its object alive."""
         if not callable(callback):
             raise TypeError("callback should be callable, got {}", type(callback))
         with self._lock:
-            if not self._valid:
+            if self._initialized and not self._valid:
                 callback()
             elif hasattr(callback, "__self__") and not isinstance(callback.__self__, type):
                 self._callbacks.append(weakref.WeakMethod(callback, self._forget_callback))

@@ -45,11 +45,12 @@ def shutdown(*, context: Context | None = None) -> None:
 
 
 def try_shutdown(*, context: Context | None = None) -> None:
-    """Shut ``context`` (the default one if ``None``) down, unless that has happened already."""
-    if context is not None:
-        context.try_shutdown()
-    elif ok():
-        get_default_context(shutting_down=True).try_shutdown()
+    """
+    Shut ``context`` (the default one if ``None``) down, unless that has happened already.
+
+    There is a new default context afterwards, also where a signal has shut the old one down.
+    """
+    (get_default_context(shutting_down=True) if context is None else context).try_shutdown()
 
 
 def get_rmw_implementation_identifier() -> str:

@@ -1,0 +1,55 @@
+"""Contexts, the default one above all: what init and shutdown leave behind."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+import rclpy
+from rclpy.context import Context
+from rclpy.signals import SignalHandlerOptions, get_current_signal_handlers_options
+from rclpy.utilities import get_default_context
+
+
+@pytest.fixture(autouse=True)
+def _fresh_default_context(domain_id: int) -> Iterator[None]:
+    rclpy.try_shutdown()
+    yield
+    rclpy.try_shutdown()
+    rclpy.signals.uninstall_signal_handlers()
+
+
+def test_what_is_to_run_at_shutdown_may_be_said_before_init() -> None:
+    context = Context()
+    called: list[str] = []
+    context.on_shutdown(lambda: called.append("shutdown"))
+    assert called == []
+    context.init(args=[])
+    assert called == []
+    context.shutdown()
+    assert called == ["shutdown"]
+    context.on_shutdown(lambda: called.append("late"))
+    assert called == ["shutdown", "late"]
+
+
+def test_after_try_shutdown_rclpy_can_begin_anew_though_a_signal_had_shut_it_down() -> None:
+    rclpy.init(args=[])
+    get_default_context().shutdown()  # what a signal does
+    rclpy.try_shutdown()
+    rclpy.init(args=[])
+    assert rclpy.ok()
+
+
+def test_a_shutdown_of_the_default_context_handles_signals_no_more_however_it_was_named() -> None:
+    rclpy.init(args=[])
+    assert get_current_signal_handlers_options() == SignalHandlerOptions.ALL
+    rclpy.shutdown(context=get_default_context())
+    assert get_current_signal_handlers_options() == SignalHandlerOptions.NO
+
+
+def test_a_shutdown_of_another_context_leaves_the_signal_handlers_alone() -> None:
+    rclpy.init(args=[])
+    context = Context()
+    rclpy.init(args=[], context=context)
+    rclpy.shutdown(context=context)
+    assert get_current_signal_handlers_options() == SignalHandlerOptions.ALL
