@@ -152,6 +152,29 @@ def test_spin_until_future_complete_gives_up_after_its_timeout(executor: SingleT
     assert not future.done()
 
 
+def test_spin_until_future_complete_with_timeout_zero_runs_what_is_ready(
+    make_node: MakeNode, executor: SingleThreadedExecutor
+) -> None:
+    node = make_node()
+    executor.add_node(node)
+    future: Future = Future()
+    node.create_guard_condition(lambda: future.set_result("done")).trigger()
+    executor.spin_until_future_complete(future, timeout_sec=0)
+    assert future.result() == "done"
+
+
+def test_spin_until_future_complete_leaves_a_node_with_the_executor_that_had_it(
+    make_node: MakeNode, executor: SingleThreadedExecutor
+) -> None:
+    node, guest = make_node("node"), make_node("guest")
+    executor.add_node(node)
+    future: Future = Future()
+    future.set_result(None)
+    rclpy.spin_until_future_complete(node, future, executor)
+    rclpy.spin_until_future_complete(guest, future, executor)
+    assert executor.get_nodes() == [node]
+
+
 def test_an_entity_created_on_another_thread_while_the_executor_waits_is_seen_at_once(
     make_node: MakeNode, executor: SingleThreadedExecutor
 ) -> None:
@@ -214,6 +237,15 @@ def test_shutting_the_context_down_on_another_thread_ends_spinning_with_external
     threading.Timer(0.05, context.shutdown).start()
     with pytest.raises(ExternalShutdownException):
         executor.spin_once()
+
+
+def test_a_multi_threaded_executor_returns_from_spinning_when_the_context_is_shut_down(
+    context: Context,
+) -> None:
+    with MultiThreadedExecutor(2, context=context) as executor:
+        threading.Timer(0.05, context.shutdown).start()
+        executor.spin()
+    assert not context.ok()
 
 
 def test_shutting_rclpy_down_on_another_thread_lets_spin_return(domain_id: int) -> None:

@@ -200,4 +200,10 @@ def spin_until_future_complete(
     node: Node, future: Future, executor: Executor | None = None, timeout_sec: float | None = None
 ) -> None:
     """Run the callbacks of ``node`` until ``future`` is done, but no longer than ``timeout_sec``."""
-    _with_executor(node, executor, lambda chosen: chosen.spin_until_future_complete(future, timeout_sec))
+    chosen = get_global_executor() if executor is None else executor
+    was_added = chosen.add_node(node)
+    try:
+        chosen.spin_until_future_complete(future, timeout_sec)
+    finally:
+        if was_added:
+            chosen.remove_node(node)

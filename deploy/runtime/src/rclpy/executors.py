@@ -224,9 +224,9 @@ class Executor(AbstractContextManager["Executor"]):
         future._call_when_complete(self.wake)
         deadline = _deadline(timeout_sec)
         while self._context._valid and not self._is_shutdown and not future._is_over():
+            self._spin_once(deadline, future._is_over)
             if deadline is not None and time.monotonic_ns() >= deadline:
                 return
-            self._spin_once(deadline, future._is_over)
 
     def spin_once_until_future_complete(
         self, future: Future, timeout_sec: float | TimeoutObject | None = None
@@ -498,7 +498,12 @@ class MultiThreadedExecutor(Executor):
             with self._idle:
                 self._in_pool += 1
             self._pool.submit(self._run_in_pool, entity, taken)
-        except (TimeoutException, ShutdownException, ConditionReachedException):
+        except (
+            TimeoutException,
+            ShutdownException,
+            ExternalShutdownException,  # unlike on a single-threaded executor, as in rclpy
+            ConditionReachedException,
+        ):
             pass
         finally:
             self._end_spin()
