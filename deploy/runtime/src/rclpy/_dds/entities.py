@@ -250,11 +250,10 @@ class WaitSet:
 
     def _make_room(self, capacity: int) -> None:
         self._capacity = capacity
-        self._tokens = (ct.c_ssize_t * capacity)()
-        self._timeout = Duration()
+        tokens, timeout = (ct.c_ssize_t * capacity)(), Duration()
         # Made once: a wait comes after each callback, and to convert them each time costs more than the call.
-        tokens = Pointer(ct.addressof(self._tokens))
-        self._arguments = Entity(self.handle), tokens, ct.c_size_t(capacity), self._timeout
+        address = Pointer(ct.addressof(tokens))
+        self._room = tokens, timeout, (Entity(self.handle), address, ct.c_size_t(capacity), timeout)
 
     def attach(self, handle: int, token: int) -> bool:
         """Wait on ``handle`` from now on; ``wait`` reports it as ``token``. False if it is gone already."""
@@ -272,11 +271,13 @@ class WaitSet:
 
     def wait(self, timeout: int) -> list[int]:
         """The tokens of what is triggered, after at most ``timeout`` [ns]; empty if nothing was."""
-        self._timeout.value = timeout
-        count = blocking.dds_waitset_wait(*self._arguments)
+        # Held here: DDS writes into the tokens, while another thread may attach more and make new room.
+        tokens, duration, arguments = self._room
+        duration.value = timeout
+        count = blocking.dds_waitset_wait(*arguments)
         if not count or self.closed:
             return []
-        return self._tokens[: min(checked(count, "cannot wait"), self._capacity)]
+        return tokens[: min(checked(count, "cannot wait"), len(tokens))]
 
     def close(self) -> None:
         """End it, and every wait; what was attached lives on."""
