@@ -289,6 +289,31 @@ def test_a_node_moves_to_the_executor_that_it_is_added_to_last(
     assert node.executor is None
 
 
+def test_a_message_that_cannot_be_taken_does_not_keep_its_callback_group_busy(
+    make_node: MakeNode,
+    executor: SingleThreadedExecutor,
+    spin_until: SpinUntil,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    node = make_node()
+    executor.add_node(node)
+    received: list[float] = []
+    subscription = node.create_subscription(Float64, "x", lambda message: received.append(message.data), 10)
+    publisher = node.create_publisher(Float64, "x", 10)
+
+    def fail(data: bytes) -> None:
+        raise ZeroDivisionError("planted")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(subscription, "_deserialize", fail)
+        publisher.publish(Float64(data=1.0))
+        with pytest.raises(ZeroDivisionError, match="planted"):
+            executor.spin_once(timeout_sec=5)
+    publisher.publish(Float64(data=2.0))
+    spin_until(lambda: received)
+    assert received == [2.0]
+
+
 def test_a_reentrant_group_lets_callbacks_overlap_on_a_multi_threaded_executor(
     make_node: MakeNode, context: Context
 ) -> None:

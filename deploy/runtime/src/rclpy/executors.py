@@ -281,7 +281,11 @@ class Executor(AbstractContextManager["Executor"]):
                 if group is not None and not group.beginning_execution(entity):
                     self._block(entity)
                     continue
-                taken = entity._take()
+                try:
+                    taken = entity._take()
+                except BaseException:
+                    self._ended(entity)
+                    raise
                 if taken is None:
                     if group is not None:
                         group.ending_execution(entity)
