@@ -314,6 +314,52 @@ def test_a_message_that_cannot_be_taken_does_not_keep_its_callback_group_busy(
     assert received == [2.0]
 
 
+def test_a_second_thread_cannot_spin_an_executor_meanwhile(
+    make_node: MakeNode, executor: SingleThreadedExecutor
+) -> None:
+    errors: list[ValueError] = []
+
+    def spin() -> None:
+        try:
+            executor.spin_once(timeout_sec=5)
+        except ValueError as error:
+            errors.append(error)
+
+    class Group(MutuallyExclusiveCallbackGroup):
+        """Is asked on the spinning thread."""
+
+        def can_execute(self, entity: object) -> bool:
+            if not errors:
+                second = threading.Thread(target=spin)
+                second.start()
+                second.join()
+            return super().can_execute(entity)
+
+    node = make_node()
+    called: list[bool] = []
+    node.create_timer(0.0, lambda: called.append(True), Group())
+    executor.add_node(node)
+    executor.spin_once(timeout_sec=5)
+    assert len(errors) == 1
+    assert called == [True]
+
+
+def test_a_callback_may_spin_its_executor(make_node: MakeNode, executor: SingleThreadedExecutor) -> None:
+    node = make_node()
+    executor.add_node(node)
+    called: list[str] = []
+
+    def spin() -> None:
+        called.append("outer")
+        inner.trigger()
+        executor.spin_once(timeout_sec=5)
+
+    inner = node.create_guard_condition(lambda: called.append("inner"), ReentrantCallbackGroup())
+    node.create_guard_condition(spin).trigger()
+    executor.spin_once(timeout_sec=5)
+    assert called == ["outer", "inner"]
+
+
 def test_a_reentrant_group_lets_callbacks_overlap_on_a_multi_threaded_executor(
     make_node: MakeNode, context: Context
 ) -> None:

@@ -414,8 +414,20 @@ class Executor(AbstractContextManager["Executor"]):
         """Whether no thread spins or runs a callback."""
         return self._spinning_thread is None
 
-    def _end_spin(self) -> None:
-        self._spinning_thread = self._callback_thread = None
+    def _begin_spin(self) -> int | None:
+        """
+        Make this the spinning thread; it may be that already, if it spins in a callback.
+
+        :return: what to give to :meth:`_end_spin`.
+        """
+        thread, outer = threading.get_ident(), self._spinning_thread
+        if outer is not None and outer != thread:
+            raise ValueError("another thread spins this executor: it can only be spun by one at a time")
+        self._spinning_thread = thread
+        return outer
+
+    def _end_spin(self, outer: int | None) -> None:
+        self._spinning_thread = self._callback_thread = outer
         if self._is_shutdown:  # somebody may be waiting for this; who comes later finds it done
             with self._idle:
                 self._idle.notify_all()
@@ -464,7 +476,7 @@ class SingleThreadedExecutor(Executor):
     """Runs all callbacks on the thread that spins."""
 
     def _spin_once(self, deadline: int | None, condition: Callable[[], bool] | None) -> None:
-        self._spinning_thread = threading.get_ident()
+        outer = self._begin_spin()
         try:
             try:
                 entity, taken = self._next(deadline, condition)
@@ -473,7 +485,7 @@ class SingleThreadedExecutor(Executor):
             self._callback_thread = self._spinning_thread
             self._run(entity, taken)
         finally:
-            self._end_spin()
+            self._end_spin(outer)
 
 
 class MultiThreadedExecutor(Executor):
@@ -494,7 +506,7 @@ class MultiThreadedExecutor(Executor):
         self._in_pool = 0  # callbacks under way there
 
     def _spin_once(self, deadline: int | None, condition: Callable[[], bool] | None) -> None:
-        self._spinning_thread = threading.get_ident()
+        outer = self._begin_spin()
         try:
             entity, taken = self._next(
                 deadline, lambda: bool(self._errors) or (condition is not None and condition())
@@ -510,7 +522,7 @@ class MultiThreadedExecutor(Executor):
         ):
             pass
         finally:
-            self._end_spin()
+            self._end_spin(outer)
         if self._errors:
             raise self._errors.popleft()
 
