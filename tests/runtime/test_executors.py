@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import pytest
 import rclpy
@@ -289,6 +289,30 @@ def test_a_node_moves_to_the_executor_that_it_is_added_to_last(
     assert node.executor is None
 
 
+def test_shut_down_between_taking_and_running_an_executor_runs_what_it_took(
+    make_node: MakeNode, context: Context
+) -> None:
+    node = make_node()
+    executor = MultiThreadedExecutor(2, context=context)
+
+    class Untimely(MutuallyExclusiveCallbackGroup):
+        """Its entity is about to be taken when a signal's handler shuts the executor down."""
+
+        def beginning_execution(self, entity: object) -> bool:
+            executor.shutdown(timeout_sec=0)
+            return super().beginning_execution(entity)
+
+    group = Untimely()
+    called: list[bool] = []
+    guard = node.create_guard_condition(lambda: called.append(True), group)
+    executor.add_node(node)
+    guard.trigger()
+    executor.spin_once(timeout_sec=5)
+    assert executor.shutdown(timeout_sec=10)
+    assert called == [True]
+    assert group.can_execute(guard)
+
+
 def test_a_message_that_cannot_be_taken_does_not_keep_its_callback_group_busy(
     make_node: MakeNode,
     executor: SingleThreadedExecutor,
@@ -401,6 +425,101 @@ def test_a_mutually_exclusive_group_never_overlaps_on_a_multi_threaded_executor(
         executor.add_node(node)
         executor.spin_until_future_complete(done, timeout_sec=20)
     assert calls == [True] * 200
+
+
+class Busy:
+    """A multi-threaded executor, and a subscription whose callbacks keep both its threads busy."""
+
+    def __init__(self, node: Node, executor: MultiThreadedExecutor) -> None:
+        self.received: list[float] = []
+        self.newest: Future = Future()
+        self.release = threading.Event()
+        self.executor = executor
+        self._entered = threading.Semaphore(0)
+        group = ReentrantCallbackGroup()
+        node.create_subscription(Float64, "x", self._callback, 1, callback_group=group)
+        self.publisher = node.create_publisher(Float64, "x", 1)
+        executor.add_node(node)
+
+    def _callback(self, message: Float64) -> None:
+        self.received.append(message.data)
+        self._entered.release()
+        assert self.release.wait(20)
+        if message.data == 49.0:
+            self.newest.set_result(None)
+
+    def fill(self) -> None:
+        """Let each thread run a callback, with the messages 0 and 1."""
+        for number in range(2):
+            self.publisher.publish(Float64(data=float(number)))
+            while not self._entered.acquire(blocking=False):
+                self.executor.spin_once(timeout_sec=0.1)
+
+
+@pytest.fixture
+def busy(make_node: MakeNode, context: Context) -> Iterator[Busy]:
+    with MultiThreadedExecutor(2, context=context) as executor:
+        busy = Busy(make_node(), executor)
+        busy.fill()
+        yield busy
+        busy.release.set()
+
+
+def test_a_message_is_not_taken_before_a_thread_is_free_so_that_the_newest_is(busy: Busy) -> None:
+    for number in range(2, 50):
+        busy.publisher.publish(Float64(data=float(number)))
+        busy.executor.spin_once(timeout_sec=0)
+    busy.release.set()
+    busy.executor.spin_until_future_complete(busy.newest, timeout_sec=20)
+    assert busy.received == [0.0, 1.0, 49.0]
+
+
+def test_while_all_threads_are_busy_a_timeout_still_ends_spin_once(busy: Busy) -> None:
+    busy.publisher.publish(Float64())
+    before = STEADY.now()
+    busy.executor.spin_once(timeout_sec=0.05)
+    busy.executor.spin_once(timeout_sec=0.05)
+    assert (STEADY.now() - before).nanoseconds < 10_000_000_000
+
+
+@pytest.mark.parametrize(
+    "end",
+    [
+        lambda executor, future: future.set_result(None),
+        lambda executor, future: executor.context.shutdown(),
+        lambda executor, future: executor.shutdown(timeout_sec=0),
+    ],
+    ids=["future", "context", "executor"],
+)
+def test_while_all_threads_are_busy_the_end_still_ends_spinning(
+    busy: Busy, end: Callable[[MultiThreadedExecutor, Future], None]
+) -> None:
+    future: Future = Future()
+    spinning = threading.Thread(target=busy.executor.spin_until_future_complete, args=(future,))
+    spinning.start()
+    busy.publisher.publish(Float64())
+    end(busy.executor, future)
+    spinning.join(10)
+    assert not spinning.is_alive()
+
+
+def test_no_thread_that_gets_free_is_overlooked(make_node: MakeNode, context: Context) -> None:
+    node = make_node()
+    left = threading.Semaphore(999)
+    done: Future = Future()
+
+    def callback(message: Float64) -> None:
+        if not left.acquire(blocking=False):
+            done.set_result(None)
+
+    node.create_subscription(Float64, "x", callback, 1000, callback_group=ReentrantCallbackGroup())
+    publisher = node.create_publisher(Float64, "x", 1000)
+    for _ in range(1000):
+        publisher.publish(Float64())
+    with MultiThreadedExecutor(2, context=context) as executor:
+        executor.add_node(node)
+        executor.spin_until_future_complete(done, timeout_sec=20)
+    assert done.done()
 
 
 def test_an_exception_on_a_pool_thread_comes_out_of_spinning(make_node: MakeNode, context: Context) -> None:

@@ -81,6 +81,11 @@ def _deadline(timeout: float | TimeoutObject | None) -> int | None:
     return time.monotonic_ns() + int(timeout * S_TO_NS)
 
 
+def _remaining(deadline: int | None) -> int:
+    """Nanoseconds until a deadline of :func:`_deadline`, never negative."""
+    return INFINITY if deadline is None else max(0, deadline - time.monotonic_ns())
+
+
 class _Entity(Protocol):
     """What an executor waits for and runs: a subscription, timer, service, client, guard or event."""
 
@@ -263,12 +268,7 @@ class Executor(AbstractContextManager["Executor"]):
         """Wait for work: an entity and what was taken from it; for a task, the task and ``None``."""
         waited = False
         while True:
-            if not self._context._valid:
-                raise ShutdownException if self._told_to_end else ExternalShutdownException
-            if self._is_shutdown:
-                raise ShutdownException
-            if condition is not None and condition():
-                raise ConditionReachedException
+            self._check(condition)
             if self._entities_changed:
                 self._update_entities()
             if self._groups_changed:
@@ -298,9 +298,18 @@ class Executor(AbstractContextManager["Executor"]):
             self._collect(deadline)
             waited = True
 
+    def _check(self, condition: Callable[[], bool] | None) -> None:
+        """Raise the reason for which no more work is to be waited for, if there is one."""
+        if not self._context._valid:
+            raise ShutdownException if self._told_to_end else ExternalShutdownException
+        if self._is_shutdown:
+            raise ShutdownException
+        if condition is not None and condition():
+            raise ConditionReachedException
+
     def _collect(self, deadline: int | None) -> None:
         """Wait until something is ready, ``deadline`` is over or somebody wakes us; note what is ready."""
-        timeout = INFINITY if deadline is None else max(0, deadline - time.monotonic_ns())
+        timeout = _remaining(deadline)
         while self._tasks:
             timeout = 0
             self._ready.append((self._tasks.popleft(), 0))
@@ -451,9 +460,12 @@ class Executor(AbstractContextManager["Executor"]):
             for node in self.get_nodes():
                 self.remove_node(node)
             self._context._executors.discard(self)
-            self._waitset.close()
-            self._guard.close()
+            self._close()
         return True
+
+    def _close(self) -> None:
+        self._waitset.close()
+        self._guard.close()
 
     def __enter__(self) -> Executor:
         return self
@@ -500,10 +512,23 @@ class MultiThreadedExecutor(Executor):
         if num_threads is not None and num_threads < 1:
             raise ValueError("a MultiThreadedExecutor needs at least one thread")
         super().__init__(context=context)
-        threads = num_threads or max(2, os.cpu_count() or 2)
-        self._pool = ThreadPoolExecutor(threads, thread_name_prefix="rclpy-executor")
+        self._threads = num_threads or max(2, os.cpu_count() or 2)
+        self._pool = ThreadPoolExecutor(self._threads, thread_name_prefix="rclpy-executor")
         self._errors: deque[BaseException] = deque()
         self._in_pool = 0  # callbacks under way there
+        self._wakes = WaitSet()  # for nothing but being woken
+        self._wakes.attach(self._guard.handle, _WAKE)
+
+    def _next(self, deadline: int | None, condition: Callable[[], bool] | None) -> tuple[Any, Any]:
+        """Wait for a free thread, then for work: what is taken earlier grows old, and more and more of it."""
+        while self._in_pool >= self._threads:
+            self._check(condition)
+            timeout = _remaining(deadline)
+            if not timeout:
+                raise TimeoutException
+            if self._wakes.wait(timeout):
+                self._guard.take()
+        return super()._next(deadline, condition)
 
     def _spin_once(self, deadline: int | None, condition: Callable[[], bool] | None) -> None:
         outer = self._begin_spin()
@@ -513,7 +538,10 @@ class MultiThreadedExecutor(Executor):
             )
             with self._idle:
                 self._in_pool += 1
-            self._pool.submit(self._run_in_pool, entity, taken)
+            try:
+                self._pool.submit(self._run_in_pool, entity, taken)
+            except RuntimeError:  # shut down meanwhile, by a signal's handler on this thread
+                self._run_in_pool(entity, taken)
         except (
             TimeoutException,
             ShutdownException,
@@ -532,17 +560,17 @@ class MultiThreadedExecutor(Executor):
         except BaseException as error:
             self._errors.append(error)
         finally:
-            # The spinning thread may be waiting without this entity's callback group, or for an error.
-            self.wake()
             with self._idle:
                 self._in_pool -= 1
                 self._idle.notify_all()
+                # The spinning thread may be waiting for a thread, this entity's callback group, or an error.
+                # Under the lock: whoever waits in shutdown() ends afterwards what this wakes by.
+                self.wake()
 
     def _is_idle(self) -> bool:
         return super()._is_idle() and not self._in_pool
 
-    def shutdown(self, timeout_sec: float | None = None) -> bool:
-        """Stop, and wait for the callbacks that run; see :meth:`Executor.shutdown`."""
-        ended = super().shutdown(timeout_sec)
+    def _close(self) -> None:
+        super()._close()
+        self._wakes.close()
         self._pool.shutdown(wait=False)
-        return ended
