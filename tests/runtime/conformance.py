@@ -42,6 +42,36 @@ def modules() -> list[Module]:
     return [_module(name, entries) for name, entries in API.items()]
 
 
+def surplus() -> list[str]:
+    """Name what public classes have here and not in rclpy: code that uses it would fail there."""
+    recorded: dict[str, set[str]] = {}
+    classes: list[type] = []
+    for name, entries in API.items():
+        for entry, facts in entries.items():
+            # What is a protocol or an object of C there does not tell all that it has.
+            if entry.startswith("class ") and not {"Protocol", "pybind11_object"} & {*facts["bases"]}:
+                cls = getattr(importlib.import_module(name), entry.split()[-1])
+                recorded[cls.__name__] = {*facts["methods"]}
+                classes.append(cls)
+    found = set()
+    for cls in classes:
+        known = {name for base in cls.__mro__ for name in recorded.get(base.__name__, ())}
+        found |= {f"{cls.__name__}.{name}" for name in _public_members(cls) - known}
+    return sorted(found)
+
+
+def _public_members(cls: type) -> set[str]:
+    """The public methods and properties that a class of rclpy has, also from bases of rclpy."""
+    return {
+        name
+        for base in cls.__mro__
+        if base.__module__.startswith("rclpy") and not issubclass(base, Enum)
+        for name, member in vars(base).items()
+        if not name.startswith("_") or name in ("__enter__", "__exit__")
+        if callable(member) or isinstance(member, property | classmethod | staticmethod)
+    }
+
+
 def table(rows: list[Module]) -> str:
     """Return a Markdown table, one row for each module."""
     lines = ["| module | supported | raises NotImplementedError | missing |", "|---|---:|---|---|"]

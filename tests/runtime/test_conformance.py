@@ -15,6 +15,10 @@ def test_nothing_of_rclpys_public_api_is_missing() -> None:
     assert {row.name: row.missing for row in rows if row.missing} == {}
 
 
+def test_no_class_has_more_than_rclpys() -> None:
+    assert conformance.surplus() == []
+
+
 def test_the_readme_says_what_is_supported() -> None:
     assert conformance.table(conformance.modules()) in README.read_text(), (
         "the table in deploy/runtime/README.md is out of date: python -m tests.runtime.conformance"

@@ -32,6 +32,10 @@ def test_what_is_to_run_at_shutdown_may_be_said_before_init() -> None:
     assert called == ["shutdown", "late"]
 
 
+def test_init_returns_nothing_that_code_could_come_to_rely_on() -> None:
+    assert rclpy.init(args=[]) is None  # type: ignore[func-returns-value]
+
+
 def test_after_try_shutdown_rclpy_can_begin_anew_though_a_signal_had_shut_it_down() -> None:
     rclpy.init(args=[])
     get_default_context().shutdown()  # what a signal does

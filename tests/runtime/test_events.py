@@ -107,6 +107,18 @@ def test_incompatible_qos_is_logged_in_rclpys_words_unless_told_otherwise(
     assert subscription.event_handlers == []
 
 
+def test_a_with_on_an_event_handler_does_not_end_it(node: Node, spin_until: SpinUntil) -> None:
+    matched: list[Any] = []
+    publisher = node.create_publisher(
+        Float64, "x", 1, event_callbacks=PublisherEventCallbacks(matched=matched.append)
+    )
+    for handler in publisher.event_handlers:
+        with handler as nothing:
+            assert nothing is None
+    node.create_subscription(Float64, "x", ignore, 1)
+    spin_until(lambda: matched)
+
+
 def test_both_sides_hear_of_a_missed_deadline(node: Node, spin_until: SpinUntil) -> None:
     profile = QoSProfile(depth=1, deadline=Duration(seconds=0.05))
     offered: list[Any] = []

@@ -233,24 +233,11 @@ def test_a_late_subscription_in_another_participant_gets_the_latched_message(
     assert received == [2.0]
 
 
-def test_names_are_remapped_by_arguments(context: Context) -> None:
-    with Node(
-        "node",
-        context=context,
-        cli_args=[
-            "--ros-args",
-            "-r",
-            "x:=y",
-            "-r",
-            "__node:=renamed",
-            "-r",
-            "__ns:=/arm2",
-            "-r",
-            "serve:=/other",
-        ],
-    ) as node:
-        assert node.get_fully_qualified_name() == "/arm2/renamed"
-        assert node.resolve_topic_name("x") == "/arm2/y"
-        assert node.resolve_topic_name("x", only_expand=True) == "/arm2/x"
-        assert node.create_publisher(Float64, "x", 1).topic_name == "/arm2/y"
-        assert node.resolve_service_name("serve") == "/other"
+def test_names_are_remapped_by_arguments(make_node: MakeNode) -> None:
+    rules = "x:=y", "__node:=renamed", "__ns:=/arm2", "serve:=/other"
+    node = make_node(cli_args=["--ros-args", *(word for rule in rules for word in ("-r", rule))])
+    assert node.get_fully_qualified_name() == "/arm2/renamed"
+    assert node.resolve_topic_name("x") == "/arm2/y"
+    assert node.resolve_topic_name("x", only_expand=True) == "/arm2/x"
+    assert node.create_publisher(Float64, "x", 1).topic_name == "/arm2/y"
+    assert node.resolve_service_name("serve") == "/other"

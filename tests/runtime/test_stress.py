@@ -78,8 +78,9 @@ def other(domain_id: int) -> Iterator[Node]:
     """A node of another participant."""
     context = Context()
     rclpy.init(args=[], context=context, domain_id=domain_id)
-    with Node("flooding", context=context) as node:
-        yield node
+    node = Node("flooding", context=context)
+    yield node
+    node.destroy_node()
     context.shutdown()
 
 

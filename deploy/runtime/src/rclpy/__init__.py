@@ -8,7 +8,7 @@ from __future__ import annotations
 import importlib
 import importlib.util
 from collections.abc import Callable
-from types import ModuleType, TracebackType
+from types import ModuleType
 from typing import TYPE_CHECKING
 
 from rclpy.context import Context
@@ -30,7 +30,6 @@ if TYPE_CHECKING:
 __all__ = [
     "Context",
     "Future",
-    "InitContextManager",
     "Parameter",
     "SignalHandlerOptions",
     "create_node",
@@ -56,35 +55,13 @@ def __getattr__(name: str) -> ModuleType:
     return importlib.import_module(f"{__name__}.{name}")
 
 
-class InitContextManager:
-    """What :func:`init` returns: in a ``with``, it shuts down at the end."""
-
-    def __init__(self, context: Context, installed_handlers: bool) -> None:
-        self.context = context
-        self._installed_handlers = installed_handlers
-
-    def __enter__(self) -> InitContextManager:
-        return self
-
-    def __exit__(
-        self,
-        exc_type: type[BaseException] | None,
-        exc_val: BaseException | None,
-        exc_tb: TracebackType | None,
-    ) -> None:
-        if self.context.ok():
-            shutdown(context=self.context, uninstall_handlers=self._installed_handlers)
-        elif self._installed_handlers:
-            uninstall_signal_handlers()
-
-
 def init(
     *,
     args: list[str] | None = None,
     context: Context | None = None,
     domain_id: int | None = None,
     signal_handler_options: SignalHandlerOptions | None = None,
-) -> InitContextManager:
+) -> None:
     """
     Begin.
 
@@ -102,7 +79,6 @@ def init(
     context.init(args, domain_id=domain_id)
     _shut_down_by_signal(context)
     install_signal_handlers(signal_handler_options)
-    return InitContextManager(context, signal_handler_options != SignalHandlerOptions.NO)
 
 
 def get_global_executor() -> Executor:

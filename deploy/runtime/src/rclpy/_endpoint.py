@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from types import TracebackType
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
 from rclpy._dds import Reader, Writer
 from rclpy.event_handler import EventHandler
@@ -12,8 +11,6 @@ from rclpy.exceptions import InvalidHandle
 
 if TYPE_CHECKING:
     from rclpy.node import Node
-
-_Self = TypeVar("_Self", bound="Owner")
 
 
 @dataclass(frozen=True)
@@ -66,14 +63,3 @@ class Owner:
             for handler in self.event_handlers:
                 handler.destroy()
             self._node._graph.destroy(self._node, *self._entities)
-
-    def __enter__(self: _Self) -> _Self:
-        return self
-
-    def __exit__(
-        self,
-        exc_type: type[BaseException] | None,
-        exc_val: BaseException | None,
-        exc_tb: TracebackType | None,
-    ) -> None:
-        self.destroy()

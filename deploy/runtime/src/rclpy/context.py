@@ -107,11 +107,6 @@ class Context(AbstractContextManager["Context"]):
             g_logging_ref_count += 1
         self._logging = True
 
-    @property
-    def arguments(self) -> RosArguments:
-        """The ``--ros-args`` given to :meth:`init`."""
-        return self._arguments
-
     def ok(self) -> bool:
         """Whether the context runs: after ``init``, before ``shutdown``."""
         return self._valid

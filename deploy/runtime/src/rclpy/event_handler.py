@@ -180,13 +180,13 @@ class EventHandler(Waitable):
         """Call back no more."""
         self._destroyed = True
 
-    def __enter__(self) -> EventHandler:
-        return self
+    def __enter__(self) -> None:
+        """Begin to use it: nothing breaks when it is destroyed meanwhile, as with handles."""
 
     def __exit__(
         self, t: type[BaseException] | None, v: BaseException | None, tb: TracebackType | None
     ) -> None:
-        self.destroy()
+        """Use it no longer."""
 
     def get_num_entities(self) -> NumberOfEntities:
         """One event."""

@@ -314,7 +314,7 @@ class Executor(AbstractContextManager["Executor"]):
             timeout = 0
             self._ready.append((self._tasks.popleft(), 0))
         for guard in self._guards:
-            if guard.is_ready() and self.can_execute(guard):
+            if guard._is_ready() and self.can_execute(guard):
                 timeout = 0
                 self._ready.append((guard, 0))
         next_timer, wait = self._collect_timers()

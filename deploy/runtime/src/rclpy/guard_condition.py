@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from rclpy.context import Context
 
 
-class GuardCondition(Handle):
+class GuardCondition:
     """Runs its callback on the executor after each :meth:`trigger`; several triggers may become one."""
 
     def __init__(
@@ -27,20 +27,25 @@ class GuardCondition(Handle):
         self.callback = callback
         self.callback_group = callback_group
         self._context = context
+        self._handle = Handle()
         self._triggered = threading.Event()
         self._destroyed = False
         self._on_change: Callable[[], None] = lambda: None
 
     @property
-    def handle(self) -> GuardCondition:
-        """The guard condition itself. Raises InvalidHandle when it was destroyed."""
+    def handle(self) -> Handle:
+        """What stands for the guard condition. Raises InvalidHandle when it was destroyed."""
+        self._check_usable()
+        return self._handle
+
+    def _check_usable(self) -> None:
         if self._destroyed:
             raise InvalidHandle("cannot use a guard condition that was destroyed")
-        return self
 
     def trigger(self) -> None:
         """Let the callback run; from any thread."""
-        self.handle._triggered.set()
+        self._check_usable()
+        self._triggered.set()
         self._on_change()
 
     def destroy(self) -> None:
@@ -49,12 +54,12 @@ class GuardCondition(Handle):
 
     # What the executor asks of everything it waits for.
 
-    def is_ready(self) -> bool:
+    def _is_ready(self) -> bool:
         """Whether it was triggered and its callback has not run yet."""
         return self._triggered.is_set() and not self._destroyed
 
     def _take(self) -> tuple[()] | None:
-        if not self.is_ready():
+        if not self._is_ready():
             return None
         self._triggered.clear()
         return ()

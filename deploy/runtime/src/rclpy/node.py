@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import weakref
 from collections.abc import Callable, Iterator
-from types import TracebackType
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from rcl_interfaces.msg import Log, ParameterEvent
@@ -115,7 +114,7 @@ class Node(NodeParameters, NodeGraph):
         validate_node_name(node_name)
         namespace = namespace if namespace and namespace[0] == "/" else f"/{namespace or ''}"
         validate_namespace(namespace)
-        process_arguments = self._context.arguments if use_global_arguments else parse([])
+        process_arguments = self._context._arguments if use_global_arguments else parse([])
         own_arguments = parse(cli_args or [])
         self._arguments = own_arguments.before(process_arguments)
         self._name, self._namespace = self._arguments.node_name(node_name, namespace)
@@ -142,7 +141,7 @@ class Node(NodeParameters, NodeGraph):
         with self._graph.one_announcement():
             self._graph.add_node(self)
             self._rosout_publisher: Publisher | None = None
-            if enable_rosout and self._context.arguments.rosout_logs:
+            if enable_rosout and self._context._arguments.rosout_logs:
                 self._rosout_publisher = self._create_own_publisher(Log, "/rosout", _ROSOUT_QOS)
                 _logging_output.add_rosout_publisher(self._logger.name, self._publish_log)
             self._parameter_event_publisher = self.create_publisher(
@@ -574,17 +573,6 @@ class Node(NodeParameters, NodeGraph):
                     self._destroy(entities, entity)
             self._graph.remove_node(self)
         self._context._forget(self)
-
-    def __enter__(self) -> Node:
-        return self
-
-    def __exit__(
-        self,
-        exc_type: type[BaseException] | None,
-        exc_val: BaseException | None,
-        exc_tb: TracebackType | None,
-    ) -> None:
-        self.destroy_node()
 
     # What it tells the world of itself
 

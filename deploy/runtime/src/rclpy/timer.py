@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 TimerCallbackType = Callable[[], Any]
 
 
-class Timer(Handle):
+class Timer:
     """Calls back once a period by its clock. The periods do not drift; missed ones are skipped."""
 
     def __init__(
@@ -45,6 +45,7 @@ class Timer(Handle):
         self.callback = callback
         self.callback_group = callback_group
         self._context = get_default_context() if context is None else context
+        self._handle = Handle()
         self._clock = clock
         self._source = clock.handle
         self._period = int(timer_period_ns)
@@ -73,8 +74,11 @@ class Timer(Handle):
         self._on_change()
 
     @property
-    def handle(self) -> Timer:
-        """The timer itself. Raises InvalidHandle when it was destroyed."""
+    def handle(self) -> Handle:
+        """What stands for the timer. Raises InvalidHandle when it was destroyed."""
+        return self._usable()._handle
+
+    def _usable(self) -> Timer:
         if self._destroyed:
             raise InvalidHandle("cannot use a timer that was destroyed")
         return self
@@ -87,38 +91,38 @@ class Timer(Handle):
     @property
     def timer_period_ns(self) -> int:
         """The period [ns]. A new one counts from the next call on."""
-        return self.handle._period
+        return self._usable()._period
 
     @timer_period_ns.setter
     def timer_period_ns(self, value: int) -> None:
-        self.handle._period = int(value)
+        self._usable()._period = int(value)
         self._on_change()
 
     def is_ready(self) -> bool:
         """Whether it should be called now."""
-        return not self.handle._canceled and self._source.nanoseconds() >= self._next_call
+        return not self._usable()._canceled and self._source.nanoseconds() >= self._next_call
 
     def is_canceled(self) -> bool:
         """Whether it rests."""
-        return self.handle._canceled
+        return self._usable()._canceled
 
     def cancel(self) -> None:
         """Rest until :meth:`reset`."""
-        self.handle._canceled = True
+        self._usable()._canceled = True
 
     def reset(self) -> None:
         """Start a new period now."""
-        self.handle._next_call = self._source.nanoseconds() + self._period
+        self._usable()._next_call = self._source.nanoseconds() + self._period
         self._canceled = False
         self._on_change()
 
     def time_since_last_call(self) -> int:
         """Nanoseconds since the last call, or since the creation."""
-        return self._source.nanoseconds() - self.handle._last_call
+        return self._source.nanoseconds() - self._usable()._last_call
 
     def time_until_next_call(self) -> int | None:
         """Nanoseconds until the next call, negative if it is overdue, ``None`` if canceled."""
-        return None if self.handle._canceled else self._next_call - self._source.nanoseconds()
+        return None if self._usable()._canceled else self._next_call - self._source.nanoseconds()
 
     def destroy(self) -> None:
         """End it; whoever created it should use :meth:`rclpy.node.Node.destroy_timer`."""
