@@ -339,3 +339,16 @@ def test_a_field_may_have_any_name(define: Define) -> None:
     message.initial_pose.position.x = 2.0
     again = arm(**{name: getattr(message, name) for name in names})
     assert arm._deserialize(arm._serialize(again)) == message
+
+
+@pytest.mark.parametrize("name", ["self", "check_fields"])
+def test_a_field_may_be_named_as_a_parameter_that_constructors_have(
+    define: Define, tmp_path: Path, name: str
+) -> None:
+    package = define({"Plain.msg": f"string {name}\n", "Numbers.msg": f"float64[2] {name}\n"})
+    for cls, value in ((load(package, "Plain"), "a"), (load(package, "Numbers"), [1.0, 2.0])):
+        message = cls(**{name: value})
+        assert list(getattr(message, name)) == list(value)
+        assert cls._deserialize(cls._serialize(message)) == message != cls()
+    stubs.write_stubs(package, tmp_path)
+    compile((tmp_path / package / "msg" / "__init__.pyi").read_text(), "stub", "exec")

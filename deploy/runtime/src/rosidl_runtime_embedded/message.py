@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 _CHECK_FIELDS = os.environ.get("ROS_PYTHON_CHECK_FIELDS") == "1"
 """Whether messages check what they are assigned if their constructors are not told."""
+_FLAG = "_check_fields_"
+"""The slot of what their constructors are told. No field's name ends with an underscore."""
 
 
 class _OnFirstUse:
@@ -60,7 +62,7 @@ def _checked(unchecked: Any, type_name: str, field: Field) -> property:
     """The property of a field that checks values for messages that check fields."""
 
     def set_checked(self: object, value: object) -> None:
-        if not getattr(self, "_check_fields", _CHECK_FIELDS):
+        if not getattr(self, _FLAG, _CHECK_FIELDS):
             unchecked.__set__(self, value)
             return
         try:
@@ -82,7 +84,12 @@ def _make_constructor(cls: type[Message]) -> Callable[..., None]:
         "_cls": cls,
     }
     parameters: list[str] = []
-    body = ["if check_fields is not _default: self._check_fields = check_fields; _check_assignments(_cls)"]
+    body: list[str] = []
+    options: list[str] = []
+    if all(field.name != "check_fields" for field in cls._DEFINITION.fields):
+        options.append("check_fields=_default")
+        flag = f"_self.{_FLAG} = check_fields"
+        body.append(f"if check_fields is not _default: {flag}; _check_assignments(_cls)")
     for field in cls._DEFINITION.fields:
         name, initial = field.name, f"_initial_{field.name}"
         names[initial], is_factory = initial_value(field, message_class)
@@ -93,11 +100,11 @@ def _make_constructor(cls: type[Message]) -> Callable[..., None]:
                 given = f"_convert_{name}({name})"
                 names[f"_convert_{name}"] = converter(cls._TYPE_NAME, field)
             parameters.append(f"{name}=_unset")
-            body.append(f"self.{slot_of(field)} = {initial}() if {name} is _unset else {given}")
+            body.append(f"_self.{slot_of(field)} = {initial}() if {name} is _unset else {given}")
         else:
             parameters.append(f"{name}={initial}")
-            body.append(f"self.{name} = {name}")
-    arguments = ", ".join(["self", "*", *parameters, "check_fields=_default"])
+            body.append(f"_self.{name} = {name}")
+    arguments = ", ".join(["_self", "/", "*", *parameters, *options])
     exec(f"def __init__({arguments}):\n " + "\n ".join(body), names)
     constructor: Callable[..., None] = names["__init__"]
     constructor.__qualname__ = f"{cls.__name__}.__init__"
@@ -160,7 +167,7 @@ class Message:
             """Message from little-endian XCDR1 with its header. Raises ValueError for anything else."""
     else:
 
-        def __init__(self, *args, **fields):
+        def __init__(self, /, *args, **fields):
             cls = _message_class(type(self))
             cls.__init__ = _make_constructor(cls)
             cls.__init__(self, *args, **fields)
@@ -202,7 +209,7 @@ def make_message_class(definition: MessageDefinition) -> type[Message]:
     namespace: dict[str, Any] = {
         "__module__": f"{package}.{kind}",
         "__doc__": f"Message {definition.name}.",
-        "__slots__": (*(slot_of(field) for field in definition.fields), "_check_fields"),
+        "__slots__": (*(slot_of(field) for field in definition.fields), _FLAG),
         "_DEFINITION": definition,
         "_TYPE_NAME": definition.name,
         "_DDS_TYPE_NAME": f"{package}::{kind}::dds_::{name}_",

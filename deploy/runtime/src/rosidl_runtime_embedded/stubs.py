@@ -84,9 +84,11 @@ def _message(definition: MessageDefinition) -> str:
             lines.append(f"    {field.name.upper()}__DEFAULT: Final = {_literal(default)}")
     for constant in definition.constants:
         lines.append(f"    {constant.name}: Final = {_literal(python_value(constant.type, constant.value))}")
-    types = [(field.name, _accepted(field, package, kind)) for field in definition.fields]
-    arguments = [f"        {name}: {type_} = ...," for name, type_ in [*types, ("check_fields", "bool")]]
-    lines += ["    def __init__(", "        self,", "        *,", *arguments, "    ) -> None: ..."]
+    types = {field.name: _accepted(field, package, kind) for field in definition.fields}
+    own = "_self" if "self" in types else "self"
+    types.setdefault("check_fields", "bool")
+    arguments = [f"        {name}: {type_} = ...," for name, type_ in types.items()]
+    lines += ["    def __init__(", f"        {own},", "        *,", *arguments, "    ) -> None: ..."]
     return "\n".join([f"class {name}(Message):", *lines])
 
 
