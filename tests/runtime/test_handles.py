@@ -14,10 +14,12 @@ from rclpy.exceptions import (
     RCLError,
 )
 from rclpy.node import Node
+from rclpy.publisher import Publisher
 from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 
 MakeNode = Callable[..., Node]
+SpinUntil = Callable[..., None]
 
 
 @pytest.mark.parametrize("name", ["", "a b", "9a", "/", "a//b", "{unknown}", "~/{ns}/a"])
@@ -62,6 +64,41 @@ def test_nothing_is_created_under_an_invalid_name(make_node: MakeNode, name: str
         node.create_service(Trigger, name, print)
     with pytest.raises(InvalidServiceNameException):
         node.create_client(Trigger, name)
+
+
+def test_nothing_is_left_of_a_publisher_whose_class_fails(make_node: MakeNode, spin_until: SpinUntil) -> None:
+    class Failing(Publisher):
+        def __init__(self, *args: Any, **options: Any) -> None:
+            raise ZeroDivisionError("planted")
+
+    node = make_node()
+    with pytest.raises(ZeroDivisionError, match="planted"):
+        node.create_publisher(Float64, "x", 1, publisher_class=Failing)
+    assert not [publisher for publisher in node.publishers if publisher.topic_name == "/x"]
+    spin_until(lambda: not node.count_publishers("x"))
+
+
+@pytest.mark.parametrize(
+    ("create", "topic"),
+    [
+        (lambda node: node.create_service(Trigger, "x", print), "rr/xReply"),
+        (lambda node: node.create_client(Trigger, "x"), "rq/xRequest"),
+    ],
+)
+def test_nothing_is_left_of_a_service_or_client_that_cannot_read(
+    make_node: MakeNode, monkeypatch: pytest.MonkeyPatch, create: Callable[[Node], Any], topic: str
+) -> None:
+    def fail(*args: Any) -> None:
+        raise RCLError("planted")
+
+    node = make_node()
+    with monkeypatch.context() as patch:
+        patch.setattr(node._graph, "create_reader", fail)
+        with pytest.raises(RCLError, match="planted"):
+            create(node)
+    assert node.get_publishers_info_by_topic(topic, no_mangle=True) == []
+    create(node)
+    assert len(node.get_publishers_info_by_topic(topic, no_mangle=True)) == 1
 
 
 ASKING: list[Callable[[Node], Any]] = [

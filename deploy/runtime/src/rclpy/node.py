@@ -290,14 +290,18 @@ class Node(NodeParameters, NodeGraph):
         )
         dds_name = _names.topic_to_dds(name, avoid_conventions=profile.avoid_ros_namespace_conventions)
         writer = self._graph.create_writer(self, dds_name, msg_type, profile)
-        publisher = publisher_class(
-            PublisherEndpoint(self, name, writer),
-            msg_type,
-            topic,
-            profile,
-            event_callbacks=event_callbacks or PublisherEventCallbacks(),
-            callback_group=callback_group or self._default_callback_group,
-        )
+        try:
+            publisher = publisher_class(
+                PublisherEndpoint(self, name, writer),
+                msg_type,
+                topic,
+                profile,
+                event_callbacks=event_callbacks or PublisherEventCallbacks(),
+                callback_group=callback_group or self._default_callback_group,
+            )
+        except Exception:
+            self._graph.destroy(self, writer)
+            raise
         if publisher.event_handlers:
             self._events[publisher] = EndpointEvents(publisher.event_handlers, writer)
         self._add(self._publishers, publisher)
@@ -438,7 +442,11 @@ class Node(NodeParameters, NodeGraph):
         replies = (_names.reply_to_dds(name), srv_type.Response, profile, identity)
         with graph.one_announcement():
             writer = graph.create_writer(self, *(replies if is_server else requests))
-            reader = graph.create_reader(self, *(requests if is_server else replies))
+            try:
+                reader = graph.create_reader(self, *(requests if is_server else replies))
+            except Exception:
+                graph.destroy(self, writer)
+                raise
         return ServiceEndpoint(self, name, writer, reader)
 
     def create_timer(
