@@ -1,9 +1,9 @@
 """Code that reads a message type from little-endian XCDR1, made and compiled per type.
 
 The counterpart of :mod:`.serializer`. A sample comes from anywhere: nothing is allocated or repeated on the
-word of a count that the sample is too short for, and whatever is malformed raises ValueError. Only the bounds
-of strings are not checked, as no ROS 2 checks them: C++ sends longer ones. An
-AssertionError is of a message that checks its fields.
+word of a count that the sample is too short for, and whatever is malformed raises ValueError. The bounds of
+strings alone are not checked, as no ROS 2 checks them: C++ sends longer ones. With ROS_PYTHON_CHECK_FIELDS=1
+they are, by the assignment to the field; its AssertionError becomes a ValueError like the others.
 """
 
 from __future__ import annotations
