@@ -276,6 +276,16 @@ def test_a_callback_may_shut_its_executor_down(
     assert executor.get_nodes() == []
 
 
+def test_a_callback_may_shut_its_multi_threaded_executor_down(make_node: MakeNode, context: Context) -> None:
+    node = make_node()
+    executor = MultiThreadedExecutor(2, context=context)
+    executor.add_node(node)
+    node.create_guard_condition(lambda: executor.shutdown()).trigger()
+    executor.spin()
+    assert executor.shutdown(timeout_sec=10)
+    assert executor.get_nodes() == []
+
+
 def test_a_node_moves_to_the_executor_that_it_is_added_to_last(
     make_node: MakeNode, context: Context, executor: SingleThreadedExecutor
 ) -> None:

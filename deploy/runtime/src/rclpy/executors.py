@@ -513,7 +513,10 @@ class MultiThreadedExecutor(Executor):
             raise ValueError("a MultiThreadedExecutor needs at least one thread")
         super().__init__(context=context)
         self._threads = num_threads or max(2, os.cpu_count() or 2)
-        self._pool = ThreadPoolExecutor(self._threads, thread_name_prefix="rclpy-executor")
+        self._pool_threads: set[int] = set()
+        self._pool = ThreadPoolExecutor(
+            self._threads, "rclpy-executor", lambda: self._pool_threads.add(threading.get_ident())
+        )
         self._errors: deque[BaseException] = deque()
         self._in_pool = 0  # callbacks under way there
         self._wakes = WaitSet()  # for nothing but being woken
@@ -569,6 +572,12 @@ class MultiThreadedExecutor(Executor):
 
     def _is_idle(self) -> bool:
         return super()._is_idle() and not self._in_pool
+
+    def shutdown(self, timeout_sec: float | None = None) -> bool:
+        """Stop, and wait for callbacks that run, unless one of them asks: see :meth:`Executor.shutdown`."""
+        if threading.get_ident() in self._pool_threads:
+            timeout_sec = 0  # a callback cannot wait for itself to end
+        return super().shutdown(timeout_sec)
 
     def _close(self) -> None:
         super()._close()
