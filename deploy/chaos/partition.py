@@ -9,15 +9,17 @@ from __future__ import annotations
 import os
 import shutil
 import subprocess
+import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
+from deploy import processes
 from deploy.chaos.arena import SCENARIO, Arena, ArmUnderTest
 from deploy.chaos.faults import FAULTS, Fault, Undo
 from deploy.chaos.faults import Arm as Victim
-from deploy.chaos.history import OPERATOR, PROGRAMS
+from deploy.chaos.history import OPERATOR
 from deploy.chaos.schedule import Planned
 from deploy.system import System
 
@@ -95,7 +97,7 @@ def _queue(switch: str, verb: str, *kind: str) -> None:
 class TwoHosts(Arena):
     """An arm on the robot's host, its dead man's switch on the operator's, and what befalls the network."""
 
-    lead = 6.0  # s: two systems have to start before the operator's only `turn_on`
+    lead = 6.0  # s: both hosts have to start before the operator's only `turn_on`
 
     discovery = "SUBNET"
 
@@ -115,17 +117,24 @@ class TwoHosts(Arena):
         within = {name: ("ip", "netns", "exec", self._name(name)) for name in (ROBOT, CONTROL)}
         self.observed_within = within[ROBOT]
         self.arms = [ArmUnderTest("/", System(self._runs / "run", within[ROBOT]))]
-        self._operator = System(self._runs / "run_operator", within[CONTROL])
+        self._on_operators_host = within[CONTROL]
+        self._operator = System(self._runs / "run_operator")
         stack.callback(self._operator.stop)
 
     def start(self, arm: ArmUnderTest, parameters: Mapping[str, object]) -> None:
-        """Start both hosts, each with its programs."""
+        """Start the arm, and on the operator's host the switch alone: nobody observes what runs there."""
         arm.system.start(parameters)
         arm.system.halt(UNSEEN)
-        self._operator.start(parameters)
-        for program in PROGRAMS:
-            if program != UNSEEN:
-                self._operator.halt(program)
+        service = [sys.executable, "-m", f"services.{UNSEEN}"]
+        subprocess.Popen(
+            [*self._on_operators_host, *service, "--ros-args", "--params-file", str(arm.system.parameters)],
+            cwd=processes.ROOT,
+            env={**os.environ, processes.MARK: str(self._operator.run), "SUPERVISOR_PROCESS_NAME": UNSEEN},
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            start_new_session=True,  # Ctrl-C is for the monkey
+        )
 
     def _cut(self, arm: Victim, target: str) -> Undo:
         """Take the operator's port of the switch down, and up again in the end."""

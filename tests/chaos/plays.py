@@ -5,8 +5,6 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 from deploy import processes
@@ -37,13 +35,11 @@ class Play:
 
 def play(run: Path, *options: str) -> Play:
     """Play with one arm and a directory for its runtime files."""
-    with playing(run, *options) as end:
-        return end()
+    return Play(run, *unleash(run, *options))
 
 
-@contextmanager
-def playing(run: Path, *options: str) -> Iterator[Callable[..., Play]]:
-    """Let the monkey play meanwhile; a function that waits for the end and gives an arm, by its namespace."""
+def unleash(run: Path, *options: str) -> tuple[str, int]:
+    """Let the monkey play; what it said, and its exit code."""
     process = subprocess.Popen(
         [sys.executable, "-m", "deploy.chaos", *options],
         cwd=processes.ROOT,
@@ -52,17 +48,11 @@ def playing(run: Path, *options: str) -> Iterator[Callable[..., Play]]:
         stderr=subprocess.STDOUT,
         text=True,
     )
-    output = ""
-
-    def end(namespace: str = "/") -> Play:
-        nonlocal output
-        output = output or process.communicate(timeout=LONGEST)[0]
-        assert "Report: " in output, output
-        return Play(run, output, process.returncode, namespace)
-
     try:
-        yield end
+        output = process.communicate(timeout=LONGEST)[0]
     finally:
         if process.poll() is None:
             process.terminate()
             process.wait(timeout=20.0)
+    assert "Report: " in output, output
+    return output, process.returncode

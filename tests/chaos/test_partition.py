@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import pytest
 
 from deploy.chaos.findings import HOLDS
@@ -12,18 +10,18 @@ from deploy.chaos.partition import missing
 from deploy.chaos.promises import CHECKERS
 from interfaces.topics import ENGINES_STATE, OFF, ON, OPERATOR_HEARTBEAT
 
-from .plays import Play, play
+from .plays import play
 
 DISCOVERY = 10.0  # s until a host that was given up is known again
 pytestmark = pytest.mark.timeout(120)
 
 
 @pytest.fixture(scope="module")
-def history(light_plays: dict[str, Callable[..., Play]]) -> History:
+def history(tmp_path_factory: pytest.TempPathFactory) -> History:
     """What the robot's side sees."""
     if reason := missing():
         pytest.skip(reason)
-    return light_plays["partition"]().history
+    return play(tmp_path_factory.mktemp("partition"), "--scenario", "partition").history
 
 
 @pytest.fixture(scope="module")

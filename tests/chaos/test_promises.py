@@ -1,6 +1,7 @@
 """The promises of the design, on what a monkey does to real systems; `make chaos` does it longer.
 
-The plays come one after the other: the flood of one would take the processor from the other's services.
+Two arms are played with at once where each leaves the processor idle; the flood of the other play would take
+it from a second arm's services.
 """
 
 from __future__ import annotations
@@ -11,16 +12,20 @@ from deploy.chaos.findings import HOLDS, UNKNOWN
 from deploy.chaos.history import PROGRAMS
 from deploy.chaos.promises import CHECKERS
 
-from .plays import Play, play
+from .plays import Play, play, unleash
 
-PLAYS = ("briefly", "variously")
+ARMS = ("/arm1", "/arm2")
+PLAYS = (*(f"briefly {namespace}" for namespace in ARMS), "variously")
 pytestmark = pytest.mark.timeout(420)
 
 
 @pytest.fixture(scope="module")
 def plays(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Play]:
-    """What came of each play."""
-    return {name: play(tmp_path_factory.mktemp(name), "--scenario", name) for name in PLAYS}
+    """What came of each play, for each arm."""
+    run = tmp_path_factory.mktemp("briefly")
+    end = unleash(run, "--scenario", "briefly", "--arms", "2")
+    fleet = {f"briefly {namespace}": Play(run, *end, namespace) for namespace in ARMS}
+    return fleet | {"variously": play(tmp_path_factory.mktemp("variously"), "--scenario", "variously")}
 
 
 @pytest.mark.parametrize("name", PLAYS)
@@ -36,13 +41,13 @@ def test_every_promise_is_put_to_the_test(plays: dict[str, Play], promise: str) 
 
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_every_killed_program_is_back_within_two_seconds(plays: dict[str, Play], program: str) -> None:
-    assert max(plays["briefly"].finding("L1").times[program]) <= 2.0
+    assert max(plays["briefly /arm1"].finding("L1").times[program]) <= 2.0
 
 
 def test_engines_go_off_in_time_though_the_watchdog_is_killed_every_two_seconds(
     plays: dict[str, Play],
 ) -> None:
-    assert plays["briefly"].finding("S1").cases >= 1
+    assert plays["briefly /arm1"].finding("S1").cases >= 1
 
 
 def test_engines_go_off_in_time_though_the_controller_is_stopped(plays: dict[str, Play]) -> None:
@@ -77,3 +82,9 @@ def test_the_exit_code_and_the_page_tell_the_verdict(plays: dict[str, Play], nam
     assert "All promises hold" in page
     assert page.count("<svg") >= 2
     assert not any(word in page for word in ("http:", "https:", "src="))
+
+
+def test_what_a_fleet_costs_and_how_it_ended_is_told(plays: dict[str, Play]) -> None:
+    output = plays["briefly /arm1"].output
+    assert ") in 11 processes an arm" in output
+    assert output.endswith("2 arms: no promise is broken\n")
