@@ -97,7 +97,7 @@ def _queue(switch: str, verb: str, *kind: str) -> None:
 class TwoHosts(Arena):
     """An arm on the robot's host, its dead man's switch on the operator's, and what befalls the network."""
 
-    lead = 6.0  # s: both hosts have to start before the operator's only `turn_on`
+    lead = 4.0  # s: both hosts have to start before the operator's only `turn_on`
 
     discovery = "SUBNET"
 

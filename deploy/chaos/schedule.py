@@ -13,7 +13,7 @@ from deploy.chaos.history import ALL, NOTHING, PROGRAMS
 
 PERIOD = 45.0  # s of the operator's day
 AWAKE = 30.0  # s of it in which the switch is held
-SETTLE = 6.0  # s after the last fault
+SETTLE = 5.0  # s after the last fault
 FIRST = 5.0  # s until the first fault: by then the engines are on
 
 
@@ -124,7 +124,8 @@ def nonsense() -> Schedule:
 
 def briefly() -> Schedule:
     """Kill every program three times; then the operator sleeps, and the watchdog is killed every 2 s."""
-    return [*kill_each(3), *(Planned(at, "kill", "operator_watchdog") for at in _every(2.0, AWAKE, PERIOD))]
+    asleep = _every(2.0, AWAKE, AWAKE + 12.0)
+    return [*kill_each(3), *(Planned(at, "kill", "operator_watchdog") for at in asleep)]
 
 
 def variously() -> Schedule:
@@ -145,7 +146,7 @@ def variously() -> Schedule:
         Planned(26.0, "full_disk", NOTHING, 4.0),
         Planned(27.0, "kill", "config_theta1"),
         *stop_controller(),
-        Planned(PERIOD + 1.0, "kill_supervisor", ALL, 1.0),
+        Planned(AWAKE + 14.0, "kill_supervisor", ALL, 1.0),
     ]
 
 

@@ -15,8 +15,16 @@ from tests.system.sites import Site
 STEADY = str(Path(__file__).with_name("steady.yaml"))
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-@pytest.mark.parametrize("moment", ["Starting the services", "Engines are off"])
+@pytest.mark.parametrize(
+    ("moment", "number"),
+    [
+        ("Starting the services", signal.SIGINT),
+        ("Starting the services", signal.SIGTERM),
+        ("Starting the services", signal.SIGHUP),
+        ("Engines are off", signal.SIGINT),
+        ("Engines are off", signal.SIGTERM),  # SIGHUP comes when the terminal is closed, below
+    ],
+)
 def test_a_signal_ends_everything(site: Site, number: int, moment: str) -> None:
     command = site.begin("run", STEADY)
     command.await_line(moment)
