@@ -124,8 +124,7 @@ def nonsense() -> Schedule:
 
 def briefly() -> Schedule:
     """Kill every program three times; then the operator sleeps, and the watchdog is killed every 2 s."""
-    asleep = _every(2.0, AWAKE, AWAKE + 12.0)
-    return [*kill_each(3), *(Planned(at, "kill", "operator_watchdog") for at in asleep)]
+    return [*kill_each(3), *(Planned(at, "kill", "operator_watchdog") for at in _every(2.0, AWAKE, PERIOD))]
 
 
 def variously() -> Schedule:
