@@ -57,19 +57,20 @@ def engine_state(
         refused(f"{TURN_ON} refused: {why}")
         return None
 
-    def latched(seen: Observable[datetime], late: Observable[bool]) -> Observable[str]:
-        obeyed = commands.timestamp().with_latest_from(seen.start_with(None)).map(obey).filter(bool)
-        abandoned = seen.switch_map(lambda at: rx.timer(at + patience)).map(lambda _: OFF)
-        # While this process was paused, the engines have stopped: to repeat `on` would start them.
-        stopped = late.filter(bool).map(lambda _: OFF)
-        return rx.merge(stopped, obeyed, abandoned).start_with(OFF).distinct_until_changed()
+    def is_late(renewal: tuple[tuple[Timestamp[int], Timestamp[int]], datetime | None]) -> bool:
+        (before, beat), seen = renewal
+        return beat.timestamp - before.timestamp > hold or bool(seen and beat.timestamp >= seen + patience)
 
     def repeated(seen: Observable[datetime]) -> Observable[str]:
         beats = rx.timer(0.0, repeat).timestamp().pairwise()
-        late = beats.map(lambda two: two[1].timestamp - two[0].timestamp > hold).share()
-        states = latched(seen, late).share()
-        renewals = late.filter(lambda it: not it).with_latest_from(states).map(lambda it: it[1])
-        return rx.merge(renewals, states)
+        late = beats.with_latest_from(seen.start_with(None)).map(is_late).share()
+        obeyed = commands.timestamp().with_latest_from(seen.start_with(None)).map(obey).filter(bool)
+        abandoned = seen.switch_map(lambda at: rx.timer(at + patience)).map(lambda _: OFF)
+        # While this process was paused, the engines have stopped, or should have: `on` would start them.
+        stopped = late.filter(bool).map(lambda _: OFF)
+        states = rx.merge(stopped, obeyed, abandoned).start_with(OFF).distinct_until_changed().share()
+        renewals = late.with_latest_from(states).filter(lambda it: it != (True, ON))
+        return rx.merge(renewals.map(lambda it: it[1]), states)
 
     return age.latest(presences, now=now).publish(repeated)
 
@@ -78,7 +79,6 @@ def wire(node: ServiceNode) -> None:
     """Connect the recipe with its topics."""
     presence = node.declare("presence", 1.0, (0.1, 1.0), "turn_on needs an operator seen within [s]")
     absence = node.declare("absence", 10.0, (1.0, 60.0), "off when no operator was seen for [s]")
-    # The engines' drive lets go when `on` is not repeated: so they stop also when this process does.
     repeat = node.declare("repeat", 0.1, (0.02, 0.2), "the state is repeated this often [s]")
     states = engine_state(
         node.observe(ENGINES, timestamped=True).map(lambda item: Timestamp(item.value.data, item.timestamp)),

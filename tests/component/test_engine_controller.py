@@ -175,6 +175,13 @@ def test_a_controller_that_was_paused_does_not_start_engines_that_have_stopped_m
     assert {state for time, state in states if time > 5.15} == {OFF}
 
 
+def test_nor_one_that_was_paused_shortly_what_has_ended_in_the_pause(engines: Engines) -> None:
+    engines.scheduler.schedule_absolute(9.9, lambda *_: engines.scheduler.sleep(2.0))
+    states = engines.states([(1.2, TURN_ON, 1.2)], [(1.0, 1.0)], 20.0)
+    assert ON in {state for time, state in states if time < 9.95}
+    assert {state for time, state in states if time > 9.95} == {OFF}
+
+
 def test_a_pause_that_the_drive_does_not_notice_changes_nothing(engines: Engines) -> None:
     engines.scheduler.schedule_absolute(5.1, lambda *_: engines.scheduler.sleep(2.0))
     assert engines.run([(1.2, TURN_ON, 1.2)], seen_until(12), 12.0) == [(0.002, OFF), (1.2, ON)]
