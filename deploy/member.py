@@ -10,7 +10,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 
 from deploy.health import Health, HealthMonitor
-from deploy.system import NAMESPACE
+from deploy.system import namespace_of
 from interfaces.reactive_node import ReactiveNode
 
 
@@ -19,8 +19,7 @@ class Member:
 
     def __init__(self) -> None:
         rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
-        namespace = os.environ.get(NAMESPACE) or "/"
-        self.node = ReactiveNode(f"console_{os.getpid()}", namespace=namespace)
+        self.node = ReactiveNode(f"console_{os.getpid()}", namespace=namespace_of(os.environ))
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self.node)
         self._monitor = HealthMonitor(self.node)

@@ -14,7 +14,7 @@ from rclpy.exceptions import InvalidNamespaceException
 from rclpy.validate_namespace import validate_namespace
 
 from deploy.processes import ROOT
-from deploy.system import NAMESPACE, DeploymentError, System
+from deploy.system import NAMESPACE, DeploymentError, System, namespace_of
 from interfaces import scenario
 
 SCENARIOS = ROOT / "deploy" / "scenarios"
@@ -70,7 +70,7 @@ def check_environment() -> None:
     domain = os.environ.get("ROS_DOMAIN_ID") or "0"
     if not domain.isdecimal() or int(domain) > 232:
         raise DeploymentError(f"ROS_DOMAIN_ID={domain} is not a number from 0 to 232")
-    namespace = os.environ.get(NAMESPACE) or "/"
+    namespace = namespace_of(os.environ)
     try:
         validate_namespace(namespace)
     except InvalidNamespaceException as error:

@@ -36,7 +36,11 @@ def run_directory() -> Path:
 
 def environment_of(pid: int) -> dict[str, str]:
     """The environment that a process was started with; empty when it has ended or is somebody else's."""
-    pairs = (os.fsdecode(entry).partition("=") for entry in _environ(pid).split(b"\0") if entry)
+    return _variables(_environ(pid))
+
+
+def _variables(environ: bytes) -> dict[str, str]:
+    pairs = (os.fsdecode(entry).partition("=") for entry in environ.split(b"\0") if entry)
     return {key: value for key, _, value in pairs}
 
 
@@ -53,9 +57,10 @@ def of_system(run: Path) -> list[Process]:
     mark = os.fsencode(f"{MARK}={run}")
     found = []
     for pid in (int(name) for name in os.listdir("/proc") if name.isdigit()):
-        if mark not in _environ(pid):
+        environ = _environ(pid)
+        if mark not in environ:
             continue  # without a look at each variable: a machine has many processes
-        environment = environment_of(pid)
+        environment = _variables(environ)
         if environment.get(MARK) == str(run):
             found.append(Process(pid, environment.get("SUPERVISOR_PROCESS_NAME", "")))
     return sorted(found, key=lambda process: (process.program, process.pid))

@@ -197,7 +197,7 @@ class System:
         self._end_members()
         environment = dict(self._environment)
         environment[processes.MARK] = str(self.run)
-        environment[NAMESPACE] = environment.get(NAMESPACE) or "/"
+        environment[NAMESPACE] = namespace_of(environment)
         environment["PYTHONUNBUFFERED"] = "1"
         _prepend(environment, "PATH", str(Path(sys.executable).parent))
         _prepend(environment, "PYTHONPATH", str(processes.ROOT))
@@ -269,6 +269,11 @@ class _UnixTransport(xmlrpc.client.Transport):
 
     def close(self) -> None:
         self._unix_connection.close()
+
+
+def namespace_of(environment: Mapping[str, str]) -> str:
+    """The ROS namespace that the arm of an environment lives in."""
+    return environment.get(NAMESPACE) or "/"
 
 
 def _prepend(environment: dict[str, str], name: str, path: str) -> None:

@@ -107,8 +107,10 @@ def services(seen: Seen, namespace: str) -> Observable[Line]:
         lines = []
         for status in diagnostics.value.status:
             path, _, service = status.name.rpartition("/")
+            if path != namespace.rstrip("/"):
+                continue
             complaint = "" if status.level == type(status).OK else status.message
-            if complaint != complaints.get(status.name, "") and complaint and path == namespace.rstrip("/"):
+            if complaint and complaint != complaints.get(status.name):
                 lines.append(Line(diagnostics.timestamp, "service", f"{service}: {complaint}"))
             complaints[status.name] = complaint
         return rx.from_iterable(lines)

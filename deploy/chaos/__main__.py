@@ -1,7 +1,7 @@
 """`make chaos`: unleash the monkey, and tell what it found. Exit code 1 if a promise is violated.
 
 usage: python -m deploy.chaos [--minutes 5] [--seed N] [--scenario NAME] [--every 5] [--faults kill,stop]
-                              [--targets kinematics,velocity] [--arms 5] [--loss PERCENT]
+                              [--targets kinematics,velocity] [--arms 10] [--loss PERCENT]
                               [--replay RECORD]
 """
 
@@ -28,7 +28,7 @@ from deploy.chaos.arena import SCENARIO, Arena
 from deploy.chaos.cost import Cost
 from deploy.chaos.faults import FAULTS
 from deploy.chaos.findings import VIOLATED
-from deploy.chaos.history import CIRCUMSTANCES, PROGRAMS
+from deploy.chaos.history import CIRCUMSTANCES, PROGRAMS, suffix
 from deploy.chaos.page import page
 from deploy.chaos.promises import check
 from deploy.chaos.report import text
@@ -122,7 +122,7 @@ def _keeps_its_promises(path: Path, title: str, namespace: str) -> bool:
     history = record.load(path, namespace)
     findings = check(history)
     print("\n" + (f"{namespace}\n" if namespace != "/" else "") + text(findings))
-    report = path.with_name(f"report{namespace.replace('/', '_').rstrip('_')}.html")
+    report = path.with_name(f"report{suffix(namespace)}.html")
     faults = sum(fault.kind not in CIRCUMSTANCES for fault in history.faults)
     messages = sum(map(len, history.streams.values()))
     remarks = [

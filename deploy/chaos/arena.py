@@ -34,7 +34,7 @@ import yaml
 
 from deploy import processes
 from deploy.chaos.faults import FAULTS, INJECTED
-from deploy.chaos.history import LOSS, NOTHING, OPERATOR, PROGRAMS, SILENCE, Fault
+from deploy.chaos.history import LOSS, NOTHING, OPERATOR, PROGRAMS, SILENCE, Fault, suffix
 from deploy.chaos.schedule import AWAKE, FIRST, PERIOD, Planned, Schedule
 from deploy.system import NAMESPACE, DeploymentError, System
 from interfaces import topics
@@ -109,10 +109,7 @@ class Arena:
         :param loss: of the packets that a process sends [%]; by Cyclone DDS, as not every kernel has netem
         """
         self.record = directory / "record.mcap"
-        self.arms = [
-            ArmUnderTest(name, System(directory / f"run{name.replace('/', '_').rstrip('_')}"))
-            for name in namespaces
-        ]
+        self.arms = [ArmUnderTest(name, System(directory / f"run{suffix(name)}")) for name in namespaces]
         self._directory = directory
         self._scenario = scenario
         self._say = say

@@ -54,6 +54,10 @@ class Fault(NamedTuple):
     pid: int = 0
     detail: str = ""
 
+    def overlaps(self, begin: float, end: float) -> bool:
+        """Whether any of it was between two times."""
+        return self.begin < end and self.end > begin
+
 
 @dataclass(frozen=True)
 class History:
@@ -77,7 +81,7 @@ class History:
 
     def may_have_missed(self, begin: float, end: float) -> bool:
         """Whether the observer may not know all that was said between two times."""
-        return any(f.kind in (OVERLOAD, LOSS) and f.begin < end and f.end > begin for f in self.faults)
+        return any(f.kind in (OVERLOAD, LOSS) and f.overlaps(begin, end) for f in self.faults)
 
 
 OUTPUTS = {
@@ -89,6 +93,11 @@ OUTPUTS = {
 """The topic by which one sees that a service works; the sentinel's is its health."""
 
 PROGRAMS = (*OUTPUTS, SENTINEL)
+
+
+def suffix(namespace: str) -> str:
+    """What the name of an arm's file ends with: nothing in the root namespace, `_arm1` in `/arm1`."""
+    return namespace.replace("/", "_").rstrip("_")
 
 
 def between(samples: Sequence[Sample], begin: float, end: float) -> Sequence[Sample]:

@@ -218,8 +218,7 @@ def _controller_was_away(history: History, on: Sample, off: Sample) -> bool:
     paused = history.may_have_missed(on.sent, off.sent) or any(
         fault.kind in BLINDING
         and fault.target in ("engine_controller", ALL)
-        and fault.begin < off.sent
-        and fault.end > on.sent
+        and fault.overlaps(on.sent, off.sent)
         for fault in history.faults
     )
     return died or (paused and off.sent - on.sent > DRIVE)

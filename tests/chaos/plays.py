@@ -10,7 +10,7 @@ from pathlib import Path
 from deploy import processes
 from deploy.chaos import record
 from deploy.chaos.findings import Finding
-from deploy.chaos.history import History
+from deploy.chaos.history import History, suffix
 from deploy.chaos.promises import CHECKERS
 
 LONGEST = 150.0  # s
@@ -22,7 +22,7 @@ class Play:
     def __init__(self, directory: Path, output: str, code: int, namespace: str = "/") -> None:
         self.output = output
         self.code = code
-        self.page = next(directory.glob(f"chaos/*/report{namespace.replace('/', '_').rstrip('_')}.html"))
+        self.page = next(directory.glob(f"chaos/*/report{suffix(namespace)}.html"))
         self.history: History = record.load(self.page.with_name("record.mcap"), namespace)
         self.findings: dict[str, Finding] = {name: check(self.history) for name, check in CHECKERS.items()}
 

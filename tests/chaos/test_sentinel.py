@@ -48,11 +48,7 @@ class Run:
                     if each.pid and each.name not in silent:
                         self.heard[each.name, each.pid] = self.now
             sight = Sight(
-                self.now,
-                self.programs.values(),
-                dict(self.heard),
-                frozenset(stopped),
-                frozenset(doubles),
+                self.now, self.programs.values(), dict(self.heard), frozenset(stopped), frozenset(doubles)
             )
             decided += [(self.now, action) for action in self.judge.judge(sight)]
         return decided

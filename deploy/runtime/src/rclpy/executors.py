@@ -69,7 +69,7 @@ class TimeoutObject:
         """Seconds that remain, never negative; -1 for no end."""
         if self._deadline is None:
             return -1.0
-        return max(0, self._deadline - time.monotonic_ns()) / S_TO_NS
+        return _remaining(self._deadline) / S_TO_NS
 
 
 def _deadline(timeout: float | TimeoutObject | None) -> int | None:
