@@ -27,16 +27,25 @@ from interfaces import service
 from interfaces.service import ServiceNode
 from interfaces.topics import DIAGNOSTICS
 
+OFTEN = 3  # restarts within a minute are a warning
 MEETING = 0.3  # s after its start until it is discovered: what it says before may be lost
 
 
-def states(programs: Iterable[Watched], reasons: Mapping[str, str], node: str) -> list[DiagnosticStatus]:
-    """The states of the processes, as they are published."""
-    return [_state(program, reasons.get(program.name, ""), node) for program in programs]
+def states(
+    programs: Iterable[Watched], reasons: Mapping[str, str], recent: Mapping[str, int], node: str
+) -> list[DiagnosticStatus]:
+    """The states of the processes, as they are published; ``recent``: restarts within the last minute."""
+    return [_state(each, reasons.get(each.name, ""), recent.get(each.name, 0), node) for each in programs]
 
 
-def _state(program: Watched, why: str, node: str) -> DiagnosticStatus:
+def _state(program: Watched, why: str, recent: int, node: str) -> DiagnosticStatus:
     good = program.state in ("STARTING", "RUNNING")
+    level, message = DiagnosticStatus.OK, program.state
+    if not good:
+        level = DiagnosticStatus.ERROR
+        message = f"{program.state} after {program.restarts} restarts {program.error}".strip()
+    elif recent >= OFTEN:
+        level, message = DiagnosticStatus.WARN, f"{program.state}, restarted {recent} times within a minute"
     values = {
         "process": program.name,
         "state": program.state,
@@ -46,11 +55,9 @@ def _state(program: Watched, why: str, node: str) -> DiagnosticStatus:
         "why": why or ("" if good else program.error),
     }
     return DiagnosticStatus(
-        level=DiagnosticStatus.OK if good else DiagnosticStatus.ERROR,
+        level=level,
         name=f"{node}: {program.name}",
-        message=program.state
-        if good
-        else f"{program.state} after {program.restarts} restarts {program.error}".strip(),
+        message=message,
         hardware_id=socket.gethostname(),
         values=[KeyValue(key=key, value=str(value)) for key, value in values.items()],
     )
@@ -98,7 +105,7 @@ def wire(node: ServiceNode) -> None:
         return known != before
 
     def message(_: object) -> DiagnosticArray:
-        array = DiagnosticArray(status=states(known, judge.reasons, own))
+        array = DiagnosticArray(status=states(known, judge.reasons, judge.recent, own))
         array.header.stamp = node.get_clock().now().to_msg()
         return array
 

@@ -10,6 +10,7 @@ from deploy import processes
 from deploy.system import Watched
 
 NAME = "sentinel"
+MEMORY = 60.0  # s that a restart counts as a recent one
 
 
 @dataclass(frozen=True)
@@ -62,11 +63,14 @@ class Judge:
         """why nothing is done, in words; '' where the sentinel trusts what it sees"""
         self.reasons: dict[str, str] = {}
         """why a program was acted on last"""
+        self.recent: dict[str, int] = {}
+        """how often a program was restarted within the last minute"""
         self._patience = patience or Patience()
         self._since: dict[str, tuple[int, float]] = {}  # pid, and when it was seen first
         self._stopped_since: dict[int, float] = {}
         self._double_since: dict[int, float] = {}
         self._revivals: dict[str, tuple[int, float]] = {}  # how often, and when the next is due
+        self._restarts: dict[str, list[tuple[float, int]]] = {}  # when there were so many; the first is older
         self._looked: float | None = None
         self._lost = 0.0  # [s] that it was kept from looking
         self._heard: dict[tuple[str, int], tuple[float, float]] = {}  # by the clocks of the sight and its own
@@ -74,6 +78,7 @@ class Judge:
     def judge(self, sight: Sight) -> list[Action]:
         """What is to be done now."""
         sight = self._in_own_time(sight)
+        self._count_restarts(sight)
         running = [program for program in sight.programs if program.state in ("STARTING", "RUNNING")]
         actions = self._kill_stopped(sight, running)
         actions += self._kill_silent(sight, [p for p in running if p.pid not in sight.stopped])
@@ -98,6 +103,16 @@ class Judge:
             self._heard[process] = known if known and known[0] == when else (when, when - self._lost)
         heard = {process: when for process, (_, when) in self._heard.items()}
         return replace(sight, time=sight.time - self._lost, heard=heard)
+
+    def _count_restarts(self, sight: Sight) -> None:
+        """What dies again and again, but runs for a while each time, never gets FATAL."""
+        for program in sight.programs:
+            counts = self._restarts.setdefault(program.name, [(sight.time, program.restarts)])
+            if program.restarts != counts[-1][1]:
+                counts.append((sight.time, program.restarts))
+            while len(counts) > 1 and sight.time - counts[1][0] >= MEMORY:
+                del counts[0]
+            self.recent[program.name] = max(0, program.restarts - counts[0][1])
 
     def _kill_stopped(self, sight: Sight, running: list[Watched]) -> list[Action]:
         """The kernel says that they are stopped: no network can err about that."""

@@ -64,6 +64,7 @@ class ArmUnderTest:
     def __init__(self, namespace: str, system: System) -> None:
         self.namespace = namespace
         self.system = system
+        self.domain = 0  # ROS_DOMAIN_ID
         self._environment: dict[str, str] = {}
 
     def pid(self, program: str) -> int:
@@ -126,8 +127,9 @@ class Arena:
             scenario = self._directory / "scenario.yaml"
             scenario.write_text(yaml.safe_dump(dict(self._scenario)))
             self.prepare(stack)
-            domains = [stack.enter_context(_domain()) for _ in self.arms]
-            observed = [f"{a.namespace}={d}={a.system.run}" for a, d in zip(self.arms, domains, strict=True)]
+            for arm in self.arms:
+                arm.domain = stack.enter_context(_domain())
+            observed = [f"{arm.namespace}={arm.domain}={arm.system.run}" for arm in self.arms]
             environment = {"ROS_AUTOMATIC_DISCOVERY_RANGE": self.discovery, **_losing(self._loss)}
             self._observer = stack.enter_context(
                 _observer(self.record, observed, environment, self.observed_within)
@@ -138,9 +140,9 @@ class Arena:
             environment["PYTHONPATH"] = os.pathsep.join(
                 [str(INJECTED), *filter(None, [os.environ.get("PYTHONPATH")])]
             )
-            for arm, domain in zip(self.arms, domains, strict=True):
+            for arm in self.arms:
                 stack.callback(arm.system.stop)
-                with _environment(environment | {NAMESPACE: arm.namespace, "ROS_DOMAIN_ID": str(domain)}):
+                with _environment(environment | {NAMESPACE: arm.namespace, "ROS_DOMAIN_ID": str(arm.domain)}):
                     self.start(arm, {"/**": {"ros__parameters": shared}})
                 arm.environment()
                 # One after the other: together they would keep each other from starting.

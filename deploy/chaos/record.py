@@ -7,14 +7,17 @@ monkey did stands beside it, as JSON in std_msgs/String.
 from __future__ import annotations
 
 import json
+import struct
 import threading
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import yaml
-from mcap.reader import make_reader
+from mcap.exceptions import McapError
+from mcap.reader import McapReader, make_reader
 from mcap.writer import Writer
 from rclpy.serialization import deserialize_message, serialize_message
 from rosbags.typesys import Stores, get_typestore
@@ -22,6 +25,7 @@ from std_msgs.msg import String
 
 from deploy.chaos.history import Fault, History, Life, Sample
 from deploy.chaos.marks import is_babble
+from deploy.system import DeploymentError
 from interfaces import topics
 
 PROCESSES, FAULTS = "/chaos/processes", "/chaos/faults"
@@ -96,10 +100,24 @@ def qos_profiles(topic: topics.Topic) -> str:
     return str(yaml.safe_dump([profile]))
 
 
+@contextmanager
+def _reader(path: Path) -> Iterator[McapReader]:
+    """
+    Open a record.
+
+    :raises DeploymentError: if it is not complete, or none at all.
+    """
+    try:
+        with path.open("rb") as file:
+            yield make_reader(file)
+    except (McapError, struct.error) as error:  # the latter of a file that ends within a number
+        raise DeploymentError(f"{path} is no complete record: {error}") from None
+
+
 def namespaces(path: Path) -> list[str]:
     """The namespaces of the arms that a record tells of."""
-    with path.open("rb") as file:
-        events = make_reader(file).iter_messages(topics=[PROCESSES])
+    with _reader(path) as reader:
+        events = reader.iter_messages(topics=[PROCESSES])
         told = {
             json.loads(deserialize_message(message.data, String).data)["namespace"] for *_, message in events
         }
@@ -113,13 +131,14 @@ def load(path: Path, namespace: str = "/") -> History:
     streams: dict[str, list[Sample]] = {topic.name: [] for topic in topics.CONTRACT}
     lives: dict[tuple[int, float], Life] = {}
     faults: list[Fault] = []
-    end = 0.0
-    with path.open("rb") as file:
-        reader = make_reader(file)
+    with _reader(path) as reader:
         origin = next(int(m.metadata["origin"]) for m in reader.iter_metadata() if m.name == METADATA)
-        for _, channel, message in reader.iter_messages():
+        summary = reader.get_summary()
+        assert summary is not None
+        assert summary.statistics is not None
+        end = (summary.statistics.message_end_time - origin) / 1e9
+        for _, channel, message in reader.iter_messages(topics=[*names, PROCESSES, FAULTS]):
             received, sent = ((t - origin) / 1e9 for t in (message.log_time, message.publish_time))
-            end = max(end, received)
             if topic := names.get(channel.topic):
                 streams[topic.name] += [
                     Sample(sent, received, value) for value in _values(topic, message.data, prefix)

@@ -179,9 +179,25 @@ def test_leaves_a_program_alone_that_somebody_has_stopped() -> None:
     assert run.look(30.0) == []
 
 
+def test_warns_of_a_program_that_dies_again_and_again_though_it_runs_for_a_while_each_time() -> None:
+    run = Run()
+    for restarts in range(8, 12):  # 8 of them before the sentinel was there
+        kinematics = program("kinematics")._replace(restarts=restarts)
+        run.programs["kinematics"] = kinematics
+        run.look(10.0)
+    (status,) = states([kinematics], {}, run.judge.recent, "/sentinel")
+    assert (status.level, status.message) == (
+        DiagnosticStatus.WARN,
+        "RUNNING, restarted 3 times within a minute",
+    )
+    run.look(45.0)  # it has run ever since
+    (status,) = states([kinematics], {}, run.judge.recent, "/sentinel")
+    assert (status.level, status.message) == (DiagnosticStatus.OK, "RUNNING")
+
+
 def test_tells_state_pid_restarts_last_exit_and_why_of_every_process() -> None:
     given_up = Watched("velocity", "FATAL", 0, 7, "code 2", "Exited too quickly")
-    status, fatal = states([program("kinematics"), given_up], {"velocity": "no health"}, "/sentinel")
+    status, fatal = states([program("kinematics"), given_up], {"velocity": "no health"}, {}, "/sentinel")
     assert (status.level, status.name) == (DiagnosticStatus.OK, "/sentinel: kinematics")
     assert fatal.level == DiagnosticStatus.ERROR
     assert {pair.key: pair.value for pair in fatal.values} == {
