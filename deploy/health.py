@@ -33,10 +33,6 @@ class HealthMonitor:
         topic = topics.DIAGNOSTICS
         node.create_subscription(topic.type, topic.name, self._on_message, topic.qos)
 
-    def forget(self) -> None:
-        """Begin anew: what was heard is of a system that is gone."""
-        self.latest.clear()
-
     def _on_message(self, message: DiagnosticArray) -> None:
         for status in message.status:
             values = {pair.key: pair.value for pair in status.values}

@@ -22,6 +22,7 @@ START_LIMIT = 60.0  # s until all services have to report their health
 STATUS_LIMIT = 1.5  # s that they have when they are up: they report at 1 Hz
 START_ATTEMPTS = 3  # of a service, even where dying takes it so long that supervisord sees no early death
 LOG_LINES = 15  # of a service that does not start
+LOADER = ("PYTHONPATH", "LD_LIBRARY_PATH", "AMENT_PREFIX_PATH")  # where rclpy and its libraries are found
 
 # rclpy takes its time to load: a command loads it when it is sure to need it.
 
@@ -41,23 +42,23 @@ def start(system: System, scenario: str, parameter_file: str) -> None:
 
 def console(system: System) -> None:
     """Show a running system in this terminal."""
+    if not _adopt_environment(system):
+        raise DeploymentError("Nothing runs: make start")
     from deploy.member import Member
     from deploy.parameters import epoch_of
 
-    if not _adopt_environment(system):
-        raise DeploymentError("Nothing runs: make start")
     with Member() as member:
         _show(system, member, epoch_of(system))
 
 
 def status(system: System) -> None:
     """Print a table of the services."""
-    from deploy.member import Member
-    from deploy.status import table
-
     if not _adopt_environment(system):
         print("Nothing runs.")
         return
+    from deploy.member import Member
+    from deploy.status import of_services
+
     programs = system.programs()
     running = [program for program in programs if program.pid]
     deadline = time.monotonic() + STATUS_LIMIT
@@ -65,7 +66,7 @@ def status(system: System) -> None:
         while not all(_reports(program, member) for program in running) and time.monotonic() < deadline:
             interruption.check()
             member.spin_once()
-        print(table(programs, member.health))
+        print(of_services(programs, member.health))
 
 
 def logs(system: System) -> None:
@@ -117,8 +118,7 @@ def _await_services(system: System, member: Member) -> None:
     while missing := [program for program in system.programs() if not _reports(program, member)]:
         for program in missing:
             if program.state in ("BACKOFF", "FATAL") or program.restarts >= START_ATTEMPTS:
-                lines = (system.logs / f"{program.name}.log").read_text(errors="replace").splitlines()
-                raise DeploymentError("\n".join([f"{program.name} does not start:", *lines[-LOG_LINES:]]))
+                raise DeploymentError(f"{program.name} does not start:\n{_last_words(system, program)}")
         if time.monotonic() > deadline:
             names = ", ".join(program.name for program in missing)
             raise DeploymentError(f"No sign of life from {names}; see make logs")
@@ -126,6 +126,13 @@ def _await_services(system: System, member: Member) -> None:
         while time.monotonic() < look_again:
             interruption.check()
             member.spin_once()
+
+
+def _last_words(system: System, program: Program) -> str:
+    """What a program said at last; what supervisord says where it could not even be run."""
+    log = system.logs / f"{program.name}.log"
+    lines = log.read_text(errors="replace").splitlines() if log.exists() else []
+    return "\n".join(lines[-LOG_LINES:]) or program.description
 
 
 def _reports(program: Program, member: Member) -> bool:
@@ -145,7 +152,7 @@ def _show(system: System, member: Member, epoch: float, *, owner: bool = False) 
         console.read_commands()
         if system.supervisor_has_ended():
             if not owner or not system.start_again():
-                print("The system has ended.", flush=True)
+                print(system.unattended() if system.is_wanted else "The system has ended.", flush=True)
                 return
             print("supervisord was killed: everything has been started anew.", flush=True)
 
@@ -161,14 +168,20 @@ def _stop(system: System) -> None:
 
 
 def _adopt_environment(system: System) -> bool:
-    """Look where the running system communicates, whatever the environment here; whether one runs."""
+    """Look where the running system does, with its rclpy, whatever this shell has. False if none runs."""
     environment = system.environment()
-    for name in (*os.environ, *environment):
-        if name.startswith(("ROS_", "RMW_", "CYCLONEDDS_", "FASTRTPS_", "FASTDDS_", NAMESPACE)):
+    if not environment:
+        return False
+    before = dict(os.environ)
+    for name in (*before, *environment):
+        if name.startswith((*LOADER, "ROS_", "RMW_", "CYCLONEDDS_", "FASTRTPS_", "FASTDDS_", NAMESPACE)):
             os.environ.pop(name, None)
             if name in environment:
                 os.environ[name] = environment[name]
-    return bool(environment)
+    if any(os.environ.get(name) != before.get(name) for name in LOADER):
+        # Only a new process finds the rclpy that the system has: this shell may have sourced another one.
+        os.execv(sys.executable, [sys.executable, *sys.orig_argv[1:]])
+    return True
 
 
 def main(arguments: list[str]) -> int:
@@ -206,6 +219,9 @@ def main(arguments: list[str]) -> int:
         return 1
     except BrokenPipeError:  # nobody reads our output any more, as in `make run | head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
+    except OSError as error:  # of files of the system: no space, no permission
+        print(error, file=sys.stderr)
         return 1
     return 0
 

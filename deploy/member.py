@@ -10,7 +10,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 
 from deploy.health import Health, HealthMonitor
-from deploy.system import namespace_of
+from deploy.system import DeploymentError, namespace_of
 from interfaces.reactive_node import ReactiveNode
 
 
@@ -18,8 +18,13 @@ class Member:
     """In a `with`, this process takes part in the system's communication; it handles no signals."""
 
     def __init__(self) -> None:
-        rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
-        self.node = ReactiveNode(f"console_{os.getpid()}", namespace=namespace_of(os.environ))
+        """Join. Raises DeploymentError if the environment does not let it."""
+        try:
+            rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+            self.node = ReactiveNode(f"console_{os.getpid()}", namespace=namespace_of(os.environ))
+        except RuntimeError as error:
+            rclpy.try_shutdown()
+            raise DeploymentError(f"Cannot join the ROS graph: {error}") from None
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self.node)
         self._monitor = HealthMonitor(self.node)

@@ -4,12 +4,14 @@
       ros__parameters:
         silence: 2.0
 
-with `/**` for all services that have the parameter. This is done in a process of its own: it loads the
+with `/**` for all services that have the parameter; an arm in a namespace may name its services with it, or
+without. This is done in a process of its own: it loads the
 services, and who loads a service becomes one, down to its signals.
 """
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -20,6 +22,8 @@ from typing import Any, NamedTuple
 import yaml
 
 from deploy import sentinel
+from deploy.parameters import ALL, KEY, program_of
+from deploy.system import namespace_of
 from interfaces import topics
 from services import (
     config_publisher,
@@ -30,8 +34,6 @@ from services import (
     velocity,
 )
 
-ALL = "/**"
-KEY = "ros__parameters"
 KINDS = {bool: "true or false", int: "an integer", float: "a number with a decimal point", str: "a string"}
 
 WIRES: dict[str, Callable[[Any], None]] = {
@@ -66,25 +68,33 @@ def declared() -> dict[str, dict[str, Declared]]:
     return {name: _Declarations(wire).parameters for name, wire in WIRES.items()}
 
 
-def faults(document: Any) -> Iterator[tuple[str, str]]:
-    """The mistakes in a parameter file: the key at which each stands, and the reason."""
-    known = declared()
-    known[ALL] = {name: one for parameters in known.values() for name, one in parameters.items()}
+def faults(document: Any, namespace: str) -> Iterator[tuple[str, str]]:
+    """The mistakes in the parameter file of an arm: the key at which each stands, and the reason."""
+    services = declared()
+    names = ", ".join([*services, ALL])
     if not isinstance(document, dict):
-        yield "file", f"must name services, of {', '.join(known)}"
+        yield "file", f"must name services, of {names}"
         return
     for node, content in document.items():
-        parameters = known.get(str(node) if node == ALL else str(node).removeprefix("/"))
-        if parameters is None:
-            yield node, f"is no service; those are {', '.join(known)}"
+        program = program_of(str(node), namespace)
+        if program not in services and node != ALL:
+            yield node, f"is no service; those are {names}"
         elif not isinstance(content, dict) or [*content] != [KEY] or not isinstance(content[KEY], dict):
             yield node, f"must hold {KEY}, and that its parameters"
         else:
             for name, value in content[KEY].items():
-                if name not in parameters:
-                    yield f"{node}.{name}", f"is no parameter; those are {', '.join(parameters) or 'none'}"
-                elif fault := parameters[name].fault(value):
+                concerned = [*services.values()] if node == ALL else [services[program]]
+                if fault := _fault(name, value, concerned):
                     yield f"{node}.{name}", fault
+
+
+def _fault(name: str, value: object, services: list[dict[str, Declared]]) -> str:
+    """What is wrong with a parameter for one of the services that have it, in words; '' for a good one."""
+    having = [parameters[name] for parameters in services if name in parameters]
+    if not having:
+        known = dict.fromkeys(name for parameters in services for name in parameters)
+        return f"is no parameter; those are {', '.join(known)}"
+    return next(filter(None, (declared.fault(value) for declared in having)), "")
 
 
 class _Declarations:
@@ -118,9 +128,11 @@ def main(path: str) -> str | None:
         document = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
     except OSError as error:
         return f"{path}: {error.strerror}"
-    except (UnicodeDecodeError, yaml.YAMLError) as error:
+    except (ValueError, yaml.YAMLError) as error:  # the former also of a date that does not exist
         return f"{path}: {' '.join(str(error).split())}"
-    return next((f"{path}: {key}: {fault}" for key, fault in faults(document)), None)
+    return next(
+        (f"{path}: {key}: {fault}" for key, fault in faults(document, namespace_of(os.environ))), None
+    )
 
 
 if __name__ == "__main__":

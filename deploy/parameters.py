@@ -14,7 +14,7 @@ from rclpy.exceptions import InvalidNamespaceException
 from rclpy.validate_namespace import validate_namespace
 
 from deploy.processes import ROOT
-from deploy.system import NAMESPACE, DeploymentError, System, namespace_of
+from deploy.system import NAMESPACE, SETTINGS, DeploymentError, System, namespace_of
 from interfaces import scenario
 
 SCENARIOS = ROOT / "deploy" / "scenarios"
@@ -38,10 +38,10 @@ def of_system(scenario_name: str, user_file: str, loading: float) -> dict[str, A
         scenario.load(path)
     except scenario.ScenarioError as error:
         raise DeploymentError(str(error)) from error
-    given = _checked(user_file) if user_file else {}
+    given = _checked(user_file, namespace_of(os.environ)) if user_file else {}
     origin = time.monotonic() + SETTLING + loading * PROCESSES / (os.cpu_count() or 1)
-    shared = given.pop(ALL, {KEY: {}})[KEY] | {"scenario": str(path), "scenario_epoch": round(origin, 3)}
-    return {ALL: {KEY: shared}, **given}
+    shared = {"scenario": str(path), "scenario_epoch": round(origin, 3), "settings": SETTINGS}
+    return {ALL: {KEY: given.pop(ALL, {KEY: {}})[KEY] | shared}, **given}
 
 
 def epoch_of(system: System) -> float:
@@ -57,12 +57,20 @@ def _scenario_file(name: str) -> Path:
     raise DeploymentError(f"SCENARIO={name} is neither a file nor one of: {known}")
 
 
-def _checked(user_file: str) -> dict[str, Any]:
+def program_of(node: str, namespace: str) -> str:
+    """The program of a node that a parameter file of an arm names: with the arm's namespace, or without."""
+    return node.removeprefix(namespace.rstrip("/") + "/")
+
+
+def _checked(user_file: str, namespace: str) -> dict[str, Any]:
+    """What a user's file says, with the full name of each node: ROS applies no other in a namespace."""
     check = [sys.executable, "-m", "deploy.parameter_file", user_file]
     done = subprocess.run(check, cwd=ROOT, capture_output=True, text=True)
     if done.returncode:
         raise DeploymentError(done.stderr.strip())
-    return dict(yaml.safe_load(Path(user_file).read_text(encoding="utf-8")))
+    given = yaml.safe_load(Path(user_file).read_text(encoding="utf-8"))
+    prefix = namespace.rstrip("/") + "/"
+    return {node if node == ALL else prefix + program_of(node, namespace): given[node] for node in given}
 
 
 def check_environment() -> None:

@@ -66,6 +66,16 @@ def of_system(run: Path) -> list[Process]:
     return sorted(found, key=lambda process: (process.program, process.pid))
 
 
+def using(directory: Path) -> list[Path]:
+    """The run directories of the systems whose programs are taken from a directory first of all."""
+    found = set()
+    for pid in (int(name) for name in os.listdir("/proc") if name.isdigit()):
+        environment = environment_of(pid)
+        if MARK in environment and environment.get("PATH", "").startswith(f"{directory}{os.pathsep}"):
+            found.add(Path(environment[MARK]))
+    return sorted(found)
+
+
 def end(run: Path, pids: Iterable[int], grace: float) -> None:
     """End processes of a system: SIGTERM, and SIGKILL for those that live after `grace` seconds."""
     handles = open_handles(run, pids)

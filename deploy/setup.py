@@ -21,9 +21,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
 
-from deploy import processes
+from deploy.processes import ROOT, using
 
-ROOT = Path(__file__).resolve().parent.parent
 VENV = ROOT / ".venv"
 PYTHON = VENV / "bin" / "python"
 STAMP = VENV / "made-from"
@@ -112,12 +111,14 @@ def make(ros: str) -> None:
         package = f"python{sys.version_info[0]}.{sys.version_info[1]}-venv"
         raise SetupError(f"Python {version} ({sys.executable}) lacks ensurepip: apt-get install {package}")
     if ros:
-        check = subprocess.run([sys.executable, "-c", "import rclpy"], capture_output=True, text=True)
+        needed = "import rclpy, diagnostic_msgs.msg, geometry_msgs.msg, std_msgs.msg"
+        check = subprocess.run([sys.executable, "-c", needed], capture_output=True, text=True)
         if check.returncode:
             raise SetupError(
-                f"ROS 2 is sourced, but its rclpy ({ros}) does not work with {sys.executable}:"
-                f" {check.stderr.strip().splitlines()[-1]}\n"
-                "Choose its interpreter (make PYTHON=/usr/bin/python3), or use a shell without ROS 2"
+                f"ROS 2 is sourced, but its rclpy ({ros}) or common_interfaces do not work with"
+                f" {sys.executable}: {check.stderr.strip().splitlines()[-1]}\n"
+                "Choose its interpreter (make setup PYTHON=/usr/bin/python3), install what it lacks, or use a"
+                " shell without ROS 2"
             )
     print(f"Setting up .venv with Python {version}, once; this takes about half a minute.", flush=True)
     venv = [sys.executable, "-m", "venv", "--clear", *(["--system-site-packages"] if ros else []), str(VENV)]
@@ -138,8 +139,10 @@ def install_runtime() -> None:
 
 
 def _refuse_while_running() -> None:
-    if processes.of_system(processes.run_directory()):
-        raise SetupError("A system runs from this .venv, which has to be changed: `make stop` first")
+    for run in using(PYTHON.parent):
+        raise SetupError(
+            f"A system runs from this .venv, which has to be changed: REACTIVE_ARM_RUN_DIR={run} make stop"
+        )
 
 
 def _step(title: str, command: list[str], log: Path | None = LOG) -> None:
@@ -171,6 +174,8 @@ def _step(title: str, command: list[str], log: Path | None = LOG) -> None:
                 file.writelines(lines)
     if process.returncode:
         reasons = [line for line in lines if line.startswith("ERROR")] or lines[-5:]
+        if any("Retrying" in line for line in lines):  # pip then blames the requirement
+            reasons.append("The package index was not reached: network, proxy, PIP_INDEX_URL?")
         where = f" (all of it: {log.relative_to(ROOT)})" if log is not None else ""
         raise SetupError(f"Set-up failed at {title}{where}:\n{''.join(reasons).rstrip()}")
 

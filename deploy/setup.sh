@@ -18,5 +18,5 @@ fi
 for python in .venv/bin/python python3 python3.13 python3.12 python3.11; do
     base=$(base_of "$python") && exec "$base" -m deploy.setup
 done
-echo "No Python 3.11, 3.12 or 3.13 found: install one, or name it: make PYTHON=/path/to/python3.12" >&2
+echo "No Python 3.11, 3.12 or 3.13 found: install one, or name it: make setup PYTHON=/path/to/python3.12" >&2
 exit 1

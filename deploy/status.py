@@ -7,17 +7,14 @@ from collections.abc import Iterable, Mapping
 
 from deploy.health import Health
 from deploy.system import Program
+from deploy.table import table
 
 HEADER = ("SERVICE", "STATE", "PID", "UPTIME", "RESTARTS", "LAST OUTPUT", "HEALTH")
 
 
-def table(programs: Iterable[Program], health: Mapping[str, Health]) -> str:
+def of_services(programs: Iterable[Program], health: Mapping[str, Health]) -> str:
     """The services, one a line; `health` is what was heard of them just now."""
-    rows = [HEADER, *(_row(program, health.get(program.name)) for program in programs)]
-    widths = [max(len(cell) for cell in column) for column in zip(*rows, strict=True)]
-    return "\n".join(
-        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows
-    )
+    return table([HEADER, *(_row(program, health.get(program.name)) for program in programs)])
 
 
 def _row(program: Program, health: Health | None) -> tuple[str, ...]:

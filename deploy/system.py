@@ -5,6 +5,7 @@ from __future__ import annotations
 import fcntl
 import http.client
 import os
+import shutil
 import socket
 import subprocess
 import sys
@@ -25,6 +26,7 @@ SUPERVISOR_GRACE = 1.4  # s that supervisord has to stop all of them
 OBEY_LIMIT = 0.4  # s that it has to say that it will; all of it ends within 2 s
 ANSWER_LIMIT = 1.5  # s that it has to answer the sentinel
 NAMESPACE = "REACTIVE_ARM_NAMESPACE"  # the environment variable that tells of an arm's ROS namespace
+SETTINGS = "settings"  # the directory, in that of the system, in which services keep what was set by hand
 GROUP = "arm"  # of all programs, in supervisord.conf
 READY_GRACE = 20.0  # s that supervisord has to answer its first call
 
@@ -45,6 +47,8 @@ class Program(NamedTuple):
     """[s] since its process was started; 0 when none runs"""
     restarts: int
     """how often it was started again since the system was started"""
+    description: str
+    """supervisord's own words on its state"""
 
 
 class Watched(NamedTuple):
@@ -80,6 +84,18 @@ class System:
         """The ROS parameter file of all services, written at each start."""
         return self.run / "parameters.yaml"
 
+    @property
+    def is_wanted(self) -> bool:
+        """Whether it was started, and nobody has stopped it since."""
+        return self.parameters.exists()
+
+    def unattended(self) -> str:
+        """What is told of services that live without supervisord."""
+        return (
+            f"supervisord has died; {len(self.members())} services go on without it in {self.run}.\n"
+            "make start begins anew with them, make stop ends them."
+        )
+
     def members(self) -> list[processes.Process]:
         """The live processes of the system, also those that a dead supervisord left behind."""
         return processes.of_system(self.run)
@@ -103,14 +119,14 @@ class System:
                 raise DeploymentError(f"Already running: supervisord has pid {pid} and works in {self.run}")
             self._environment = dict(os.environ)  # also for `start_again`
             self.logs.mkdir(exist_ok=True)
-            self.run.chmod(0o700)
+            shutil.rmtree(self.run / SETTINGS, ignore_errors=True)
             self.parameters.write_text(yaml.safe_dump(dict(parameters), sort_keys=False))
             self._start_supervisor()
 
     def start_again(self) -> bool:
         """Start it as it was, after supervisord died; whether that was right: its end may have been meant."""
         with self._alone():
-            if not self.parameters.exists():  # `stop` takes them away
+            if not self.is_wanted:
                 return False
             self._start_supervisor()
             return True
@@ -127,7 +143,7 @@ class System:
     def stop(self) -> None:
         """End every process of the system, with supervisord's help or without."""
         with self._alone():
-            self.parameters.unlink(missing_ok=True)
+            self.parameters.unlink(missing_ok=True)  # from here on it is not wanted
             if pid := self.supervisor():
                 handles = processes.open_handles(self.run, [p.pid for p in self.members()])
                 try:
@@ -143,10 +159,7 @@ class System:
         """All programs as supervisord sees them. Raises DeploymentError when it does not answer."""
         pid = self.supervisor()
         if pid is None:
-            raise DeploymentError(
-                f"supervisord has died; {len(self.members())} services go on without it in {self.run}.\n"
-                "make start begins anew with them, make stop ends them."
-            )
+            raise DeploymentError(self.unattended())
         try:
             rows = cast(list[dict[str, Any]], self._call(pid, "supervisor.getAllProcessInfo"))
             starts = cast(dict[str, int], self._call(pid, "arm.starts"))
@@ -159,6 +172,7 @@ class System:
                 pid=row["pid"],
                 uptime=row["now"] - row["start"] if row["pid"] else 0,
                 restarts=max(starts.get(row["name"], 0) - 1, 0),
+                description=row["spawnerr"] or row["description"],
             )
             for row in rows
         ]

@@ -183,7 +183,7 @@ def load(path: str | Path) -> Scenario:
         document = yaml.safe_load(text)
     except OSError as error:
         raise ScenarioError(f"{path}: {error.strerror}") from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
+    except (yaml.YAMLError, ValueError) as error:
         raise ScenarioError(f"{path}: {' '.join(str(error).split())}") from error
     return _scenario(_Item({} if document is None else document, str(path), ""))
 

@@ -50,7 +50,8 @@ from reactivex.disposable import CompositeDisposable
 from interfaces import stopping
 from interfaces.age import Timestamp
 from interfaces.reactive_node import ReactiveNode
-from interfaces.scenario import Scenario, ScenarioError, Timeline, load, play
+from interfaces.scenario import Scenario, ScenarioError, Timeline, follow, load, play
+from interfaces.settings import Settings
 from interfaces.topics import DIAGNOSTICS, Topic, is_latched
 
 T = TypeVar("T")
@@ -108,6 +109,8 @@ class ServiceNode(ReactiveNode):
         :raises ScenarioError: if there is a mistake in it.
         """
         path = self.declare("scenario", "", None, "file of the scenario, empty for none")
+        directory = self.declare("settings", "", None, "where what is set by hand is kept, empty for nowhere")
+        self._settings = Settings(directory, self.get_name())
         self.declare_origin()
         return load(path) if path else Scenario()
 
@@ -124,6 +127,28 @@ class ServiceNode(ReactiveNode):
         if timeline is None:
             return None
         return rx.defer(lambda _: play(timeline, self._elapsed(), resume=resume))
+
+    def follow(self, name: str, timeline: Observable[T] | None = None) -> Observable[T]:
+        """
+        Return what a virtual source does: see :func:`interfaces.scenario.follow`.
+
+        What was set by hand holds beyond the end of this process.
+        """
+        kept = self._settings.read()
+        if name in kept:
+            self.set_parameters([Parameter(name, value=kept[name])])
+            timeline = None
+
+        def keep(parameters: list[Parameter]) -> None:
+            for parameter in parameters:
+                if parameter.name == name:
+                    try:
+                        self._settings.keep(name, parameter.value)
+                    except OSError as error:
+                        self.remark(name, f"would be forgotten by a restart: {error.strerror}")
+
+        self.add_post_set_parameters_callback(keep)
+        return follow(self.create_parameter_observable(name), timeline)
 
     def from_origin(self, items: Observable[T]) -> Observable[T]:
         """Subscribe to an observable when the scenario begins, or at once if it has begun."""
@@ -302,19 +327,18 @@ def _live(name: str, wire: Callable[[ServiceNode], None]) -> int:
     """Return the exit code."""
     try:
         rclpy.init()
-    except RuntimeError as error:
+        node = ServiceNode(name)
+    except (*_MISTAKES, RuntimeError) as error:  # the latter of the environment: domain, discovery, DDS
+        rclpy.try_shutdown()
         return _refuse(name, error, 2)
     try:
-        node = ServiceNode(name)
-        try:
-            return _spin(node, wire)
-        finally:
-            node.destroy_node()
+        return _spin(node, wire)
     except _MISTAKES as error:
         return _refuse(name, error, 2)
     except _AlreadyRunning as error:
         return _refuse(name, error, 1)
     finally:
+        node.destroy_node()
         rclpy.try_shutdown()
 
 

@@ -11,7 +11,6 @@ from __future__ import annotations
 import sys
 
 from interfaces import service
-from interfaces.scenario import follow
 from interfaces.service import ServiceNode
 from interfaces.topics import CONFIGURATION, L1, L2, Topic
 
@@ -24,7 +23,7 @@ def wire(node: ServiceNode, topic: Topic) -> None:
     within = (0.0, 1000.0) if topic in (L1, L2) else (-1000.0, 1000.0)
     node.declare("value", DEFAULTS[topic.name], within, f"{topic.meaning} [{topic.unit}]", settable=True)
     timeline = node.declare_scenario().configuration.get(topic.name)
-    values = follow(node.create_parameter_observable("value"), node.play(timeline))
+    values = node.follow("value", node.play(timeline))
     node.publish(topic, values.map(lambda value: topic.type(data=value)))
 
 

@@ -11,7 +11,6 @@ from reactivex import Observable
 from std_msgs.msg import Bool, String
 
 from interfaces import service
-from interfaces.scenario import follow
 from interfaces.service import ServiceNode
 from interfaces.topics import ENGINES, ENGINES_STATE, OFF, ON, OPERATOR_HEARTBEAT, TURN_ON
 
@@ -52,8 +51,8 @@ def wire(node: ServiceNode) -> None:
     node.declare("pressed", False, None, "whether the switch is held", settable=True)
     scenario = node.declare_scenario()
     beats = heartbeats(
-        follow(node.create_parameter_observable("pressed"), node.play(scenario.pressed)),
-        node.create_parameter_observable("rate"),
+        node.follow("pressed", node.play(scenario.pressed)),
+        node.follow("rate"),
         node.play(scenario.heartbeats, resume=False) or rx.never(),
     )
     node.publish(OPERATOR_HEARTBEAT, beats.map(lambda beat: Bool(data=beat)))

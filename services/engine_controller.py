@@ -78,7 +78,7 @@ def engine_state(
 def wire(node: ServiceNode) -> None:
     """Connect the recipe with its topics."""
     presence = node.declare("presence", 1.0, (0.1, 1.0), "turn_on needs an operator seen within [s]")
-    absence = node.declare("absence", 10.0, (1.0, 60.0), "off when no operator was seen for [s]")
+    absence = node.declare("absence", 10.0, (1.0, 10.0), "off when no operator was seen for [s]")
     repeat = node.declare("repeat", 0.1, (0.02, 0.2), "the state is repeated this often [s]")
     states = engine_state(
         node.observe(ENGINES, timestamped=True).map(lambda item: Timestamp(item.value.data, item.timestamp)),

@@ -59,7 +59,8 @@ def operator_incapacitated(
         away = rx.timer(0.0, repeat).map(lambda _: TURN_OFF).take_until(back)
         return operator_activity(heartbeats, **activity).catch(lambda *_: away).repeat()
 
-    return heartbeats.publish(watch)
+    # A source that ends is silent for ever.
+    return heartbeats.concat(rx.never()).publish(watch)
 
 
 def wire(node: ServiceNode) -> None:

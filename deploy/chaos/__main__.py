@@ -157,24 +157,30 @@ def _options(arguments: Sequence[str]) -> argparse.Namespace:
 
 
 def _count(text: str) -> int:
-    number = int(text)
-    if number < 1:
-        raise argparse.ArgumentTypeError(f"{text} is less than 1")
-    return number
+    if not text.isdecimal() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"{text} is no number of arms")
+    return int(text)
 
 
 def _percent(text: str) -> float:
-    number = float(text)
+    number = _number(text)
     if not 0 <= number <= 100:
         raise argparse.ArgumentTypeError(f"{text} is not from 0 to 100")
     return number
 
 
 def _positive(text: str) -> float:
-    number = float(text)
+    number = _number(text)
     if not 0 < number < math.inf:
         raise argparse.ArgumentTypeError(f"{text} is not more than 0")
     return number
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text} is no number") from None
 
 
 def _words(known: Iterable[str]) -> Callable[[str], tuple[str, ...]]:
@@ -200,7 +206,7 @@ def _directory() -> Iterator[Path]:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             raise DeploymentError(f"A monkey plays already in {base}") from None
-        old = sorted(base.iterdir())
+        old = sorted(base.glob("????????-??????"))
         for directory in old:
             for run in directory.glob("run*"):
                 System(run).stop()  # what a killed monkey has left behind

@@ -36,7 +36,7 @@ from deploy import processes
 from deploy.chaos.faults import FAULTS, INJECTED
 from deploy.chaos.history import LOSS, NOTHING, OPERATOR, PROGRAMS, SILENCE, Fault, suffix
 from deploy.chaos.schedule import AWAKE, FIRST, PERIOD, Planned, Schedule
-from deploy.system import NAMESPACE, DeploymentError, System
+from deploy.system import NAMESPACE, SETTINGS, DeploymentError, System
 from interfaces import topics
 
 UP = 60.0  # s until an arm has to be up
@@ -136,7 +136,11 @@ class Arena:
             )
             lines = _lines(self._observer)
             self._epoch = time.monotonic() + self.lead
-            shared = {"scenario": str(scenario), "scenario_epoch": round(self._epoch, 3)}
+            shared = {
+                "scenario": str(scenario),
+                "scenario_epoch": round(self._epoch, 3),
+                "settings": SETTINGS,
+            }
             environment["PYTHONPATH"] = os.pathsep.join(
                 [str(INJECTED), *filter(None, [os.environ.get("PYTHONPATH")])]
             )
@@ -227,12 +231,10 @@ class Arena:
         missing = {f"{arm.namespace.rstrip('/')}/{topic.name}" for topic in AWAITED}
         deadline = time.monotonic() + UP
         while missing:
-            try:
-                missing.discard(
-                    lines.get(timeout=max(0.0, deadline - time.monotonic())).removeprefix("seen ")
-                )
-            except queue.Empty:
-                raise DeploymentError(f"Nothing is seen of {', '.join(sorted(missing))}") from None
+            with suppress(queue.Empty):
+                missing.discard(lines.get(timeout=0.1).removeprefix("seen "))
+            if time.monotonic() > deadline:
+                raise DeploymentError(f"Nothing is seen of {', '.join(sorted(missing))}")
             self._check()
 
 

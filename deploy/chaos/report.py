@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 
 from deploy.chaos.findings import VIOLATED, Finding, percentile
 from deploy.chaos.promises import meaning
+from deploy.table import table
 
 SHOWN = 5  # pieces of evidence of a promise
 HEADER = ("", "PROMISE", "VERDICT", "CASES", "UNKNOWN", "FIGURES")
@@ -13,7 +14,7 @@ HEADER = ("", "PROMISE", "VERDICT", "CASES", "UNKNOWN", "FIGURES")
 
 def text(findings: Sequence[Finding]) -> str:
     """Everything that an engineer wants to know at first."""
-    blocks = [_table([HEADER, *(_row(finding) for finding in findings)])]
+    blocks = [table([HEADER, *(_row(finding) for finding in findings)])]
     for finding in findings:
         if finding.verdict == VIOLATED:
             lines = [f"  at {e.time:.2f} s: {e.what}" for e in finding.evidence[:SHOWN]]
@@ -21,7 +22,7 @@ def text(findings: Sequence[Finding]) -> str:
                 lines.append(f"  and {more} times more")
             blocks.append("\n".join([f"{finding.promise} is violated:", *lines]))
     for finding, title in ((f, t) for f in findings for p, t in TIMES.items() if f.promise == p and f.times):
-        blocks.append(title + "\n" + _table([TIMES_HEADER, *times(finding)]))
+        blocks.append(title + "\n" + table([TIMES_HEADER, *times(finding)]))
     return "\n\n".join(blocks)
 
 
@@ -44,11 +45,4 @@ def _row(finding: Finding) -> tuple[str, ...]:
         str(finding.cases),
         str(finding.unknown),
         finding.figures if finding.cases else "not put to the test",
-    )
-
-
-def _table(rows: Sequence[Sequence[str]]) -> str:
-    widths = [max(len(cell) for cell in column) for column in zip(*rows, strict=True)]
-    return "\n".join(
-        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows
     )

@@ -110,12 +110,13 @@ def test_a_silence_of_almost_three_seconds_is_none(scheduler: TestScheduler) -> 
     assert (commands, missed) == ([], [])
 
 
-def test_the_end_of_the_heartbeats_turns_nothing_on(scheduler: TestScheduler) -> None:
+def test_the_end_of_the_heartbeats_is_a_silence(scheduler: TestScheduler) -> None:
     heartbeats = scheduler.create_hot_observable(on_next(1.0, 1.0), on_completed(2.0))
 
     commands, _, _ = watch(scheduler, heartbeats, 30.0)
 
-    assert {command for _, command in commands} <= {TURN_OFF}
+    assert {command for _, command in commands} == {TURN_OFF}
+    assert 10.0 <= commands[0][0] <= 10.5
 
 
 def strikes(heartbeats: list[int], until: int) -> list[int]:

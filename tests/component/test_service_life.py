@@ -233,3 +233,15 @@ def test_a_mistake_in_a_parameter_is_one_line_and_exit_code_2(
     assert code == 2
     assert errors.count("\n") == 1
     assert re.search(reason, errors)
+
+
+@pytest.mark.parametrize(("variable", "value"), [("ROS_DOMAIN_ID", "one"), ("CYCLONEDDS_URI", "<no xml")])
+def test_an_environment_in_which_no_node_can_live_is_told_without_a_traceback(
+    start: Start, monkeypatch: pytest.MonkeyPatch, variable: str, value: str
+) -> None:
+    monkeypatch.setenv("RMW_IMPLEMENTATION", "rmw_cyclonedds_cpp")
+    monkeypatch.setenv(variable, value)
+    code, errors = start(*service("velocity")).end()
+    assert code == 2
+    assert errors.splitlines()[-1].startswith("velocity: ")
+    assert "Traceback" not in errors

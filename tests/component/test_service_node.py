@@ -287,6 +287,54 @@ def test_a_scenario_is_played_from_where_it_is_now(
     spin_until(lambda: values == [2.0, 3.0])
 
 
+def test_what_was_set_by_hand_holds_beyond_a_restart(
+    make_node: Make, spin_until: SpinUntil, tmp_path: Path
+) -> None:
+    scenario = tmp_path / "scenario.yaml"
+    scenario.write_text("l1: 2.0")
+
+    def source() -> tuple[ServiceNode, list[float]]:
+        node = overridden(
+            make_node,
+            scenario=str(scenario),
+            scenario_epoch=time.monotonic() - 1.0,
+            settings=str(tmp_path / "settings"),
+        )
+        node.declare("value", 1.0, (0.0, 9.0), "length [m]", settable=True)
+        values: list[float] = []
+        timeline = node.play(node.declare_scenario().configuration["l1"])
+        node.follow("value", timeline).subscribe(values.append, scheduler=node.scheduler)
+        return node, values
+
+    first, values = source()
+    spin_until(lambda: values == [2.0])
+    first.set_parameters([Parameter("value", value=-1.0)])  # refused
+    first.set_parameters([Parameter("value", value=5.0)])
+    assert values == [2.0, 5.0]
+    first.destroy_node()
+    second, values = source()
+    assert values == [5.0]
+    assert second.get_parameter("value").value == 5.0
+
+
+def test_it_is_told_when_a_setting_would_be_forgotten(
+    make_node: Make, peer: Node, spin_until: SpinUntil, tmp_path: Path
+) -> None:
+    heard: list[str] = []
+    topic = topics.DIAGNOSTICS
+    peer.create_subscription(topic.type, topic.name, lambda it: heard.append(it.status[0].message), topic.qos)
+    (tmp_path / "file").touch()
+    node = overridden(make_node, settings=str(tmp_path / "file" / "settings"))
+    node.declare("value", 1.0, (0.0, 9.0), "length [m]", settable=True)
+    node.declare_scenario()
+    values: list[float] = []
+    node.follow("value").subscribe(values.append, scheduler=node.scheduler)
+    spin_until(lambda: heard)
+    node.set_parameters([Parameter("value", value=5.0)])
+    assert values == [1.0, 5.0]
+    spin_until(lambda: heard[-1] == "value: would be forgotten by a restart: Not a directory")
+
+
 def test_what_waits_for_the_origin_begins_there_or_at_once(make_node: Make, spin_until: SpinUntil) -> None:
     begun: list[float] = []
     origin = time.monotonic() + 0.2

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 
 from deploy.health import Health
-from deploy.status import table
+from deploy.status import of_services
 from deploy.system import Program
 
 
@@ -15,10 +15,10 @@ def health(pid: int, *, since_output: float | None = 0.0, reason: str = "") -> H
 
 def test_the_table_says_how_each_service_is() -> None:
     programs = [
-        Program("kinematics", "RUNNING", 101, 3725.9, 2),
-        Program("velocity", "RUNNING", 102, 5.0, 0),
-        Program("operator_watchdog", "RUNNING", 103, 1.0, 1),
-        Program("engine_controller", "BACKOFF", 0, 0.0, 7),
+        Program("kinematics", "RUNNING", 101, 3725.9, 2, ""),
+        Program("velocity", "RUNNING", 102, 5.0, 0, ""),
+        Program("operator_watchdog", "RUNNING", 103, 1.0, 1, ""),
+        Program("engine_controller", "BACKOFF", 0, 0.0, 7, ""),
     ]
     heard = {
         "kinematics": health(101, since_output=0.2, reason="l1: nan is not finite"),
@@ -26,7 +26,7 @@ def test_the_table_says_how_each_service_is() -> None:
         "operator_watchdog": health(99),  # of the process before this one
         "engine_controller": health(104),
     }
-    assert table(programs, heard).splitlines() == [
+    assert of_services(programs, heard).splitlines() == [
         "SERVICE            STATE    PID  UPTIME   RESTARTS  LAST OUTPUT  HEALTH",
         "kinematics         RUNNING  101  1:02:05  2         0.2 s ago    l1: nan is not finite",
         "velocity           RUNNING  102  0:00:05  0         never        ok",

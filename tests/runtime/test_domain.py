@@ -29,7 +29,7 @@ def test_the_domain_is_0_unless_the_environment_says_otherwise() -> None:
 
 @pytest.mark.parametrize("text", ["-1", "233", "one", "4.2"])
 def test_a_domain_that_is_none_is_refused_in_one_line(text: str) -> None:
-    with pytest.raises(ValueError, match=r"^ROS_DOMAIN_ID must be a whole number from 0 to 232, not '"):
+    with pytest.raises(RCLError, match=r"^ROS_DOMAIN_ID must be a whole number from 0 to 232, not '"):
         domain.domain_id_from_environment({"ROS_DOMAIN_ID": text})
 
 
@@ -74,12 +74,12 @@ def test_network_interfaces_of_cyclonedds_uri_are_the_only_ones() -> None:
 
 
 def test_an_unknown_range_is_refused_in_one_line() -> None:
-    with pytest.raises(ValueError, match=r"^ROS_AUTOMATIC_DISCOVERY_RANGE must be one of .*, not 'MOON'$"):
+    with pytest.raises(RCLError, match=r"^ROS_AUTOMATIC_DISCOVERY_RANGE must be one of .*, not 'MOON'$"):
         domain.configuration({"ROS_AUTOMATIC_DISCOVERY_RANGE": "moon"})
 
 
 def test_peers_that_are_no_addresses_are_refused() -> None:
-    with pytest.raises(ValueError, match="ROS_STATIC_PEERS"):
+    with pytest.raises(RCLError, match="ROS_STATIC_PEERS"):
         domain.configuration({"ROS_STATIC_PEERS": '"/><Evil'})
 
 

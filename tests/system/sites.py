@@ -64,13 +64,15 @@ class Command:
         """All that it has printed."""
         return "\n".join(text for _, text in self.lines)
 
-    def await_line(self, pattern: str, seconds: float = LIMIT) -> re.Match[str]:
-        """The first line with this pattern, as soon as it is there."""
+    def await_line(self, pattern: str, seconds: float = LIMIT, after: int = 0) -> re.Match[str]:
+        """The first line with this pattern, as soon as it is there; ``after`` so many that do not count."""
         found: re.Match[str] | None = None
 
         def is_there() -> bool:
             nonlocal found
-            found = next((match for _, text in self.lines if (match := re.search(pattern, text))), None)
+            found = next(
+                (match for _, text in self.lines[after:] if (match := re.search(pattern, text))), None
+            )
             return found is not None
 
         with self._changed:

@@ -183,14 +183,28 @@ def test_who_lets_go_of_the_switch_in_the_demo_has_the_engines_stopped(site: Sit
     assert command.wait() == 0
 
 
+def test_another_terminal_may_have_sourced_another_rclpy(
+    module_site: Site, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "rclpy").mkdir()
+    (tmp_path / "rclpy" / "__init__.py").write_text("raise ImportError('made for another Python')")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    code, printed = module_site.do("status")
+    assert code == 0, printed
+    assert {row[-1] for row in rows(printed).values()} == {"ok"}
+
+
 def test_a_second_arm_lives_in_the_same_domain_in_a_namespace_of_its_own(
     module_site: Site, tmp_path: Path
 ) -> None:
     first = module_site.members
+    parameters = tmp_path / "mine.yaml"
+    parameters.write_text("dead_mans_switch: {ros__parameters: {pressed: true}}")
     with closing(Site(tmp_path / "run", module_site.domain, "/second")) as second:
-        command = second.begin("run", STEADY)
+        command = second.begin("run", STEADY, str(parameters))
         command.await_line(f"ROS domain {second.domain}, namespace /second ...")
         command.await_line("Position x")
+        command.await_line("Operator is alive")
         second.namespace = ""  # another terminal, which does not know of it
         healths = {row[-1] for row in rows(second.do("status")[1]).values()}
         assert healths == {"ok"}

@@ -100,6 +100,19 @@ def test_it_is_started_anew_when_supervisord_is_killed(site: Site) -> None:
     assert site.members == {}
 
 
+def test_the_switch_stays_in_the_hand_of_who_took_it_though_its_process_dies(site: Site) -> None:
+    command = site.begin("run", STEADY)
+    command.await_line("Engines are off")
+    command.type("press\n")
+    command.await_line("Operator is alive")
+    switch = site.members["dead_mans_switch"]
+    os.kill(switch, signal.SIGKILL)
+    site.await_members(lambda left: left.get("dead_mans_switch", switch) != switch)
+    command.await_line("Operator is alive", after=len(command.lines))
+    command.type("quit\n")
+    assert command.wait(10) == 0
+
+
 def test_stopping_from_elsewhere_ends_the_terminal_too(site: Site) -> None:
     command = site.begin("run", STEADY)
     command.await_line("Engines are off")
@@ -125,6 +138,15 @@ def test_stop_ends_what_a_killed_supervisord_left_behind(site: Site) -> None:
     assert site.do("stop")[0] == 0
     assert site.members == {}
     assert site.do("stop") == (0, "Nothing runs.")
+
+
+def test_a_console_tells_that_the_services_go_on_without_supervisord(site: Site) -> None:
+    assert site.do("start", STEADY)[0] == 0
+    console = site.begin("console")
+    console.await_line("Engines are off")
+    os.kill(site.members[""], signal.SIGKILL)
+    console.await_line("supervisord has died; .* services go on without it")
+    assert console.wait(10) == 0
 
 
 def test_start_replaces_what_a_killed_supervisord_left_behind(site: Site) -> None:
@@ -171,6 +193,21 @@ def test_an_unknown_scenario_is_told_with_those_that_there_are(site: Site) -> No
 def test_an_impossible_domain_is_told(site: Site) -> None:
     site.domain = 233
     assert site.do("run", STEADY) == (1, "ROS_DOMAIN_ID=233 is not a number from 0 to 232")
+
+
+def test_an_impossible_dds_configuration_is_told(site: Site, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CYCLONEDDS_URI", "<no xml")
+    code, printed = site.do("run", STEADY)
+    assert code == 1
+    assert printed.splitlines()[-1].startswith("Cannot join the ROS graph: ")
+    assert "Traceback" not in printed
+    assert not site.run.exists()
+
+
+def test_a_run_directory_that_cannot_be_made_is_told(site: Site, tmp_path: Path) -> None:
+    site.run = tmp_path / "file" / "run"
+    site.run.parent.touch()
+    assert site.do("start", STEADY) == (1, f"[Errno 20] Not a directory: '{site.run}'")
 
 
 def test_an_impossible_namespace_is_told(site: Site) -> None:

@@ -1,8 +1,8 @@
 """How a process joins a DDS domain: the ROS 2 environment variables, in Cyclone DDS' terms.
 
-Source: REP-2005-style variables of ROS 2 Jazzy – ROS_AUTOMATIC_DISCOVERY_RANGE, ROS_STATIC_PEERS,
-ROS_LOCALHOST_ONLY (deprecated there, still obeyed), ROS_DOMAIN_ID – and Cyclone's CYCLONEDDS_URI, whose
-settings win.
+Source: the variables of ROS 2 Jazzy ("Improved dynamic discovery") – ROS_AUTOMATIC_DISCOVERY_RANGE,
+ROS_STATIC_PEERS, ROS_LOCALHOST_ONLY (deprecated there, still obeyed), ROS_DOMAIN_ID – and Cyclone's
+CYCLONEDDS_URI, whose settings win.
 """
 
 from __future__ import annotations
@@ -10,6 +10,8 @@ from __future__ import annotations
 import os
 import threading
 from collections.abc import Mapping
+
+from rclpy.exceptions import RCLError
 
 from .library import PRECONDITION_NOT_MET, blocking, checked
 
@@ -21,15 +23,15 @@ _handles: dict[int, int] = {}
 
 
 def domain_id_from_environment(environment: Mapping[str, str] = os.environ) -> int:
-    """ROS_DOMAIN_ID, 0 if it is not set. Raises ValueError if it is no number from 0 to 232."""
+    """ROS_DOMAIN_ID, 0 if it is not set. Raises RCLError if it is no number from 0 to 232."""
     text = environment.get("ROS_DOMAIN_ID", "").strip() or "0"
     if not text.isdecimal() or int(text) > 232:
-        raise ValueError(f"ROS_DOMAIN_ID must be a whole number from 0 to 232, not '{text}'")
+        raise RCLError(f"ROS_DOMAIN_ID must be a whole number from 0 to 232, not '{text}'")
     return int(text)
 
 
 def configuration(environment: Mapping[str, str] = os.environ) -> str:
-    """Cyclone's configuration for the discovery range that the environment asks for.
+    """Cyclone's configuration for the discovery range that the environment asks for. Raises RCLError.
 
     In LOCALHOST the loopback interface is the only one. Multicast on it lets our own processes meet at once;
     real Jazzy nodes do not multicast there but probe participant indices on localhost, so we take an index
@@ -37,14 +39,14 @@ def configuration(environment: Mapping[str, str] = os.environ) -> str:
     """
     discovery_range = environment.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "").strip().upper() or "SUBNET"
     if discovery_range not in RANGES:
-        raise ValueError(
+        raise RCLError(
             f"ROS_AUTOMATIC_DISCOVERY_RANGE must be one of {', '.join(RANGES)}, not '{discovery_range}'"
         )
     if environment.get("ROS_LOCALHOST_ONLY", "0") == "1" and discovery_range == "SUBNET":
         discovery_range = "LOCALHOST"
     peers = [peer.strip() for peer in environment.get("ROS_STATIC_PEERS", "").split(";") if peer.strip()]
     if any(character in peer for peer in peers for character in "<>&\"'"):
-        raise ValueError(f"ROS_STATIC_PEERS must be addresses or host names with ';' between, not {peers}")
+        raise RCLError(f"ROS_STATIC_PEERS must be addresses or host names with ';' between, not {peers}")
     general, discovery = "", ""
     if discovery_range == "LOCALHOST":
         # Cyclone would add interfaces up and fail on one named twice: who names some means only these.

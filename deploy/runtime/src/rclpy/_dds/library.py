@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import ctypes as ct
 import importlib.util
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -119,11 +118,10 @@ def _load() -> tuple[ct.CDLL, ct.PyDLL]:
     if spec is None or not spec.submodule_search_locations:
         raise ImportError("Eclipse Cyclone DDS is not installed: pip install 'cyclonedds>=11.0.1,<12'")
     package = Path(spec.submodule_search_locations[0])
-    places = [package / ".dylibs"] if sys.platform == "darwin" else [package.parent / "cyclonedds.libs"]
-    for place in places:
-        for path in sorted(place.glob("libddsc*")):
-            return ct.CDLL(str(path)), ct.PyDLL(str(path))
-    raise ImportError(f"the C library of Cyclone DDS is not beside its package: no libddsc* in {places[0]}")
+    place = package.parent / "cyclonedds.libs"
+    for path in sorted(place.glob("libddsc*")):
+        return ct.CDLL(str(path)), ct.PyDLL(str(path))
+    raise ImportError(f"the C library of Cyclone DDS is not beside its package: no libddsc* in {place}")
 
 
 blocking, quick = _load()
