@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
@@ -66,7 +67,9 @@ class Judge:
         self.recent: dict[str, int] = {}
         """how often a program was restarted within the last minute"""
         self._patience = patience or Patience()
-        self._since: dict[str, tuple[int, float]] = {}  # pid, and when it was seen first
+        # pid, when it was seen first, and how long its first report may take from then on [s]
+        self._since: dict[str, tuple[int, float, float]] = {}
+        self._deaf_since = math.inf
         self._stopped_since: dict[int, float] = {}
         self._double_since: dict[int, float] = {}
         self._revivals: dict[str, tuple[int, float]] = {}  # how often, and when the next is due
@@ -128,20 +131,26 @@ class Judge:
         silent = []
         awaited = 0
         for program in running:
-            pid, since = self._since.get(program.name, (0, 0.0))
+            pid, since, patience = self._since.get(program.name, (0, 0.0, 0.0))
             if pid != program.pid:
-                pid, since = self._since[program.name] = (program.pid, sight.time)
+                # A new sentinel does not wait anew for what has had its time to start.
+                pid, since = program.pid, sight.time
+                patience = max(2 * self._patience.silence, self._patience.start - program.age)
+                self._since[program.name] = (pid, since, patience)
             heard = sight.heard.get((program.name, pid))
-            awaited += heard is not None or sight.time - since >= self._patience.start
-            limit = self._patience.start if heard is None else self._patience.silence
+            awaited += heard is not None or sight.time - since >= patience
+            limit = patience if heard is None else self._patience.silence
             last = since if heard is None else heard
             if sight.time - last >= limit:
                 silent.append(Action("kill", program.name, pid, f"no health for {sight.time - last:.1f} s"))
-        names = {action.program for action in silent}
         self.confused = ""
-        if NAME in names:
+        if itself := [action for action in silent if action.program == NAME]:
             self.confused = "it does not hear itself"
-        elif len(silent) > 1 and 2 * len(silent) > awaited:
+            self._deaf_since = min(self._deaf_since, sight.time)
+            # It can do nothing for anybody, but its successor may.
+            return itself if sight.time - self._deaf_since >= self._patience.start else []
+        self._deaf_since = math.inf
+        if len(silent) > 1 and 2 * len(silent) > awaited:
             self.confused = f"{len(silent)} of {awaited} services are silent at once"
         return [] if self.confused else silent
 

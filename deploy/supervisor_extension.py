@@ -58,6 +58,7 @@ class ArmInterface:
                     "name": name,
                     "state": getProcessStateDescription(process.get_state()),
                     "pid": process.pid,
+                    "age": max(0.0, time.time() - process.laststart),
                     "restarts": max(0, self._starts[name] - 1),
                     "exit": self._exits.get(name, ""),
                     "error": process.spawnerr or "",

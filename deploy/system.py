@@ -57,6 +57,8 @@ class Watched(NamedTuple):
     name: str
     state: str
     pid: int
+    age: float
+    """[s] since its process was started"""
     restarts: int
     exit: str
     """how its last process ended, in words; '' before the first end"""
@@ -128,7 +130,10 @@ class System:
         with self._alone():
             if not self.is_wanted:
                 return False
-            self._start_supervisor()
+            if self.supervisor():
+                self._supervisor = None  # somebody else has started it meanwhile
+            else:
+                self._start_supervisor()
             return True
 
     def supervisor_has_ended(self) -> bool:
@@ -237,6 +242,7 @@ class System:
                 time.sleep(0.02)
         process.kill()
         process.wait()
+        self._end_members()  # what it may have started already
         raise DeploymentError(f"supervisord does not start:\n{output.read_text(errors='replace').strip()}")
 
     def _call(self, pid: int, method: str, *arguments: object, timeout: float = 5.0) -> object:

@@ -150,6 +150,11 @@ class ServiceNode(ReactiveNode):
         self.add_post_set_parameters_callback(keep)
         return follow(self.create_parameter_observable(name), timeline)
 
+    @property
+    def resumes(self) -> bool:
+        """Whether the scenario has begun without this process, which takes the place of one that died."""
+        return self._elapsed() > 0.0
+
     def from_origin(self, items: Observable[T]) -> Observable[T]:
         """Subscribe to an observable when the scenario begins, or at once if it has begun."""
         return rx.defer(lambda _: items.delay_subscription(max(0.0, -self._elapsed())))

@@ -132,7 +132,7 @@ ENGINES = Topic(
 ENGINES_STATE = Topic(
     "engines/state",
     String,
-    _STATE,
+    _qos(1, latched=True, lifespan=DRIVE),
     "",
     ("engine_controller",),
     f"`{ON}` or `{OFF}`, on every change and at 10 Hz: the drive takes an `{ON}` for {1000 * DRIVE:.0f} ms",

@@ -19,6 +19,7 @@ from interfaces.age import Timestamp
 from interfaces.service import ServiceNode
 from interfaces.topics import ENGINES, OPERATOR_HEARTBEAT, OPERATOR_PRESENCE, TURN_OFF
 
+AT_ONCE = 0.1  # s after which a successor says whether it sees the operator
 Heartbeat = Timestamp[Any]  # with its source time
 
 
@@ -28,6 +29,7 @@ def operator_activity(
     received: Callable[[Heartbeat], None] = lambda heartbeat: None,
     alive: Callable[[Heartbeat], None] = lambda heartbeat: None,
     missed: Callable[[Exception], None] = lambda error: None,
+    first: float = 0.5,  # [s] until the first sample, of which one is taken every so often
     sampling: float = 0.5,
     silence: float = 3.0,
     strikes: int = 3,
@@ -35,7 +37,7 @@ def operator_activity(
     """Emit nothing; end in an error at the last of ``strikes`` silences of ``silence`` [s] (Listing 5.7)."""
     return (
         heartbeats.do_action(received)  # Received signal from operator
-        .sample(sampling)
+        .sample(rx.timer(first, sampling))
         .timeout(silence)
         .do_action(alive, missed)  # Operator is alive; Not received signal from operator...
         .ignore_elements()
@@ -49,9 +51,7 @@ def operator_incapacitated(
     """
     Emit ``turn_off`` when the operator is incapacitated (Listing 5.8), and again every ``repeat`` [s].
 
-    The next heartbeat ends that: "Operator is alive", and new strikes begin.
-
-    :param activity: see :func:`operator_activity`.
+    The next heartbeat ends that: "Operator is alive", and new strikes begin (see :func:`operator_activity`).
     """
 
     def watch(heartbeats: Observable[Heartbeat]) -> Observable[str]:
@@ -59,8 +59,7 @@ def operator_incapacitated(
         away = rx.timer(0.0, repeat).map(lambda _: TURN_OFF).take_until(back)
         return operator_activity(heartbeats, **activity).catch(lambda *_: away).repeat()
 
-    # A source that ends is silent for ever.
-    return heartbeats.concat(rx.never()).publish(watch)
+    return heartbeats.concat(rx.never()).publish(watch)  # a source that ends is silent for ever
 
 
 def wire(node: ServiceNode) -> None:
@@ -82,11 +81,12 @@ def wire(node: ServiceNode) -> None:
         alive=presences.on_next,
         missed=lambda _: node.get_logger().warning("Not received signal from operator..."),
         sampling=sampling,
+        first=min(AT_ONCE, sampling) if node.resumes else sampling,
         silence=silence,
         strikes=strikes,
         repeat=repeat,
     )
-    node.publish(OPERATOR_PRESENCE, presences.map(lambda seen: Header(stamp=age.to_message(seen.timestamp))))
+    node.publish(OPERATOR_PRESENCE, presences.map(lambda it: Header(stamp=age.to_message(it.timestamp))))
     # Before a scenario begins nobody is expected: no silence counts yet.
     node.publish(ENGINES, node.from_origin(commands).map(lambda command: String(data=command)))
 

@@ -44,7 +44,7 @@ def main(arguments: Sequence[str]) -> int:
     options = _options(arguments)
     try:
         if options.replay:
-            return conclude(options.replay, f"Record {options.replay}")
+            return conclude(options.replay, f"Record {options.replay}", "replay")
         return unleash(options)
     except interruption.Interrupted:
         print("Interrupted: everything has been stopped.")
@@ -65,6 +65,8 @@ def unleash(options: argparse.Namespace) -> int:
         )
         schedules = [planned[arm :: options.arms] for arm in range(options.arms)]
         title = f"Random monkey, seed {seed}, {options.minutes:g} min, a fault each {options.every:g} s"
+        if options.faults != tuple(FAULTS) or options.targets:
+            title += f" of {', '.join(options.faults)} to {', '.join(options.targets) or 'all'}"
     elif options.scenario in partition.SCHEDULES:
         if reason := partition.missing(options.scenario):
             raise DeploymentError(f"No {options.scenario} here: {reason}")
@@ -76,6 +78,10 @@ def unleash(options: argparse.Namespace) -> int:
         schedules = [planned] * options.arms
         length = schedule.duration(planned)
         title = f"Scenario {options.scenario}, {length:.0f} s"
+    if options.arms > 1:
+        title += f", {options.arms} arms"
+    if options.loss:
+        title += f", {options.loss:g} % loss"
     print(title, flush=True)
     with _directory() as directory:
         arena = kind(
@@ -105,24 +111,26 @@ def _fleet(arms: int) -> dict[str, Any]:
     }
 
 
-def conclude(path: Path, title: str) -> int:
-    """Judge what a record tells of each of its arms; the exit code."""
+def conclude(path: Path, title: str, page_name: str = "report") -> int:
+    """Judge what a record tells of each of its arms, and write a page for each; the exit code."""
     namespaces = record.namespaces(path)
     if not namespaces:
         raise DeploymentError(f"{path} tells of no arm")
-    broken = [namespace for namespace in namespaces if not _keeps_its_promises(path, title, namespace)]
+    broken = [
+        namespace for namespace in namespaces if not _keeps_its_promises(path, title, namespace, page_name)
+    ]
     if len(namespaces) > 1:
         verdict = f"promises are broken for {', '.join(broken)}" if broken else "no promise is broken"
         print(f"\n{len(namespaces)} arms: {verdict}")
     return int(bool(broken))
 
 
-def _keeps_its_promises(path: Path, title: str, namespace: str) -> bool:
+def _keeps_its_promises(path: Path, title: str, namespace: str, page_name: str) -> bool:
     """Judge an arm, print the verdict and write the page beside its record."""
     history = record.load(path, namespace)
     findings = check(history)
     print("\n" + (f"{namespace}\n" if namespace != "/" else "") + text(findings))
-    report = path.with_name(f"report{suffix(namespace)}.html")
+    report = path.with_name(f"{page_name}{suffix(namespace)}.html")
     faults = sum(fault.kind not in CIRCUMSTANCES for fault in history.faults)
     messages = sum(map(len, history.streams.values()))
     remarks = [

@@ -118,6 +118,7 @@ class Arena:
         self._loss = loss
         self._stack = ExitStack()
         self._epoch = 0.0
+        self._origin = 0.0
         self.faults = FAULTS
         self.observed_within: Sequence[str] = ()
 
@@ -135,6 +136,7 @@ class Arena:
                 _observer(self.record, observed, environment, self.observed_within)
             )
             lines = _lines(self._observer)
+            self._origin = float(_next(lines, UP, self._check, "the observer").removeprefix("observing "))
             self._epoch = time.monotonic() + self.lead
             shared = {
                 "scenario": str(scenario),
@@ -185,7 +187,7 @@ class Arena:
         def start(arm: ArmUnderTest, planned: Planned) -> None:
             _, kind, target, lasting = planned
             pid = arm.pid(target) if target in PROGRAMS else 0
-            self._say(f"{time.monotonic() - begin:7.1f} s  {arm.namespace:7} {kind} {target}")
+            self._say(f"{time.monotonic() - self._origin:7.1f} s  {arm.namespace:7} {kind} {target}")
             at = time.monotonic()
             undo = self.faults[kind].do(arm, target)
             self._tell(Fault(kind, target, at, at + lasting, pid), arm.namespace)
@@ -231,11 +233,9 @@ class Arena:
         missing = {f"{arm.namespace.rstrip('/')}/{topic.name}" for topic in AWAITED}
         deadline = time.monotonic() + UP
         while missing:
-            with suppress(queue.Empty):
-                missing.discard(lines.get(timeout=0.1).removeprefix("seen "))
-            if time.monotonic() > deadline:
-                raise DeploymentError(f"Nothing is seen of {', '.join(sorted(missing))}")
-            self._check()
+            left = deadline - time.monotonic()
+            seen = _next(lines, left, self._check, ", ".join(sorted(missing)))
+            missing.discard(seen.removeprefix("seen "))
 
 
 class _Once:
@@ -305,6 +305,16 @@ def _lines(process: subprocess.Popen[str]) -> queue.Queue[str]:
 
     threading.Thread(target=read, daemon=True).start()
     return said
+
+
+def _next(lines: queue.Queue[str], within: float, check: Callable[[], None], awaited: str) -> str:
+    """The next line, within so many seconds; `check` is called meanwhile."""
+    deadline = time.monotonic() + within
+    while time.monotonic() < deadline:
+        check()
+        with suppress(queue.Empty):
+            return lines.get(timeout=0.1)
+    raise DeploymentError(f"Nothing is seen of {awaited}")
 
 
 @contextmanager

@@ -20,7 +20,7 @@ from rclpy.node import Node
 from rclpy.serialization import serialize_message
 from std_msgs.msg import Bool, Float64, Header
 
-from deploy.chaos.marks import GARBAGE, NAN, TEXT
+from deploy.chaos.marks import GARBAGE, TEXT, nan
 from interfaces import topics
 
 RATE = 10_000  # Hz, of a flood
@@ -35,14 +35,14 @@ def nonsense(topic: topics.Topic, rng: random.Random) -> Any:
         tail = b"" if topic.type is Float64 else rng.randbytes(rng.randrange(64))
         return b"\x00\x01\x00\x00" + GARBAGE + tail
     if topic is topics.EFFECTOR_POSITION:
-        return PointStamped(header=Header(frame_id=TEXT), point=Point(x=NAN, y=rng.random()))
+        return PointStamped(header=Header(frame_id=TEXT), point=Point(x=nan(topic), y=rng.random()))
     if topic is topics.OPERATOR_PRESENCE:
         return Header(stamp=rng.choice(_FRESH), frame_id=TEXT)
     if topic is topics.OPERATOR_HEARTBEAT:
         return Bool(data=False)
     if topic is topics.DIAGNOSTICS:
         return topic.type()
-    return topic.type(data=TEXT if topic in (topics.ENGINES, topics.ENGINES_STATE) else NAN)
+    return topic.type(data=TEXT if topic in (topics.ENGINES, topics.ENGINES_STATE) else nan(topic))
 
 
 def flood(node: Node) -> None:

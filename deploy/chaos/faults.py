@@ -194,7 +194,7 @@ FAULTS: dict[str, Fault] = {
     "hog": Fault(hog, PROGRAMS),
     "kill_all": Fault(kill_all, (ALL,)),
     "kill_supervisor": Fault(kill_supervisor, (ALL,), (0.5, 5.0)),
-    "double": Fault(double, PROGRAMS, (5.0, 8.0)),
+    "double": Fault(double, PROGRAMS, (6.0, 8.0)),
     "crash_loop": Fault(crash_loop, tuple(PARAMETERS), (3.0, 6.0)),
     "full_disk": Fault(full_disk, (NOTHING,), (3.0, 10.0)),
     "flood": Fault(_babbler("flood"), (NOTHING,), (3.0, 6.0)),

@@ -83,6 +83,11 @@ class History:
         """Whether the observer may not know all that was said between two times."""
         return any(f.kind in (OVERLOAD, LOSS) and f.overlaps(begin, end) for f in self.faults)
 
+    def missed(self, begin: float, end: float) -> float:
+        """How much of the time [s] between two times the observer may not know all that was said."""
+        blind = (f for f in self.faults if f.kind in (OVERLOAD, LOSS) and f.overlaps(begin, end))
+        return sum(min(end, f.end) - max(begin, f.begin) for f in blind)
+
 
 OUTPUTS = {
     publisher: topic

@@ -3,10 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from deploy.chaos.findings import Evidence, Finding, percentile
-from deploy.chaos.history import ALL, CIRCUMSTANCES, OPERATOR, OUTPUTS, PROGRAMS, Fault, History, between
+from deploy.chaos.history import (
+    ALL,
+    CIRCUMSTANCES,
+    OPERATOR,
+    OUTPUTS,
+    PROGRAMS,
+    SENTINEL,
+    Fault,
+    History,
+    between,
+)
 from deploy.chaos.safety import Published
 from interfaces import topics
 
@@ -28,6 +38,8 @@ DOWNSTREAM = {
 STEADY = tuple(program for program in OUTPUTS if program != "operator_watchdog")
 """Programs whose output comes more often than every 250 ms, as long as the operator holds the switch."""
 
+OBSCURED = dict.fromkeys(("flood", "babble"), ("dead_mans_switch", "operator_watchdog"))
+"""Whose output cannot be told from what the monkey says."""
 MOMENTARY = ("kill", "terminate", "raise")
 LASTING = ("stop", "hang", "hog", "crash_loop", "kill_all", "kill_supervisor")
 
@@ -87,9 +99,8 @@ def others_flow_on(history: History) -> Finding:
         if fault.kind != "kill":
             continue
         end = min(fault.begin + min(_recovery(history, fault) or SLOWEST, SLOWEST), history.end - GAP)
-        for program in STEADY:
-            if program in (fault.target, *DOWNSTREAM.get(fault.target, ())):
-                continue
+        others = [p for p in STEADY if p not in (fault.target, *DOWNSTREAM.get(fault.target, ()))]
+        for program in others:
             if not _flowed(history, program, fault.begin, GAP):
                 continue
             if any(_disturbs(other, program, fault.begin - 1.0, end) for other in history.faults):
@@ -97,7 +108,7 @@ def others_flow_on(history: History) -> Finding:
             sent = [s.sent for s in between(history.output(program), fault.begin - GAP, end + GAP)]
             excused = 0
             for one, two in zip(sent, [*sent[1:], end], strict=True):
-                if two - one > GAP and _overloaded(history, one, two):
+                if two - one > GAP and _overloaded(history, one, two, others):
                     excused = 1
                     continue
                 longest = max(longest, two - one)
@@ -110,10 +121,10 @@ def others_flow_on(history: History) -> Finding:
     return Finding("L2", cases, figures, evidence, unknown)
 
 
-def _overloaded(history: History, begin: float, end: float) -> bool:
-    """Whether the observer may have missed something, or most steady streams paused at the same time."""
-    paused = sum(not between(history.output(program), begin + 0.02, end - 0.02) for program in STEADY)
-    return history.may_have_missed(begin, end) or 2 * paused > len(STEADY)
+def _overloaded(history: History, begin: float, end: float, programs: Sequence[str]) -> bool:
+    """Whether all but a gap is what the observer may have missed, or most of the streams paused with it."""
+    paused = sum(not between(history.output(program), begin + 0.02, end - 0.02) for program in programs)
+    return end - begin - history.missed(begin, end) <= GAP or 2 * paused > len(programs)
 
 
 def right_after_return(history: History) -> Finding:
@@ -151,7 +162,13 @@ def hung_is_replaced(history: History) -> Finding:
         if fault.kind not in ("stop", "hang") or fault.target not in PROGRAMS or lasted < HUNG:
             continue
         time = _recovery(history, fault)
-        if time is None or not _undisturbed(history, fault, fault.begin, fault.begin + min(time, HUNG)):
+        until = fault.begin + (0.0 if time is None else min(time, HUNG))
+        replaced_itself = any(
+            other.target in (SENTINEL, ALL) and other.overlaps(fault.begin - 1.0, until + 0.001)
+            for other in history.faults
+            if other is not fault
+        )
+        if time is None or replaced_itself or not _undisturbed(history, fault, fault.begin, until):
             unknown += 1
             continue
         times.setdefault(fault.target, []).append(time)
@@ -206,7 +223,7 @@ def _disturbs(fault: Fault, program: str, begin: float, end: float) -> bool:
     recovery = HUNG if fault.kind in LASTING else SLOWEST
     if fault.end + recovery < begin or fault.begin > end:
         return False
-    concerned = (fault.target, *DOWNSTREAM.get(fault.target, ()))
+    concerned = (fault.target, *DOWNSTREAM.get(fault.target, ()), *OBSCURED.get(fault.kind, ()))
     return program in concerned or fault.target == ALL
 
 

@@ -4,14 +4,22 @@ from __future__ import annotations
 
 import struct
 
-_NAN = struct.pack("<Q", 0x7FF8_BAB1_EBAB_1E00)
-NAN: float = struct.unpack("<d", _NAN)[0]
-"""Not a number, with the monkey's mark in it."""
+from interfaces import topics
+
+_MARK = 0x7FF8_BAB1_EBAB_1E00
+_NANS = {topic.name: struct.pack("<Q", _MARK + number) for number, topic in enumerate(topics.CONTRACT)}
 TEXT = "babble"
+_TEXT = struct.pack("<I", len(TEXT) + 1) + TEXT.encode() + b"\0"  # as a string of CDR, not as a part of one
 GARBAGE = b"\x00\xba\xbb\x1e"
 """The first bytes, after the header, of what nobody can read: a released switch, an endless text."""
 
 
-def is_babble(data: bytes) -> bool:
-    """Whether the monkey wrote this serialized message."""
-    return data[4:8] == GARBAGE or _NAN in data or TEXT.encode() in data
+def nan(topic: topics.Topic) -> float:
+    """Not a number, with a mark in it: the topic's own, as arithmetic keeps that of what came in."""
+    number: float = struct.unpack("<d", _NANS[topic.name])[0]
+    return number
+
+
+def is_babble(topic: topics.Topic, data: bytes) -> bool:
+    """Whether the monkey wrote this serialized message on a topic."""
+    return data[4:8] == GARBAGE or _NANS[topic.name] in data or _TEXT in data

@@ -197,7 +197,7 @@ def _command(pid: int) -> str:
 
 
 def main(arguments: list[str]) -> int:
-    """Observe until standard input ends."""
+    """Observe until standard input ends; the first line of output is the origin of the record's times."""
     path, arms = Path(arguments[0]), [Arm.parse(text) for text in arguments[1:]]
     origin = time.monotonic()
     recorder = Recorder(path, round(origin * 1e9), time.time_ns())
@@ -214,7 +214,7 @@ def main(arguments: list[str]) -> int:
         recorder.event(FAULTS, time.monotonic_ns(), event)
 
     def obey() -> None:
-        print("observing", flush=True)
+        print(f"observing {origin}", flush=True)
         for line in sys.stdin:
             event = relative(json.loads(line), "begin", "end")
             recorder.event(FAULTS, time.monotonic_ns(), event)

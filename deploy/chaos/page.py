@@ -7,12 +7,11 @@ from collections.abc import Iterator, Sequence
 from html import escape
 
 from deploy.chaos.findings import UNKNOWN, VIOLATED, Finding, percentile
-from deploy.chaos.history import ALL, LOSS, NOTHING, PROGRAMS, SILENCE, Fault, History
+from deploy.chaos.history import ALL, CIRCUMSTANCES, LOSS, NOTHING, OVERLOAD, PROGRAMS, Fault, History
 from deploy.chaos.liveness import HUNG, MEDIAN, SLOWEST
 from deploy.chaos.promises import meaning
 from deploy.chaos.report import TIMES
-from interfaces import topics
-from interfaces.topics import ON
+from deploy.chaos.safety import running
 
 LEFT, ROW, BAR = 150, 26, 14  # px: labels, rows, bars
 PER_SECOND, NARROWEST = 8.0, 1000.0  # px of a timeline
@@ -43,7 +42,8 @@ th { color: var(--soft); font-weight: 500; font-size: 13px; } td.number { text-a
 svg text { font: 12px system-ui, sans-serif; fill: var(--text); } svg .soft { fill: var(--soft); }
 svg .grid { stroke: var(--line); } svg .bound { stroke: var(--bad); stroke-dasharray: 4 3; }
 .one { fill: var(--one); } .two { fill: var(--two); } .flow { fill: var(--flow); } .on { fill: var(--on); }
-.kill { fill: var(--bad); } .lasting { fill: var(--lasting); fill-opacity: .55; }
+.missed { fill: var(--soft); } .kill { fill: var(--bad); }
+.lasting { fill: var(--lasting); fill-opacity: .55; }
 """
 
 
@@ -58,7 +58,7 @@ def page(title: str, remarks: Sequence[str], findings: Sequence[Finding], histor
         f"<h1 class={'violated' if broken else 'holds'}>{verdict}</h1>",
         *(f"<p>{escape(remark)}</p>" for remark in remarks),
         f"<h2>Promises</h2><div class=card>{_promises(findings)}</div>",
-        f"<h2>What happened</h2><p>{LEGEND}</p><div class=card>{timeline(history)}</div>",
+        f"<h2>What happened</h2><p>{LEGEND}</p><div class=card>{timeline(history, findings)}</div>",
     ]
     for finding in findings:
         if finding.times:
@@ -72,7 +72,9 @@ def page(title: str, remarks: Sequence[str], findings: Sequence[Finding], histor
 
 LEGEND = (
     "Each row shows the processes of a program, one after the other, and below them whether its output "
-    "flows. Red triangles are faults of a moment, amber bars those that last."
+    "flows. Red triangles are faults of a moment, amber bars those that last. Engines run from an `on` until "
+    "an `off`, or for 400 ms. Grey among the others: the observer may have missed something. Dashed red "
+    "lines: where a promise was broken."
 )
 
 
@@ -91,8 +93,12 @@ def _promises(findings: Sequence[Finding]) -> str:
     return f"<table>{''.join(rows)}</table>"
 
 
-def timeline(history: History) -> str:
-    """All programs over time: processes, output, faults; on top of them the operator and the engines."""
+def timeline(history: History, findings: Sequence[Finding] = ()) -> str:
+    """
+    All programs over time: processes, output, faults; on top of them the operator and the engines.
+
+    Lines across all rows show where the evidence of violated promises is.
+    """
     scale = max(PER_SECOND if history.end < 240 else 3.0, (NARROWEST - LEFT) / max(history.end, 1.0))
     rows = ["operator", "engines", OTHERS, "supervisord", *PROGRAMS]
     height = ROW * (len(rows) + 1)
@@ -115,6 +121,11 @@ def timeline(history: History) -> str:
                 f"width={max(0.7, x(end) - x(begin)):.1f} />"
             )
         parts += [_mark(fault, x, top) for fault in history.faults if _row_of(fault, row)]
+    for finding in findings:
+        for evidence in finding.evidence:
+            tip = f"<title>{finding.promise}: {escape(evidence.what)}</title>"
+            at = x(evidence.time)
+            parts.append(f"<line class=bound x1={at:.1f} x2={at:.1f} y1=0 y2={height - ROW}>{tip}</line>")
     return "".join(parts) + "</svg>"
 
 
@@ -124,10 +135,11 @@ def _bars(history: History, row: str) -> Iterator[tuple[float, float, str, int, 
         yield from ((b, e, "flow", 0, BAR) for b, e in _stretches(_times(history, "dead_mans_switch")))
         return
     if row == "engines":
-        on = [s.sent for s in history.stream(topics.ENGINES_STATE) if s.value == ON]
-        yield from ((b, e, "on", 0, BAR) for b, e in _stretches(on))
+        yield from ((b, e, "on", 0, BAR) for b, e in running(history))
         return
     if row == OTHERS:
+        blind = (f for f in history.faults if f.kind in (OVERLOAD, LOSS))
+        yield from ((f.begin, f.end, "missed", 0, BAR) for f in blind)
         return
     program = "" if row == "supervisord" else row
     lives = [life for life in history.lives if life.program == program]
@@ -158,7 +170,7 @@ def _stretches(times: Sequence[float]) -> Iterator[tuple[float, float]]:
 
 
 def _row_of(fault: Fault, row: str) -> bool:
-    if fault.kind in (SILENCE, LOSS):
+    if fault.kind in CIRCUMSTANCES:
         return False
     if fault.target == row:
         return True

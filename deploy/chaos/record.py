@@ -164,7 +164,7 @@ def load(path: Path, namespace: str = "/") -> History:
 
 def _values(topic: topics.Topic, data: bytes, prefix: str) -> list[Any]:
     """What a message says, plain; nothing where it is the monkey's babble."""
-    if is_babble(data):
+    if is_babble(topic, data):
         return []
     try:
         message = deserialize_message(data, topic.type)

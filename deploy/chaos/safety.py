@@ -13,6 +13,7 @@ from interfaces import topics
 from interfaces.topics import DRIVE, OFF, ON, TURN_OFF, TURN_ON
 
 OFF_WITHIN = 10.5  # s, S1
+ABSENCE = 10.0  # s without a presence after which the controller turns the engines off
 STRIKE, STRIKES = 3.0, 3  # s; silences after which the operator watchdog turns the engines off
 SAMPLING = 0.5  # s by which it may notice the begin of a silence early
 SEEN_WITHIN = 1.0  # s, S3
@@ -27,9 +28,9 @@ def engines_off_in_time(history: History) -> Finding:
     """S1: engines are off at most 10.5 s after the operator's last sign of life."""
     alive = [s.sent for s in history.stream(topics.OPERATOR_HEARTBEAT) if s.value is True]
     evidence, longest, cases = [], 0.0, 0
-    running = list(_running(history))
+    stretches = list(running(history))
     for begin, end in gaps(alive, -math.inf, history.end):
-        late = [(on, off) for on, off in running if on < end and off > begin]
+        late = [(on, off) for on, off in stretches if on < end and off > begin]
         if not late:
             continue
         if begin == -math.inf:
@@ -47,19 +48,23 @@ def engines_off_in_time(history: History) -> Finding:
 
 def stays_on(history: History) -> Finding:
     """S2: while the operator is alive, no kill of any other service turns the engines off."""
-    evidence, explained, held = [], 0, 0
+    evidence, explained, held, unknown = [], 0, 0, 0
     for on, off in _changes(history, ON, OFF):
-        absent = _absences(history, off.sent) >= STRIKES
-        if absent or _controller_was_away(history, on, off) or _commanded_by_others(history, off):
+        if _controller_was_away(history, on, off) or _commanded(history, off) or _abandoned(history, off):
             explained += 1
+        elif history.may_have_missed(off.sent - 1.0, off.sent):
+            unknown += 1  # the command
         else:
             evidence.append(Evidence(off.sent, "engines turned off though the operator was there"))
     states = history.stream(topics.ENGINES_STATE)
+    heartbeats = [s for s in history.stream(topics.OPERATOR_HEARTBEAT) if s.value is True]
     for fault in history.faults:
         if fault.kind == "kill" and fault.target != "engine_controller":
             before = _last(states, fault.begin)
-            held += before is not None and before.value == ON
-    return Finding("S2", held, f"{held} kills while on; off {explained} times for a good reason", evidence)
+            alive = between(heartbeats, fault.begin - SEEN_WITHIN, fault.begin)
+            held += bool(before and before.value == ON and alive)
+    figures = f"{held} kills while on; off {explained} times for a good reason"
+    return Finding("S2", held, figures, evidence, unknown)
 
 
 def turned_on_by_the_present(history: History) -> Finding:
@@ -67,17 +72,19 @@ def turned_on_by_the_present(history: History) -> Finding:
     commands = [s for s in history.stream(topics.ENGINES) if s.value == TURN_ON]
     heartbeats = [s for s in history.stream(topics.OPERATOR_HEARTBEAT) if s.value is True]
     evidence, cases, unknown, oldest = [], 0, 0, 0.0
+    before = -math.inf
     for stopped, on in _starts(history):
-        command = between(commands, on.sent - SEEN_WITHIN - TRANSPORT, on.sent + 0.01)
+        # A command starts them once: not again after they were turned off.
+        command = between(commands, max(before, on.sent - SEEN_WITHIN - TRANSPORT), on.sent + 0.01)
+        before = on.sent + 0.011
         seen = between(heartbeats, on.sent - SEEN_WITHIN - TRANSPORT, on.sent + 0.01)
         if command and seen:
             cases += 1
             oldest = max(oldest, on.sent - seen[-1].sent)
-        elif not command and any(
-            life.program == "dead_mans_switch" and on.sent - 3.0 < life.began <= on.sent
-            for life in history.lives
+        elif _told_of(history, on.sent) and any(
+            on.sent - 3.0 < life.began <= on.sent for life in _lives(history, "dead_mans_switch")
         ):
-            unknown += 1  # a command of a new publisher, which the observer did not know yet
+            unknown += 1  # a command or heartbeat of a new publisher, which the observer did not know yet
         elif history.may_have_missed(max(stopped, on.sent - SEEN_WITHIN), on.sent):
             unknown += 1  # what kept them on, or the command
         else:
@@ -185,7 +192,7 @@ def _any_fits(candidates: list[list[float]], x: float, y: float) -> bool:
     return False
 
 
-def _running(history: History) -> Iterator[tuple[float, float]]:
+def running(history: History) -> Iterator[tuple[float, float]]:
     """The stretches for which the engines run: renewed by each `on`, ended by an `off` or by nothing."""
     states = history.stream(topics.ENGINES_STATE)
     for state, following in itertools.zip_longest(states, states[1:]):
@@ -197,7 +204,7 @@ def _starts(history: History) -> Iterator[tuple[float, Sample]]:
     """Each `on` that sets the engines going, and since when they stood still: also without an `off`."""
     stopped = -math.inf
     states = {state.sent: state for state in history.stream(topics.ENGINES_STATE)}
-    for begin, end in _running(history):
+    for begin, end in running(history):
         if begin > stopped:
             yield stopped, states[begin]
         stopped = end
@@ -211,10 +218,7 @@ def _changes(history: History, before: str, after: str) -> Iterator[tuple[Sample
 
 def _controller_was_away(history: History, on: Sample, off: Sample) -> bool:
     """Whether another process than that which said `on` may have said `off`, or it was paused in between."""
-    died = any(
-        life.program == "engine_controller" and on.sent - 0.02 < life.began <= off.sent
-        for life in history.lives
-    )
+    died = any(on.sent - 0.02 < life.began <= off.sent for life in _lives(history, "engine_controller"))
     paused = history.may_have_missed(on.sent, off.sent) or any(
         fault.kind in BLINDING
         and fault.target in ("engine_controller", ALL)
@@ -224,32 +228,62 @@ def _controller_was_away(history: History, on: Sample, off: Sample) -> bool:
     return died or (paused and off.sent - on.sent > DRIVE)
 
 
-def _absences(history: History, time: float) -> float:
-    """The strikes that an operator watchdog may have counted until a time, since it counted anew."""
-    since = max(
-        (s.sent for s in history.stream(topics.ENGINES) if s.value == TURN_OFF and s.sent < time - 1.0),
-        default=0.0,
+def _told_of(history: History, time: float) -> bool:
+    """Whether the operator watchdog saw the operator in the second before."""
+    presences = history.stream(topics.OPERATOR_PRESENCE)
+    return bool(between(presences, time - SEEN_WITHIN - TRANSPORT, time + 0.01))
+
+
+def _commanded(history: History, off: Sample) -> bool:
+    """Whether a `turn_off` was said just before, by the monkey or for as many silences as that takes."""
+    commands = [s for s in history.stream(topics.ENGINES) if s.value == TURN_OFF]
+    if not between(commands, off.sent - TRANSPORT, off.sent + 0.01):
+        return False
+    by_the_monkey = any(
+        fault.kind == "turn_off" and fault.begin <= off.sent <= fault.begin + 1.0 for fault in history.faults
     )
+    return by_the_monkey or _absences(history, off.sent) >= STRIKES
+
+
+def _absences(history: History, time: float) -> float:
+    """The strikes that the operator watchdog of a time may have counted until then, since it counted anew."""
+    commands = (s.sent for s in history.stream(topics.ENGINES) if s.value == TURN_OFF and s.sent < time - 1.0)
+    births = (life.began for life in _lives(history, "operator_watchdog") if life.began < time)
+    since = max([*commands, *births], default=0.0)
     heartbeats = [s.sent for s in history.stream(topics.OPERATOR_HEARTBEAT) if s.value is True]
     begin = max((t for t in heartbeats if t <= since), default=0.0)
     # While it was stopped it saw nobody either: that is what S2 does not promise.
-    blind = [
-        (fault.begin, fault.end)
-        for fault in history.faults
-        if fault.kind in BLINDING and fault.target in ("operator_watchdog", ALL) and fault.end <= time + 1.0
-    ]
+    blind = [(max(one, begin), min(two, time)) for one, two in _blind(history) if one < time and two > begin]
     silences = [*gaps([t for t in heartbeats if begin < t <= time], begin, time), *blind]
     return sum((end - begin + SAMPLING) // STRIKE for begin, end in silences)
 
 
+def _abandoned(history: History, off: Sample) -> bool:
+    """Whether the controller saw nobody for ten seconds: the operator was silent, or the watchdog blind."""
+    presences = history.stream(topics.OPERATOR_PRESENCE)
+    begin = off.sent - ABSENCE + TRANSPORT
+    if between(presences, begin, off.sent - TRANSPORT):
+        return False
+    heartbeats = [s.sent for s in history.stream(topics.OPERATOR_HEARTBEAT) if s.value is True]
+    silent = any(two - one > SEEN_WITHIN for one, two in gaps(heartbeats, begin, off.sent))
+    return silent or any(one < off.sent and two > begin for one, two in _blind(history))
+
+
+def _blind(history: History) -> Iterator[tuple[float, float]]:
+    """When an operator watchdog heard nobody: it was paused by the monkey, until it died or went on."""
+    ends = {life.pid: life.ended for life in _lives(history, "operator_watchdog")}
+    for fault in history.faults:
+        if fault.kind in BLINDING and fault.target in ("operator_watchdog", ALL):
+            ended = ends.get(fault.pid)
+            yield fault.begin, fault.end if ended is None else min(fault.end, ended)
+
+
+def _lives(history: History, program: str) -> Iterator[Life]:
+    return (life for life in history.lives if life.program == program)
+
+
 BLINDING = ("stop", "hang", "hog")
 """Faults that keep a process from hearing."""
-
-
-def _commanded_by_others(history: History, off: Sample) -> bool:
-    return any(
-        fault.kind == "turn_off" and fault.begin <= off.sent <= fault.begin + 1.0 for fault in history.faults
-    )
 
 
 def _last(samples: Sequence[Sample], time: float) -> Sample | None:

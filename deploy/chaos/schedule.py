@@ -95,7 +95,7 @@ def stop_controller() -> Schedule:
     """Stop the engine controller just before it would turn off, when the watchdog has lost its strikes."""
     return [
         Planned(AWAKE + 5.0, "kill", "operator_watchdog"),
-        Planned(AWAKE + 9.6, "stop", "engine_controller", 4.0),
+        Planned(AWAKE + 9.4, "stop", "engine_controller", 4.0),
     ]
 
 
@@ -118,7 +118,7 @@ def nonsense() -> Schedule:
         Planned(21.0, "kill", "velocity"),
         Planned(26.0, "full_disk", NOTHING, 8.0),
         Planned(29.0, "kill", "config_theta1"),
-        Planned(32.0, "double", "engine_controller", 5.0),
+        Planned(32.0, "double", "engine_controller", 6.0),
     ]
 
 
@@ -131,10 +131,10 @@ def variously() -> Schedule:
     """All other faults once, ending with a controller that is stopped while it should act."""
     return [
         Planned(5.0, "hang", "kinematics", 15.0),
-        Planned(5.5, "double", "engine_controller", 5.0),
-        Planned(6.0, "stop", "config_l1", 15.0),
+        Planned(5.5, "double", "engine_controller", 6.0),
         Planned(8.0, "terminate", "config_l2"),
         Planned(9.0, "raise", "config_theta1"),
+        Planned(9.5, "stop", "config_l1", 15.0),
         Planned(11.0, "hog", "velocity"),
         Planned(12.0, "crash_loop", "config_l2", 3.0),
         Planned(13.0, "flood", NOTHING, 5.0),

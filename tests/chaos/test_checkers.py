@@ -112,9 +112,26 @@ def test_s2_three_silences_are_a_good_reason_and_two_are_none() -> None:
     history = good()
     for begin in (20.0, 30.0):
         history = silent(history, "operator_heartbeat", begin, begin + 4.0)
-    assert verdict("S2", says(history, "engines/state", OFF, 44.0)) == VIOLATED
-    history = silent(history, "operator_heartbeat", 40.0, 44.0)
-    assert verdict("S2", says(history, "engines/state", OFF, 44.0)) != VIOLATED
+    command = (44.05, TURN_OFF)
+    assert verdict("S2", added(says(history, "engines/state", OFF, 44.0), "engines", command)) == VIOLATED
+    history = says(silent(history, "operator_heartbeat", 40.0, 44.0), "engines/state", OFF, 44.0)
+    assert verdict("S2", history) == VIOLATED  # of itself: no turn_off was heard
+    assert verdict("S2", faulty(history, Fault("overload", NOTHING, 43.5, 43.9))) != VIOLATED
+    assert verdict("S2", added(history, "engines", command)) != VIOLATED
+
+
+def test_s2_a_watchdog_that_hung_has_no_strikes_when_it_is_replaced() -> None:
+    history = killed(good(), "operator_watchdog", 13.0, 1.0)
+    pid = next(life.pid for life in history.lives if life.program == "operator_watchdog")
+    history = faulty(history, Fault("hang", "operator_watchdog", 10.0, 25.0, pid))
+    history = added(says(history, "engines/state", OFF, 50.0), "engines", (50.05, TURN_OFF))
+    assert verdict("S2", history) == VIOLATED
+
+
+def test_s2_ten_seconds_without_a_presence_are_a_reason_if_the_operator_was_silent() -> None:
+    history = says(silent(good(), "operator_presence", 30.0, 45.0), "engines/state", OFF, 40.0)
+    assert verdict("S2", history) == VIOLATED
+    assert verdict("S2", silent(history, "operator_heartbeat", 30.0, 45.0)) != VIOLATED
 
 
 def test_s2_a_controller_that_was_stopped_is_a_good_reason() -> None:
@@ -132,6 +149,10 @@ def test_s3_holds_when_a_present_operator_turns_them_on() -> None:
 
 def test_s3_catches_engines_that_go_on_without_a_command() -> None:
     assert verdict("S3", says(good(), "engines/state", OFF, 20.0, 25.0)) == VIOLATED
+
+
+def test_s3_catches_engines_that_go_on_again_by_a_command_that_was_obeyed_before() -> None:
+    assert verdict("S3", says(good(), "engines/state", OFF, 5.25, 5.65)) == VIOLATED
 
 
 def test_s3_catches_engines_that_go_on_without_an_operator() -> None:
@@ -248,6 +269,14 @@ def test_l1_what_a_second_fault_held_up_is_unknown() -> None:
     assert (finding.verdict, finding.unknown) == (UNKNOWN, 1)
 
 
+@pytest.mark.parametrize("kind", ["flood", "babble"])
+def test_l1_the_monkeys_own_heartbeats_are_no_return_of_the_switch(kind: str) -> None:
+    history = killed(good(), "dead_mans_switch", 20.0, 99.0)
+    history = added(history, "operator_heartbeat", *((20.0 + n / 10, True) for n in range(1, 50)))
+    finding = CHECKERS["L1"](faulty(history, Fault(kind, NOTHING, 19.0, 25.0)))
+    assert (finding.cases, finding.unknown) == (0, 1)
+
+
 def test_l1_a_switch_that_is_not_held_has_nothing_to_say() -> None:
     history = asleep(good(), 20.0, 29.6)
     history = killed(history, "dead_mans_switch", 25.0, 0.6)
@@ -270,10 +299,11 @@ def test_l2_catches_a_stream_that_pauses_meanwhile() -> None:
 
 def test_l2_a_pause_of_the_whole_machine_stays_unknown_and_hides_no_other() -> None:
     history = silent(killed(good(), "kinematics", 20.0, 0.6), "theta1", 20.1, 20.5)
-    stalled = faulty(history, Fault("overload", NOTHING, 20.05, 20.12))
+    assert verdict("L2", faulty(history, Fault("overload", NOTHING, 20.05, 20.12))) == VIOLATED
+    stalled = faulty(history, Fault("overload", NOTHING, 20.05, 20.4))
     finding = CHECKERS["L2"](stalled)
     assert (finding.verdict, finding.cases, finding.unknown) == (HOLDS, 5, 1)
-    (evidence,) = CHECKERS["L2"](silent(stalled, "l1", 20.2, 20.55)).evidence
+    (evidence,) = CHECKERS["L2"](silent(stalled, "l1", 20.41, 20.79)).evidence
     assert "config_l1 is silent" in evidence.what
 
 
@@ -315,6 +345,12 @@ def test_l4_holds_when_it_is_replaced_soon() -> None:
 @pytest.mark.parametrize("after", [5.2, 15.0, 99.0])
 def test_l4_catches_what_is_replaced_late_or_never(after: float) -> None:
     assert verdict("L4", hung(after)) == VIOLATED
+
+
+def test_l4_while_the_sentinel_itself_is_replaced_is_unknown() -> None:
+    history = faulty(hung(6.5), Fault("kill", "sentinel", 22.0, 22.0))
+    finding = CHECKERS["L4"](history)
+    assert (finding.cases, finding.unknown) == (0, 1)
 
 
 def test_percentiles_are_values_that_occurred() -> None:

@@ -16,10 +16,10 @@ PIDS = {name: 100 + index for index, name in enumerate(SERVICES)}
 LOOK = 0.25
 
 
-def program(name: str, state: str = "RUNNING", pid: int | None = None) -> Watched:
+def program(name: str, state: str = "RUNNING", pid: int | None = None, age: float = 0.0) -> Watched:
     """A supervised program."""
     up = state in ("RUNNING", "STARTING")
-    return Watched(name, state, (pid or PIDS[name]) if up else 0, 0, "", "")
+    return Watched(name, state, (pid or PIDS[name]) if up else 0, age, 0, "", "")
 
 
 class Run:
@@ -78,6 +78,14 @@ def test_gives_a_new_process_time_to_start() -> None:
     assert action[:3] == ("kill", "velocity", 500)
 
 
+def test_a_new_sentinel_does_not_give_time_to_start_to_what_hangs_already() -> None:
+    run = Run()
+    run.programs["velocity"] = program("velocity", age=300.0)
+    (when, action), *_ = run.look(7.0, silent=["velocity"])
+    assert action[:3] == ("kill", "velocity", PIDS["velocity"])
+    assert when < 6.0
+
+
 def test_the_health_of_another_process_of_that_name_counts_for_nothing() -> None:
     run = Run()
     run.look(20.0)
@@ -106,8 +114,18 @@ def test_lets_a_process_be_that_was_stopped_briefly() -> None:
 def test_does_nothing_when_it_does_not_hear_itself() -> None:
     run = Run()
     run.look(20.0)
-    assert run.look(30.0, silent=[NAME, "kinematics"]) == []
+    assert run.look(10.0, silent=[NAME, "kinematics"]) == []
     assert run.judge.confused == "it does not hear itself"
+    assert run.look(2.0) == []
+    assert not run.judge.confused
+
+
+def test_makes_room_for_a_successor_when_it_has_not_heard_itself_for_long() -> None:
+    run = Run()
+    run.look(20.0)
+    decided = run.look(14.0, silent=[NAME, "kinematics"])
+    assert {action.program for _, action in decided} == {NAME}
+    assert 32.0 < decided[0][0] < 34.0
 
 
 def test_does_nothing_when_most_are_silent_at_once() -> None:
@@ -121,7 +139,7 @@ def test_does_nothing_when_most_are_silent_at_once() -> None:
 
 def test_does_nothing_while_it_has_heard_nobody_yet() -> None:
     run = Run()
-    assert run.look(60.0, silent=SERVICES) == []
+    assert {action.program for _, action in run.look(60.0, silent=SERVICES)} <= {NAME}
 
 
 def test_after_a_pause_of_its_own_it_waits_for_news() -> None:
@@ -196,7 +214,7 @@ def test_warns_of_a_program_that_dies_again_and_again_though_it_runs_for_a_while
 
 
 def test_tells_state_pid_restarts_last_exit_and_why_of_every_process() -> None:
-    given_up = Watched("velocity", "FATAL", 0, 7, "code 2", "Exited too quickly")
+    given_up = Watched("velocity", "FATAL", 0, 0.0, 7, "code 2", "Exited too quickly")
     status, fatal = states([program("kinematics"), given_up], {"velocity": "no health"}, {}, "/sentinel")
     assert (status.level, status.name) == (DiagnosticStatus.OK, "/sentinel: kinematics")
     assert fatal.level == DiagnosticStatus.ERROR

@@ -119,24 +119,26 @@ def test_the_end_of_the_heartbeats_is_a_silence(scheduler: TestScheduler) -> Non
     assert 10.0 <= commands[0][0] <= 10.5
 
 
-def strikes(heartbeats: list[int], until: int) -> list[int]:
+def strikes(heartbeats: list[int], first: int, until: int) -> list[int]:
     """
     Return when the operator is missed, in ms, by a model that knows no Rx.
 
-    A silence is one of the samples: of each half second from where counting began, whether there was a
-    heartbeat in it.
+    A silence is one of the samples: of each half second, from the first sample on after where counting
+    began, whether there was a heartbeat in it.
     """
     missed: list[int] = []
     begin = seen = 10
     pending = sorted(heartbeats)
     while len(missed) < 3:
-        for sample in range(begin + 500, until, 500):
+        before = begin
+        for sample in range(begin + first, until, 500):
             if seen + 3000 <= sample:
                 break
             beats = [beat for beat in pending if beat <= sample]
             pending = pending[len(beats) :]
-            if any(beat > sample - 500 for beat in beats):
+            if any(beat > before for beat in beats):
                 seen = sample
+            before = sample
         if seen + 3000 >= until:
             break
         begin = seen = seen + 3000
@@ -145,14 +147,16 @@ def strikes(heartbeats: list[int], until: int) -> list[int]:
     return missed
 
 
-@given(st.lists(st.integers(11, 20_000), max_size=30))
-def test_the_watchdog_fires_if_and_only_if_there_were_three_silences(heartbeats: list[int]) -> None:
+@given(st.lists(st.integers(11, 20_000), max_size=30), st.sampled_from([100, 500]))
+def test_the_watchdog_fires_if_and_only_if_there_were_three_silences(
+    heartbeats: list[int], sample: int
+) -> None:
     until = 25_000
-    expected = strikes(heartbeats, until)
+    expected = strikes(heartbeats, sample, until)
     scheduler = TestScheduler()
     times = [time / 1000 for time in sorted(heartbeats)]
 
-    commands, _, missed = watch(scheduler, hot(scheduler, *times), until / 1000)
+    commands, _, missed = watch(scheduler, hot(scheduler, *times), until / 1000, first=sample / 1000)
 
     assert [round(time * 1000) for time in missed[:3]] == expected
     first = round(commands[0][0] * 1000) if commands else None

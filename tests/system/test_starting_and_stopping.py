@@ -208,6 +208,7 @@ def test_a_run_directory_that_cannot_be_made_is_told(site: Site, tmp_path: Path)
     site.run = tmp_path / "file" / "run"
     site.run.parent.touch()
     assert site.do("start", STEADY) == (1, f"[Errno 20] Not a directory: '{site.run}'")
+    site.run.parent.unlink()
 
 
 def test_an_impossible_namespace_is_told(site: Site) -> None:
