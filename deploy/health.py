@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from contextlib import suppress
 from typing import NamedTuple
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
@@ -34,15 +35,23 @@ class HealthMonitor:
         node.create_subscription(topic.type, topic.name, self._on_message, topic.qos)
 
     def _on_message(self, message: DiagnosticArray) -> None:
-        for status in message.status:
-            values = {pair.key: pair.value for pair in status.values}
-            namespace, _, program = status.name.rpartition("/")
-            if namespace == self._namespace and "pid" in values and "published" in values:
-                self.latest[program] = _health(status, values)
+        self.latest.update(healths(message, self._namespace))
+
+
+def healths(message: DiagnosticArray, prefix: str) -> dict[str, Health]:
+    """The healths of services in a message, by program; what others say there is none."""
+    found = {}
+    for status in message.status:
+        values = {pair.key: pair.value for pair in status.values}
+        namespace, _, program = status.name.rpartition("/")
+        if namespace == prefix and "published" in values:
+            with suppress(KeyError, ValueError):  # of somebody who says something similar
+                found[program] = _health(status, values)
+    return found
 
 
 def _health(status: DiagnosticStatus, values: dict[str, str]) -> Health:
-    since_output = values.get("seconds_since_output", "")
+    since_output = values["seconds_since_output"]
     return Health(
         heard=time.monotonic(),
         pid=int(values["pid"]),

@@ -47,6 +47,16 @@ def test_members_are_found_by_their_mark_and_know_their_program(spawn: Spawn, tm
     assert processes.of_system(tmp_path) == [(supervisor.pid, ""), (service.pid, "velocity")]
 
 
+def test_who_uses_a_directory_of_programs_is_found_wherever_it_runs(spawn: Spawn, tmp_path: Path) -> None:
+    programs, elsewhere = tmp_path / "bin", os.environ["PATH"]
+    marked = {processes.MARK: str(tmp_path / "run")}
+    spawn(**marked, PATH=f"{programs}:{elsewhere}")
+    spawn(**marked, SUPERVISOR_PROCESS_NAME="velocity", PATH=f"{programs}:{elsewhere}")
+    spawn(**{processes.MARK: str(tmp_path / "other")}, PATH=f"{elsewhere}:{programs}")
+    spawn(PATH=f"{programs}:{elsewhere}")
+    assert processes.using(programs) == [tmp_path / "run"]
+
+
 def test_a_member_that_heeds_sigterm_ends_by_it(spawn: Spawn, tmp_path: Path) -> None:
     process = spawn(**{processes.MARK: str(tmp_path)})
     processes.end(tmp_path, [process.pid], grace=10.0)
