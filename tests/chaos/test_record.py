@@ -1,22 +1,73 @@
-"""What the monkey says of a file that is no record."""
+"""Records: what others read in them, what the monkey says of them, and of files that are none."""
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
+from rclpy.serialization import serialize_message
+from rosbags.highlevel import AnyReader
+from rosbags.typesys import Stores, get_typestore
+from std_msgs.msg import Float64
 
 from deploy.chaos.__main__ import main
 from deploy.chaos.history import Life
-from deploy.chaos.record import PROCESSES, Recorder
+from deploy.chaos.record import PROCESSES, Recorder, qos_profiles
+from interfaces import topics
 
 
-def recorded(path: Path) -> bytes:
-    """A record of a process, and nothing else."""
-    recorder = Recorder(path, 0, 0)
-    recorder.event(PROCESSES, 1, Life("kinematics", 7, 0.0, None)._asdict() | {"namespace": "/"})
+def recorded(path: Path, *lives: Life) -> bytes:
+    """A record of processes and a speed, and nothing else."""
+    recorder = Recorder(path, 0, 10**18)
+    for life in lives:
+        recorder.event(PROCESSES, 1, life._asdict() | {"namespace": "/"})
+    speed = topics.EFFECTOR_SPEED
+    data = serialize_message(Float64(data=1.5))
+    for second in range(20):
+        sent = second * 10**9
+        recorder.message(
+            "/effector/speed", speed.type_name, qos_profiles(speed), data, sent + 2_000_000, sent + 1_000_000
+        )
     recorder.close()
     return path.read_bytes()
+
+
+ONE, OTHER = Life("velocity", 7, 0.0, None), Life("velocity", 8, 5.0, 12.0)
+
+
+def test_a_record_is_read_by_the_tools_of_ros(tmp_path: Path) -> None:
+    path = tmp_path / "record.mcap"
+    recorded(path, ONE)
+    with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_JAZZY)) as reader:
+        read = [
+            (connection.topic, time, reader.deserialize(data, connection.msgtype).data)
+            for connection, time, data in reader.messages()
+        ]
+    assert read[1:3] == [
+        ("/effector/speed", 10**18 + 2_000_000, 1.5),
+        ("/effector/speed", 10**18 + 1_002_000_000, 1.5),
+    ]
+    assert json.loads(read[0][2])["program"] == "velocity"
+
+
+def test_a_broken_promise_is_told_with_its_evidence_and_is_exit_code_1(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "record.mcap"
+    recorded(path, ONE, OTHER)
+    assert main(["--replay", str(path)]) == 1
+    printed = capsys.readouterr().out
+    assert "S5 is violated:\n  at 5.00 s: processes 7 and 8 are both velocity" in printed
+    page = (tmp_path / "replay.html").read_text(encoding="utf-8")
+    assert "<h1 class=violated>S5 violated</h1>" in page
+    assert "processes 7 and 8 are both velocity" in page
+
+
+def test_where_nothing_is_broken_the_exit_code_is_0(tmp_path: Path) -> None:
+    path = tmp_path / "record.mcap"
+    recorded(path, ONE)
+    assert main(["--replay", str(path)]) == 0
 
 
 @pytest.mark.parametrize("kept", [0, 5, 100, -10], ids="to {} bytes".format)
@@ -24,7 +75,7 @@ def test_tells_in_a_line_that_a_record_is_not_complete(
     kept: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     record = tmp_path / "record.mcap"
-    record.write_bytes(recorded(tmp_path / "whole.mcap")[:kept])
+    record.write_bytes(recorded(tmp_path / "whole.mcap", ONE)[:kept])
     assert main(["--replay", str(record)]) == 1
     assert capsys.readouterr().err.startswith(f"{record} is no complete record: ")
 
