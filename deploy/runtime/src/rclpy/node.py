@@ -130,6 +130,7 @@ class Node(NodeParameters, NodeGraph):
         self._guards: list[GuardCondition] = []
         self._rates: dict[Rate, Timer] = {}
         self._events: dict[Publisher | Subscription, EndpointEvents] = {}
+        self._used_types: set[Any] = set()  # of messages and services, for who asks what they look like
         self._entities_version = 0
         self._default_callback_group = MutuallyExclusiveCallbackGroup()
 
@@ -373,6 +374,7 @@ class Node(NodeParameters, NodeGraph):
         """The profile, with its overrides, and the fully qualified name of a new endpoint's topic."""
         self._check_usable()
         check_is_valid_msg_type(msg_type)
+        self._used_types.add(msg_type)
         if isinstance(qos_profile, QoSProfile):
             profile = qos_profile
         elif isinstance(qos_profile, int):
@@ -434,6 +436,7 @@ class Node(NodeParameters, NodeGraph):
     ) -> ServiceEndpoint:
         self._check_usable()
         check_is_valid_srv_type(srv_type)
+        self._used_types.add(srv_type)
         validate_topic_name(srv_name, is_service=True)
         name = self._remapped(srv_name, is_service=True)
         graph = self._graph

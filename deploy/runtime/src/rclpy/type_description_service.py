@@ -6,15 +6,18 @@ from typing import TYPE_CHECKING, Any
 
 from rclpy.parameter import Parameter
 from rclpy.qos import qos_profile_services_default
+from rclpy.type_hash import TypeHash
 
 if TYPE_CHECKING:
     from rclpy.node import Node
 
 START_TYPE_DESCRIPTION_SERVICE_PARAM = "start_type_description_service"
 
+_NOT_IN_USE = "Type not currently in use by this node"
+
 
 class TypeDescriptionService:
-    """Describes types, unless the parameter ``start_type_description_service`` is false."""
+    """Describes a node's types, unless its parameter ``start_type_description_service`` is false."""
 
     def __init__(self, node: Node) -> None:
         """Declare the parameter, and create the service if it says so."""
@@ -48,23 +51,16 @@ class TypeDescriptionService:
             self._service = None
 
     def _describe(self, request: Any, response: Any) -> Any:
-        from rosidl_runtime_embedded.packages import definition_source
-        from rosidl_runtime_embedded.type_description import type_description, type_hash
-        from type_description_interfaces.msg import TypeSource
+        """Answer as rcl does: the hash says which type is meant, whatever the name, and it must be in use."""
+        from rosidl_runtime_embedded.type_description import type_description, type_sources
 
-        try:
-            if request.type_hash != type_hash(request.type_name):
-                raise LookupError(f"type {request.type_name} has another hash than {request.type_hash}")
-            description: Any = type_description(request.type_name)
-        except (LookupError, ValueError) as error:
-            response.successful, response.failure_reason = False, str(error)
+        names = {used._TYPE_HASH: used._TYPE_NAME for used in list(self._node._used_types)}
+        name = names.get(request.type_hash)
+        if name is None:
+            known = TypeHash._parse(request.type_hash) != TypeHash()
+            response.failure_reason = _NOT_IN_USE if known else "Failed to parse type hash"
             return response
-        response.successful, response.type_description = True, description
+        response.successful, response.type_description = True, type_description(name)
         if request.include_type_sources:
-            referenced = description.referenced_type_descriptions
-            for name in [request.type_name, *(one.type_name for one in referenced)]:
-                path, contents = definition_source(name)
-                encoding = path.rpartition(".")[2]
-                source = TypeSource(type_name=name, encoding=encoding, raw_file_contents=contents)
-                response.type_sources.append(source)
+            response.type_sources = type_sources(response.type_description)
         return response

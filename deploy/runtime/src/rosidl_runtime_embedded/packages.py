@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 _SHIPPED = os.path.dirname(os.path.dirname(__file__))
 _KINDS = ["msg", "srv", "action"]
-_SERVICE_PARTS = ("Request", "Response", "Event")
+SERVICE_PARTS = ("Request", "Response", "Event")
 
 
 def _directories(package: str) -> Iterator[str]:
@@ -50,8 +50,12 @@ def interface_names(package: str, kind: str) -> list[str]:
     return sorted(file.removesuffix(f".{kind}") for file in files if file.endswith(f".{kind}"))
 
 
+@cache
 def definition_source(name: str) -> tuple[str, str]:
-    """File and text that define ``<package>/<msg or srv>/<Name>``. Raises LookupError if there is none."""
+    """File and text that define ``<package>/<msg or srv>/<Name>``. Raises LookupError or InvalidDefinition.
+
+    Kept for who asks what a type in use looks like: the file may have changed meanwhile.
+    """
     path = _file(name)
     if path is None:
         raise LookupError(f"there is no definition of {name}")
@@ -78,7 +82,7 @@ def message_definition(name: str) -> MessageDefinition:
     """Definition of a message or a service's part by full name. Raises LookupError or InvalidDefinition."""
     if "/srv/" in name:
         service, _, part = name.rpartition("_")
-        if part not in _SERVICE_PARTS:
+        if part not in SERVICE_PARTS:
             raise LookupError(f"{name} is no message")
         definition: MessageDefinition = getattr(service_definition(service), part.lower())
         return definition
@@ -116,13 +120,13 @@ def interfaces(module_name: str) -> tuple[Callable[[str], Any], Callable[[], lis
     def names() -> list[str]:
         names = interface_names(package, kind)
         if kind == "srv":
-            names += [f"{name}_{part}" for name in names for part in _SERVICE_PARTS]
+            names += [f"{name}_{part}" for name in names for part in SERVICE_PARTS]
         return sorted(names)
 
     def get(name: str) -> Any:
         if name == "__all__":
             return names()
-        is_part = kind == "srv" and name.endswith(tuple(f"_{part}" for part in _SERVICE_PARTS))
+        is_part = kind == "srv" and name.endswith(tuple(f"_{part}" for part in SERVICE_PARTS))
         interface = name.rpartition("_")[0] if is_part else name
         if not _is_defined(f"{package}/{kind}/{interface}"):
             raise AttributeError(f"module '{module_name}' has no attribute '{name}'")

@@ -7,7 +7,7 @@ from hashlib import sha256
 from typing import TYPE_CHECKING, Any
 
 from .definition import Field, FieldType, MessageDefinition
-from .packages import message_class, message_definition, service_definition
+from .packages import SERVICE_PARTS, definition_source, message_class, message_definition, service_definition
 
 if TYPE_CHECKING:
     from .message import Message
@@ -32,9 +32,13 @@ _TYPE_IDS = {
 _NESTED, _BOUNDED_TEXT, _ARRAY, _BOUNDED_SEQUENCE, _SEQUENCE = 1, 4, 48, 96, 144
 
 
+def _is_part(name: str) -> bool:
+    return "/srv/" in name and name.rpartition("_")[2] in SERVICE_PARTS
+
+
 def _individual(name: str) -> MessageDefinition:
     """A type as a struct; that of a service has its three messages as members."""
-    if "/srv/" not in name or name.endswith(("_Request", "_Response", "_Event")):
+    if "/srv/" not in name or _is_part(name):
         return message_definition(name)
     service = service_definition(name)
     parts = {"request": service.request, "response": service.response, "event": service.event}
@@ -100,6 +104,22 @@ def type_description(name: str) -> Message:
     return _to_message(
         "TypeDescription", {"type_description": description, "referenced_type_descriptions": referenced}
     )
+
+
+def type_sources(description: Any) -> list[Message]:
+    """``type_description_interfaces/msg/TypeSource`` of what a ``TypeDescription`` describes, in its order.
+
+    A service's parts have no definition of their own: theirs is empty, its encoding ``implicit`` (as in rcl).
+    """
+    individual = [description.type_description, *description.referenced_type_descriptions]
+    return [_to_message("TypeSource", _source(one.type_name)) for one in individual]
+
+
+def _source(name: str) -> dict[str, str]:
+    if _is_part(name):
+        return {"type_name": name, "encoding": "implicit"}
+    path, contents = definition_source(name)
+    return {"type_name": name, "encoding": path.rpartition(".")[2], "raw_file_contents": contents}
 
 
 def _to_message(type_name: str, values: dict[str, Any]) -> Message:
