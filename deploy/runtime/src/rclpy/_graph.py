@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any
 
-from rclpy import _names
+from rclpy import _best_available, _names
 from rclpy._dds import INFINITY, GuardCondition, Participant, Reader, WaitSet, Writer
 from rclpy._dds.discovery import Discovery, Endpoint
 from rclpy._dds.qos import user_data_value
@@ -186,6 +186,9 @@ class Graph:
         self, node: Node, topic: str, msg_type: Any, profile: QoSProfile, extra: str = ""
     ) -> Writer:
         """A writer of ``msg_type`` that belongs to ``node``; ``extra`` goes to USER_DATA before the hash."""
+        if _best_available.has_open_policy(profile):
+            readers = [reader.profile for reader in self._discovered().readers() if reader.topic == topic]
+            profile = _best_available.for_publisher(profile, readers)
         user_data = f"{extra}typehash={msg_type._TYPE_HASH};"
         writer = self.participant.create_writer(topic, msg_type._DDS_TYPE_NAME, profile, user_data)
         writer.logger_name = node.get_logger().name
@@ -196,6 +199,9 @@ class Graph:
         self, node: Node, topic: str, msg_type: Any, profile: QoSProfile, extra: str = ""
     ) -> Reader:
         """A reader of ``msg_type`` that belongs to ``node``; ``extra`` goes to USER_DATA before the hash."""
+        if _best_available.has_open_policy(profile):
+            writers = [writer.profile for writer in self._discovered().writers() if writer.topic == topic]
+            profile = _best_available.for_subscription(profile, writers)
         user_data = f"{extra}typehash={msg_type._TYPE_HASH};"
         reader = self.participant.create_reader(topic, msg_type._DDS_TYPE_NAME, profile, user_data)
         reader.logger_name = node.get_logger().name

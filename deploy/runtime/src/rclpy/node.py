@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from rcl_interfaces.msg import Log, ParameterEvent
-from rclpy import _names
+from rclpy import _best_available, _names
 from rclpy._arguments import parse
 from rclpy._endpoint import PublisherEndpoint, ServiceEndpoint, SubscriptionEndpoint
 from rclpy._node_graph import NodeGraph
@@ -439,6 +439,7 @@ class Node(NodeParameters, NodeGraph):
         self._used_types.add(srv_type)
         validate_topic_name(srv_name, is_service=True)
         name = self._remapped(srv_name, is_service=True)
+        profile = _best_available.for_service(profile)
         graph = self._graph
         identity = f"{'serviceid' if is_server else 'clientid'}={graph.next_service_id()};"
         requests = (_names.request_to_dds(name), srv_type.Request, profile, identity)

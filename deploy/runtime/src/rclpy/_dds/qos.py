@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from rclpy.duration import Duration
+from rclpy.exceptions import RCLError
 from rclpy.qos import (
     DurabilityPolicy,
     HistoryPolicy,
@@ -36,7 +37,12 @@ def endpoint_qos(profile: QoSProfile, user_data: str) -> Iterator[int]:
     """The DDS QoS of a reader or writer, for the length of a ``with``.
 
     ``user_data`` goes to USER_DATA, where ROS 2 announces type hashes and service identifiers.
+
+    :raises RCLError: if a policy is UNKNOWN, as where rmw creates an endpoint.
     """
+    for name in ("history", "reliability", "durability", "liveliness"):
+        if getattr(profile, name).name == "UNKNOWN":
+            raise RCLError(f"the {name} of an endpoint cannot be UNKNOWN")
     qos = quick.dds_create_qos()
     try:
         quick.dds_qset_writer_data_lifecycle(qos, False)
