@@ -241,3 +241,17 @@ def test_names_are_remapped_by_arguments(make_node: MakeNode) -> None:
     assert node.resolve_topic_name("x", only_expand=True) == "/arm2/x"
     assert node.create_publisher(Float64, "x", 1).topic_name == "/arm2/y"
     assert node.resolve_service_name("serve") == "/other"
+
+
+def test_to_count_endpoints_does_not_remap_their_name_to_list_them_does(make_node: MakeNode) -> None:
+    rules = "x:=y", "serve:=/other"
+    node = make_node(cli_args=["--ros-args", *(word for rule in rules for word in ("-r", rule))])
+    node.create_publisher(Float64, "x", 1)
+    node.create_subscription(Float64, "x", lambda message: None, 1)
+    node.create_service(Trigger, "serve", lambda request, response: response)
+    node.create_client(Trigger, "serve")
+    assert (node.count_publishers("x"), node.count_publishers("y")) == (0, 1)
+    assert (node.count_subscribers("x"), node.count_subscribers("y")) == (0, 1)
+    assert (node.count_services("serve"), node.count_services("/other")) == (0, 1)
+    assert (node.count_clients("serve"), node.count_clients("/other")) == (0, 1)
+    assert len(node.get_publishers_info_by_topic("x")) == len(node.get_subscriptions_info_by_topic("x")) == 1

@@ -74,20 +74,20 @@ class NodeGraph(NodeNames):
         return self._asked().clients_of_node(node_name, node_namespace)
 
     def count_publishers(self, topic_name: str) -> int:
-        """Return how many publishers a topic has."""
-        return self._asked().count_writers(self._dds_topic(topic_name))
+        """Return how many publishers a topic has; its name is not remapped."""
+        return self._asked().count_writers(self._counted_topic(topic_name))
 
     def count_subscribers(self, topic_name: str) -> int:
-        """Return how many subscriptions a topic has."""
-        return self._asked().count_readers(self._dds_topic(topic_name))
+        """Return how many subscriptions a topic has; its name is not remapped."""
+        return self._asked().count_readers(self._counted_topic(topic_name))
 
     def count_services(self, service_name: str) -> int:
-        """Return how many servers a service has."""
-        return self._asked().count_readers(self._dds_requests(service_name))
+        """Return how many servers a service has; its name is not remapped."""
+        return self._asked().count_readers(self._counted_requests(service_name))
 
     def count_clients(self, service_name: str) -> int:
-        """Return how many clients a service has."""
-        return self._asked().count_writers(self._dds_requests(service_name))
+        """Return how many clients a service has; its name is not remapped."""
+        return self._asked().count_writers(self._counted_requests(service_name))
 
     def get_publishers_info_by_topic(
         self, topic_name: str, no_mangle: bool = False
@@ -106,8 +106,11 @@ class NodeGraph(NodeNames):
     def _dds_topic(self, name: str, no_mangle: bool = False) -> str:
         return name if no_mangle else _names.topic_to_dds(self._remapped(name))
 
-    def _dds_requests(self, name: str) -> str:
-        return _names.request_to_dds(self._remapped(name, is_service=True))
+    def _counted_topic(self, name: str) -> str:
+        return _names.topic_to_dds(self._expanded(name))
+
+    def _counted_requests(self, name: str) -> str:
+        return _names.request_to_dds(self._expanded(name, is_service=True))
 
     def wait_for_node(self, fully_qualified_node_name: str, timeout: float) -> bool:
         """Wait until a node is there; ``False`` if that takes longer than ``timeout`` seconds."""
