@@ -11,6 +11,7 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.srv import SetParameters
 from rclpy._dds import Participant, Writer
+from rclpy._graph import NodeEntities, encode
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
@@ -174,7 +175,31 @@ def test_a_client_survives_bad_replies(node: Node, stranger: Participant, spin_u
     assert future.result() == SetBool.Response(success=True)
 
 
-def test_what_nobody_can_read_in_ros_discovery_info_does_no_harm(
+def test_what_nobody_can_read_in_ros_discovery_info_is_dropped_counted_and_logged_once(
+    node: Node, stranger: Participant, spin_until: SpinUntil, capfd: pytest.CaptureFixture[str]
+) -> None:
+    writers = [
+        writer_for(
+            stranger, "ros_discovery_info", "rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_", spin_until
+        )
+        for _ in range(2)
+    ]
+    chance = random.Random(2)
+    for _ in range(100):
+        for writer in writers:
+            # The GUIDs differ: of each participant only what it said last is looked at.
+            writer.write(HEADER + chance.randbytes(16) + b"\xff" * chance.randrange(1, 200))
+
+    def all_are_counted() -> bool:
+        node.get_node_names()  # who asks has it looked at
+        return node._graph._bad_input.count == 200
+
+    spin_until(all_are_counted)
+    assert node.get_node_names() == ["node"]
+    assert capfd.readouterr().err.count("octets on ros_discovery_info") == 2
+
+
+def test_what_others_say_of_themselves_is_read_though_much_of_it_is_nonsense(
     node: Node, stranger: Participant, spin_until: SpinUntil
 ) -> None:
     writer = writer_for(
@@ -183,8 +208,9 @@ def test_what_nobody_can_read_in_ros_discovery_info_does_no_harm(
     chance = random.Random(2)
     for _ in range(100):
         writer.write(HEADER + chance.randbytes(chance.randrange(1, 200)))
+    writer.write(encode(stranger.gid, [NodeEntities("/far", "stranger")]))
     received: list[Float64] = []
     node.create_subscription(Float64, "x", received.append, 1)
     node.create_publisher(Float64, "x", 1).publish(Float64())
     spin_until(lambda: received)
-    assert "node" in node.get_node_names()
+    spin_until(lambda: set(node.get_fully_qualified_node_names()) == {"/node", "/far/stranger"})

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from rclpy._dds import Sample
 
 if TYPE_CHECKING:
-    from rclpy.node import Node
+    from rclpy.impl.rcutils_logger import RcutilsLogger
 
 # Writers come and go; a flood of short-lived ones must not fill the memory.
 _REMEMBERED_WRITERS = 1000
@@ -16,8 +16,8 @@ _REMEMBERED_WRITERS = 1000
 class BadInput:
     """What one reader has dropped."""
 
-    def __init__(self, node: Node, name: str) -> None:
-        self._node = node
+    def __init__(self, logger: RcutilsLogger, name: str) -> None:
+        self._logger = logger
         self._name = name
         self._writers: set[int] = set()
         self.count = 0
@@ -30,7 +30,7 @@ class BadInput:
         if len(self._writers) >= _REMEMBERED_WRITERS:
             self._writers.clear()
         self._writers.add(sample.publication_handle)
-        self._node.get_logger().warning(
+        self._logger.warning(
             f"dropped {len(sample.data)} octets on {self._name}: {reason}"
             " (more of this writer is dropped silently)"
         )

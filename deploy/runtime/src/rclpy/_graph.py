@@ -10,14 +10,16 @@ import struct
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from rclpy import _best_available, _names
-from rclpy._dds import INFINITY, GuardCondition, Participant, Reader, WaitSet, Writer
+from rclpy._bad_input import BadInput
+from rclpy._dds import INFINITY, GuardCondition, Participant, Reader, Sample, WaitSet, Writer
 from rclpy._dds.discovery import Discovery, Endpoint
 from rclpy._dds.qos import user_data_value
 from rclpy.exceptions import NodeNameNonExistentError
+from rclpy.logging import get_logger
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
 if TYPE_CHECKING:
@@ -124,7 +126,8 @@ class Graph:
         self._reader = self.participant.create_reader(_TOPIC, _TYPE, _READER_QOS, hash_)
         self._own: dict[Node, NodeEntities] = {}
         self._deferred = 0
-        self._announced: dict[bytes, bytes] = {}  # by a participant's GUID, until somebody asks
+        self._announced: dict[bytes, Sample] = {}  # by a participant's GUID, until somebody asks
+        self._bad_input = BadInput(get_logger("rclpy"), _TOPIC)
         self._peers: dict[bytes, list[NodeEntities]] = {}
         self._many_peers = _MANY_PEERS
         self._discovery: Discovery | None = None  # made when somebody asks about the graph
@@ -251,16 +254,23 @@ class Graph:
         """Note what peers have announced."""
         with self._lock:
             while (sample := self._reader.take()) is not None:
-                self._announced[sample.data[4:20]] = sample.data
+                self._announced[sample.data[4:20]] = sample
             if len(self._announced) + len(self._peers) > self._many_peers:
                 self._forget_dead_peers()
-                self._many_peers = max(_MANY_PEERS, 2 * (len(self._announced) + len(self._peers)))
+                self._many_peers = max(_MANY_PEERS, 2 * len(self._peers))
 
     def _forget_dead_peers(self) -> None:
-        alive = self._discovered().participants()
-        for gid in (self._announced.keys() | self._peers.keys()) - alive.keys():
-            self._announced.pop(gid, None)
-            self._peers.pop(gid, None)
+        """Read what was announced, and keep that of participants that exist."""
+        while self._announced:
+            sample = self._announced.popitem()[1]
+            try:
+                gid, nodes = decode(sample.data)
+            except ValueError as error:
+                self._bad_input.drop(sample, error)
+            else:
+                self._peers[gid] = nodes
+        for gid in self._peers.keys() - self._discovered().participants().keys():
+            del self._peers[gid]
 
     def _discovered(self) -> Discovery:
         with self._lock:
@@ -306,10 +316,6 @@ class Graph:
         with self._lock:
             self._take()
             self._forget_dead_peers()
-            while self._announced:
-                with suppress(ValueError):  # not from a ROS 2 process: it has no nodes that could be named
-                    gid, nodes = decode(self._announced.popitem()[1])
-                    self._peers[gid] = nodes
             known = {**self._peers, self.participant.gid: list(self._own.values())}
             for gid, nodes in known.items():
                 for node in nodes:

@@ -39,7 +39,7 @@ class ServiceSide(Owner):
     ) -> None:
         super().__init__(endpoint.node, endpoint.name, endpoint.writer, endpoint.reader)
         self._handles = (endpoint.reader.condition,)
-        self._bad_input = BadInput(self._node, self._name)
+        self._bad_input = BadInput(self._node.get_logger(), self._name)
         self._lock = threading.Lock()
         self._introspection: _Introspection | None = None
         self.srv_type = srv_type

@@ -40,7 +40,7 @@ class Subscription(Owner):
         self._reader = subscription_impl.reader
         self._handles = (self._reader.condition,)
         self._deserialize = msg_type._deserialize
-        self._bad_input = BadInput(self._node, self._name)
+        self._bad_input = BadInput(self._node.get_logger(), self._name)
         self.callback = callback
         self.callback_group = callback_group
         self.msg_type = msg_type
