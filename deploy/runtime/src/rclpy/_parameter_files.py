@@ -17,7 +17,8 @@ from rclpy.parameter import PARAMETER_SEPARATOR_STRING, Parameter
 
 _PARAMETERS_KEY = "ros__parameters"
 _STRING_TAG = "tag:yaml.org,2002:str"
-_PLAIN_TAG = "plain"
+_NO_TAG = ""
+_QUOTES = ("'", '"')
 _TOO_DEEP = "it is nested too deeply"
 _KINDS = {bool: "bool", int: "integer", float: "double", str: "string"}
 
@@ -69,11 +70,11 @@ def parse_yaml_value(text: str) -> Any:
 
 
 class _Loader(yaml.SafeLoader):
-    """Composes nodes; tells plain scalars from others by their tag, and refuses aliases as ROS does."""
+    """Composes nodes; leaves scalars without a tag of YAML's own choice, and refuses aliases as ROS does."""
 
     def resolve(self, kind: type[yaml.Node], value: Any, implicit: Any) -> str:
         if kind is yaml.ScalarNode:
-            return _PLAIN_TAG if implicit[0] else _STRING_TAG
+            return _NO_TAG
         tag: str = super().resolve(kind, value, implicit)  # type: ignore[no-untyped-call]
         return tag
 
@@ -138,7 +139,7 @@ def _describe(node: yaml.Node) -> str:
 
 
 def _is_empty(node: yaml.Node) -> bool:
-    return node.tag == _PLAIN_TAG and not node.value
+    return isinstance(node, yaml.ScalarNode) and not node.value and node.style not in _QUOTES
 
 
 def _join(namespace: str, name: str) -> str:
@@ -174,7 +175,9 @@ def _value(node: yaml.Node | None) -> Any:
 
 
 def _scalar(node: yaml.ScalarNode) -> bool | int | float | str:
-    return plain_scalar(node.value) if node.tag == _PLAIN_TAG else str(node.value)
+    """Type a scalar by its text, unless quotes or `!!str` make it a string; ROS heeds no other tag."""
+    text = str(node.value)
+    return text if node.tag == _STRING_TAG or node.style in _QUOTES else plain_scalar(text)
 
 
 def _reason(error: yaml.YAMLError) -> str:
