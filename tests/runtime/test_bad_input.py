@@ -14,6 +14,7 @@ from rclpy._dds import Participant, Writer
 from rclpy._graph import NodeEntities, encode
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import Float64, String
 from std_srvs.srv import SetBool
@@ -85,6 +86,28 @@ def test_each_writer_of_bad_samples_is_logged_for_itself(
         writer.write(HEADER + b"\xff\xff\xff\x7fabcd")  # a string of 2 GB, they say
     spin_until(lambda: subscription._bad_input.count == 6)
     assert capfd.readouterr().err.count("octets on /x") == 3
+
+
+def test_a_time_of_a_simulator_that_is_none_is_bad_input_too(
+    make_node: MakeNode,
+    executor: SingleThreadedExecutor,
+    stranger: Participant,
+    spin_until: SpinUntil,
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    node = make_node(parameter_overrides=[Parameter("use_sim_time", value=True)])
+    executor.add_node(node)
+    (subscription,) = node.subscriptions
+    type_name = "rosgraph_msgs::msg::dds_::Clock_"
+    writers = [writer_for(stranger, "rt/clock", type_name, spin_until) for _ in range(2)]
+    spin_until(lambda: subscription.get_publisher_count() == 2)
+    for number, writer in enumerate(writers * 2, 1):  # one by one: the subscription keeps only the last
+        writer.write(HEADER + struct.pack("<iI", -1, 0))
+        spin_until(lambda number=number: subscription._bad_input.count == number)
+    assert node.get_clock().now().nanoseconds == 0
+    writers[0].write(HEADER + struct.pack("<iI", 5, 7))
+    spin_until(lambda: node.get_clock().now().nanoseconds == 5_000_000_007)
+    assert capfd.readouterr().err.count("octets on /clock") == 2
 
 
 def test_huge_counts_cost_no_memory_and_no_time(

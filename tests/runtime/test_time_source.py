@@ -63,15 +63,6 @@ def test_only_clocks_of_ros_time_follow() -> None:
         TimeSource(node="node")  # type: ignore[arg-type]
 
 
-def test_a_negative_time_is_dropped() -> None:
-    source, clock = TimeSource(), ROSClock()
-    source.ros_time_is_active = True
-    source.attach_clock(clock)
-    source.clock_callback(ClockMsg(clock=TimeMsg(sec=5)))
-    source.clock_callback(ClockMsg(clock=TimeMsg(sec=-1)))
-    assert clock.now().nanoseconds == 5_000_000_000
-
-
 def test_a_node_follows_its_parameter(make_node: Callable[..., Node]) -> None:
     node = make_node()
     assert node.get_parameter("use_sim_time").value is False

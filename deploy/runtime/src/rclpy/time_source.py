@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import weakref
+from functools import cache
 from typing import TYPE_CHECKING
 
 from rcl_interfaces.msg import SetParametersResult
@@ -101,13 +102,12 @@ class TimeSource:
         self._associated_clocks.add(clock)
 
     def clock_callback(self, msg: rosgraph_msgs.msg.Clock) -> None:
-        """Set all clocks to the simulator's time; a negative one is none and dropped."""
-        try:
-            time = Time.from_msg(msg.clock)
-        except ValueError as error:
-            if node := self._get_node():
-                node.get_logger().warning(f"dropped a message on {CLOCK_TOPIC}: {error}", once=True)
-            return
+        """
+        Set all clocks to the simulator's time.
+
+        :raises ValueError: if it is negative: no time.
+        """
+        time = Time.from_msg(msg.clock)
         # Clocks that are attached later start with it.
         self._last_time_set = time
         for clock in self._associated_clocks:
@@ -117,10 +117,8 @@ class TimeSource:
         node = self._get_node()
         if node is None or self._clock_sub is not None:
             return
-        from rosgraph_msgs.msg import Clock
-
         self._clock_sub = node.create_subscription(
-            Clock,
+            _valid_clock(),
             CLOCK_TOPIC,
             self.clock_callback,
             QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT),
@@ -152,3 +150,18 @@ class TimeSource:
 
     def _get_node(self) -> Node | None:
         return None if self._node_weak_ref is None else self._node_weak_ref()
+
+
+@cache
+def _valid_clock() -> type[rosgraph_msgs.msg.Clock]:
+    """The message of `/clock`; refuses what is no time where octets become messages, as all bad input is."""
+    from rosgraph_msgs.msg import Clock
+
+    class ValidClock(Clock):
+        @classmethod
+        def _deserialize(cls, data: bytes) -> Clock:  # type: ignore[override]
+            message = Clock._deserialize(data)
+            Time.from_msg(message.clock)
+            return message
+
+    return ValidClock
