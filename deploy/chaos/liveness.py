@@ -17,7 +17,7 @@ from deploy.chaos.history import (
     History,
     between,
 )
-from deploy.chaos.safety import Published
+from deploy.chaos.safety import Published, a_source_was_new
 from interfaces import topics
 
 MEDIAN, SLOWEST = 1.0, 2.0  # s, L1
@@ -130,7 +130,7 @@ def _overloaded(history: History, begin: float, end: float, programs: Sequence[s
 def right_after_return(history: History) -> Finding:
     """L3: what changed while a service was dead is right after its return."""
     published = Published(history)
-    evidence, cases = [], 0
+    evidence, cases, unknown = [], 0, 0
     concerned = ("kinematics", *(topics.CONFIGURATION[name].publishers[0] for name in topics.CONFIGURATION))
     for fault in history.faults:
         if fault.target not in concerned or fault.kind not in (*MOMENTARY, *LASTING):
@@ -146,11 +146,15 @@ def right_after_return(history: History) -> Finding:
         ):
             continue
         positions = between(history.stream(topics.EFFECTOR_POSITION), begin, begin + 1.0)
+        right = bool(positions) and published.explains(positions[-1], within=SETTLED)
+        if positions and not right and a_source_was_new(history, positions[-1].sent):
+            unknown += 1
+            continue
         cases += bool(positions)
-        if positions and not published.explains(positions[-1], within=SETTLED):
+        if positions and not right:
             what = f"the position is not that of the last values after {fault.kind} of {fault.target}"
             evidence.append(Evidence(positions[-1].sent, what))
-    return Finding("L3", cases, f"right after {cases - len(evidence)} of {cases} returns", evidence)
+    return Finding("L3", cases, f"right after {cases - len(evidence)} of {cases} returns", evidence, unknown)
 
 
 def hung_is_replaced(history: History) -> Finding:

@@ -106,7 +106,7 @@ def speeds_and_positions_are_true(history: History) -> Finding:
     for position in positions:
         if published.explains(position, within=LONGEST_PAUSE):
             continue
-        if _a_source_was_new(history, position.sent) or history.may_have_missed(
+        if a_source_was_new(history, position.sent) or history.may_have_missed(
             position.sent - MEETING, position.sent
         ):
             unknown += 1
@@ -135,7 +135,7 @@ def never_two_alive(history: History) -> Finding:
     return Finding("S5", cases, f"{cases} successors and doubles", sorted(evidence))
 
 
-def _a_source_was_new(history: History, time: float) -> bool:
+def a_source_was_new(history: History, time: float) -> bool:
     """Whether others may have got a value that the observer did not: it may have met its source later."""
     for life in history.lives:
         if life.program.startswith("config_") and life.began < time:

@@ -329,6 +329,21 @@ def test_l3_catches_positions_of_values_from_before() -> None:
     assert verdict("L3", change(history, "effector/position", keep)) == VIOLATED
 
 
+def test_l3_a_first_value_that_the_observer_may_have_missed_stays_unknown() -> None:
+    def of_another_value(history: History) -> History:
+        other = (0.123, 0.456)
+        return change(
+            history,
+            "effector/position",
+            lambda s: s._replace(value=other) if 21.6 < s.sent < 22.2 else s,
+        )
+
+    history = killed(good(), "kinematics", 20.0, 0.6)
+    assert verdict("L3", of_another_value(history)) == VIOLATED
+    finding = CHECKERS["L3"](of_another_value(killed(history, "config_l1", 21.5, 0.6)))
+    assert (len(finding.evidence), finding.unknown) == (0, 1)
+
+
 # L4
 
 

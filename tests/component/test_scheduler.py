@@ -206,7 +206,7 @@ def test_setting_the_wall_clock_changes_nothing(
         monkeypatch.setattr(time, "time_ns", lambda hours=hours: time_ns() + hours * 3600 * 10**9)
         monkeypatch.setattr(time, "time", lambda hours=hours: timer() + hours * 3600)
 
-        spin_until(lambda seen=seen: len(ticks) == seen + 5)
+        spin_until(lambda seen=seen: len(ticks) >= seen + 5)
 
     assert all(timedelta(0) < b - a < timedelta(seconds=1) for a, b in pairwise(ticks))
 
