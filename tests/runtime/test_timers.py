@@ -180,6 +180,48 @@ def test_a_rate_wakes_its_sleeper_once_a_period(
     assert slept == [True] * 3
 
 
+def test_a_tick_that_came_while_nobody_slept_lets_the_next_sleeper_go_at_once(
+    make_node: MakeNode,
+    clock: ROSClock,
+    executor: SingleThreadedExecutor,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    node = make_node()
+    executor.add_node(node)
+    rate = node.create_rate(1e6, clock)
+    waits: list[bool] = []
+    monkeypatch.setattr(rate._ticks, "wait_for", lambda woken: waits.append(woken()))
+    clock.set_ros_time_override(simulated(2000))
+    executor.spin_once(timeout_sec=0)
+    rate.sleep()
+    assert waits == []
+    rate.sleep()
+    assert waits == [False]
+
+
+def test_a_tick_that_woke_its_sleeper_does_not_let_him_go_again(
+    make_node: MakeNode,
+    clock: ROSClock,
+    executor: SingleThreadedExecutor,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    node = make_node()
+    executor.add_node(node)
+    rate = node.create_rate(1e6, clock)
+    waits: list[bool] = []
+
+    def tick(woken: Callable[[], bool]) -> None:
+        if len(waits) < 2:
+            clock.set_ros_time_override(simulated(2000 + 1000 * len(waits)))
+            executor.spin_once(timeout_sec=0)
+        waits.append(woken())
+
+    monkeypatch.setattr(rate._ticks, "wait_for", tick)
+    for _ in range(3):
+        rate.sleep()
+    assert waits == [True, True, False]
+
+
 def test_a_destroyed_rate_lets_its_sleeper_go(make_node: MakeNode) -> None:
     node = make_node()
     rate = node.create_rate(0.001)

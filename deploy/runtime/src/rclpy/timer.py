@@ -169,6 +169,7 @@ class Rate:
         self._context = context
         self._ticks = threading.Condition()
         self._tick = 0
+        self._overrun = False  # whether the latest tick has let nobody go yet
         self._is_destroyed = False
         timer.callback = self._wake
         context.on_shutdown(self._end)
@@ -176,6 +177,7 @@ class Rate:
     def _wake(self) -> None:
         with self._ticks:
             self._tick += 1
+            self._overrun = True
             self._ticks.notify_all()
 
     def _end(self) -> None:
@@ -189,7 +191,7 @@ class Rate:
 
     def sleep(self) -> None:
         """
-        Sleep until the next tick.
+        Sleep until the next tick; not at all if one came while nobody slept.
 
         :raises ROSInterruptException: if the context is or gets shut down.
         :raises RuntimeError: if the rate is destroyed; a sleep under way just ends then.
@@ -197,7 +199,9 @@ class Rate:
         with self._ticks:
             if self._is_destroyed and self._context.ok():
                 raise RuntimeError("Rate cannot sleep because it has been destroyed")
-            tick = self._tick
-            self._ticks.wait_for(lambda: self._tick != tick or self._is_destroyed)
+            if not self._overrun:
+                tick = self._tick
+                self._ticks.wait_for(lambda: self._tick != tick or self._is_destroyed)
+            self._overrun = False
             if not self._context.ok():
                 raise ROSInterruptException
