@@ -56,6 +56,20 @@ def test_a_timer_skips_missed_periods_and_does_not_drift(
     assert timer.time_until_next_call() == 700
 
 
+def test_a_step_of_exactly_some_periods_is_one_call(
+    make_node: MakeNode, clock: ROSClock, executor: SingleThreadedExecutor
+) -> None:
+    node = make_node()
+    executor.add_node(node)
+    calls: list[int] = []
+    timer = node.create_timer(1e-6, lambda: calls.append(clock.now().nanoseconds), clock=clock)
+    clock.set_ros_time_override(simulated(3000))
+    executor.spin_once(timeout_sec=0)
+    executor.spin_once(timeout_sec=0)
+    assert calls == [3000]
+    assert timer.time_until_next_call() == 1000
+
+
 def test_when_time_jumps_back_a_timer_starts_a_new_period(make_node: MakeNode, clock: ROSClock) -> None:
     timer = make_node().create_timer(1e-6, lambda: None, clock=clock)
     clock.set_ros_time_override(simulated(500))
@@ -67,6 +81,26 @@ def test_when_simulated_time_begins_what_remained_of_a_period_remains(make_node:
     timer = make_node().create_timer(3600.0, lambda: None, clock=clock)
     clock.set_ros_time_override(simulated(7))
     clock._set_ros_time_is_active(True)
+    remaining = timer.time_until_next_call()
+    assert remaining is not None
+    assert 3_590_000_000_000 < remaining <= 3_600_000_000_000
+
+
+def test_a_timer_begins_its_period_with_the_first_time_that_a_simulator_tells(make_node: MakeNode) -> None:
+    clock = ROSClock()
+    timer = make_node().create_timer(1e-6, lambda: None, clock=clock)
+    clock._set_ros_time_is_active(True)  # no time was heard yet
+    assert not timer.is_ready()
+    clock.set_ros_time_override(simulated(5_000_000))
+    assert not timer.is_ready()
+    assert timer.time_until_next_call() == 1000
+
+
+def test_a_simulated_time_that_was_never_heard_changes_nothing_for_a_timer(make_node: MakeNode) -> None:
+    clock = ROSClock()
+    timer = make_node().create_timer(3600.0, lambda: None, clock=clock)
+    clock._set_ros_time_is_active(True)
+    clock._set_ros_time_is_active(False)
     remaining = timer.time_until_next_call()
     assert remaining is not None
     assert 3_590_000_000_000 < remaining <= 3_600_000_000_000

@@ -65,9 +65,11 @@ class Timer:
     def _time_has_jumped(self, jump: TimeJump) -> None:
         now = self._source.nanoseconds()
         if jump.clock_change in (ClockChange.ROS_TIME_ACTIVATED, ClockChange.ROS_TIME_DEACTIVATED):
-            # Another scale of time: what remained of the period still remains.
-            self._next_call += jump.delta.nanoseconds
-            self._last_call += jump.delta.nanoseconds
+            # Another scale of time: what remained of the period still remains. Not so while no simulated time
+            # was heard yet: the first one will be a jump back, which starts a new period.
+            if self._source._latest:
+                self._next_call += jump.delta.nanoseconds
+                self._last_call += jump.delta.nanoseconds
         elif now < self._last_call:
             self._last_call = now
             self._next_call = now + self._period
@@ -150,7 +152,7 @@ class Timer:
             return None
         self._last_call = now
         self._next_call += self._period
-        if self._next_call < now:
+        if self._next_call <= now:
             behind = now - self._next_call
             self._next_call = now if not self._period else now + self._period - behind % self._period
         return ()
