@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import atexit
+import inspect
 import threading
 import weakref
 from collections.abc import Callable
@@ -85,6 +86,7 @@ class Context(AbstractContextManager["Context"]):
         Begin.
 
         :param args: command line arguments, ``sys.argv`` if ``None``; those after ``--ros-args`` count.
+        :param initialize_logging: whether its arguments configure logging, if no other context has done so.
         :param domain_id: DDS domain, by default the one that ``ROS_DOMAIN_ID`` names.
         :raises RuntimeError: if the context was initialized already, or an argument cannot be understood.
         """
@@ -103,7 +105,8 @@ class Context(AbstractContextManager["Context"]):
     def _initialize_logging(self) -> None:
         global g_logging_ref_count
         with _logging_lock:
-            logging._apply_arguments(self._arguments)
+            if not g_logging_ref_count:  # it is the whole process': who came first has said how he wants it
+                logging._apply_arguments(self._arguments)
             g_logging_ref_count += 1
         self._logging = True
 
@@ -123,7 +126,7 @@ class Context(AbstractContextManager["Context"]):
         with self._lock:
             if self._initialized and not self._valid:
                 callback()
-            elif hasattr(callback, "__self__") and not isinstance(callback.__self__, type):
+            elif inspect.ismethod(callback):  # of Python: a builtin's cannot be referred to weakly
                 self._callbacks.append(weakref.WeakMethod(callback, self._forget_callback))
             else:
                 self._callbacks.append(lambda: callback)
