@@ -181,26 +181,29 @@ class Reader(Handle):
         self.logger_name = ""  # of the node that it belongs to
         self.gid = _guid(handle)
         self.condition = checked(blocking.dds_create_readcondition(handle, ANY_STATE), "read condition")
-        self._buffer = ct.create_string_buffer(64)
-        self._serdata = Pointer()
-        self._serdata_address = ct.addressof(self._serdata)
-        self._info = SampleInfo()
-        self._info_address = ct.addressof(self._info)
+        # Where DDS puts what is taken: one for each thread that takes, made once, as that costs some time.
+        self._rooms: list[tuple[Pointer, int, SampleInfo, int]] = []
 
     def take(self) -> Sample | None:
-        """The next message, None if there is none. Not for two threads at once."""
-        while quick.dds_takecdr(self.handle, self._serdata_address, 1, self._info_address, ANY_STATE) > 0:
-            serdata, info = self._serdata.value, self._info
+        """The next message, None if there is none. On any thread, whoever else takes."""
+        try:
+            room = self._rooms.pop()
+        except IndexError:
+            serdata, info = Pointer(), SampleInfo()
+            room = serdata, ct.addressof(serdata), info, ct.addressof(info)
+        serdata, serdata_address, info, info_address = room
+        sample = None
+        while quick.dds_takecdr(self.handle, serdata_address, 1, info_address, ANY_STATE) > 0:
             if info.valid_data:
                 size = quick.ddsi_serdata_size(serdata)
-                if size > len(self._buffer):
-                    self._buffer = ct.create_string_buffer(size)
-                quick.ddsi_serdata_to_ser(serdata, 0, size, self._buffer)
-                quick.ddsi_serdata_unref(serdata)
-                data = ct.string_at(self._buffer, size)
-                return Sample(data, info.source_timestamp, info.publication_handle)
-            quick.ddsi_serdata_unref(serdata)  # a writer came or went: news, but no message
-        return None
+                data = bytes(size)  # which nobody else knows yet: it may still be written to
+                quick.ddsi_serdata_to_ser(serdata, 0, size, data)
+                sample = Sample(data, info.source_timestamp, info.publication_handle)
+            quick.ddsi_serdata_unref(serdata)
+            if sample is not None:  # else a writer came or went: news, but no message
+                break
+        self._rooms.append(room)
+        return sample
 
     def matched(self) -> int:
         """How many writers are matched now."""
