@@ -9,6 +9,8 @@ from __future__ import annotations
 import struct
 import threading
 import time
+import weakref
+from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
@@ -54,6 +56,17 @@ class NodeEntities:
         self.name = name
         self.readers: list[bytes] = []
         self.writers: list[bytes] = []
+
+
+class _OwnNode(NodeEntities):
+    """A node of this process: its endpoints, too, and what to do when it is gone undestroyed."""
+
+    __slots__ = ("dropped", "endpoints")
+
+    def __init__(self, node: Node, dropped: Callable[[], None]) -> None:
+        super().__init__(node.get_namespace(), node.get_name())
+        self.endpoints: list[Writer | Reader] = []
+        self.dropped = dropped
 
 
 def encode(gid: bytes, nodes: list[NodeEntities]) -> bytes:
@@ -124,7 +137,9 @@ class Graph:
         hash_ = f"typehash={_TYPE_HASH};"
         self._writer = self.participant.create_writer(_TOPIC, _TYPE, _WRITER_QOS, hash_)
         self._reader = self.participant.create_reader(_TOPIC, _TYPE, _READER_QOS, hash_)
-        self._own: dict[Node, NodeEntities] = {}
+        self._own: dict[weakref.ref[Node], _OwnNode] = {}  # a node that nobody else keeps shall go
+        self._dropped: deque[weakref.ref[Node]] = deque()
+        self._drops = GuardCondition()
         self._deferred = 0
         self._announced: dict[bytes, Sample] = {}  # by a participant's GUID, until somebody asks
         self._bad_input = BadInput(get_logger("rclpy"), _TOPIC)
@@ -135,6 +150,7 @@ class Graph:
         self._waiting: set[GuardCondition] = set()
         self._waitset = WaitSet()
         self._waitset.attach(self._reader.condition, 0)
+        self._waitset.attach(self._drops.handle, 0)
         self._closing = threading.Event()
         self._listener = threading.Thread(target=self._listen, name="rclpy-graph", daemon=True)
         self._listener.start()
@@ -143,10 +159,13 @@ class Graph:
         """Leave the domain."""
         self._closing.set()
         with self._lock:  # in which the listening thread does what it does
+            self._own.clear()
             self._waitset.close()
+            self._drops.close()
             self.participant.close()
-        # Its end is at hand, unless a signal interrupted who holds the lock: that cannot wait for itself.
-        self._listener.join(_REST)
+        if threading.current_thread() is not self._listener:
+            # Its end is at hand, unless a signal interrupted who holds the lock: that cannot wait for itself.
+            self._listener.join(_REST)
 
     # What this process tells
 
@@ -164,25 +183,50 @@ class Graph:
 
     def _announce(self) -> None:
         with self._lock:
-            if not self._deferred:
+            if not self._deferred and not self._closing.is_set():
                 self._writer.write(encode(self.participant.gid, list(self._own.values())))
 
-    def add_node(self, node: Node) -> None:
-        """Announce a node of this process."""
+    def add_node(self, node: Node, dropped: Callable[[], None]) -> None:
+        """
+        Announce a node of this process, until it is removed or the garbage collector takes it.
+
+        :param dropped: is called in the latter case, when its endpoints have ended; on a thread of the graph.
+        """
         with self._lock:
-            self._own[node] = NodeEntities(node.get_namespace(), node.get_name())
+            self._own[weakref.ref(node, self._drop)] = _OwnNode(node, dropped)
         self._announce()
 
     def remove_node(self, node: Node) -> None:
-        """Announce that a node is no more."""
-        with self._lock:
-            self._own.pop(node, None)
-        self._announce()
+        """Announce that a node is no more, and end what endpoints it still has."""
+        self._remove(weakref.ref(node))
 
-    def _change(self, node: Node, change: Callable[[NodeEntities], None]) -> None:
+    def _remove(self, node: weakref.ref[Node]) -> _OwnNode | None:
         with self._lock:
-            if node in self._own:
-                change(self._own[node])
+            own = self._own.pop(node, None)
+        self._announce()
+        for endpoint in own.endpoints if own else ():
+            endpoint.close()
+        return own
+
+    def _drop(self, node: weakref.ref[Node]) -> None:
+        """
+        Leave word for the listening thread that a node is gone.
+
+        The garbage collector calls this on any thread, whatever that is doing and whatever locks it holds: so
+        this may wait for none.
+        """
+        self._dropped.append(node)
+        self._drops.trigger()
+
+    def _remove_dropped(self) -> None:
+        while self._dropped:
+            if (own := self._remove(self._dropped.popleft())) is not None:
+                own.dropped()
+
+    def _change(self, node: Node, change: Callable[[_OwnNode], None]) -> None:
+        with self._lock:
+            if (own := self._own.get(weakref.ref(node))) is not None:
+                change(own)
         self._announce()
 
     def create_writer(
@@ -195,7 +239,12 @@ class Graph:
         user_data = f"{extra}typehash={msg_type._TYPE_HASH};"
         writer = self.participant.create_writer(topic, msg_type._DDS_TYPE_NAME, profile, user_data)
         writer.logger_name = node.get_logger().name
-        self._change(node, lambda own: own.writers.append(writer.gid))
+
+        def add(own: _OwnNode) -> None:
+            own.writers.append(writer.gid)
+            own.endpoints.append(writer)
+
+        self._change(node, add)
         return writer
 
     def create_reader(
@@ -208,16 +257,22 @@ class Graph:
         user_data = f"{extra}typehash={msg_type._TYPE_HASH};"
         reader = self.participant.create_reader(topic, msg_type._DDS_TYPE_NAME, profile, user_data)
         reader.logger_name = node.get_logger().name
-        self._change(node, lambda own: own.readers.append(reader.gid))
+
+        def add(own: _OwnNode) -> None:
+            own.readers.append(reader.gid)
+            own.endpoints.append(reader)
+
+        self._change(node, add)
         return reader
 
     def destroy(self, node: Node, *endpoints: Writer | Reader) -> None:
         """End readers and writers of ``node``."""
         gone = {endpoint.gid for endpoint in endpoints}
 
-        def remove(own: NodeEntities) -> None:
+        def remove(own: _OwnNode) -> None:
             own.readers = [gid for gid in own.readers if gid not in gone]
             own.writers = [gid for gid in own.writers if gid not in gone]
+            own.endpoints = [endpoint for endpoint in own.endpoints if endpoint.gid not in gone]
 
         self._change(node, remove)
         for endpoint in endpoints:
@@ -244,11 +299,13 @@ class Graph:
             with self._lock:
                 if self._waitset.closed:
                     return
+                self._drops.take()
                 self._take()
                 if self._discovery is not None:
                     self._discovery.forget_gone()
                 for guard in self._waiting:
                     guard.trigger()
+            self._remove_dropped()  # without the lock: who hears of it may wait for others
 
     def _take(self) -> None:
         """Note what peers have announced."""
@@ -316,7 +373,8 @@ class Graph:
         with self._lock:
             self._take()
             self._forget_dead_peers()
-            known = {**self._peers, self.participant.gid: list(self._own.values())}
+            own: list[NodeEntities] = [*self._own.values()]
+            known = {**self._peers, self.participant.gid: own}
             for gid, nodes in known.items():
                 for node in nodes:
                     yield gid, node

@@ -170,8 +170,7 @@ class Context(AbstractContextManager["Context"]):
             global g_logging_ref_count
             with _logging_lock:
                 g_logging_ref_count -= 1
-        if not self._nodes:
-            self._leave_domain()
+        self._leave_if_unused()
         return True
 
     def __enter__(self) -> Context:
@@ -210,7 +209,12 @@ class Context(AbstractContextManager["Context"]):
     def _forget(self, node: Node) -> None:
         with self._lock:
             self._nodes.discard(node)
-            if not self._nodes and not self._valid:
+            self._leave_if_unused()
+
+    def _leave_if_unused(self) -> None:
+        """Leave the DDS domain if the context was shut down and there are no nodes."""
+        with self._lock:
+            if not self._valid and not list(self._nodes):  # its length counts those that are just going
                 self._leave_domain()
 
     def _leave_domain(self) -> None:

@@ -12,6 +12,7 @@ import inspect
 import os
 import threading
 import time
+import weakref
 from collections import deque
 from collections.abc import Callable, Coroutine
 from concurrent.futures import ThreadPoolExecutor
@@ -125,6 +126,10 @@ class Executor(AbstractContextManager["Executor"]):
         self._guard = GuardCondition()
         self._waitset = WaitSet()
         self._waitset.attach(self._guard.handle, _WAKE)
+        # What ends with the executor, also where nobody shuts it down.
+        self._dds: list[WaitSet | GuardCondition] = [self._waitset, self._guard]
+        self._close_dds = weakref.finalize(self, _close, self._dds)
+        self._close_dds.atexit = False  # DDS ends by itself then
         self._spinning_thread: int | None = None
         self._callback_thread: int | None = None  # the spinning thread, while it runs a callback itself
         # The rest is the spinning thread's own, but for the two flags by which others leave word.
@@ -464,8 +469,7 @@ class Executor(AbstractContextManager["Executor"]):
         return True
 
     def _close(self) -> None:
-        self._waitset.close()
-        self._guard.close()
+        self._close_dds()
 
     def __enter__(self) -> Executor:
         return self
@@ -477,6 +481,11 @@ class Executor(AbstractContextManager["Executor"]):
         exc_tb: TracebackType | None,
     ) -> None:
         self.shutdown()
+
+
+def _close(entities: list[WaitSet | GuardCondition]) -> None:
+    for entity in entities:
+        entity.close()
 
 
 def _raise_exception_of(task: Task) -> None:
@@ -513,14 +522,17 @@ class MultiThreadedExecutor(Executor):
             raise ValueError("a MultiThreadedExecutor needs at least one thread")
         super().__init__(context=context)
         self._threads = num_threads or max(2, os.cpu_count() or 2)
-        self._pool_threads: set[int] = set()
+        self._pool_threads = pool_threads = set[int]()
         self._pool = ThreadPoolExecutor(
-            self._threads, "rclpy-executor", lambda: self._pool_threads.add(threading.get_ident())
+            self._threads,
+            "rclpy-executor",
+            lambda: pool_threads.add(threading.get_ident()),  # the threads shall not keep the executor alive
         )
         self._errors: deque[BaseException] = deque()
         self._in_pool = 0  # callbacks under way there
         self._wakes = WaitSet()  # for nothing but being woken
         self._wakes.attach(self._guard.handle, _WAKE)
+        self._dds.append(self._wakes)
 
     def _next(self, deadline: int | None, condition: Callable[[], bool] | None) -> tuple[Any, Any]:
         """Wait for a free thread, then for work: what is taken earlier grows old, and more and more of it."""
@@ -581,5 +593,4 @@ class MultiThreadedExecutor(Executor):
 
     def _close(self) -> None:
         super()._close()
-        self._wakes.close()
         self._pool.shutdown(wait=False)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import weakref
 from collections.abc import Callable, Iterator
+from functools import partial
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from rcl_interfaces.msg import Log, ParameterEvent
@@ -138,25 +139,30 @@ class Node(NodeParameters, NodeGraph):
         overrides.update({parameter.name: parameter for parameter in parameter_overrides or []})
         self._init_parameters(overrides, allow_undeclared=allow_undeclared_parameters)
 
+        self._rosout_publisher: Publisher | None = None
+        self._log_listener = _weakly(self._publish_log)
         self._graph = self._context._join_domain(self)
         with self._graph.one_announcement():
-            self._graph.add_node(self)
-            self._rosout_publisher: Publisher | None = None
-            if enable_rosout and self._context._arguments.rosout_logs:
-                self._rosout_publisher = self._create_own_publisher(Log, "/rosout", _ROSOUT_QOS)
-                _logging_output.add_rosout_publisher(self._logger.name, self._publish_log)
-            self._parameter_event_publisher = self.create_publisher(
-                ParameterEvent, "/parameter_events", qos_profile_parameter_events
-            )
-            if automatically_declare_parameters_from_overrides:
-                self._declare_overrides()
-            self._time_source = TimeSource(node=self)
-            self._time_source.attach_clock(self._clock)
-            if start_parameter_services:
-                self._parameter_service = ParameterService(self)
-            if enable_logger_service:
-                self._logger_service = LoggingService(self)
-            self._type_description_service = TypeDescriptionService(self)
+            self._graph.add_node(self, partial(_forget_dropped, self._context, self._log_listener))
+            try:
+                if enable_rosout and self._context._arguments.rosout_logs:
+                    self._rosout_publisher = self._create_own_publisher(Log, "/rosout", _ROSOUT_QOS)
+                    _logging_output.add_rosout_publisher(self._logger.name, self._log_listener)
+                self._parameter_event_publisher = self.create_publisher(
+                    ParameterEvent, "/parameter_events", qos_profile_parameter_events
+                )
+                if automatically_declare_parameters_from_overrides:
+                    self._declare_overrides()
+                self._time_source = TimeSource(node=self)
+                self._time_source.attach_clock(self._clock)
+                if start_parameter_services:
+                    self._parameter_service = ParameterService(self)
+                if enable_logger_service:
+                    self._logger_service = LoggingService(self)
+                self._type_description_service = TypeDescriptionService(self)
+            except BaseException:
+                Node.destroy_node(self)  # a subclass' own does not expect to be called yet
+                raise
 
     # Who it is
 
@@ -570,7 +576,7 @@ class Node(NodeParameters, NodeGraph):
             self.destroy_rate(rate)
         with self._graph.one_announcement():
             if self._rosout_publisher is not None:
-                _logging_output.remove_rosout_publisher(self._publish_log)
+                _logging_output.remove_rosout_publisher(self._log_listener)
                 self._rosout_publisher.destroy()
             self._destroyed = True
             for entities in (
@@ -601,3 +607,20 @@ class Node(NodeParameters, NodeGraph):
         message.name, message.msg = record.name, record.message
         message.file, message.function, message.line = record.file, record.function, record.line
         publisher.publish(message)
+
+
+def _weakly(method: Callable[[Any], None]) -> Callable[[Any], None]:
+    """What calls a bound method as long as its object is there, which this does not keep alive."""
+    reference = weakref.WeakMethod(method)
+
+    def call(argument: Any) -> None:
+        if (method := reference()) is not None:
+            method(argument)
+
+    return call
+
+
+def _forget_dropped(context: Context, log_listener: Callable[[Any], None]) -> None:
+    """Forget a node that is gone though nobody destroyed it."""
+    _logging_output.remove_rosout_publisher(log_listener)
+    context._leave_if_unused()
