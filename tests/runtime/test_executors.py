@@ -299,6 +299,49 @@ def test_a_node_moves_to_the_executor_that_it_is_added_to_last(
     assert node.executor is None
 
 
+def test_what_a_node_had_ready_runs_where_it_went(
+    make_node: MakeNode, context: Context, executor: SingleThreadedExecutor
+) -> None:
+    node = make_node()
+    threads: list[str] = []
+    with SingleThreadedExecutor(context=context) as other:
+
+        def leave() -> None:
+            threads.append("first")
+            other.add_node(node)
+
+        executor.add_node(node)
+        node.create_guard_condition(leave).trigger()
+        node.create_guard_condition(lambda: threads.append("second")).trigger()
+        executor.spin_once(timeout_sec=5)
+        task = executor.create_task(lambda: None)
+        executor.spin_once(timeout_sec=0)
+        assert task.done()
+        executor.spin_once(timeout_sec=0)
+        assert threads == ["first"]
+        other.spin_once(timeout_sec=5)
+        assert threads == ["first", "second"]
+
+
+def test_messages_of_a_node_that_left_stay_for_the_executor_that_has_it(
+    make_node: MakeNode, context: Context, executor: SingleThreadedExecutor, spin_until: SpinUntil
+) -> None:
+    node = make_node()
+    received: list[float] = []
+    node.create_subscription(Float64, "x", lambda message: received.append(message.data), 10)
+    publisher = node.create_publisher(Float64, "x", 10)
+    for number in range(3):
+        publisher.publish(Float64(data=float(number)))
+    executor.add_node(node)
+    spin_until(lambda: received)
+    executor.remove_node(node)
+    executor.spin_once(timeout_sec=0)
+    assert received == [0.0]
+    executor.add_node(node)
+    spin_until(lambda: len(received) == 3)
+    assert received == [0.0, 1.0, 2.0]
+
+
 def test_shut_down_between_taking_and_running_an_executor_runs_what_it_took(
     make_node: MakeNode, context: Context
 ) -> None:

@@ -378,6 +378,9 @@ class Executor(AbstractContextManager["Executor"]):
                 if self._waitset.attach(handle, self._last_token):
                     self._tokens[handle] = self._last_token
                     self._attached[self._last_token] = (entity, handle)
+        if self._ready:  # what others run from now on is not run here
+            here = {*self._timers, *self._guards, *wanted.values()}
+            self._ready = deque(one for one in self._ready if one[0].__class__ is Task or one[0] in here)
 
     def _block(self, entity: _Entity) -> None:
         """Do not wait for an entity whose callback group is busy: its data would end every wait at once."""
