@@ -11,9 +11,13 @@ from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallb
 from rclpy.clock import Clock, ClockType
 from rclpy.context import Context
 from rclpy.executors import (
+    ConditionReachedException,
+    Executor,
     ExternalShutdownException,
     MultiThreadedExecutor,
     SingleThreadedExecutor,
+    TimeoutException,
+    TimeoutObject,
 )
 from rclpy.node import Node
 from rclpy.task import Future
@@ -340,6 +344,110 @@ def test_messages_of_a_node_that_left_stay_for_the_executor_that_has_it(
     executor.add_node(node)
     spin_until(lambda: len(received) == 3)
     assert received == [0.0, 1.0, 2.0]
+
+
+class OwnExecutor(Executor):
+    """An executor as users write them: with what rclpy documents."""
+
+    def spin_once(self, timeout_sec: float | None = None) -> None:
+        self._run_one(timeout_sec, lambda: False)
+
+    def spin_once_until_future_complete(
+        self, future: Future, timeout_sec: float | TimeoutObject | None = None
+    ) -> None:
+        self._run_one(timeout_sec, future.done)
+
+    def _run_one(self, timeout_sec: float | TimeoutObject | None, condition: Callable[[], bool]) -> None:
+        try:
+            task, _, _ = self.wait_for_ready_callbacks(timeout_sec, None, condition)
+        except (TimeoutException, ConditionReachedException):
+            return
+        task()
+        task.result()
+
+
+@pytest.fixture
+def own_executor(context: Context) -> Iterator[OwnExecutor]:
+    """An executor of the test's context, made by a user."""
+    with OwnExecutor(context=context) as executor:
+        yield executor
+
+
+def test_an_executor_of_ones_own_spins_until_a_future_is_complete(
+    make_node: MakeNode, own_executor: OwnExecutor
+) -> None:
+    node = make_node()
+    own_executor.add_node(node)
+    future: Future = Future()
+    calls: list[bool] = []
+
+    def call() -> None:
+        calls.append(True)
+        if len(calls) == 3:
+            future.set_result("done")
+
+    node.create_timer(0.0, call)
+    own_executor.spin_until_future_complete(future)
+    assert future.result() == "done"
+    assert len(calls) == 3
+
+
+def test_an_executor_of_ones_own_gives_up_after_its_timeout(own_executor: OwnExecutor) -> None:
+    future: Future = Future()
+    own_executor.spin_until_future_complete(future, timeout_sec=0.05)
+    assert not future.done()
+
+
+def test_an_executor_of_ones_own_has_to_say_how_it_spins(context: Context) -> None:
+    with Executor(context=context) as executor:
+        with pytest.raises(NotImplementedError):
+            executor.spin_once()
+        with pytest.raises(NotImplementedError):
+            executor.spin_until_future_complete(Future())
+
+
+def test_callbacks_may_be_waited_for_of_some_nodes_only(
+    make_node: MakeNode, own_executor: OwnExecutor
+) -> None:
+    first, second = make_node("first"), make_node("second")
+    guards = []
+    for node in (first, second):
+        own_executor.add_node(node)
+        guards.append(node.create_guard_condition(lambda: None))
+        guards[-1].trigger()
+    task, entity, node_of_it = own_executor.wait_for_ready_callbacks(5, [second])
+    assert (entity, node_of_it) == (guards[1], second)
+    task()
+    with pytest.raises(TimeoutException):
+        own_executor.wait_for_ready_callbacks(0, nodes=[second])
+    assert own_executor.wait_for_ready_callbacks(5)[1:] == (guards[0], first)
+
+
+def test_a_callback_that_ends_on_another_thread_lets_the_next_of_its_group_run(
+    make_node: MakeNode, own_executor: OwnExecutor
+) -> None:
+    node = make_node()
+    own_executor.add_node(node)
+    group = MutuallyExclusiveCallbackGroup()
+    node.create_subscription(Float64, "x", lambda message: None, 10, callback_group=group)
+    node.create_subscription(Float64, "x", lambda message: None, 10, callback_group=group)
+    node.create_publisher(Float64, "x", 10).publish(Float64())
+    first, entity, _ = own_executor.wait_for_ready_callbacks(10)
+    looked = threading.Event()
+
+    def run() -> None:
+        looked.wait(10)
+        first()
+
+    def look() -> bool:
+        looked.set()
+        return False
+
+    thread = threading.Thread(target=run)
+    thread.start()
+    second = own_executor.wait_for_ready_callbacks(10, condition=look)[1]
+    thread.join()
+    assert {entity, second} == set(node.subscriptions)
 
 
 def test_shut_down_between_taking_and_running_an_executor_runs_what_it_took(

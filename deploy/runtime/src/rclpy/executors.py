@@ -135,6 +135,7 @@ class Executor(AbstractContextManager["Executor"]):
         # The rest is the spinning thread's own, but for the two flags by which others leave word.
         self._entities_changed = True
         self._groups_changed = False
+        self._only_nodes: list[Node] | None = None  # to wait for, in place of those that were added
         self._seen: list[tuple[Node, int]] = []  # the nodes, and the version of their entities, waited for
         self._timers: list[Timer] = []
         self._guards: list[Any] = []
@@ -226,22 +227,30 @@ class Executor(AbstractContextManager["Executor"]):
             self.spin_once()
 
     def spin_once(self, timeout_sec: float | None = None) -> None:
-        """Run one callback, waiting at most ``timeout_sec`` for it (``None`` or negative: for ever)."""
+        """
+        Run one callback, waiting at most ``timeout_sec`` for it (``None`` or negative: for ever).
+
+        An executor of your own defines this, and gets its work from :meth:`wait_for_ready_callbacks`.
+        """
         self._spin_once(_deadline(timeout_sec), None)
 
     def spin_until_future_complete(self, future: Future, timeout_sec: float | None = None) -> None:
         """Run callbacks until ``future`` is done or cancelled, but no longer than ``timeout_sec``."""
         future._call_when_complete(self.wake)
-        deadline = _deadline(timeout_sec)
+        timeout = None if timeout_sec is None or timeout_sec < 0 else TimeoutObject(timeout_sec)
         while self._context._valid and not self._is_shutdown and not future._is_over():
-            self._spin_once(deadline, future._is_over)
-            if deadline is not None and time.monotonic_ns() >= deadline:
+            self.spin_once_until_future_complete(future, timeout)
+            if timeout is not None and not timeout.timeout:
                 return
 
     def spin_once_until_future_complete(
         self, future: Future, timeout_sec: float | TimeoutObject | None = None
     ) -> None:
-        """Run one callback, unless ``future`` is or gets done before one is ready."""
+        """
+        Run one callback, unless ``future`` is or gets done before one is ready.
+
+        An executor of your own defines this, if somebody is to wait for futures with it.
+        """
         future._call_when_complete(self.wake)
         self._spin_once(_deadline(timeout_sec), future._is_over)
 
@@ -258,12 +267,27 @@ class Executor(AbstractContextManager["Executor"]):
         """
         Wait for a callback and return it as a task, with its entity and node.
 
+        :param nodes: the nodes whose callbacks to wait for; those of this executor if ``None``.
         :raises TimeoutException, ShutdownException, ExternalShutdownException, ConditionReachedException:
             if there is none.
         """
-        entity, taken = self._next(_deadline(timeout_sec), condition)
-        node = next((node for node in self.get_nodes() if entity in node._entities()), None)
-        return Task(self._run, (entity, taken), executor=self), entity, node
+        if nodes is not None:
+            self._wait_only_for(list(nodes))
+        try:
+            entity, taken = self._next(_deadline(timeout_sec), condition)
+        finally:
+            if nodes is not None:
+                self._wait_only_for(None)
+        candidates = self.get_nodes() if nodes is None else nodes
+        node = next((node for node in candidates if entity in node._entities()), None)
+        task = Task(self._run, (entity, taken), executor=self)
+        # Whoever waits here on another thread than the task's may have to wait for more from then on.
+        task._call_when_complete(self.wake)
+        return task, entity, node
+
+    def _wait_only_for(self, nodes: list[Node] | None) -> None:
+        self._only_nodes = nodes
+        self._entities_changed = True
 
     def can_execute(self, entity: Any) -> bool:
         """Whether ``entity``'s callback group would let it run now."""
@@ -354,7 +378,7 @@ class Executor(AbstractContextManager["Executor"]):
     def _update_entities(self) -> None:
         """Bring the wait set up to the entities that the nodes have now."""
         self._entities_changed = False  # first: what changes from now on is seen in the next round
-        nodes = self.get_nodes()
+        nodes = self.get_nodes() if self._only_nodes is None else self._only_nodes
         seen = [(node, node._entities_version) for node in nodes]
         if seen == self._seen:
             return  # rclpy.spin_once() adds and removes its node with every call
@@ -496,7 +520,20 @@ def _raise_exception_of(task: Task) -> None:
         task.result()
 
 
-class SingleThreadedExecutor(Executor):
+class _ReadyMadeExecutor(Executor):
+    """An executor of this module: no other call stands between its spinning and a callback."""
+
+    def spin_until_future_complete(self, future: Future, timeout_sec: float | None = None) -> None:
+        """Run callbacks until ``future`` is done or cancelled, but no longer than ``timeout_sec``."""
+        future._call_when_complete(self.wake)
+        deadline = _deadline(timeout_sec)
+        while self._context._valid and not self._is_shutdown and not future._is_over():
+            self._spin_once(deadline, future._is_over)
+            if deadline is not None and time.monotonic_ns() >= deadline:
+                return
+
+
+class SingleThreadedExecutor(_ReadyMadeExecutor):
     """Runs all callbacks on the thread that spins."""
 
     def _spin_once(self, deadline: int | None, condition: Callable[[], bool] | None) -> None:
@@ -512,7 +549,7 @@ class SingleThreadedExecutor(Executor):
             self._end_spin(outer)
 
 
-class MultiThreadedExecutor(Executor):
+class MultiThreadedExecutor(_ReadyMadeExecutor):
     """Runs callbacks on a pool of threads, as far as their callback groups let them run in parallel."""
 
     def __init__(self, num_threads: int | None = None, *, context: Context | None = None) -> None:
