@@ -76,19 +76,32 @@ class ReactiveNode(Node):
         return Observable(_SharedReader(self, create_reader, _retained(qos_profile), timestamped).subscribe)
 
     def create_parameter_observable(self, name: str) -> Observable[Any]:
-        """Return the values of a declared parameter: the present one at once, then each that is set."""
+        """
+        Return the values of a declared parameter: the present one at once, then each that is set.
+
+        One that is set on another thread just then may come twice.
+        """
 
         def subscribe(
             observer: abc.ObserverBase[Any], scheduler: abc.SchedulerBase | None = None
         ) -> abc.DisposableBase:
-            def changed(parameters: list[Parameter]) -> None:
-                for parameter in parameters:
-                    if parameter.name == name:
-                        observer.on_next(parameter.value)
+            lock = threading.RLock()  # the present value comes first, whoever sets another one meanwhile
 
-            observer.on_next(self.get_parameter(name).value)
-            self.add_post_set_parameters_callback(changed)
-            return Disposable(lambda: self.remove_post_set_parameters_callback(changed))
+            def changed(parameters: list[Parameter]) -> None:
+                with lock:
+                    for parameter in parameters:
+                        if parameter.name == name:
+                            observer.on_next(parameter.value)
+
+            end = Disposable(lambda: self.remove_post_set_parameters_callback(changed))
+            with lock:
+                self.add_post_set_parameters_callback(changed)
+                try:
+                    observer.on_next(self.get_parameter(name).value)
+                except Exception:
+                    end.dispose()
+                    raise
+            return end
 
         return Observable(subscribe).take_until(self._end)
 
@@ -150,7 +163,12 @@ class ReactiveNode(Node):
         return call
 
     def publish_observable(
-        self, observable: Observable[Any], msg_type: Any, topic: str, qos_profile: QoSProfile | int = 10
+        self,
+        observable: Observable[Any],
+        msg_type: Any,
+        topic: str,
+        qos_profile: QoSProfile | int = 10,
+        **options: Any,
     ) -> abc.DisposableBase:
         """
         Publish every message of an observable, until the returned disposable is disposed or the node ends.
@@ -158,8 +176,12 @@ class ReactiveNode(Node):
         The publisher exists from now on: peers need time to discover it, so one that is created with the
         first message loses it. An error of the observable, or a message of another type, ends the spinning of
         the node: it is raised there, once.
+
+        :param options: further arguments of :meth:`rclpy.node.Node.create_publisher`. The QoS events of the
+            publisher are an observable by a subject:
+            ``event_callbacks=PublisherEventCallbacks(deadline=subject.on_next)``.
         """
-        publisher = self.create_publisher(msg_type, topic, qos_profile)
+        publisher = self.create_publisher(msg_type, topic, qos_profile, **options)
         subscription = observable.do_action(publisher.publish).subscribe(
             on_error=self.fail, scheduler=self.scheduler
         )

@@ -10,10 +10,13 @@ from typing import Any
 import pytest
 import reactivex as rx
 from rclpy.duration import Duration
+from rclpy.event_handler import PublisherEventCallbacks
+from rclpy.exceptions import ParameterNotDeclaredException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, LivelinessPolicy, QoSProfile
+from reactivex import operators as ops
 from reactivex.abc import DisposableBase
 from reactivex.subject import Subject
 from std_msgs.msg import Float64, String
@@ -470,6 +473,52 @@ def test_a_parameter_is_an_observable_of_its_value_and_of_each_that_is_set(node:
     assert gains == [1.0, 2.0, 3.0]
 
 
+def test_an_observer_may_set_the_parameter_when_it_gets_the_present_value(node: ReactiveNode) -> None:
+    node.declare_parameter("gain", 1.0)
+    gains: list[float] = []
+
+    def double(gain: float) -> None:
+        gains.append(gain)
+        if len(gains) == 1:
+            node.set_parameters([Parameter("gain", value=2 * gain)])
+
+    node.create_parameter_observable("gain").subscribe(double)
+
+    assert gains == [1.0, 2.0]
+
+
+def test_a_parameter_set_on_another_thread_while_the_present_value_is_read_is_not_missed(
+    node: ReactiveNode, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    node.declare_parameter("gain", 1.0)
+    get = node.get_parameter
+    setter = threading.Thread(target=lambda: node.set_parameters([Parameter("gain", value=2.0)]))
+
+    def get_too_early(name: str) -> Parameter:
+        present = get(name)
+        setter.start()
+        while setter.is_alive() and get(name).value == present.value:
+            setter.join(0.001)
+        return present
+
+    gains: list[float] = []
+    with monkeypatch.context() as patch:
+        patch.setattr(node, "get_parameter", get_too_early)
+        node.create_parameter_observable("gain").subscribe(gains.append)
+    setter.join(10)
+
+    assert gains == [1.0, 2.0]
+
+
+def test_a_parameter_that_is_not_declared_is_an_error_of_the_observable(node: ReactiveNode) -> None:
+    errors: list[Exception] = []
+    node.create_parameter_observable("gain").subscribe(on_error=errors.append)
+    node.declare_parameter("gain", 1.0)
+    node.set_parameters([Parameter("gain", value=2.0)])
+
+    assert [type(error) for error in errors] == [ParameterNotDeclaredException]
+
+
 def test_a_parameter_observable_completes_with_the_node(node: ReactiveNode) -> None:
     node.declare_parameter("gain", 1.0)
     completed: list[bool] = []
@@ -606,3 +655,19 @@ def test_a_publisher_that_is_not_alive_is_an_event(
     publisher.assert_liveliness()
     spin_until(lambda: alive[-1:] == [1])
     spin_until(lambda: alive[-1:] == [0])
+
+
+def test_what_happens_to_a_publisher_is_an_observable_too(
+    node: ReactiveNode, peer: Node, spin_until: SpinUntil
+) -> None:
+    qos = QoSProfile(depth=1, deadline=Duration(seconds=0.1))
+    missed, matched = Subject[Any](), Subject[Any]()
+    events: list[str] = []
+    missed.pipe(ops.take(1)).subscribe(lambda _: events.append("missed"))
+    matched.pipe(ops.take(1)).subscribe(lambda info: events.append(f"matched {info.current_count}"))
+    callbacks = PublisherEventCallbacks(deadline=missed.on_next, matched=matched.on_next)
+    node.publish_observable(rx.just(String(data="once")), String, "topic", qos, event_callbacks=callbacks)
+
+    peer.create_subscription(String, "topic", lambda _: None, qos)
+
+    spin_until(lambda: sorted(events) == ["matched 1", "missed"])
