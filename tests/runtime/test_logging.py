@@ -376,6 +376,28 @@ def test_a_child_that_is_gone_is_forgotten() -> None:
     assert not _logging_output._rosout
 
 
+def test_a_child_may_go_while_its_publisher_is_removed() -> None:
+    class Publisher:
+        def __call__(self, record: LogRecord) -> None:
+            raise AssertionError
+
+        def __eq__(self, other: object) -> bool:  # here the garbage collector may come
+            children.clear()
+            return self is other
+
+        __hash__ = None  # type: ignore[assignment]
+
+    children: list[RcutilsLogger] = []
+    publisher, other = Publisher(), Publisher()
+    _logging_output.add_rosout_publisher("node", other)
+    _logging_output.add_rosout_publisher("parent", publisher)
+    children.append(get_logger("parent").get_child("child"))
+    _logging_output.remove_rosout_publisher(publisher)
+    assert _logging_output._rosout == {"node": [other]}
+    _logging_output.remove_rosout_publisher(other)
+    assert _logging_output._rosout == {}
+
+
 def test_a_publisher_that_logs_or_fails_neither_recurses_nor_fails_the_program(
     capsys: pytest.CaptureFixture[str],
 ) -> None:

@@ -155,10 +155,12 @@ def add_rosout_publisher(logger_name: str, publish: Callable[[LogRecord], None])
 def remove_rosout_publisher(publish: Callable[[LogRecord], None]) -> None:
     """End what `add_rosout_publisher` began, for the logger and its children."""
     with _rosout_lock:
-        for name in list(_rosout):
-            _rosout[name] = [other for other in _rosout[name] if other != publish]
-            if not _rosout[name]:
-                del _rosout[name]
+        for name, publishers in list(_rosout.items()):
+            kept = [other for other in publishers if other != publish]
+            if kept:
+                _rosout[name] = kept
+            else:  # the garbage collector may have come in between, and taken a child
+                _rosout.pop(name, None)
 
 
 def share_rosout_publisher(parent: str, child: str) -> Callable[[LogRecord], None] | None:
