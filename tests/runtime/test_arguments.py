@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 import rclpy.logging
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 from rclpy._arguments import RosArguments, parse, remove_ros_args
 from rclpy._parameter_files import ParameterFileError, read_parameter_file
@@ -342,6 +342,7 @@ def test_any_text_is_a_value_or_a_mistake(text: str) -> None:
 
 
 @given(text=st.text() | st.text("[]{}:,-'\"&*!#|>\n ~a1./", min_size=1))
+@example(text="{0\n\n0}")
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_any_text_in_a_file_is_understood_or_a_mistake(tmp_path: Path, text: str) -> None:
     path = tmp_path / "any.yaml"

@@ -51,7 +51,8 @@ def read_parameter_file(path: str) -> NodeParameters:
             _read_nodes(document, "", nodes)
     except _Mistake as mistake:
         key = f"{mistake.key}: " if mistake.key else ""
-        raise ParameterFileError(f"{path}: line {mistake.line}: {key}{mistake.reason}") from None
+        told = " ".join(f"{key}{mistake.reason}".split())  # a key may have several lines
+        raise ParameterFileError(f"{path}: line {mistake.line}: {told}") from None
     return nodes
 
 
