@@ -67,7 +67,8 @@ def test_engines_go_off_in_time_though_the_controller_is_stopped(plays: dict[str
     play = plays["variously"]
     begin, off = asleep(play)
     stop = next(f for f in play.history.faults if (f.kind, f.target) == ("stop", "engine_controller"))
-    assert stop.begin < off <= stop.begin + DRIVE  # of itself, as nobody said so
+    assert stop.begin < off <= stop.begin + DRIVE + TRANSPORT  # of itself, as nobody said so
+    assert not between(play.history.stream(ENGINES), begin, off)
     assert off - begin <= OFF_WITHIN
 
 
