@@ -261,7 +261,7 @@ def _absences(history: History, time: float) -> float:
 def _abandoned(history: History, off: Sample) -> bool:
     """Whether the controller saw nobody for ten seconds: the operator was silent, or the watchdog blind."""
     presences = history.stream(topics.OPERATOR_PRESENCE)
-    begin = off.sent - ABSENCE + TRANSPORT
+    begin = off.sent - ABSENCE + SAMPLING + TRANSPORT  # a presence is as old as its stamp
     if between(presences, begin, off.sent - TRANSPORT):
         return False
     heartbeats = [s.sent for s in history.stream(topics.OPERATOR_HEARTBEAT) if s.value is True]

@@ -129,7 +129,7 @@ def test_s2_a_watchdog_that_hung_has_no_strikes_when_it_is_replaced() -> None:
 
 
 def test_s2_ten_seconds_without_a_presence_are_a_reason_if_the_operator_was_silent() -> None:
-    history = says(silent(good(), "operator_presence", 30.0, 45.0), "engines/state", OFF, 40.0)
+    history = says(silent(good(), "operator_presence", 30.6, 45.0), "engines/state", OFF, 40.0)
     assert verdict("S2", history) == VIOLATED
     assert verdict("S2", silent(history, "operator_heartbeat", 30.0, 45.0)) != VIOLATED
 
