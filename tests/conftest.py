@@ -1,4 +1,4 @@
-"""What every test may rely on: a DDS domain of its own on loopback, and that nothing is left behind."""
+"""What every test may rely on: a DDS domain of its own on loopback, nodes, and that nothing is left behind."""
 
 from __future__ import annotations
 
@@ -9,11 +9,16 @@ import signal
 import socket
 import time
 import uuid
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
+import rclpy
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
 
 # On the rclpy of ROS 2 there is no embedded runtime to test.
 collect_ignore = [] if importlib.util.find_spec("rosidl_runtime_embedded") else ["runtime"]
@@ -82,6 +87,50 @@ def module_domain_id() -> Iterator[int]:
     """A free ROS_DOMAIN_ID for what the tests of a module share; the environment stays as it is."""
     with reserved_domain() as domain:
         yield domain
+
+
+@pytest.fixture
+def context(domain_id: int) -> Iterator[Context]:
+    """An initialized context that handles no signals, in a domain of its own."""
+    context = Context()
+    rclpy.init(args=[], context=context, domain_id=domain_id)
+    yield context
+    context.try_shutdown()
+    context.destroy()
+
+
+@pytest.fixture
+def make_node(context: Context) -> Iterator[Callable[..., Node]]:
+    """Makes nodes of the test's context and ends them with the test."""
+    with ExitStack() as stack:
+
+        def make(name: str = "node", **options: Any) -> Node:
+            node = Node(name, **{"context": context, **options})
+            stack.callback(node.destroy_node)
+            return node
+
+        yield make
+
+
+@pytest.fixture
+def executor(context: Context) -> Iterator[SingleThreadedExecutor]:
+    """A single-threaded executor of the test's context."""
+    with SingleThreadedExecutor(context=context) as executor:
+        yield executor
+
+
+@pytest.fixture
+def spin_until(executor: SingleThreadedExecutor) -> Callable[..., None]:
+    """Spins the test's executor until a condition is true; fails when that takes too long."""
+
+    def spin(condition: Callable[[], object], seconds: float = 10.0) -> None:
+        clock = rclpy.clock.Clock(clock_type=rclpy.clock.ClockType.STEADY_TIME)
+        deadline = clock.now().nanoseconds + int(seconds * 1e9)
+        while not condition():
+            assert clock.now().nanoseconds < deadline, f"not within {seconds} s"
+            executor.spin_once(timeout_sec=0.1)
+
+    return spin
 
 
 def _left_behind() -> dict[int, str]:

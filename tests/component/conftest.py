@@ -8,7 +8,6 @@ from contextlib import ExitStack
 from typing import Any
 
 import pytest
-import rclpy
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -21,22 +20,6 @@ from interfaces.reactive_node import ReactiveNode
 def scheduler() -> TestScheduler:
     """Virtual time [s]."""
     return TestScheduler()
-
-
-@pytest.fixture
-def context(domain_id: int) -> Iterator[Context]:
-    """An initialized context that handles no signals, in a domain of its own."""
-    context = Context()
-    rclpy.init(args=[], context=context, domain_id=domain_id)
-    yield context
-    context.try_shutdown()
-
-
-@pytest.fixture
-def executor(context: Context) -> Iterator[SingleThreadedExecutor]:
-    """The executor of the test's nodes."""
-    with SingleThreadedExecutor(context=context) as executor:
-        yield executor
 
 
 @pytest.fixture

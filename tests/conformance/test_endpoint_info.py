@@ -6,7 +6,8 @@ from typing import Any
 
 import pytest
 from rclpy.duration import Infinite
-from rclpy.exceptions import NoTypeSupportImportedException, RMWError
+from rclpy._rclpy_pybind11 import RMWError
+from rclpy.exceptions import NoTypeSupportImportedException
 from rclpy.qos import QoSPresetProfiles, QoSProfile
 from rclpy.serialization import deserialize_message, serialize_message
 from rclpy.topic_endpoint_info import TopicEndpointInfo, TopicEndpointTypeEnum

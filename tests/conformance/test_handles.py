@@ -6,12 +6,12 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
+from rclpy._rclpy_pybind11 import RCLError
 from rclpy.context import Context
 from rclpy.exceptions import (
     InvalidHandle,
     InvalidServiceNameException,
     InvalidTopicNameException,
-    RCLError,
 )
 from rclpy.node import Node
 from rclpy.publisher import Publisher

@@ -18,7 +18,9 @@ from service_msgs.msg import ServiceEventInfo
 from std_srvs.srv import SetBool
 
 SpinUntil = Callable[..., None]
-OFF, METADATA, CONTENTS = ServiceIntrospectionState
+OFF = ServiceIntrospectionState.OFF
+METADATA = ServiceIntrospectionState.METADATA
+CONTENTS = ServiceIntrospectionState.CONTENTS
 
 
 def negate(request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
