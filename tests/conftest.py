@@ -1,4 +1,4 @@
-"""What every test may rely on: a DDS domain of its own on loopback, nodes, and that nothing is left behind."""
+"""What every test may rely on: a DDS domain of its own on loopback, nodes in it, and nothing left behind."""
 
 from __future__ import annotations
 

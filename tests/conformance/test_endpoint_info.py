@@ -6,13 +6,11 @@ from typing import Any
 
 import pytest
 from rclpy.duration import Infinite
-from rclpy._rclpy_pybind11 import RMWError
-from rclpy.exceptions import NoTypeSupportImportedException
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.qos import QoSPresetProfiles, QoSProfile
 from rclpy.serialization import deserialize_message, serialize_message
 from rclpy.topic_endpoint_info import TopicEndpointInfo, TopicEndpointTypeEnum
 from rclpy.topic_or_service_is_hidden import topic_or_service_is_hidden
-from rclpy.type_hash import TypeHash
 from rclpy.type_support import check_for_type_support, check_is_valid_msg_type, check_is_valid_srv_type
 from std_msgs.msg import Float64, String
 from std_srvs.srv import Trigger
@@ -76,36 +74,22 @@ def test_endpoints_with_equal_properties_are_equal() -> None:
     ],
 )
 def test_a_property_of_a_wrong_type_or_name_is_an_error(properties: dict[str, Any]) -> None:
-    with pytest.raises(AssertionError, match=r"must be|Invalid arguments"):
+    with pytest.raises(AssertionError):
         TopicEndpointInfo(**properties)
-
-
-def test_a_type_hash_is_written_and_read() -> None:
-    assert str(TypeHash._parse(HASH)) == HASH
-    assert TypeHash._parse(HASH) == TypeHash(1, bytes.fromhex("0123456789abcdef" * 4))
-    assert TypeHash() != TypeHash(version=1)
-
-
-@pytest.mark.parametrize(
-    "text", ["", "RIHS01", "RIHS01_00", "RIHSxx_" + "0" * 64, "RIHS01_" + "g" * 64, HASH[1:]]
-)
-def test_what_is_no_type_hash_is_the_unknown_one(text: str) -> None:
-    assert TypeHash._parse(text) == TypeHash()
-    assert str(TypeHash._parse(text)) == "INVALID"
 
 
 def test_a_message_becomes_bytes_and_back() -> None:
     data = serialize_message(String(data="hello"))
     assert data[:4] == b"\x00\x01\x00\x00"
     assert deserialize_message(data, String) == String(data="hello")
-    with pytest.raises(RMWError, match="no std_msgs/msg/Float64"):
+    with pytest.raises(rclpy_implementation.RMWError):
         deserialize_message(data[:5], Float64)
 
 
 def test_what_is_no_message_does_not_become_bytes() -> None:
-    with pytest.raises(NoTypeSupportImportedException):
+    with pytest.raises(AttributeError):
         serialize_message("hello")
-    with pytest.raises(NoTypeSupportImportedException):
+    with pytest.raises(AttributeError):
         deserialize_message(b"", str)
 
 
@@ -113,14 +97,12 @@ def test_a_type_is_one_of_messages_or_of_services() -> None:
     check_is_valid_msg_type(String)
     check_is_valid_srv_type(Trigger)
     for check in (check_for_type_support, check_is_valid_msg_type, check_is_valid_srv_type):
-        with pytest.raises(NoTypeSupportImportedException):
+        with pytest.raises(AttributeError):
             check(str)
     with pytest.raises(RuntimeError, match="might be a service"):
         check_is_valid_msg_type(Trigger)
     with pytest.raises(RuntimeError, match="might be a message"):
         check_is_valid_srv_type(String)
-    with pytest.raises(RuntimeError, match="might be a service"):
-        deserialize_message(b"", Trigger)
 
 
 @pytest.mark.parametrize(

@@ -300,7 +300,6 @@ def test_a_node_moves_to_the_executor_that_it_is_added_to_last(
         other.add_node(node)
         assert executor.get_nodes() == []
         assert node.executor is other
-    assert node.executor is None
 
 
 def test_what_a_node_had_ready_runs_where_it_went(
@@ -448,55 +447,6 @@ def test_a_callback_that_ends_on_another_thread_lets_the_next_of_its_group_run(
     second = own_executor.wait_for_ready_callbacks(10, condition=look)[1]
     thread.join()
     assert {entity, second} == set(node.subscriptions)
-
-
-def test_shut_down_between_taking_and_running_an_executor_runs_what_it_took(
-    make_node: MakeNode, context: Context
-) -> None:
-    node = make_node()
-    executor = MultiThreadedExecutor(2, context=context)
-
-    class Untimely(MutuallyExclusiveCallbackGroup):
-        """Its entity is about to be taken when a signal's handler shuts the executor down."""
-
-        def beginning_execution(self, entity: object) -> bool:
-            executor.shutdown(timeout_sec=0)
-            return super().beginning_execution(entity)
-
-    group = Untimely()
-    called: list[bool] = []
-    guard = node.create_guard_condition(lambda: called.append(True), group)
-    executor.add_node(node)
-    guard.trigger()
-    executor.spin_once(timeout_sec=5)
-    assert executor.shutdown(timeout_sec=10)
-    assert called == [True]
-    assert group.can_execute(guard)
-
-
-def test_a_message_that_cannot_be_taken_does_not_keep_its_callback_group_busy(
-    make_node: MakeNode,
-    executor: SingleThreadedExecutor,
-    spin_until: SpinUntil,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    node = make_node()
-    executor.add_node(node)
-    received: list[float] = []
-    subscription = node.create_subscription(Float64, "x", lambda message: received.append(message.data), 10)
-    publisher = node.create_publisher(Float64, "x", 10)
-
-    def fail(data: bytes) -> None:
-        raise ZeroDivisionError("planted")
-
-    with monkeypatch.context() as patch:
-        patch.setattr(subscription, "_deserialize", fail)
-        publisher.publish(Float64(data=1.0))
-        with pytest.raises(ZeroDivisionError, match="planted"):
-            executor.spin_once(timeout_sec=5)
-    publisher.publish(Float64(data=2.0))
-    spin_until(lambda: received)
-    assert received == [2.0]
 
 
 def test_a_second_thread_cannot_spin_an_executor_meanwhile(

@@ -62,7 +62,7 @@ def test_these_namespaces_are_valid(namespace: str) -> None:
         ("/invalid_ns?", "must not contain characters", 11),
         ("/a//b", "repeated", 3),
         ("/a/1b", "starts with a number", 3),
-        ("/" + "n" * 245, "should not exceed '245'", 244),
+        ("/" + "n" * 245, "should not exceed", 244),
     ],
 )
 def test_these_namespaces_are_not(namespace: str, reason: str, place: int) -> None:
@@ -86,7 +86,7 @@ def test_these_full_topic_names_are_valid(name: str) -> None:
         ("/a/{node}", "must not contain characters", 3),
         ("/a//b", "repeated", 3),
         ("/a/1b", "starts with a number", 3),
-        ("/" + "t" * 247, "should not exceed '247'", 246),
+        ("/" + "t" * 247, "should not exceed", 246),
     ],
 )
 def test_these_full_topic_names_are_not(name: str, reason: str, place: int) -> None:

@@ -67,7 +67,7 @@ def test_policies_may_be_given_as_numbers() -> None:
     ],
 )
 def test_a_policy_of_a_wrong_type_or_name_is_an_error(arguments: dict[str, object]) -> None:
-    with pytest.raises(AssertionError, match=r"must be|Invalid arguments"):
+    with pytest.raises(AssertionError):
         QoSProfile(**arguments)
 
 
@@ -109,11 +109,6 @@ def test_the_names_of_old_still_work_and_warn() -> None:
 def test_a_policy_kind_has_a_name() -> None:
     assert qos.qos_policy_name_from_kind(QoSPolicyKind.LIFESPAN) == "LIFESPAN"
     assert qos.qos_policy_name_from_kind(2) == "DURABILITY"
-
-
-def test_what_c_would_need_is_refused_by_name() -> None:
-    with pytest.raises(NotImplementedError, match="get_c_qos_profile"):
-        qos.qos_profile_default.get_c_qos_profile()
 
 
 def profile(**policies: object) -> QoSProfile:

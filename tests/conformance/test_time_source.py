@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable
 from typing import Any
 
@@ -12,7 +11,6 @@ from builtin_interfaces.msg import Time as TimeMsg
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock, ROSClock
 from rclpy.clock_type import ClockType
-from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
@@ -86,28 +84,6 @@ def test_simulated_time_is_on_or_off(make_node: Callable[..., Node]) -> None:
     assert node.get_parameter("use_sim_time").value is False
 
 
-def test_what_another_callback_rejects_does_not_happen(make_node: Callable[..., Node]) -> None:
-    node = make_node()
-
-    def reject(parameters: list[Parameter]) -> SetParametersResult:
-        return SetParametersResult(successful=False, reason="not now")
-
-    # The time source was there first, so it is asked last: ask it first.
-    node._on_set_parameters_callbacks.append(reject)
-    assert use_sim_time(node, True).reason == "not now"
-    assert not node.get_clock().ros_time_is_active  # type: ignore[attr-defined]
-
-
-def test_a_source_detached_from_its_node_follows_it_no_longer(make_node: Callable[..., Node]) -> None:
-    node = make_node()
-    source = node._time_source
-    use_sim_time(node, True)
-    source.detach_node()
-    assert clock_topics(node) == []
-    use_sim_time(node, False)
-    assert source.ros_time_is_active
-
-
 def test_time_goes_on_with_the_messages_on_the_clock_topic(
     make_node: Callable[..., Node], executor: object, spin_until: Callable[..., None]
 ) -> None:
@@ -137,18 +113,6 @@ def test_a_message_that_does_not_come_is_waited_for_so_long(make_node: Callable[
     node = make_node()
     assert wait_for_message(String, node, "silence", time_to_wait=0.01) == (False, None)
     assert list(node.subscriptions) == []
-
-
-def test_waiting_ends_with_the_context(make_node: Callable[..., Node], context: Context) -> None:
-    node = make_node()
-    result: list[tuple[bool, Any]] = []
-    thread = threading.Thread(target=lambda: result.append(wait_for_message(String, node, "silence")))
-    thread.start()
-    while thread.is_alive() and not list(node.subscriptions):
-        thread.join(0.001)
-    context.shutdown()
-    thread.join(10)
-    assert result == [(False, None)]
 
 
 def test_a_callback_of_the_node_may_wait_for_a_message(

@@ -76,16 +76,6 @@ def test_when_time_jumps_back_a_timer_starts_a_new_period(make_node: MakeNode, c
     assert timer.time_until_next_call() == 1000
 
 
-def test_when_simulated_time_begins_what_remained_of_a_period_remains(make_node: MakeNode) -> None:
-    clock = ROSClock()
-    timer = make_node().create_timer(3600.0, lambda: None, clock=clock)
-    clock.set_ros_time_override(simulated(7))
-    clock._set_ros_time_is_active(True)
-    remaining = timer.time_until_next_call()
-    assert remaining is not None
-    assert 3_590_000_000_000 < remaining <= 3_600_000_000_000
-
-
 def test_a_timer_begins_its_period_with_the_first_time_that_a_simulator_tells(make_node: MakeNode) -> None:
     clock = ROSClock()
     timer = make_node().create_timer(1e-6, lambda: None, clock=clock)

@@ -33,12 +33,17 @@ class SubscriptionEndpoint:
 
 @dataclass(frozen=True)
 class ServiceEndpoint:
-    """Where a service or client writes and reads, its node, and the service's fully qualified name."""
+    """
+    Where a service or client writes and reads, its node, and the service's fully qualified name.
+
+    Its identifier is what its writer and reader announce.
+    """
 
     node: Node
     name: str
     writer: Writer
     reader: Reader
+    identifier: bytes
 
 
 class Owner:

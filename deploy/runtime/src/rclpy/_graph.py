@@ -278,12 +278,11 @@ class Graph:
         for endpoint in endpoints:
             endpoint.close()
 
-    def next_service_id(self) -> str:
+    def next_service_id(self) -> bytes:
         """An identifier for the two endpoints of a service or client, unique in the domain."""
         with self._lock:
             self._service_ids += 1
-            octets = self.participant.gid[:12] + struct.pack(">I", self._service_ids)
-        return " " + ".".join(f"{octet:x}" for octet in octets)
+            return self.participant.gid[:12] + struct.pack(">I", self._service_ids)
 
     # What the others tell
 

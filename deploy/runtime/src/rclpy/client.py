@@ -34,6 +34,7 @@ class Client(ServiceSide):
         super().__init__(client_impl, srv_type, srv_name, callback_group, qos_profile)
         self._requests = client_impl.writer
         self._replies = client_impl.reader
+        self._identifier = client_impl.identifier
         self._sequence_numbers = itertools.count(1)
         self._pending_requests: dict[int, Future] = {}
         self.context = context
@@ -78,7 +79,7 @@ class Client(ServiceSide):
         # Not as a done callback: it would need the executor to run it.
         future._call_when_complete(lambda: self.remove_pending_request(future))
         self.handle.write(wrap(RequestId(self._requests.instance_handle, number), data))
-        self._tell(ServiceEventInfo.REQUEST_SENT, self._requests.gid, number, request=request)
+        self._tell(ServiceEventInfo.REQUEST_SENT, self._identifier, number, request=request)
         return future
 
     def get_pending_request(self, sequence_number: int) -> Future:
@@ -114,7 +115,7 @@ class Client(ServiceSide):
                 self._bad_input.drop(sample, error)
                 continue
             number = request_id.sequence_number
-            self._tell(ServiceEventInfo.RESPONSE_RECEIVED, self._requests.gid, number, response=response)
+            self._tell(ServiceEventInfo.RESPONSE_RECEIVED, self._identifier, number, response=response)
             with self._lock:
                 future = self._pending_requests.get(number)
             if future is not None:  # else nobody waits for it any more

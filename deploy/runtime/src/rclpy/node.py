@@ -447,7 +447,9 @@ class Node(NodeParameters, NodeGraph):
         name = self._remapped(srv_name, is_service=True)
         profile = _best_available.for_service(profile)
         graph = self._graph
-        identity = f"{'serviceid' if is_server else 'clientid'}={graph.next_service_id()};"
+        identifier = graph.next_service_id()
+        text = ".".join(f"{octet:x}" for octet in identifier)
+        identity = f"{'serviceid' if is_server else 'clientid'}= {text};"
         requests = (_names.request_to_dds(name), srv_type.Request, profile, identity)
         replies = (_names.reply_to_dds(name), srv_type.Response, profile, identity)
         with graph.one_announcement():
@@ -457,7 +459,7 @@ class Node(NodeParameters, NodeGraph):
             except Exception:
                 graph.destroy(self, writer)
                 raise
-        return ServiceEndpoint(self, name, writer, reader)
+        return ServiceEndpoint(self, name, writer, reader, identifier)
 
     def create_timer(
         self,

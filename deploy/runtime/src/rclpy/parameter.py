@@ -248,5 +248,6 @@ def _flatten(namespace: str, parameters: dict[str, Any]) -> dict[str, ParameterM
         if isinstance(value, dict):
             messages.update(_flatten(name + PARAMETER_SEPARATOR_STRING, value))
         else:
-            messages[name] = ParameterMsg(name=name, value=_from_yaml(value, str(value)))
+            # As rclpy does: what counts is how a value looks, whether it stands in quotes or not.
+            messages[name] = ParameterMsg(name=name, value=get_parameter_value(str(value)))
     return messages

@@ -14,7 +14,7 @@ def serialize_message(message: Any) -> bytes:
     """
     Return a message as CDR with its four bytes of header.
 
-    :raises NoTypeSupportImportedException: if it is no message.
+    :raises AttributeError: if it is no message.
     :raises TypeError, ValueError: if a field has a value that it cannot have.
     """
     message_type: Any = type(message)
@@ -27,7 +27,7 @@ def deserialize_message(serialized_message: bytes, message_type: type[_Message])
     """
     Return the message that `serialize_message` turned into these bytes.
 
-    :raises NoTypeSupportImportedException: if `message_type` is no type of messages or services.
+    :raises AttributeError: if `message_type` is no type of messages or services.
     :raises RuntimeError: if it is a type of services.
     :raises RMWError: if the bytes are no message of that type.
     """

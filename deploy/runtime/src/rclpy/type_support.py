@@ -4,24 +4,22 @@ from __future__ import annotations
 
 from typing import Any
 
-from rclpy.exceptions import NoTypeSupportImportedException
-
 
 def check_for_type_support(msg_or_srv_type: Any) -> None:
     """
     Check that a class is a message or service type.
 
-    :raises NoTypeSupportImportedException: if it is none.
+    :raises AttributeError: if it is none.
     """
     if not hasattr(msg_or_srv_type, "_TYPE_NAME"):
-        raise NoTypeSupportImportedException
+        raise AttributeError(f"{msg_or_srv_type!r} is no message or service type of ROS 2")
 
 
 def check_is_valid_msg_type(msg_type: Any) -> None:
     """
     Check that a class is a message type.
 
-    :raises NoTypeSupportImportedException: if it is no type at all.
+    :raises AttributeError: if it is no type at all.
     :raises RuntimeError: if it is a service type.
     """
     check_for_type_support(msg_type)
@@ -35,7 +33,7 @@ def check_is_valid_srv_type(srv_type: Any) -> None:
     """
     Check that a class is a service type.
 
-    :raises NoTypeSupportImportedException: if it is no type at all.
+    :raises AttributeError: if it is no type at all.
     :raises RuntimeError: if it is a message type.
     """
     check_for_type_support(srv_type)

@@ -1,0 +1,32 @@
+"""Handlers of parameter events that change while they are called."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from rcl_interfaces.msg import Parameter as ParameterMsg
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.parameter_event_handler import ParameterEventHandler
+
+
+def test_a_callback_may_remove_itself(
+    make_node: Callable[..., Node], executor: SingleThreadedExecutor, spin_until: Callable[..., None]
+) -> None:
+    node = make_node()
+    executor.add_node(node)
+    handler = ParameterEventHandler(node)
+    called: list[str] = []
+    heard: list[object] = []
+
+    def once(message: ParameterMsg) -> None:
+        called.append(message.name)
+        handler.remove_parameter_callback(handle)
+
+    handle = handler.add_parameter_callback("a", "", once)
+    handler.add_parameter_event_callback(heard.append)
+    node.declare_parameter("a", 1)
+    node.set_parameters([Parameter("a", value=2)])
+    spin_until(lambda: len(heard) == 2)
+    assert called == ["a"]

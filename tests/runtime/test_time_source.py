@@ -1,0 +1,56 @@
+"""Simulated time: what others reject, and what ends with its node or context."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from typing import Any
+
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.context import Context
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.wait_for_message import wait_for_message
+from std_msgs.msg import String
+
+
+def use_sim_time(node: Node, value: object) -> SetParametersResult:
+    return node.set_parameters([Parameter("use_sim_time", value=value)])[0]
+
+
+def clock_topics(node: Node) -> list[str]:
+    return [subscription.topic_name for subscription in node.subscriptions]
+
+
+def test_what_another_callback_rejects_does_not_happen(make_node: Callable[..., Node]) -> None:
+    node = make_node()
+
+    def reject(parameters: list[Parameter]) -> SetParametersResult:
+        return SetParametersResult(successful=False, reason="not now")
+
+    # The time source was there first, so it is asked last: ask it first.
+    node._on_set_parameters_callbacks.append(reject)
+    assert use_sim_time(node, True).reason == "not now"
+    assert not node.get_clock().ros_time_is_active  # type: ignore[attr-defined]
+
+
+def test_a_source_detached_from_its_node_follows_it_no_longer(make_node: Callable[..., Node]) -> None:
+    node = make_node()
+    source = node._time_source
+    use_sim_time(node, True)
+    source.detach_node()
+    assert clock_topics(node) == []
+    use_sim_time(node, False)
+    assert source.ros_time_is_active
+
+
+def test_waiting_ends_with_the_context(make_node: Callable[..., Node], context: Context) -> None:
+    node = make_node()
+    result: list[tuple[bool, Any]] = []
+    thread = threading.Thread(target=lambda: result.append(wait_for_message(String, node, "silence")))
+    thread.start()
+    while thread.is_alive() and not list(node.subscriptions):
+        thread.join(0.001)
+    context.shutdown()
+    thread.join(10)
+    assert result == [(False, None)]
