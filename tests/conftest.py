@@ -20,7 +20,7 @@ from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
-# On the rclpy of ROS 2 there is no embedded runtime to test.
+# What any rclpy does is in tests/conformance; on that of ROS 2 there is no embedded runtime to test besides.
 collect_ignore = [] if importlib.util.find_spec("rosidl_runtime_embedded") else ["runtime"]
 
 MARK = f"REACTIVE_ARM_TESTS={uuid.uuid4()}"

@@ -13,13 +13,7 @@ from rclpy.parameter import Parameter
 from rclpy.wait_for_message import wait_for_message
 from std_msgs.msg import String
 
-
-def use_sim_time(node: Node, value: object) -> SetParametersResult:
-    return node.set_parameters([Parameter("use_sim_time", value=value)])[0]
-
-
-def clock_topics(node: Node) -> list[str]:
-    return [subscription.topic_name for subscription in node.subscriptions]
+from tests.conformance.test_time_source import clock_topics, use_sim_time
 
 
 def test_what_another_callback_rejects_does_not_happen(make_node: Callable[..., Node]) -> None:

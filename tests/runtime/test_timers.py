@@ -4,15 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from rclpy.clock import ClockType, ROSClock
+from rclpy.clock import ROSClock
 from rclpy.node import Node
-from rclpy.time import Time
+
+from tests.conformance.test_timers import simulated
 
 MakeNode = Callable[..., Node]
-
-
-def simulated(nanoseconds: int) -> Time:
-    return Time(nanoseconds=nanoseconds, clock_type=ClockType.ROS_TIME)
 
 
 def test_when_simulated_time_begins_what_remained_of_a_period_remains(make_node: MakeNode) -> None:

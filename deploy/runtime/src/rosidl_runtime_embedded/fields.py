@@ -133,7 +133,7 @@ def numeric_field(type_name: str, field: Field) -> property:
 
 def _to_array(code: str, value: Any) -> array[Any]:
     if isinstance(value, array) and value.typecode == code:
-        return value
+        return value[:]  # of its own, as in rclpy: the caller may go on changing theirs
     try:
         view = memoryview(value)
     except TypeError:
