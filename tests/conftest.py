@@ -16,9 +16,12 @@ from typing import Any
 
 import pytest
 import rclpy
+from rclpy.clock import ROSClock
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.time import Time
+from rclpy.time_source import TimeSource
 
 # What any rclpy does is in tests/conformance; on that of ROS 2 there is no embedded runtime to test besides.
 collect_ignore = [] if importlib.util.find_spec("rosidl_runtime_embedded") else ["runtime"]
@@ -131,6 +134,16 @@ def spin_until(executor: SingleThreadedExecutor) -> Callable[..., None]:
             executor.spin_once(timeout_sec=0.1)
 
     return spin
+
+
+@pytest.fixture
+def clock() -> ROSClock:
+    """ROS time that stands still, 1 µs after its epoch, unless the test moves it."""
+    clock, simulator = ROSClock(), TimeSource()
+    simulator.ros_time_is_active = True
+    simulator.attach_clock(clock)
+    clock.set_ros_time_override(Time(nanoseconds=1000, clock_type=clock.clock_type))
+    return clock
 
 
 def _left_behind() -> dict[int, str]:

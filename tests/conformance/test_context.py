@@ -56,7 +56,7 @@ def test_a_method_that_is_to_run_at_shutdown_does_not_keep_its_object_alive() ->
 
 
 def test_the_first_context_says_for_the_whole_process_how_to_log(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(rclpy.context, "g_logging_ref_count", 0)
     first, second, third = Context(), Context(), Context()
@@ -64,13 +64,13 @@ def test_the_first_context_says_for_the_whole_process_how_to_log(
         first.init(args=["--ros-args", "--disable-stdout-logs", "--log-level", "error"])
         second.init(args=["--ros-args", "--log-level", "debug"])
         get_logger("quiet").error("this is not for the console")
-        assert capsys.readouterr().err == ""
+        assert capfd.readouterr().err == ""
         assert get_logger_effective_level("quiet") == LoggingSeverity.ERROR
         first.shutdown()
         second.shutdown()
         third.init(args=["--ros-args", "--log-level", "debug"])
         get_logger("loud").debug("this is")
-        assert "this is" in capsys.readouterr().err
+        assert "this is" in capfd.readouterr().err
     finally:
         for context in (first, second, third):
             context.try_shutdown()

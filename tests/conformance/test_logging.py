@@ -118,9 +118,8 @@ def test_skip_first_leaves_out_the_first_message_of_a_place() -> None:
     assert [logger.info(str(i), skip_first=True) for i in range(3)] == [False, True, True]
 
 
-def test_throttle_follows_the_clock_it_is_given() -> None:
-    logger, clock = get_logger("throttle"), ROSClock()
-    clock._set_ros_time_is_active(True)
+def test_throttle_follows_the_clock_it_is_given(clock: ROSClock) -> None:
+    logger = get_logger("throttle")
     logged = []
     for tenth in range(100, 125):
         clock.set_ros_time_override(Time(nanoseconds=tenth * 100_000_000))
@@ -129,9 +128,8 @@ def test_throttle_follows_the_clock_it_is_given() -> None:
     assert logged == [100, 110, 120]
 
 
-def test_filters_apply_together_throttle_first() -> None:
-    logger, clock = get_logger("both"), ROSClock()
-    clock._set_ros_time_is_active(True)
+def test_filters_apply_together_throttle_first(clock: ROSClock) -> None:
+    logger = get_logger("both")
     logged = []
     for second in range(2, 8):
         clock.set_ros_time_override(Time(seconds=second))

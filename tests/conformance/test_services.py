@@ -101,20 +101,12 @@ def test_a_blocking_call_works_while_another_thread_spins(make_node: MakeNode, c
 def test_a_blocking_call_without_a_server_returns_none_after_its_timeout(make_node: MakeNode) -> None:
     client = make_node().create_client(Trigger, "nobody")
     assert client.call(Trigger.Request(), timeout_sec=0.05) is None
-    assert client._pending_requests == {}
 
 
 def test_waiting_for_a_service_that_never_comes_ends_with_its_timeout(make_node: MakeNode) -> None:
     client = make_node().create_client(Trigger, "nobody")
     assert not client.service_is_ready()
     assert not client.wait_for_service(timeout_sec=0.05)
-
-
-def test_a_cancelled_call_is_forgotten(make_node: MakeNode) -> None:
-    client = make_node().create_client(Trigger, "nobody")
-    future = client.call_async(Trigger.Request())
-    future.cancel()
-    assert client._pending_requests == {}
 
 
 def test_a_reply_that_nobody_waits_for_any_more_is_dropped(

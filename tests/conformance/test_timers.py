@@ -13,6 +13,7 @@ from rclpy.exceptions import InvalidHandle
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.time import Time
+from rclpy.time_source import TimeSource
 
 MakeNode = Callable[..., Node]
 SpinUntil = Callable[..., None]
@@ -20,15 +21,6 @@ SpinUntil = Callable[..., None]
 
 def simulated(nanoseconds: int) -> Time:
     return Time(nanoseconds=nanoseconds, clock_type=ClockType.ROS_TIME)
-
-
-@pytest.fixture
-def clock() -> ROSClock:
-    """ROS time that stands still unless the test moves it."""
-    clock = ROSClock()
-    clock._set_ros_time_is_active(True)
-    clock.set_ros_time_override(simulated(1000))
-    return clock
 
 
 def test_a_timer_of_simulated_time_is_due_exactly_after_its_period(
@@ -79,21 +71,13 @@ def test_when_time_jumps_back_a_timer_starts_a_new_period(make_node: MakeNode, c
 def test_a_timer_begins_its_period_with_the_first_time_that_a_simulator_tells(make_node: MakeNode) -> None:
     clock = ROSClock()
     timer = make_node().create_timer(1e-6, lambda: None, clock=clock)
-    clock._set_ros_time_is_active(True)  # no time was heard yet
+    simulator = TimeSource()
+    simulator.ros_time_is_active = True
+    simulator.attach_clock(clock)
     assert not timer.is_ready()
     clock.set_ros_time_override(simulated(5_000_000))
     assert not timer.is_ready()
     assert timer.time_until_next_call() == 1000
-
-
-def test_a_simulated_time_that_was_never_heard_changes_nothing_for_a_timer(make_node: MakeNode) -> None:
-    clock = ROSClock()
-    timer = make_node().create_timer(3600.0, lambda: None, clock=clock)
-    clock._set_ros_time_is_active(True)
-    clock._set_ros_time_is_active(False)
-    remaining = timer.time_until_next_call()
-    assert remaining is not None
-    assert 3_590_000_000_000 < remaining <= 3_600_000_000_000
 
 
 def test_a_canceled_timer_rests_until_it_is_reset(make_node: MakeNode, clock: ROSClock) -> None:
@@ -202,48 +186,6 @@ def test_a_rate_wakes_its_sleeper_once_a_period(
     executor.spin()
     sleeper.join(10)
     assert slept == [True] * 3
-
-
-def test_a_tick_that_came_while_nobody_slept_lets_the_next_sleeper_go_at_once(
-    make_node: MakeNode,
-    clock: ROSClock,
-    executor: SingleThreadedExecutor,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    node = make_node()
-    executor.add_node(node)
-    rate = node.create_rate(1e6, clock)
-    waits: list[bool] = []
-    monkeypatch.setattr(rate._ticks, "wait_for", lambda woken: waits.append(woken()))
-    clock.set_ros_time_override(simulated(2000))
-    executor.spin_once(timeout_sec=0)
-    rate.sleep()
-    assert waits == []
-    rate.sleep()
-    assert waits == [False]
-
-
-def test_a_tick_that_woke_its_sleeper_does_not_let_him_go_again(
-    make_node: MakeNode,
-    clock: ROSClock,
-    executor: SingleThreadedExecutor,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    node = make_node()
-    executor.add_node(node)
-    rate = node.create_rate(1e6, clock)
-    waits: list[bool] = []
-
-    def tick(woken: Callable[[], bool]) -> None:
-        if len(waits) < 2:
-            clock.set_ros_time_override(simulated(2000 + 1000 * len(waits)))
-            executor.spin_once(timeout_sec=0)
-        waits.append(woken())
-
-    monkeypatch.setattr(rate._ticks, "wait_for", tick)
-    for _ in range(3):
-        rate.sleep()
-    assert waits == [True, True, False]
 
 
 def test_a_destroyed_rate_lets_its_sleeper_go(make_node: MakeNode) -> None:

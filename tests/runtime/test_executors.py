@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 
 import pytest
@@ -13,6 +14,8 @@ from rclpy.executors import (
 )
 from rclpy.node import Node
 from std_msgs.msg import Float64
+
+from tests.conformance.test_executors import OwnExecutor
 
 MakeNode = Callable[..., Node]
 SpinUntil = Callable[..., None]
@@ -74,3 +77,31 @@ def test_a_node_has_no_executor_once_that_was_shut_down(
     executor.add_node(node)
     executor.shutdown()
     assert node.executor is None
+
+
+def test_a_callback_that_ends_on_another_thread_lets_the_next_of_its_group_run(
+    make_node: MakeNode, context: Context
+) -> None:
+    with OwnExecutor(context=context) as own_executor:
+        node = make_node()
+        own_executor.add_node(node)
+        group = MutuallyExclusiveCallbackGroup()
+        node.create_subscription(Float64, "x", lambda message: None, 10, callback_group=group)
+        node.create_subscription(Float64, "x", lambda message: None, 10, callback_group=group)
+        node.create_publisher(Float64, "x", 10).publish(Float64())
+        first, entity, _ = own_executor.wait_for_ready_callbacks(10)
+        looked = threading.Event()
+
+        def run() -> None:
+            looked.wait(10)
+            first()
+
+        def look() -> bool:
+            looked.set()
+            return False
+
+        thread = threading.Thread(target=run)
+        thread.start()
+        second = own_executor.wait_for_ready_callbacks(10, condition=look)[1]
+        thread.join()
+        assert {entity, second} == set(node.subscriptions)

@@ -11,6 +11,7 @@ import pytest
 import rclpy.logging
 from rclpy.impl import _logging_output
 from rclpy.impl._logging_output import LogRecord
+from rclpy.impl.rcutils_logger import RcutilsLogger
 from rclpy.logging import LoggingSeverity, get_logger
 
 ENVIRONMENT = (
