@@ -174,8 +174,8 @@ def test_nothing_is_created_with_a_policy_that_is_unknown(node: Node, policy: st
         lambda: node.create_service(Trigger, "serve", lambda request, response: response, qos_profile=qos),
         lambda: node.create_client(Trigger, "serve", qos_profile=qos),
     ]
-    before = node.get_topic_names_and_types(no_demangle=True)
     for create in creations:
         with pytest.raises(rclpy_implementation.RCLError):
             create()
-    assert node.get_topic_names_and_types(no_demangle=True) == before
+    topics = dict(node.get_topic_names_and_types(no_demangle=True))
+    assert not topics.keys() & {"rt/x", "rq/serveRequest", "rr/serveReply"}

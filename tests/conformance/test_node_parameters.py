@@ -34,14 +34,19 @@ from rclpy.signals import SignalHandlerOptions
 def default_context(module_domain_id: int) -> Iterator[None]:
     rclpy.init(args=[], domain_id=module_domain_id, signal_handler_options=SignalHandlerOptions.NO)
     yield
+    while Node.made:
+        Node.made.pop().destroy_node()
     rclpy.shutdown()
 
 
 class Node(rclpy.node.Node):
     """A node that keeps what it tells of its parameters, and has no others than the test's."""
 
+    made: list[Node] = []
+
     def __init__(self, overrides: dict[str, Any] | None = None, **options: Any) -> None:
         self.events: list[ParameterEvent] = []
+        self.made.append(self)
         parameters = [Parameter(name, value=value) for name, value in (overrides or {}).items()]
         super().__init__("node", namespace="/ns", parameter_overrides=parameters, **options)
         self._born_with = {*self.list_parameters([], 0).names} - (overrides or {}).keys()

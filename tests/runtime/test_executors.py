@@ -105,3 +105,42 @@ def test_a_callback_that_ends_on_another_thread_lets_the_next_of_its_group_run(
         second = own_executor.wait_for_ready_callbacks(10, condition=look)[1]
         thread.join()
         assert {entity, second} == set(node.subscriptions)
+
+
+def test_a_thousand_entities_come_and_go_under_traffic_and_nothing_is_left(
+    make_node: MakeNode, context: Context, executor: SingleThreadedExecutor
+) -> None:
+    node = make_node()
+    executor.add_node(node)
+    publisher = node.create_publisher(Float64, "x", 10)
+    spinning = threading.Thread(target=executor.spin)
+    spinning.start()
+    before = threading.active_count()
+    failures: list[BaseException] = []
+
+    def churn() -> None:
+        try:
+            for _ in range(125):
+                subscription = node.create_subscription(Float64, "x", lambda message: None, 10)
+                timer = node.create_timer(0.001, lambda: None)
+                publisher.publish(Float64())
+                extra = node.create_publisher(Float64, "y", 10)
+                node.destroy_timer(timer)
+                node.destroy_subscription(subscription)
+                node.destroy_publisher(extra)
+        except BaseException as error:
+            failures.append(error)
+
+    threads = [threading.Thread(target=churn) for _ in range(8)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    executor.shutdown()
+    spinning.join(10)
+    assert not failures
+    assert list(node.subscriptions) == []
+    assert list(node.timers) == []
+    assert node.count_subscribers("x") == 0
+    assert node.count_publishers("y") == 0
+    assert threading.active_count() <= before
