@@ -37,6 +37,7 @@ def pytest_configure() -> None:
     os.environ[DISCOVERY_RANGE] = "LOCALHOST"
     signal.signal(signal.SIGHUP, signal.SIG_DFL)  # also under nohup
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # with clean-up, too
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # also in the background of a shell
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:

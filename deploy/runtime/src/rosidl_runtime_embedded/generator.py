@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from . import generated
+
 if TYPE_CHECKING:
     from collections.abc import Callable
 
@@ -40,7 +42,7 @@ class Generator:
 
     def _compiled(self, name: str, code: list[str]) -> Callable[[Any], Any]:
         """The function ``name`` that the code defines."""
-        exec("\n".join(code), self._names)
+        generated.run("\n".join(code), self._names)
         function: Callable[[Any], Any] = self._names[name]
         function.__qualname__ = f"{self._cls.__name__}._{name}"
         return function

@@ -7,6 +7,7 @@ from array import array
 from functools import cache
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from . import generated
 from .fields import converter, initial_value, is_numeric, numeric_field, python_value, slot_of
 from .packages import message_class
 from .validation import validate_assignment
@@ -105,7 +106,7 @@ def _make_constructor(cls: type[Message]) -> Callable[..., None]:
             parameters.append(f"{name}={initial}")
             body.append(f"_self.{name} = {name}")
     arguments = ", ".join(["_self", "/", "*", *parameters, *options])
-    exec(f"def __init__({arguments}):\n " + "\n ".join(body), names)
+    generated.run(f"def __init__({arguments}):\n " + "\n ".join(body), names)
     constructor: Callable[..., None] = names["__init__"]
     constructor.__qualname__ = f"{cls.__name__}.__init__"
     return constructor
