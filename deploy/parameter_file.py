@@ -5,8 +5,8 @@
         silence: 2.0
 
 with `/**` for all services that have the parameter; an arm in a namespace may name its services with it, or
-without. This is done in a process of its own: it loads the
-services, and who loads a service becomes one, down to its signals.
+without. This is done in a process of its own: it loads the services, and who loads a service becomes one,
+down to its signals.
 """
 
 from __future__ import annotations

@@ -12,7 +12,7 @@ import os
 import select
 import signal
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
@@ -54,26 +54,33 @@ def _environ(pid: int) -> bytes:
 
 def of_system(run: Path) -> list[Process]:
     """The live processes of the system with this run directory, supervisord first."""
-    mark = os.fsencode(f"{MARK}={run}")
-    found = []
-    for pid in (int(name) for name in os.listdir("/proc") if name.isdigit()):
-        environ = _environ(pid)
-        if mark not in environ:
-            continue  # without a look at each variable: a machine has many processes
-        environment = _variables(environ)
-        if environment.get(MARK) == str(run):
-            found.append(Process(pid, environment.get("SUPERVISOR_PROCESS_NAME", "")))
+    found = [
+        Process(pid, environment.get("SUPERVISOR_PROCESS_NAME", ""))
+        for pid, environment in _marked(str(run))
+        if environment.get(MARK) == str(run)
+    ]
     return sorted(found, key=lambda process: (process.program, process.pid))
 
 
 def using(directory: Path) -> list[Path]:
     """The run directories of the systems whose programs are taken from a directory first of all."""
-    found = set()
+    first = f"{directory}{os.pathsep}"
+    return sorted(
+        {
+            Path(environment[MARK])
+            for _, environment in _marked()
+            if MARK in environment and environment.get("PATH", "").startswith(first)
+        }
+    )
+
+
+def _marked(begin: str = "") -> Iterator[tuple[int, dict[str, str]]]:
+    """Processes, with their environments, that may have a mark which begins so."""
+    mark = os.fsencode(f"{MARK}={begin}")
     for pid in (int(name) for name in os.listdir("/proc") if name.isdigit()):
-        environment = environment_of(pid)
-        if MARK in environment and environment.get("PATH", "").startswith(f"{directory}{os.pathsep}"):
-            found.add(Path(environment[MARK]))
-    return sorted(found)
+        environ = _environ(pid)
+        if mark in environ:  # without a look at each variable of the others: a machine has many processes
+            yield pid, _variables(environ)
 
 
 def end(run: Path, pids: Iterable[int], grace: float) -> None:

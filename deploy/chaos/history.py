@@ -6,7 +6,7 @@ Times are seconds since the record began, by the monotonic clock of the host.
 from __future__ import annotations
 
 from bisect import bisect_left, bisect_right
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -81,12 +81,14 @@ class History:
 
     def may_have_missed(self, begin: float, end: float) -> bool:
         """Whether the observer may not know all that was said between two times."""
-        return any(f.kind in (OVERLOAD, LOSS) and f.overlaps(begin, end) for f in self.faults)
+        return any(True for _ in self._blind(begin, end))
 
     def missed(self, begin: float, end: float) -> float:
         """How much of the time [s] between two times the observer may not know all that was said."""
-        blind = (f for f in self.faults if f.kind in (OVERLOAD, LOSS) and f.overlaps(begin, end))
-        return sum(min(end, f.end) - max(begin, f.begin) for f in blind)
+        return sum(min(end, f.end) - max(begin, f.begin) for f in self._blind(begin, end))
+
+    def _blind(self, begin: float, end: float) -> Iterator[Fault]:
+        return (f for f in self.faults if f.kind in (OVERLOAD, LOSS) and f.overlaps(begin, end))
 
 
 OUTPUTS = {

@@ -26,7 +26,7 @@ CLAIM = 5.0  # s within which a double has to notice that it is one
 
 def engines_off_in_time(history: History) -> Finding:
     """S1: engines are off at most 10.5 s after the operator's last sign of life."""
-    alive = [s.sent for s in history.stream(topics.OPERATOR_HEARTBEAT) if s.value is True]
+    alive = [s.sent for s in _signs_of_life(history)]
     evidence, longest, cases = [], 0.0, 0
     stretches = list(running(history))
     for begin, end in gaps(alive, -math.inf, history.end):
@@ -57,7 +57,7 @@ def stays_on(history: History) -> Finding:
         else:
             evidence.append(Evidence(off.sent, "engines turned off though the operator was there"))
     states = history.stream(topics.ENGINES_STATE)
-    heartbeats = [s for s in history.stream(topics.OPERATOR_HEARTBEAT) if s.value is True]
+    heartbeats = _signs_of_life(history)
     for fault in history.faults:
         if fault.kind == "kill" and fault.target != "engine_controller":
             before = _last(states, fault.begin)
@@ -70,7 +70,7 @@ def stays_on(history: History) -> Finding:
 def turned_on_by_the_present(history: History) -> Finding:
     """S3: engines go on only by a `turn_on` with the operator present."""
     commands = [s for s in history.stream(topics.ENGINES) if s.value == TURN_ON]
-    heartbeats = [s for s in history.stream(topics.OPERATOR_HEARTBEAT) if s.value is True]
+    heartbeats = _signs_of_life(history)
     evidence, cases, unknown, oldest = [], 0, 0, 0.0
     before = -math.inf
     for stopped, on in _starts(history):
@@ -228,6 +228,11 @@ def _controller_was_away(history: History, on: Sample, off: Sample) -> bool:
     return died or (paused and off.sent - on.sent > DRIVE)
 
 
+def _signs_of_life(history: History) -> list[Sample]:
+    """The heartbeats of an operator who holds the switch."""
+    return [s for s in history.stream(topics.OPERATOR_HEARTBEAT) if s.value is True]
+
+
 def _told_of(history: History, time: float) -> bool:
     """Whether the operator watchdog saw the operator in the second before."""
     presences = history.stream(topics.OPERATOR_PRESENCE)
@@ -250,7 +255,7 @@ def _absences(history: History, time: float) -> float:
     commands = (s.sent for s in history.stream(topics.ENGINES) if s.value == TURN_OFF and s.sent < time - 1.0)
     births = (life.began for life in _lives(history, "operator_watchdog") if life.began < time)
     since = max([*commands, *births], default=0.0)
-    heartbeats = [s.sent for s in history.stream(topics.OPERATOR_HEARTBEAT) if s.value is True]
+    heartbeats = [s.sent for s in _signs_of_life(history)]
     begin = max((t for t in heartbeats if t <= since), default=0.0)
     # While it was stopped it saw nobody either: that is what S2 does not promise.
     blind = [(max(one, begin), min(two, time)) for one, two in _blind(history) if one < time and two > begin]
@@ -264,7 +269,7 @@ def _abandoned(history: History, off: Sample) -> bool:
     begin = off.sent - ABSENCE + SAMPLING + TRANSPORT  # a presence is as old as its stamp
     if between(presences, begin, off.sent - TRANSPORT):
         return False
-    heartbeats = [s.sent for s in history.stream(topics.OPERATOR_HEARTBEAT) if s.value is True]
+    heartbeats = [s.sent for s in _signs_of_life(history)]
     silent = any(two - one > SEEN_WITHIN for one, two in gaps(heartbeats, begin, off.sent))
     return silent or any(one < off.sent and two > begin for one, two in _blind(history))
 

@@ -34,32 +34,19 @@ def test_a_timer_of_simulated_time_is_due_exactly_after_its_period(
     assert timer.is_ready()
 
 
+@pytest.mark.parametrize(("now", "left"), [(4300, 700), (3000, 1000)])  # the latter: exactly some periods
 def test_a_timer_skips_missed_periods_and_does_not_drift(
-    make_node: MakeNode, clock: ROSClock, executor: SingleThreadedExecutor
+    make_node: MakeNode, clock: ROSClock, executor: SingleThreadedExecutor, now: int, left: int
 ) -> None:
     node = make_node()
     executor.add_node(node)
     calls: list[int] = []
     timer = node.create_timer(1e-6, lambda: calls.append(clock.now().nanoseconds), clock=clock)
-    clock.set_ros_time_override(simulated(4300))
+    clock.set_ros_time_override(simulated(now))
     executor.spin_once(timeout_sec=0)
     executor.spin_once(timeout_sec=0)
-    assert calls == [4300]
-    assert timer.time_until_next_call() == 700
-
-
-def test_a_step_of_exactly_some_periods_is_one_call(
-    make_node: MakeNode, clock: ROSClock, executor: SingleThreadedExecutor
-) -> None:
-    node = make_node()
-    executor.add_node(node)
-    calls: list[int] = []
-    timer = node.create_timer(1e-6, lambda: calls.append(clock.now().nanoseconds), clock=clock)
-    clock.set_ros_time_override(simulated(3000))
-    executor.spin_once(timeout_sec=0)
-    executor.spin_once(timeout_sec=0)
-    assert calls == [3000]
-    assert timer.time_until_next_call() == 1000
+    assert calls == [now]
+    assert timer.time_until_next_call() == left
 
 
 def test_when_time_jumps_back_a_timer_starts_a_new_period(make_node: MakeNode, clock: ROSClock) -> None:
