@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import importlib.util
 import os
-import random
 import signal
-import socket
 import time
 import uuid
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +20,8 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.time import Time
 from rclpy.time_source import TimeSource
+
+from deploy.chaos.domain import reserved_domain
 
 # What any rclpy does is in tests/conformance; on that of ROS 2 there is no embedded runtime to test besides.
 collect_ignore = [] if importlib.util.find_spec("rosidl_runtime_embedded") else ["runtime"]
@@ -48,34 +48,6 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
     reasons = [str(report.longrepr[2]).removeprefix("Skipped: ") for report in skipped]
     if not all(reason.startswith("platform:") for reason in reasons) and session.exitstatus == 0:
         session.exitstatus = pytest.ExitCode.TESTS_FAILED
-
-
-@contextmanager
-def reserved_domain() -> Iterator[int]:
-    """A ROS_DOMAIN_ID that nobody uses, kept from other test runs on this host until it is given back."""
-    with ExitStack() as stack:
-        for domain in random.sample(range(30, 102), 72):
-            # An abstract unix socket has one owner, and the kernel takes it back from a killed one.
-            owner = stack.enter_context(socket.socket(socket.AF_UNIX))
-            try:
-                owner.bind(f"\0reactive-arm-test-domain-{domain}")
-            except OSError:
-                continue
-            if not _has_participants(domain):
-                yield domain
-                return
-    raise RuntimeError("no free ROS_DOMAIN_ID on this host")
-
-
-def _has_participants(domain: int) -> bool:
-    """Whether somebody listens on the domain's ports for discovery (RTPS 9.6.1)."""
-    for offset in (0, 10):
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-            try:
-                probe.bind(("", 7400 + 250 * domain + offset))
-            except OSError:
-                return True
-    return False
 
 
 @pytest.fixture

@@ -17,8 +17,6 @@ import itertools
 import json
 import os
 import queue
-import random
-import socket
 import subprocess
 import sys
 import threading
@@ -33,6 +31,7 @@ from typing import Any
 import yaml
 
 from deploy import processes
+from deploy.chaos.domain import reserved_domain
 from deploy.chaos.faults import FAULTS, INJECTED
 from deploy.chaos.history import LOSS, NOTHING, OPERATOR, PROGRAMS, SILENCE, Fault, suffix
 from deploy.chaos.schedule import AWAKE, FIRST, PERIOD, Planned, Schedule
@@ -129,7 +128,7 @@ class Arena:
             scenario.write_text(yaml.safe_dump(dict(self._scenario)))
             self.prepare(stack)
             for arm in self.arms:
-                arm.domain = stack.enter_context(_domain())
+                arm.domain = stack.enter_context(reserved_domain())
             observed = [f"{arm.namespace}={arm.domain}={arm.system.run}" for arm in self.arms]
             environment = {"ROS_AUTOMATIC_DISCOVERY_RANGE": self.discovery, **_losing(self._loss)}
             self._observer = stack.enter_context(
@@ -315,22 +314,6 @@ def _next(lines: queue.Queue[str], within: float, check: Callable[[], None], awa
         with suppress(queue.Empty):
             return lines.get(timeout=0.1)
     raise DeploymentError(f"Nothing is seen of {awaited}")
-
-
-@contextmanager
-def _domain() -> Iterator[int]:
-    """A ROS domain that no other arena nor test on this host uses."""
-    with ExitStack() as stack:
-        for domain in random.sample(range(30, 102), 72):
-            owner = stack.enter_context(socket.socket(socket.AF_UNIX))
-            probe = stack.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM))
-            with suppress(OSError):
-                owner.bind(f"\0reactive-arm-test-domain-{domain}")
-                probe.bind(("", 7400 + 250 * domain + 10))  # RTPS 9.6.1: of its first participant
-                probe.close()
-                yield domain
-                return
-    raise DeploymentError("no free ROS domain on this host")
 
 
 @contextmanager

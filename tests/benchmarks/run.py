@@ -18,7 +18,8 @@ import sys
 from collections import defaultdict
 from pathlib import Path
 
-from tests.conftest import DISCOVERY_RANGE, reserved_domain
+from deploy.chaos.domain import reserved_domain
+from tests.conftest import DISCOVERY_RANGE
 
 NODES = Path(__file__).with_name("nodes.py")
 PATIENCE = 120.0  # [s]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import random
 import struct
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -28,23 +28,15 @@ LATCHED = QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 @pytest.fixture
-def stranger(domain_id: int) -> Iterator[Participant]:
-    """Another member of the domain, that writes what it wants."""
-    participant = Participant(domain_id, "enclave=/;")
-    yield participant
-    participant.close()
-
-
-@pytest.fixture
 def node(make_node: MakeNode, executor: SingleThreadedExecutor) -> Node:
     node = make_node()
     executor.add_node(node)
     return node
 
 
-def writer_for(stranger: Participant, topic: str, type_name: str, spin_until: SpinUntil) -> Writer:
+def writer_for(participant: Participant, topic: str, type_name: str, spin_until: SpinUntil) -> Writer:
     """A writer that has found its reader."""
-    writer = stranger.create_writer(topic, type_name, LATCHED, "")
+    writer = participant.create_writer(topic, type_name, LATCHED, "")
     spin_until(writer.matched)
     return writer
 
@@ -59,7 +51,7 @@ def writer_for(stranger: Participant, topic: str, type_name: str, spin_until: Sp
 def test_bad_samples_are_dropped_counted_and_logged_once(
     data: bytes,
     node: Node,
-    stranger: Participant,
+    participant: Participant,
     spin_until: SpinUntil,
     capfd: pytest.CaptureFixture[str],
 ) -> None:
@@ -67,7 +59,7 @@ def test_bad_samples_are_dropped_counted_and_logged_once(
     subscription = node.create_subscription(
         Float64, "x", lambda message: received.append(message.data), QUEUE
     )
-    writer = writer_for(stranger, "rt/x", "std_msgs::msg::dds_::Float64_", spin_until)
+    writer = writer_for(participant, "rt/x", "std_msgs::msg::dds_::Float64_", spin_until)
     for _ in range(50):
         writer.write(data)
     writer.write(HEADER + struct.pack("<d", 2.0))
@@ -78,10 +70,10 @@ def test_bad_samples_are_dropped_counted_and_logged_once(
 
 
 def test_each_writer_of_bad_samples_is_logged_for_itself(
-    node: Node, stranger: Participant, spin_until: SpinUntil, capfd: pytest.CaptureFixture[str]
+    node: Node, participant: Participant, spin_until: SpinUntil, capfd: pytest.CaptureFixture[str]
 ) -> None:
     subscription = node.create_subscription(String, "x", lambda message: None, QUEUE)
-    writers = [writer_for(stranger, "rt/x", "std_msgs::msg::dds_::String_", spin_until) for _ in range(3)]
+    writers = [writer_for(participant, "rt/x", "std_msgs::msg::dds_::String_", spin_until) for _ in range(3)]
     for writer in writers * 2:
         writer.write(HEADER + b"\xff\xff\xff\x7fabcd")  # a string of 2 GB, they say
     spin_until(lambda: subscription._bad_input.count == 6)
@@ -91,7 +83,7 @@ def test_each_writer_of_bad_samples_is_logged_for_itself(
 def test_a_time_of_a_simulator_that_is_none_is_bad_input_too(
     make_node: MakeNode,
     executor: SingleThreadedExecutor,
-    stranger: Participant,
+    participant: Participant,
     spin_until: SpinUntil,
     capfd: pytest.CaptureFixture[str],
 ) -> None:
@@ -99,7 +91,7 @@ def test_a_time_of_a_simulator_that_is_none_is_bad_input_too(
     executor.add_node(node)
     (subscription,) = node.subscriptions
     type_name = "rosgraph_msgs::msg::dds_::Clock_"
-    writers = [writer_for(stranger, "rt/clock", type_name, spin_until) for _ in range(2)]
+    writers = [writer_for(participant, "rt/clock", type_name, spin_until) for _ in range(2)]
     spin_until(lambda: subscription.get_publisher_count() == 2)
     for number, writer in enumerate(writers * 2, 1):  # one by one: the subscription keeps only the last
         writer.write(HEADER + struct.pack("<iI", -1, 0))
@@ -111,20 +103,20 @@ def test_a_time_of_a_simulator_that_is_none_is_bad_input_too(
 
 
 def test_huge_counts_cost_no_memory_and_no_time(
-    node: Node, stranger: Participant, spin_until: SpinUntil
+    node: Node, participant: Participant, spin_until: SpinUntil
 ) -> None:
     subscription = node.create_subscription(DiagnosticArray, "x", lambda message: None, QUEUE)
-    writer = writer_for(stranger, "rt/x", "diagnostic_msgs::msg::dds_::DiagnosticArray_", spin_until)
+    writer = writer_for(participant, "rt/x", "diagnostic_msgs::msg::dds_::DiagnosticArray_", spin_until)
     stamp_and_frame = bytes(8) + b"\1\0\0\0\0\0\0\0"
     for count in (0x7FFFFFFF, 0xFFFFFFFF, 1_000_000):
         writer.write(HEADER + stamp_and_frame + struct.pack("<I", count) + bytes(64))
     spin_until(lambda: subscription._bad_input.count == 3)
 
 
-def test_random_samples_do_no_harm(node: Node, stranger: Participant, spin_until: SpinUntil) -> None:
+def test_random_samples_do_no_harm(node: Node, participant: Participant, spin_until: SpinUntil) -> None:
     good: list[Any] = []
     subscription = node.create_subscription(DiagnosticArray, "x", good.append, QUEUE)
-    writer = writer_for(stranger, "rt/x", "diagnostic_msgs::msg::dds_::DiagnosticArray_", spin_until)
+    writer = writer_for(participant, "rt/x", "diagnostic_msgs::msg::dds_::DiagnosticArray_", spin_until)
     chance = random.Random(0)
     for _ in range(10):
         for _ in range(50):
@@ -133,13 +125,13 @@ def test_random_samples_do_no_harm(node: Node, stranger: Participant, spin_until
         spin_until(lambda done=done: subscription._bad_input.count + len(good) == done)
 
 
-def test_a_service_survives_bad_requests(node: Node, stranger: Participant, spin_until: SpinUntil) -> None:
+def test_a_service_survives_bad_requests(node: Node, participant: Participant, spin_until: SpinUntil) -> None:
     def answer(request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
         response.success = request.data
         return response
 
     service = node.create_service(SetBool, "switch", answer)
-    writer = writer_for(stranger, "rq/switchRequest", "std_srvs::srv::dds_::SetBool_Request_", spin_until)
+    writer = writer_for(participant, "rq/switchRequest", "std_srvs::srv::dds_::SetBool_Request_", spin_until)
     for data in (b"\1", bytes(8), bytes(15), bytes(16), b"\xff" * 40):
         writer.write(HEADER + data)
     client = node.create_client(SetBool, "switch")
@@ -151,10 +143,10 @@ def test_a_service_survives_bad_requests(node: Node, stranger: Participant, spin
 
 
 def test_the_parameter_services_survive_bad_requests(
-    node: Node, stranger: Participant, spin_until: SpinUntil
+    node: Node, participant: Participant, spin_until: SpinUntil
 ) -> None:
     writer = writer_for(
-        stranger,
+        participant,
         "rq/node/set_parametersRequest",
         "rcl_interfaces::srv::dds_::SetParameters_Request_",
         spin_until,
@@ -169,12 +161,12 @@ def test_the_parameter_services_survive_bad_requests(
     assert future.result() == SetParameters.Response()
 
 
-def test_a_client_survives_bad_replies(node: Node, stranger: Participant, spin_until: SpinUntil) -> None:
+def test_a_client_survives_bad_replies(node: Node, participant: Participant, spin_until: SpinUntil) -> None:
     client = node.create_client(SetBool, "switch")
-    requests = stranger.create_reader(
+    requests = participant.create_reader(
         "rq/switchRequest", "std_srvs::srv::dds_::SetBool_Request_", QUEUE, "serviceid=1;"
     )
-    writer = stranger.create_writer(
+    writer = participant.create_writer(
         "rr/switchReply", "std_srvs::srv::dds_::SetBool_Response_", QUEUE, "serviceid=1;"
     )
     spin_until(lambda: client.service_is_ready() and requests.matched() and writer.matched())
@@ -199,11 +191,14 @@ def test_a_client_survives_bad_replies(node: Node, stranger: Participant, spin_u
 
 
 def test_what_nobody_can_read_in_ros_discovery_info_is_dropped_counted_and_logged_once(
-    node: Node, stranger: Participant, spin_until: SpinUntil, capfd: pytest.CaptureFixture[str]
+    node: Node, participant: Participant, spin_until: SpinUntil, capfd: pytest.CaptureFixture[str]
 ) -> None:
     writers = [
         writer_for(
-            stranger, "ros_discovery_info", "rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_", spin_until
+            participant,
+            "ros_discovery_info",
+            "rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_",
+            spin_until,
         )
         for _ in range(2)
     ]
@@ -223,15 +218,15 @@ def test_what_nobody_can_read_in_ros_discovery_info_is_dropped_counted_and_logge
 
 
 def test_what_others_say_of_themselves_is_read_though_much_of_it_is_nonsense(
-    node: Node, stranger: Participant, spin_until: SpinUntil
+    node: Node, participant: Participant, spin_until: SpinUntil
 ) -> None:
     writer = writer_for(
-        stranger, "ros_discovery_info", "rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_", spin_until
+        participant, "ros_discovery_info", "rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_", spin_until
     )
     chance = random.Random(2)
     for _ in range(100):
         writer.write(HEADER + chance.randbytes(chance.randrange(1, 200)))
-    writer.write(encode(stranger.gid, [NodeEntities("/far", "stranger")]))
+    writer.write(encode(participant.gid, [NodeEntities("/far", "stranger")]))
     received: list[Float64] = []
     node.create_subscription(Float64, "x", received.append, 1)
     node.create_publisher(Float64, "x", 1).publish(Float64())

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import tracemalloc
-from collections.abc import Iterator
 from types import SimpleNamespace
 from typing import Any
 
@@ -13,14 +12,6 @@ from rclpy.qos import QoSProfile
 
 HEADER = b"\x00\x01\x00\x00"
 PROFILE = QoSProfile(depth=10)
-
-
-@pytest.fixture
-def participant(domain_id: int) -> Iterator[Participant]:
-    """A member of the test's domain."""
-    participant = Participant(domain_id, "enclave=/;")
-    yield participant
-    participant.close()
 
 
 @pytest.fixture

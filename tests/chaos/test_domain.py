@@ -1,0 +1,31 @@
+"""A domain that is reserved belongs to one alone."""
+
+from __future__ import annotations
+
+import socket
+
+import pytest
+
+from deploy.chaos import domain
+from deploy.chaos.domain import reserved_domain
+from deploy.system import DeploymentError
+
+
+def test_a_domain_is_reserved_by_one_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    with reserved_domain() as first:
+        monkeypatch.setattr(domain, "DOMAINS", range(first, first + 1))
+        with pytest.raises(DeploymentError, match="no free ROS domain"), reserved_domain():
+            pass
+
+
+@pytest.mark.parametrize("offset", [0, 10])
+def test_a_domain_that_has_participants_is_not_free(offset: int) -> None:
+    with reserved_domain() as free, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as participant:
+        assert not domain._has_participants(free)
+        participant.bind(("127.0.0.1", 7400 + 250 * free + offset))
+        assert domain._has_participants(free)
+
+
+def test_an_error_where_a_domain_is_reserved_is_told() -> None:
+    with pytest.raises(OSError, match="planted"), reserved_domain():
+        raise OSError("planted")
