@@ -5,6 +5,7 @@ Times are seconds since the record began, by the monotonic clock of the host.
 
 from __future__ import annotations
 
+import itertools
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
@@ -19,6 +20,9 @@ OPERATOR, ALL, NOTHING = "operator", "all", "nothing"
 OVERLOAD, LOSS, SILENCE = "overload", "loss", "silence"
 CIRCUMSTANCES = (OVERLOAD, LOSS, SILENCE)
 """Told like faults, but of no process: a machine or network that loses messages; an operator asleep."""
+
+BLINDING = ("stop", "hang", "hog")
+"""Faults that keep a process from hearing, until it goes on or is replaced."""
 
 
 class Sample(NamedTuple):
@@ -79,6 +83,19 @@ class History:
             return self.stream(topic)
         return [s for s in self.stream(topics.DIAGNOSTICS) if s.value[0] == program]
 
+    def lives_of(self, program: str) -> list[Life]:
+        """The processes of a program, but none that ended beside an older one: that was a double."""
+        lives = [life for life in self.lives if life.program == program]
+        return [life for life in lives if not any(_outlives(older, life) for older in lives)]
+
+    def ended(self, fault: Fault) -> float:
+        """When a fault was over: when the monkey stopped doing it, or its victim was replaced before."""
+        if fault.kind not in BLINDING:
+            return fault.end
+        victim = (fault.target, fault.pid)
+        ends = [life.ended for life in self.lives if (life.program, life.pid) == victim and life.ended]
+        return min([fault.end, *ends])
+
     def may_have_missed(self, begin: float, end: float) -> bool:
         """Whether the observer may not know all that was said between two times."""
         return any(True for _ in self._blind(begin, end))
@@ -115,11 +132,15 @@ def between(samples: Sequence[Sample], begin: float, end: float) -> Sequence[Sam
 
 
 def gaps(times: Iterable[float], begin: float, end: float) -> Iterable[tuple[float, float]]:
-    """The stretches from one time to the next, also from `begin` to the first and from the last to `end`."""
+    """The stretches into which the sorted `times` cut that from `begin` to `end`."""
     last = begin
-    for time in times:
-        if time > last:
-            yield last, time
+    for time in itertools.chain(times, [end]):
+        if last < min(time, end):
+            yield last, min(time, end)
             last = time
-    if end > last:
-        yield last, end
+
+
+def _outlives(one: Life, two: Life) -> bool:
+    """Whether a process was there before another one, and longer."""
+    later = one.ended is None or (two.ended is not None and one.ended > two.ended)
+    return one.began < two.began and later

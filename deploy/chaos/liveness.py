@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import math
+from bisect import bisect_left, bisect_right
 from collections.abc import Iterator, Sequence
 
 from deploy.chaos.findings import Evidence, Finding, percentile
@@ -79,7 +81,7 @@ def _never_back(history: History) -> Iterator[Evidence]:
             if program not in PROGRAMS or between(history.output(program), begin, end):
                 continue
             held_up = (
-                _disturbs(other, source, begin, end)
+                _disturbs(history, other, source, begin, end)
                 for other in history.faults
                 if other is not fault
                 for source in (program, *_sources(program))
@@ -103,11 +105,12 @@ def others_flow_on(history: History) -> Finding:
         for program in others:
             if not _flowed(history, program, fault.begin, GAP):
                 continue
-            if any(_disturbs(other, program, fault.begin - 1.0, end) for other in history.faults):
+            if any(
+                _disturbs(history, other, program, fault.begin - 1.0, end + GAP) for other in history.faults
+            ):
                 continue
-            sent = [s.sent for s in between(history.output(program), fault.begin - GAP, end + GAP)]
             excused = 0
-            for one, two in zip(sent, [*sent[1:], end], strict=True):
+            for one, two in _pauses(history, program, fault.begin - GAP, end):
                 if two - one > GAP and _overloaded(history, one, two, others):
                     excused = 1
                     continue
@@ -119,6 +122,15 @@ def others_flow_on(history: History) -> Finding:
             unknown += excused
     figures = f"longest gap {1000 * longest:.0f} ms of {1000 * GAP:.0f} ms"
     return Finding("L2", cases, figures, evidence, unknown)
+
+
+def _pauses(history: History, program: str, begin: float, end: float) -> Iterator[tuple[float, float]]:
+    """From each message that a program sent between two times to its next one, or to the record's end."""
+    output = history.output(program)
+    first = bisect_left(output, begin, key=lambda s: s.sent)
+    last = bisect_right(output, end, key=lambda s: s.sent)
+    following = output[last].sent if last < len(output) else history.end
+    return itertools.pairwise([*(s.sent for s in output[first:last]), following])
 
 
 def _overloaded(history: History, begin: float, end: float, programs: Sequence[str]) -> bool:
@@ -140,7 +152,7 @@ def right_after_return(history: History) -> Finding:
             continue
         begin = fault.begin + time + SETTLED
         if any(
-            _disturbs(other, "kinematics", begin, begin + 1.0)
+            _disturbs(history, other, "kinematics", begin, begin + 1.0)
             for other in history.faults
             if other is not fault
         ):
@@ -215,17 +227,17 @@ def _flowed(history: History, program: str, time: float, within: float) -> bool:
 def _undisturbed(history: History, fault: Fault, begin: float, end: float) -> bool:
     """Whether nothing else kept the program from its output."""
     return not any(
-        _disturbs(other, program, begin, end)
+        _disturbs(history, other, program, begin, end)
         for other in history.faults
         if other is not fault
         for program in (fault.target, *_sources(fault.target))
     )
 
 
-def _disturbs(fault: Fault, program: str, begin: float, end: float) -> bool:
+def _disturbs(history: History, fault: Fault, program: str, begin: float, end: float) -> bool:
     """Whether a fault, or the recovery from it, concerns a program's output within a time."""
     recovery = HUNG if fault.kind in LASTING else SLOWEST
-    if fault.end + recovery < begin or fault.begin > end:
+    if history.ended(fault) + recovery < begin or fault.begin > end:
         return False
     concerned = (fault.target, *DOWNSTREAM.get(fault.target, ()), *OBSCURED.get(fault.kind, ()))
     return program in concerned or fault.target == ALL

@@ -8,7 +8,7 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Iterator, Sequence
 
 from deploy.chaos.findings import Evidence, Finding
-from deploy.chaos.history import ALL, History, Life, Sample, between, gaps
+from deploy.chaos.history import ALL, BLINDING, History, Life, Sample, between, gaps
 from interfaces import topics
 from interfaces.topics import DRIVE, OFF, ON, TURN_OFF, TURN_ON
 
@@ -82,7 +82,7 @@ def turned_on_by_the_present(history: History) -> Finding:
             cases += 1
             oldest = max(oldest, on.sent - seen[-1].sent)
         elif _told_of(history, on.sent) and any(
-            on.sent - 3.0 < life.began <= on.sent for life in _lives(history, "dead_mans_switch")
+            on.sent - 3.0 < life.began <= on.sent for life in history.lives_of("dead_mans_switch")
         ):
             unknown += 1  # a command or heartbeat of a new publisher, which the observer did not know yet
         elif history.may_have_missed(max(stopped, on.sent - SEEN_WITHIN), on.sent):
@@ -218,7 +218,7 @@ def _changes(history: History, before: str, after: str) -> Iterator[tuple[Sample
 
 def _controller_was_away(history: History, on: Sample, off: Sample) -> bool:
     """Whether another process than that which said `on` may have said `off`, or it was paused in between."""
-    died = any(on.sent - 0.02 < life.began <= off.sent for life in _lives(history, "engine_controller"))
+    died = any(on.sent - 0.02 < life.began <= off.sent for life in history.lives_of("engine_controller"))
     paused = history.may_have_missed(on.sent, off.sent) or any(
         fault.kind in BLINDING
         and fault.target in ("engine_controller", ALL)
@@ -240,26 +240,23 @@ def _told_of(history: History, time: float) -> bool:
 
 
 def _commanded(history: History, off: Sample) -> bool:
-    """Whether a `turn_off` was said just before, by the monkey or for as many silences as that takes."""
+    """Whether a `turn_off` was said just before, for as many silences as that takes."""
     commands = [s for s in history.stream(topics.ENGINES) if s.value == TURN_OFF]
     if not between(commands, off.sent - TRANSPORT, off.sent + 0.01):
         return False
-    by_the_monkey = any(
-        fault.kind == "turn_off" and fault.begin <= off.sent <= fault.begin + 1.0 for fault in history.faults
-    )
-    return by_the_monkey or _absences(history, off.sent) >= STRIKES
+    return _absences(history, off.sent) >= STRIKES
 
 
 def _absences(history: History, time: float) -> float:
     """The strikes that the operator watchdog of a time may have counted until then, since it counted anew."""
     commands = (s.sent for s in history.stream(topics.ENGINES) if s.value == TURN_OFF and s.sent < time - 1.0)
-    births = (life.began for life in _lives(history, "operator_watchdog") if life.began < time)
+    births = (life.began for life in history.lives_of("operator_watchdog") if life.began < time)
     since = max([*commands, *births], default=0.0)
     heartbeats = [s.sent for s in _signs_of_life(history)]
     begin = max((t for t in heartbeats if t <= since), default=0.0)
     # While it was stopped it saw nobody either: that is what S2 does not promise.
     blind = [(max(one, begin), min(two, time)) for one, two in _blind(history) if one < time and two > begin]
-    silences = [*gaps([t for t in heartbeats if begin < t <= time], begin, time), *blind]
+    silences = [*gaps(heartbeats, begin, time), *blind]
     return sum((end - begin + SAMPLING) // STRIKE for begin, end in silences)
 
 
@@ -276,19 +273,9 @@ def _abandoned(history: History, off: Sample) -> bool:
 
 def _blind(history: History) -> Iterator[tuple[float, float]]:
     """When an operator watchdog heard nobody: it was paused by the monkey, until it died or went on."""
-    ends = {life.pid: life.ended for life in _lives(history, "operator_watchdog")}
     for fault in history.faults:
         if fault.kind in BLINDING and fault.target in ("operator_watchdog", ALL):
-            ended = ends.get(fault.pid)
-            yield fault.begin, fault.end if ended is None else min(fault.end, ended)
-
-
-def _lives(history: History, program: str) -> Iterator[Life]:
-    return (life for life in history.lives if life.program == program)
-
-
-BLINDING = ("stop", "hang", "hog")
-"""Faults that keep a process from hearing."""
+            yield fault.begin, history.ended(fault)
 
 
 def _last(samples: Sequence[Sample], time: float) -> Sample | None:

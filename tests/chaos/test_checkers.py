@@ -120,6 +120,18 @@ def test_s2_three_silences_are_a_good_reason_and_two_are_none() -> None:
     assert verdict("S2", added(history, "engines", command)) != VIOLATED
 
 
+def test_s2_a_double_that_ends_itself_is_no_successor() -> None:
+    history = good()
+    for begin in (20.0, 30.0, 40.0):
+        history = silent(history, "operator_heartbeat", begin, begin + 4.0)
+    history = added(says(history, "engines/state", OFF, 44.0), "engines", (44.05, TURN_OFF))
+    watchdog = Life("operator_watchdog", 999, 36.0, 36.4)  # the strikes are with the other one
+    assert verdict("S2", replace(history, lives=[*history.lives, watchdog])) != VIOLATED
+    history = says(killed(good(), "velocity", 30.0, 0.6), "engines/state", OFF, 30.5)
+    controller = Life("engine_controller", 999, 30.3, 30.7)  # the other one turned them off
+    assert verdict("S2", replace(history, lives=[*history.lives, controller])) == VIOLATED
+
+
 def test_s2_a_watchdog_that_hung_has_no_strikes_when_it_is_replaced() -> None:
     history = killed(good(), "operator_watchdog", 13.0, 1.0)
     pid = next(life.pid for life in history.lives if life.program == "operator_watchdog")
@@ -132,6 +144,7 @@ def test_s2_ten_seconds_without_a_presence_are_a_reason_if_the_operator_was_sile
     history = says(silent(good(), "operator_presence", 30.6, 45.0), "engines/state", OFF, 40.0)
     assert verdict("S2", history) == VIOLATED
     assert verdict("S2", silent(history, "operator_heartbeat", 30.0, 45.0)) != VIOLATED
+    assert verdict("S2", silent(history, "operator_heartbeat", 50.0, 55.0)) == VIOLATED  # too late
 
 
 def test_s2_a_controller_that_was_stopped_is_a_good_reason() -> None:
@@ -295,6 +308,27 @@ def test_l2_catches_a_stream_that_pauses_meanwhile() -> None:
     history = silent(killed(good(), "kinematics", 20.0, 0.6), "theta1", 20.1, 20.5)
     (evidence,) = CHECKERS["L2"](history).evidence
     assert "config_theta1 is silent" in evidence.what
+
+
+@pytest.mark.parametrize("end", [23.0, END])
+def test_l2_catches_a_pause_that_outlasts_the_return_of_the_victim(end: float) -> None:
+    history = silent(killed(good(), "kinematics", 20.0, 0.25), "theta1", 20.1, end)
+    (evidence,) = CHECKERS["L2"](history).evidence
+    assert "config_theta1 is silent" in evidence.what
+
+
+def test_l2_a_pause_by_another_fault_is_none() -> None:
+    history = killed(killed(good(), "kinematics", 20.0, 0.25), "config_theta1", 20.4, 0.8)
+    assert verdict("L2", history) == HOLDS
+
+
+def test_l2_what_was_replaced_is_held_up_no_more() -> None:
+    history = killed(killed(good(), "config_theta1", 7.0, 0.5), "kinematics", 20.0, 0.6)
+    history = silent(history, "theta1", 20.1, 20.5)
+    pid = next(life.pid for life in history.lives if life.program == "config_theta1")
+    hang = Fault("hang", "config_theta1", 5.0, 18.0, pid)
+    assert verdict("L2", faulty(history, hang)) == VIOLATED
+    assert verdict("L2", faulty(history, hang._replace(pid=0))) == HOLDS
 
 
 def test_l2_a_pause_of_the_whole_machine_stays_unknown_and_hides_no_other() -> None:
