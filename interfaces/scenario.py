@@ -7,7 +7,7 @@ left out; a source that no scenario drives follows its parameters. ::
     l2: 3.0
     theta1: {center: 0.8, amplitude: 0.5, period: 12.0, rate: 25.0, phase: 0.0, delay: 0.0}
                                             # center + amplitude · sin(2π · t/period + phase), `rate` times a
-                                            # second, the first at `delay`
+                                            # second: at `delay` + n / `rate`, before the origin, too
     theta2:                                 # values, each from its time on
       - {at: 1.5, value: 0.8}
       - {at: 4.0, value: 1.8}
@@ -18,13 +18,14 @@ left out; a source that no scenario drives follows its parameters. ::
       heartbeats: [1.942, 1.991]            # single signals of the switch, beside those while it is held
     engines:                                # what the virtual operator wants of the engines
       - {at: 5.0, command: turn_on}
-    repeat: 60.0                            # all of it but the sweeps starts again every 60 s; without: once
+    repeat: 60.0                            # all but the sweeps and `let_go` starts again every 60 s
 
 ``rate`` (25 Hz), ``phase`` (0 rad) and ``delay`` (0 s) have these defaults.
 """
 
 from __future__ import annotations
 
+import heapq
 import itertools
 import math
 from collections.abc import Callable, Iterator, Mapping
@@ -74,26 +75,25 @@ class Events(Generic[T]):
     def at(self, time: float) -> T | None:
         """Return the last value up to a time."""
         value = None
-        if self.repeat is not None and time >= self.repeat:
-            value = self.items[-1][1]
-            time %= self.repeat
-        for at, item in self.items:
-            if at <= time:
-                value = item
+        for _, item in itertools.takewhile(lambda item: item[0] <= time, self._around(time)):
+            value = item
         return value
 
     def after(self, time: float) -> Iterator[tuple[float, T]]:
         """Return the values after a time."""
+        return itertools.dropwhile(lambda item: item[0] <= time, self._around(time))
+
+    def _around(self, time: float) -> Iterator[tuple[float, T]]:
+        """Return the values since the beginning, or since a whole round before a time."""
         if self.repeat is None:
-            return ((at, item) for at, item in self.items if at > time)
-        rounds = itertools.count(max(0, math.floor(time / self.repeat)))
-        every = ((at + round_ * self.repeat, item) for round_ in rounds for at, item in self.items)
-        return ((at, item) for at, item in every if at > time)
+            return iter(self.items)
+        rounds = itertools.count(max(0, math.floor(time / self.repeat) - 1))
+        return ((at + round_ * self.repeat, item) for round_ in rounds for at, item in self.items)
 
 
 @dataclass(frozen=True)
 class Sweep:
-    """center + amplitude · sin(2π · t/period + phase) at t = ``delay`` + n / ``rate``, for ever."""
+    """center + amplitude · sin(2π · t/period + phase) at t = ``delay`` + n / ``rate``, n = …, -1, 0, 1, …"""
 
     center: float
     amplitude: float
@@ -285,15 +285,12 @@ class _LetGo:
         return bool(self.held.at(time)) and bool(self.grip.at(time))
 
     def after(self, time: float) -> Iterator[tuple[float, bool]]:
-        held, grip = self.held.after(time), self.grip.after(time)
-        next_held, next_grip = next(held, None), next(grip, None)
-        while next_grip is not None:
-            at = next_grip[0] if next_held is None else min(next_held[0], next_grip[0])
-            yield at, self.at(at)
-            if next_held is not None and next_held[0] <= at:
-                next_held = next(held, None)
-            if next_grip[0] <= at:
-                next_grip = next(grip, None)
+        now = {"held": bool(self.held.at(time)), "grip": bool(self.grip.at(time))}
+        held = ((at, "held", value) for at, value in self.held.after(time))
+        grip = ((at, "grip", value) for at, value in self.grip.after(time))
+        for at, changes in itertools.groupby(heapq.merge(held, grip), key=lambda change: change[0]):
+            now.update((which, value) for _, which, value in changes)
+            yield at, all(now.values())
 
 
 @dataclass(frozen=True)

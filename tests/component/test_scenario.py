@@ -237,6 +237,30 @@ def test_an_operator_lets_go_now_and_then(tmp_path: Path, scheduler: TestSchedul
     assert changes[0] == (0, False)
 
 
+@pytest.mark.parametrize("every", [0.7, 5.6, 11.2, 0.1, 1 / 3])
+def test_an_operator_lets_go_in_every_round_whatever_the_period(tmp_path: Path, every: float) -> None:
+    text = f"operator: {{pressed: [{{from: 0}}], let_go: {{every: {every!r}, for: {every / 4!r}}}}}"
+    pressed = loaded(tmp_path, text).pressed
+    assert pressed is not None
+
+    changes = list(islice(pressed.after(0.0), 200))
+
+    assert [value for _, value in changes] == [False, True] * 100
+    assert all(pressed.at(time) is value for time, value in changes)
+    assert [time for time, _ in changes[1::2]] == pytest.approx([every * (n + 1) for n in range(100)])
+
+
+@pytest.mark.parametrize("repeat", [0.7, 11.2, 0.1, 1 / 3])
+def test_each_event_of_each_round_holds_from_its_time_on(repeat: float) -> None:
+    events = Events(((0.0, "a"), (repeat / 3, "b"), (repeat / 2, "c")), repeat)
+
+    changes = list(islice(events.after(0.0), 300))
+
+    assert [value for _, value in changes] == [*"bca"] * 100
+    assert all(events.at(time) == value for time, value in changes)
+    assert all(next(events.after(time)) == after for (time, _), after in pairwise(changes))
+
+
 def test_a_source_follows_its_parameter_where_no_scenario_drives_it(scheduler: TestScheduler) -> None:
     parameter = rx.merge(rx.just(1.0), scheduler.create_hot_observable(on_next(300, 2.0)))
 
