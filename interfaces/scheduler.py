@@ -51,9 +51,9 @@ class NodeScheduler(PeriodicScheduler):
     Schedules on a node's executor; any thread may schedule and cancel.
 
     Time is monotonic: it begins as the time of day and then follows the steady clock, so setting the clock of
-    the machine changes nothing. While the node's ROS time is simulated (``use_sim_time``), it is that
-    instead. When simulated time jumps back, begins or ends, what was to come in so many seconds still comes
-    in so many.
+    the machine changes nothing. While the node's ROS time is simulated (``use_sim_time``), it follows that
+    instead, and begins as that if it is simulated from the start. When simulated time jumps back, begins or
+    ends, it goes on from where it is: what was to come in so many seconds still comes in so many.
     """
 
     def __init__(self, node: Node) -> None:
@@ -66,8 +66,11 @@ class NodeScheduler(PeriodicScheduler):
         self._orders = itertools.count()
         self._armed_for: int | None = None
         self._disposed = False
+        self._offset = 0  # [ns] from the clock's time to ours
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._use_clock(self._time_is_simulated())
+        if not self._simulated:
+            self._offset = node.get_clock().now().nanoseconds - self._read()
         self._jumps = node.get_clock().create_jump_callback(
             JumpThreshold(min_forward=None, min_backward=Duration(nanoseconds=-1), on_clock_change=True),
             post_callback=self._time_has_jumped,
@@ -206,38 +209,32 @@ class NodeScheduler(PeriodicScheduler):
 
     def _use_clock(self, simulated: bool) -> None:
         self._simulated = simulated
-        clock = self._node.get_clock() if simulated else self._steady
-        self._offset = 0 if simulated else self._node.get_clock().now().nanoseconds - clock.now().nanoseconds
-        self._clock = clock
-        self._timer: Timer = self._node.create_timer(1.0, self._run, clock=clock, autostart=False)
+        self._clock = self._node.get_clock() if simulated else self._steady
+        self._timer: Timer = self._node.create_timer(1.0, self._run, clock=self._clock, autostart=False)
 
     def _read(self) -> int:
         return int(self._clock.now().nanoseconds) + self._offset
-
-    def _time_has_jumped(self, jump: TimeJump) -> None:
-        with self._lock:
-            if self._disposed:
-                return
-            simulated = self._time_is_simulated()
-            if simulated != self._simulated:
-                before = self._read() - (jump.delta.nanoseconds if self._simulated else 0)
-                self._node.destroy_timer(self._timer)
-                self._use_clock(simulated)
-                self._shift(self._read() - before)
-            elif simulated:
-                self._shift(min(0, jump.delta.nanoseconds))
 
     def _time_is_simulated(self) -> bool:
         clock = self._node.get_clock()
         return isinstance(clock, ROSClock) and bool(clock.ros_time_is_active)
 
-    def _shift(self, nanoseconds: int) -> None:
-        """Keep how long everything still has to wait."""
-        self._heap = [(due + nanoseconds, order, item) for due, order, item in self._heap]
-        for _, _, item in self._heap:
-            item.due += nanoseconds
-        self._armed_for = None
-        self._arm()
+    def _time_has_jumped(self, jump: TimeJump) -> None:
+        """Go on from where our time is, by the same clock or another one."""
+        with self._lock:
+            if self._disposed:
+                return
+            simulated = self._time_is_simulated()
+            if simulated != self._simulated:
+                # Simulated time that has just ended is not to be read any more.
+                before = self._read() - (jump.delta.nanoseconds if self._simulated else 0)
+                self._node.destroy_timer(self._timer)
+                self._use_clock(simulated)
+                self._offset += before - self._read()
+            elif simulated:
+                self._offset -= min(0, jump.delta.nanoseconds)
+            self._armed_for = None
+            self._arm()
 
     def dispose(self) -> None:
         """Forget everything, for ever: the node ends."""

@@ -17,6 +17,7 @@ from reactivex.disposable import BooleanDisposable
 from reactivex.subject import Subject
 from rosgraph_msgs.msg import Clock as ClockMessage
 
+from interfaces.age import Timestamp
 from interfaces.reactive_node import ReactiveNode
 from interfaces.scheduler import NodeScheduler
 
@@ -284,6 +285,23 @@ def test_after_a_jump_back_what_was_to_come_in_a_second_comes_in_a_second(
     assert ran == []
     simulation.set(11.5)
     spin_until(lambda: ran)
+
+
+def test_after_a_jump_back_what_counts_from_an_absolute_time_goes_on(
+    simulation: Simulation, spin_until: SpinUntil
+) -> None:
+    """`timer` with a period keeps the time of its next item, `timestamp` gives times that others compare."""
+    simulation.set(1000.0)
+    ticks: list[Timestamp[int]] = []
+    rx.timer(1.0, 2.0).timestamp().subscribe(ticks.append, scheduler=simulation.node.scheduler)
+
+    for time_, count in [(1001.0, 1), (10.0, 1), (12.0, 2), (14.0, 3), (5.0, 3), (7.0, 4)]:
+        simulation.set(time_)
+        spin_until(lambda count=count: len(ticks) == count)
+
+    assert [tick.timestamp for tick in ticks] == [
+        datetime.fromtimestamp(at, UTC) for at in (1001, 1003, 1005, 1007)
+    ]
 
 
 def test_simulated_time_may_begin_and_end_while_something_waits(
