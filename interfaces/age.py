@@ -27,6 +27,8 @@ __all__ = [
 
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 _MICROSECOND = timedelta(microseconds=1)
+IN_STEP = timedelta(milliseconds=50)
+"""By how much the clocks of two hosts may differ that NTP or PTP keeps in step (deploy/SAFETY.md, A3)."""
 
 
 def now() -> datetime:
@@ -78,12 +80,27 @@ def fresh(
     return items.filter(is_fresh)
 
 
-def latest(stamps: Observable[datetime], *, now: Callable[[], datetime] = now) -> Observable[datetime]:
+def latest(
+    stamps: Observable[datetime],
+    *,
+    now: Callable[[], datetime] = now,
+    dropped: Callable[[str], None] = lambda why: None,
+) -> Observable[datetime]:
     """
     Emit when the latest of what is stamped was, by the scheduler's clock, which nobody sets.
 
     It is as old as its stamp says when it arrives, and ages by the scheduler's clock from then on. One from
-    the future, or of before the last one, counts for nothing.
+    the future, by more than two clocks that are kept in step may differ, or of before the last one, counts
+    for nothing.
+
+    :param dropped: is told of those from the future.
     """
-    arrivals = stamps.timestamp().map(lambda stamp: (stamp.timestamp, now() - stamp.value))
-    return arrivals.filter(lambda it: it[1] >= timedelta(0)).map(lambda it: it[0] - it[1]).scan(max)
+
+    def moment(stamp: Timestamp[datetime]) -> datetime | None:
+        age = now() - stamp.value
+        if age < -IN_STEP:
+            dropped(f"it is stamped by a clock that is {-age.total_seconds():.3f} s ahead of ours")
+            return None
+        return stamp.timestamp - max(age, timedelta(0))
+
+    return stamps.timestamp().map(moment).filter(bool).scan(max)

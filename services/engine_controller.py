@@ -6,7 +6,6 @@ been seen ever since, whatever dies.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from datetime import datetime, timedelta
 
@@ -40,7 +39,7 @@ def engine_state(
     :param absence: when nobody was seen for so long [s], the engines turn off; not less than ``presence``.
     :param drive: the engines stop by themselves when ``on`` is not repeated for so long [s].
     :param now: the clock of source times and stamps.
-    :param refused: is told why a ``turn_on`` is not obeyed.
+    :param refused: is told why a ``turn_on`` is not obeyed, or a presence counts for nothing.
     """
     patience, hold = timedelta(seconds=absence), timedelta(seconds=drive)
 
@@ -50,10 +49,11 @@ def engine_state(
         if command.value == TURN_OFF:
             return OFF
         waited = abs(now() - command.timestamp).total_seconds()
-        unseen = (arrived.timestamp - seen).total_seconds() if seen else math.inf
-        if waited < presence and unseen < presence:
+        unseen = arrived.timestamp - seen if seen else timedelta.max
+        if waited < presence and unseen < timedelta(seconds=presence):
             return ON
-        why = f"no operator seen for {unseen:.3f} s" if waited < presence else f"{waited:.3f} s old"
+        since = f"for {unseen.total_seconds():.3f} s" if seen else "yet"
+        why = f"no operator seen {since}" if waited < presence else f"{waited:.3f} s old"
         refused(f"{TURN_ON} refused: {why}")
         return None
 
@@ -72,7 +72,7 @@ def engine_state(
         renewals = late.with_latest_from(states).filter(lambda it: it != (True, ON))
         return rx.merge(renewals.map(lambda it: it[1]), states)
 
-    return age.latest(presences, now=now).publish(repeated)
+    return age.latest(presences, now=now, dropped=lambda why: refused(f"presence: {why}")).publish(repeated)
 
 
 def wire(node: ServiceNode) -> None:
