@@ -51,12 +51,13 @@ def operator_incapacitated(
     """
     Emit ``turn_off`` when the operator is incapacitated (Listing 5.8), and again every ``repeat`` [s].
 
-    The next heartbeat ends that: "Operator is alive", and new strikes begin (see :func:`operator_activity`).
+    A heartbeat after the first ends that: "Operator is alive", and new strikes begin (Listing 5.7, above).
     """
 
     def watch(heartbeats: Observable[Heartbeat]) -> Observable[str]:
         back = heartbeats.do_action(activity.get("alive"))
-        away = rx.timer(0.0, repeat).map(lambda _: TURN_OFF).take_until(back)
+        offs = rx.timer(0.0, repeat).map(lambda _: TURN_OFF)
+        away = offs.publish(lambda it: it.take_until(back.skip_until(it)))
         return operator_activity(heartbeats, **activity).catch(lambda *_: away).repeat()
 
     return heartbeats.concat(rx.never()).publish(watch)  # a source that ends is silent for ever
@@ -70,7 +71,6 @@ def wire(node: ServiceNode) -> None:
     strikes = node.declare("strikes", 3, (1, 100), "the strike that turns the engines off")
     repeat = node.declare("repeat", 0.5, (0.05, 10.0), "turn_off is repeated this often [s]")
     node.declare_origin()
-
     presences: Subject[Heartbeat] = Subject()
     commands = operator_incapacitated(
         age.fresh(

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import Any
 
 from hypothesis import given
 from hypothesis import strategies as st
+from reactivex.subject import Subject
 from reactivex.testing import ReactiveTest, TestScheduler
 
 from interfaces.topics import TURN_OFF
@@ -72,6 +74,24 @@ def test_strikes_do_not_reset_when_the_operator_comes_back_in_between(scheduler:
     assert missed == [3.01, 7.01, 11.01]
     assert alive == [4.01, 8.01]
     assert commands == [(11.01, TURN_OFF), (11.51, TURN_OFF)]
+
+
+def test_who_comes_back_in_the_moment_of_the_third_strike_prevents_nothing(scheduler: TestScheduler) -> None:
+    heartbeats: Subject[float] = Subject()
+    silences = itertools.count(1)
+
+    def missed(_: Exception) -> None:
+        if next(silences) == 3:  # `retry` ends a step later: between that and what follows it
+            scheduler.schedule(lambda *_: scheduler.schedule(lambda *_: heartbeats.on_next(0.0)))
+
+    results = scheduler.start(
+        lambda: operator_incapacitated(heartbeats, missed=missed),
+        created=BEGIN / 2,
+        subscribed=BEGIN,
+        disposed=12.0,
+    )
+
+    assert [message.value.value for message in results.messages[:1]] == [TURN_OFF]
 
 
 def test_a_return_is_seen_at_once_and_begins_three_new_strikes(scheduler: TestScheduler) -> None:
