@@ -24,7 +24,7 @@ import struct
 import sys
 import time
 import traceback
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable
 from datetime import datetime
 from typing import Any, NoReturn, TypeVar
@@ -57,6 +57,7 @@ from interfaces.topics import DIAGNOSTICS, Topic, is_latched
 T = TypeVar("T")
 _HEALTH_PERIOD = 1.0  # [s]
 _MISTAKES = (NameValidationException, ParameterException, ScenarioError)  # of who started the service
+_REASONS, _OTHER_REASONS = 4, "other reasons"  # that a report tells of a topic
 _RECENT = 16  # messages of which a second reader may bring a copy
 
 
@@ -71,7 +72,7 @@ class ServiceNode(ReactiveNode):
         self._published_count = 0
         self._last_output: float | None = None
         self._dropped_count = 0
-        self._remarks: dict[str, tuple[int, str]] = {}  # since the last report: about what, how often, why
+        self._remarks: dict[str, Counter[str]] = {}  # since the last report: about what, why, how often
         self._logged: set[str] = set()  # those of the last report
         self.add_on_set_parameters_callback(_only_finite)
         self._health = self.create_publisher(DIAGNOSTICS.type, DIAGNOSTICS.name, DIAGNOSTICS.qos)
@@ -149,6 +150,12 @@ class ServiceNode(ReactiveNode):
 
         self.add_post_set_parameters_callback(keep)
         return follow(self.create_parameter_observable(name), timeline)
+
+    def until_set(self, name: str, items: Observable[T]) -> Observable[T]:
+        """Emit items until a parameter is set by hand; none if it was, before the end of the last process."""
+        if name in self._settings.read():
+            return rx.empty()
+        return items.take_until(self.create_parameter_observable(name).skip(1))
 
     @property
     def resumes(self) -> bool:
@@ -230,8 +237,8 @@ class ServiceNode(ReactiveNode):
 
     def remark(self, what: str, why: str) -> None:
         """Let the next health message be a warning that says this."""
-        count = self._remarks.get(what, (0, ""))[0]
-        self._remarks[what] = (count + 1, why)
+        reasons = self._remarks.setdefault(what, Counter())
+        reasons[why if why in reasons or len(reasons) < _REASONS else _OTHER_REASONS] += 1
 
     def report_health(self) -> None:
         """Publish the health, with all remarks since the last time; this happens at 1 Hz anyway."""
@@ -240,11 +247,11 @@ class ServiceNode(ReactiveNode):
                 if publisher.topic_type != topic.type_name:
                     self.remark(topic.name, f"{publisher.node_name} publishes {publisher.topic_type}")
         remarks, self._remarks = self._remarks, {}
-        news = {f"{what}: {why}" for what, (_, why) in remarks.items()}
-        if not news <= self._logged:
-            self.get_logger().warning("; ".join(sorted(news)))
-        self._logged = news
-        told = [f"{what}: {why}" + (f" ({n} times)" if n > 1 else "") for what, (n, why) in remarks.items()]
+        counts = {f"{what}: {why}": n for what, reasons in remarks.items() for why, n in reasons.items()}
+        if counts.keys() - self._logged:
+            self.get_logger().warning("; ".join(sorted(counts)))
+        self._logged = set(counts)
+        told = [remark + (f" ({n} times)" if n > 1 else "") for remark, n in counts.items()]
         now = time.monotonic()
         silence = "" if self._last_output is None else f"{now - self._last_output:.3f}"
         values = {

@@ -53,7 +53,7 @@ def wire(node: ServiceNode) -> None:
     beats = heartbeats(
         node.follow("pressed", node.play(scenario.pressed)),
         node.follow("rate"),
-        node.play(scenario.heartbeats, resume=False) or rx.never(),
+        node.until_set("pressed", node.play(scenario.heartbeats, resume=False) or rx.never()),
     )
     node.publish(OPERATOR_HEARTBEAT, beats.map(lambda beat: Bool(data=beat)))
 

@@ -47,7 +47,8 @@ def effector_speed(
         before, after = pair
         if after.stamp > before.stamp:
             return True
-        dropped(f"its time goes back by {(before.stamp - after.stamp) / 1e9:g} s")
+        back = (before.stamp - after.stamp) / 1e9
+        dropped(f"its time goes back by {back:g} s" if back else "its time stands still")
         return False
 
     return positions.pairwise().filter(advances).map(speed).distinct_until_changed()

@@ -17,6 +17,7 @@ from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValu
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
+from reactivex.subject import Subject
 from std_msgs.msg import Bool, Float64, Header, String
 
 from interfaces import topics
@@ -127,8 +128,9 @@ def test_bad_input_is_dropped_and_reported(
     assert report["dropped"] == str(len(bad))
     assert report["level"] == (DiagnosticStatus.WARN if bad else DiagnosticStatus.OK)
     if bad:
-        assert report["message"].startswith(f"{topic.name}: {topic.fault(bad[-1])}")
-        assert len(report["message"]) < 200
+        told = report["message"].split("; ")
+        assert told[0].startswith(f"{topic.name}: {topic.fault(bad[0])}")
+        assert all(len(remark) < 200 for remark in told)
     following = health()
     assert (following["level"], following["message"]) == (DiagnosticStatus.OK, "running")
     assert following["dropped"] == str(len(bad))
@@ -208,11 +210,23 @@ def test_a_remark_is_a_warning_but_not_bad_input(
 ) -> None:
     service.remark("engines", "refused")
     service.remark("engines", "refused again")
+    service.remark("engines", "refused again")
 
     report = health()
 
-    assert report["message"] == "engines: refused again (2 times)"
+    assert report["message"] == "engines: refused; engines: refused again (2 times)"
     assert (report["level"], report["dropped"]) == (DiagnosticStatus.WARN, "0")
+
+
+def test_of_many_remarks_a_few_are_told_and_the_others_counted(
+    service: ServiceNode, health: Callable[[], dict[str, Any]]
+) -> None:
+    for number in range(40):
+        service.remark("l1", f"{number} is too much")
+
+    told = health()["message"].split("; ")
+
+    assert told == [*(f"l1: {number} is too much" for number in range(4)), "l1: other reasons (36 times)"]
 
 
 # Parameters
@@ -315,6 +329,31 @@ def test_what_was_set_by_hand_holds_beyond_a_restart(
     second, values = source()
     assert values == [5.0]
     assert second.get_parameter("value").value == 5.0
+
+
+def test_what_a_scenario_does_besides_ends_for_good_when_a_parameter_is_set_by_hand(
+    make_node: Make, tmp_path: Path
+) -> None:
+    items: Subject[int] = Subject()
+
+    def source() -> tuple[ServiceNode, list[int]]:
+        node = overridden(make_node, settings=str(tmp_path / "settings"))
+        node.declare("pressed", False, None, "whether it is held", settable=True)
+        node.declare_scenario()
+        node.follow("pressed").subscribe(scheduler=node.scheduler)
+        received: list[int] = []
+        node.until_set("pressed", items).subscribe(received.append, scheduler=node.scheduler)
+        return node, received
+
+    node, received = source()
+    items.on_next(1)
+    node.set_parameters([Parameter("pressed", value=False)])
+    items.on_next(2)
+    assert received == [1]
+    node.destroy_node()
+    _, received = source()
+    items.on_next(3)
+    assert received == []
 
 
 def test_it_is_told_when_a_setting_would_be_forgotten(
