@@ -19,6 +19,7 @@ import yaml
 
 from deploy import processes
 from deploy.chaos.history import ALL, NOTHING, PROGRAMS
+from deploy.chaos.marks import BABBLER
 from deploy.system import System
 
 INJECTED = Path(__file__).parent / "inject"
@@ -95,7 +96,7 @@ def hog(arm: Arm, program: str) -> None:
 
 def kill_all(arm: Arm, target: str) -> None:
     """SIGKILL all programs at once."""
-    pids = [process.pid for process in arm.system.members() if process.program]
+    pids = [process.pid for process in arm.system.members() if process.program not in ("", BABBLER)]
     handles = processes.open_handles(arm.system.run, pids)
     for handle in handles:
         with suppress(ProcessLookupError):
@@ -169,7 +170,7 @@ def _babbler(*arguments: str) -> Callable[[Arm, str], Undo]:
         process = subprocess.Popen(
             [sys.executable, "-m", "deploy.chaos.babbler", *arguments],
             cwd=processes.ROOT,
-            env=arm.environment() | {"ARM_NAMESPACE": arm.namespace},
+            env=arm.environment() | {"ARM_NAMESPACE": arm.namespace, "SUPERVISOR_PROCESS_NAME": BABBLER},
             stdout=subprocess.DEVNULL,
         )
         return _ender(process)

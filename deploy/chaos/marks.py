@@ -1,4 +1,4 @@
-"""How the monkey's own messages are told from those of the services."""
+"""How the monkey's own messages and processes are told from those of the arm."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ from interfaces import topics
 
 _MARK = 0x7FF8_BAB1_EBAB_1E00
 _NANS = {topic.name: struct.pack("<Q", _MARK + number) for number, topic in enumerate(topics.CONTRACT)}
+BABBLER = "babbler"
+"""What a babbler's process is called among those of the arm: none of its programs, nor its supervisord."""
 TEXT = "babble"
 _TEXT = struct.pack("<I", len(TEXT) + 1) + TEXT.encode() + b"\0"  # as a string of CDR, not as a part of one
 GARBAGE = b"\x00\xba\xbb\x1e"

@@ -29,6 +29,7 @@ from rclpy.signals import SignalHandlerOptions
 
 from deploy import processes
 from deploy.chaos.history import NOTHING, OVERLOAD, Fault, Life
+from deploy.chaos.marks import BABBLER
 from deploy.chaos.record import FAULTS, PROCESSES, Recorder, qos_profiles
 from interfaces import topics
 
@@ -160,7 +161,7 @@ class Census:
         environment = processes.environment_of(pid)
         namespace = self._arms.get(environment.get(processes.MARK, ""))
         program = environment.get("SUPERVISOR_PROCESS_NAME", "")
-        if namespace is None or not (program or "supervisord" in _command(pid)):
+        if namespace is None or program == BABBLER or not (program or "supervisord" in _command(pid)):
             return False
         if not program and known < FORK:
             return False

@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
+import os
 import resource
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 import yaml
 
-from deploy.chaos.faults import FAULTS
-from deploy.chaos.history import NOTHING
+from deploy import processes
+from deploy.chaos.faults import FAULTS, Undo
+from deploy.chaos.history import ALL, NOTHING, Life
+from deploy.chaos.marks import BABBLER
+from deploy.chaos.observer import Arm, Census
 from deploy.system import System
 
 
@@ -25,7 +33,7 @@ class Nobody:
         return 0
 
     def environment(self) -> dict[str, str]:
-        return {}
+        return {**os.environ, processes.MARK: str(self.system.run)}
 
 
 @pytest.fixture
@@ -60,3 +68,51 @@ def test_two_crash_loops_at_a_time_leave_the_good_parameters(nobody: Nobody) -> 
     first()
     second()
     assert yaml.safe_load(nobody.system.parameters.read_text()) == good
+
+
+@pytest.fixture
+def babbler(nobody: Nobody, domain_id: int) -> Iterator[int]:
+    """The process of a babbler beside the arm."""
+    undo: Undo | None = FAULTS["babble"].do(nobody, NOTHING)
+    assert undo is not None
+    (member,) = nobody.system.members()
+    yield member.pid
+    undo()
+
+
+@pytest.fixture
+def velocity(nobody: Nobody) -> Iterator[subprocess.Popen[bytes]]:
+    """A process of the arm."""
+    environment = nobody.environment() | {"SUPERVISOR_PROCESS_NAME": "velocity"}
+    with subprocess.Popen(
+        [sys.executable, "-c", "import signal; signal.pause()"], env=environment
+    ) as process:
+        yield process
+        process.kill()
+
+
+def test_a_babbler_is_not_taken_for_supervisord_but_ends_with_its_system(
+    nobody: Nobody, babbler: int
+) -> None:
+    assert nobody.system.members() == [(babbler, BABBLER)]
+    assert nobody.system.supervisor() is None
+    nobody.system.stop()
+    assert nobody.system.members() == []
+
+
+def test_a_babbler_is_not_taken_for_a_program(
+    nobody: Nobody, babbler: int, velocity: subprocess.Popen[bytes], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen: list[Life] = []
+    census = Census(
+        [Arm("/", 0, nobody.system.run)], lambda _, life: seen.append(life), lambda begin, end: None
+    )
+    census.look()
+    ended = threading.Event()
+    ended.set()
+    census.run(ended)  # gives back what it holds
+    assert [(life.program, life.pid) for life in seen] == [("velocity", velocity.pid)]
+    killed: list[int] = []
+    monkeypatch.setattr(processes, "open_handles", lambda run, pids: killed.extend(pids) or [])
+    FAULTS["kill_all"].do(nobody, ALL)
+    assert killed == [velocity.pid]
