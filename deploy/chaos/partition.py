@@ -7,6 +7,7 @@ bridge between them stands in a third namespace: the network of the machine itse
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -61,11 +62,12 @@ def missing(scenario: str = "partition") -> str:
 
 @contextmanager
 def namespaces() -> Iterator[Callable[[str], str]]:
-    """Both hosts and the switch, joined; gives the full name of each."""
+    """Both hosts and the switch, joined; gives the full name of each. Deletes what a killed monkey left."""
 
     def full(name: str) -> str:
         return f"arm{os.getpid()}-{name}"
 
+    _delete_abandoned()
     with ExitStack() as stack:
         for name in (SWITCH, ROBOT, CONTROL):
             _ip("netns", "add", full(name))
@@ -83,8 +85,16 @@ def namespaces() -> Iterator[Callable[[str], str]]:
         yield full
 
 
-def _ip(*arguments: str) -> None:
-    subprocess.run(["ip", *arguments], check=True, capture_output=True, text=True)
+def _delete_abandoned() -> None:
+    """Delete the namespaces of monkeys that live no more."""
+    for name, pid in re.findall(r"^(arm(\d+)-\w+)", _ip("netns", "list"), re.MULTILINE):
+        if not Path("/proc", pid).exists():
+            with suppress(subprocess.CalledProcessError):  # another monkey was faster
+                _ip("netns", "delete", name)
+
+
+def _ip(*arguments: str) -> str:
+    return subprocess.run(["ip", *arguments], check=True, capture_output=True, text=True).stdout
 
 
 def _queue(switch: str, verb: str, *kind: str) -> None:
@@ -119,6 +129,7 @@ class TwoHosts(Arena):
         self.arms = [ArmUnderTest("/", System(self._runs / "run", within[ROBOT]))]
         self._on_operators_host = within[CONTROL]
         self._operator = System(self._runs / "run_operator")
+        self._operator.run.mkdir()  # by it the next play finds the switch, should this one be killed
         stack.callback(self._operator.stop)
 
     def start(self, arm: ArmUnderTest, parameters: Mapping[str, object]) -> None:

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+from pathlib import Path
+
 import pytest
 
+from deploy import processes
 from deploy.chaos.findings import HOLDS
 from deploy.chaos.history import Fault, History, between
-from deploy.chaos.partition import missing
+from deploy.chaos.partition import missing, namespaces
 from deploy.chaos.promises import CHECKERS
 from interfaces.topics import ENGINES_STATE, OFF, ON, OPERATOR_HEARTBEAT
 
@@ -68,3 +73,40 @@ def test_no_promise_is_broken_by_a_bad_line_and_the_engines_stay_on(
     assert {s.value for s in between(bad.history.stream(ENGINES_STATE), fault.begin, fault.end)} == {ON}
     for promise in CHECKERS:
         bad.finding(promise)
+
+
+PREPARED = """
+import signal, sys
+from contextlib import ExitStack
+from pathlib import Path
+from deploy.chaos.partition import TwoHosts
+
+with ExitStack() as stack:
+    TwoHosts(Path(sys.argv[1])).prepare(stack)
+    print(flush=True)
+    signal.pause()
+"""
+
+
+def test_what_a_killed_monkey_leaves_behind_is_found_by_the_next_one(tmp_path: Path) -> None:
+    if reason := missing():
+        pytest.skip(reason)
+    command = [sys.executable, "-c", PREPARED, str(tmp_path)]
+    with subprocess.Popen(command, cwd=processes.ROOT, stdout=subprocess.PIPE) as monkey:
+        try:
+            assert monkey.stdout is not None
+            monkey.stdout.readline()
+            with namespaces():  # it lives: what it has made is its own
+                assert f"arm{monkey.pid}-switch" in hosts()
+        finally:
+            monkey.kill()
+    assert (tmp_path / "run_operator").is_dir()  # by which make chaos ends the switch of an earlier play
+    assert f"arm{monkey.pid}-switch" in hosts()
+    with namespaces():
+        assert not [name for name in hosts() if name.startswith(f"arm{monkey.pid}-")]
+
+
+def hosts() -> list[str]:
+    """The network namespaces of this machine that have a name."""
+    listed = subprocess.run(["ip", "netns", "list"], check=True, capture_output=True, text=True)
+    return [line.split()[0] for line in listed.stdout.splitlines()]
