@@ -10,6 +10,7 @@ CHAOS ?=
 SHELL := /bin/sh
 MAKEFLAGS += --no-print-directory
 PY := .venv/bin/python
+STAMP := .venv/made-from
 
 .PHONY: help setup run start stop status logs console chaos test check bench
 
@@ -32,9 +33,9 @@ setup:
 run start: setup
 	@$(PY) -m deploy.launcher $@ '$(SCENARIO)' '$(PARAMETERS)'
 
-# These do without a set-up: what they look at, or end, runs already.
+# These do without a set-up: what they look at, or end, runs already. Nothing runs from half of one: it has no stamp.
 console status logs stop:
-	@if test -x $(PY); then exec $(PY) -m deploy.launcher $@; else echo "Nothing runs: .venv is not set up."; fi
+	@if test -e $(STAMP); then exec $(PY) -m deploy.launcher $@; else echo "Nothing runs: .venv is not set up (make setup)."; fi
 
 chaos: setup
 	@$(PY) -m deploy.chaos --minutes $(MINUTES) $(if $(SEED),--seed $(SEED)) $(CHAOS)

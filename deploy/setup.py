@@ -16,8 +16,9 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from types import FrameType
 
@@ -46,17 +47,16 @@ def main() -> int:
         with _alone():
             began = time.monotonic()
             ros = system_rclpy()
-            with _stamped(STAMP, fingerprint(ros)) as venv_missing:
-                if venv_missing:
-                    make(ros)
+            venv_missing = _update(STAMP, fingerprint(ros), partial(make, ros))
             if not ros:
-                with _stamped(RUNTIME_STAMP, fingerprint_of_runtime()) as runtime_missing:
-                    if runtime_missing:
-                        install_runtime()
+                _update(RUNTIME_STAMP, fingerprint_of_runtime(), install_runtime)
             if venv_missing:
                 print(f"Set up in {time.monotonic() - began:.0f} s.", flush=True)
     except SetupError as error:
         print(error, file=sys.stderr)
+        return 1
+    except OSError as error:  # no space, no permission
+        print(f"Set-up failed: {error}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
         print("\nSet-up interrupted; the next make starts it anew.", file=sys.stderr)
@@ -92,15 +92,13 @@ def _digest(files: Iterable[Path], *words: str) -> str:
     return digest.hexdigest()
 
 
-@contextmanager
-def _stamped(stamp: Path, fingerprint: str) -> Iterator[bool]:
-    """Tell whether something has to be made; it has been once the block has ended well."""
-    missing = not stamp.exists() or stamp.read_text() != fingerprint
-    if missing:
-        stamp.unlink(missing_ok=True)
-    yield missing
-    if missing:
-        stamp.write_text(fingerprint)
+def _update(stamp: Path, fingerprint: str, make: Callable[[], None]) -> bool:
+    """Make what a stamp tells of unless it was made from just this; whether it had to be made."""
+    if stamp.exists() and stamp.read_text() == fingerprint:
+        return False
+    make()
+    stamp.write_text(fingerprint)
+    return True
 
 
 def make(ros: str) -> None:
@@ -121,6 +119,7 @@ def make(ros: str) -> None:
                 " shell without ROS 2"
             )
     print(f"Setting up .venv with Python {version}, once; this takes about half a minute.", flush=True)
+    STAMP.unlink(missing_ok=True)  # no sooner: where it cannot be made anew, what there is goes on to count
     venv = [sys.executable, "-m", "venv", "--clear", *(["--system-site-packages"] if ros else []), str(VENV)]
     _step("a virtual environment", venv, log=None)
     files = ["system.txt", "develop.txt", *([] if ros else ["runtime.txt"])]
@@ -134,6 +133,7 @@ def make(ros: str) -> None:
 def install_runtime() -> None:
     """Install deploy/runtime into .venv, or install it again."""
     _refuse_while_running()
+    RUNTIME_STAMP.unlink(missing_ok=True)
     command = [*PIP, "--no-build-isolation", "--force-reinstall", str(RUNTIME)]
     _step("deploy/runtime, as this machine has no ROS 2", command)
 
