@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING
 
-from deploy.system import NAMESPACE, DeploymentError, Program, System
+from deploy.system import NAMESPACE, Check, DeploymentError, Program, System
 
 if TYPE_CHECKING:
     from deploy.member import Member
@@ -93,9 +93,11 @@ def _started(system: System, scenario: str, parameter_file: str) -> Iterator[tup
 
     parameters.check_environment()
     with Member() as member:
-        given = parameters.of_system(scenario, parameter_file, loading=time.monotonic() - began)
-        interruption.check()
-        system.start(given)
+        try:
+            given = parameters.of_system(scenario, parameter_file, loading=time.monotonic() - began)
+        finally:
+            interruption.check()  # Ctrl-C ends the check of a parameter file, too: that is no mistake in it
+        system.start(given, interruption.check)
         try:
             place = f"ROS domain {os.environ.get('ROS_DOMAIN_ID') or 0}"
             if namespace := os.environ.get(NAMESPACE):
@@ -151,18 +153,18 @@ def _show(system: System, member: Member, epoch: float, *, owner: bool = False) 
         member.spin_once()
         console.read_commands()
         if system.supervisor_has_ended():
-            if not owner or not system.start_again():
+            if not owner or not system.start_again(interruption.check):
                 print(system.unattended() if system.is_wanted else "The system has ended.", flush=True)
                 return
             print("supervisord was killed: everything has been started anew.", flush=True)
 
 
-def _stop(system: System) -> None:
-    """Stop the system and say so, as far as there still is somebody to tell."""
+def _stop(system: System, check: Check = lambda: None) -> None:
+    """Stop the system and say so, as far as there still is somebody to tell; `check` may end the waiting."""
     count = len(system.members())
     with suppress(OSError):
         print(f"Stopping {count} processes ..." if count else "Nothing runs.", flush=True)
-    system.stop()
+    system.stop(check)
     with suppress(OSError):
         print("All have ended." if count else "", end="\n" if count else "", flush=True)
 
@@ -211,7 +213,7 @@ def main(arguments: list[str]) -> int:
             case "logs":
                 logs(system)
             case "stop":
-                _stop(system)
+                _stop(system, interruption.check)
     except interruption.Interrupted:
         return 0
     except DeploymentError as error:

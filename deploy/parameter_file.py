@@ -5,8 +5,7 @@
         silence: 2.0
 
 with `/**` for all services that have the parameter; an arm in a namespace may name its services with it, or
-without. This is done in a process of its own: it loads the services, and who loads a service becomes one,
-down to its signals.
+without. This is done in a process of its own, which a Ctrl-C ends wherever it is: the launcher only notes it.
 """
 
 from __future__ import annotations

@@ -11,8 +11,8 @@ import subprocess
 import sys
 import time
 import xmlrpc.client
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, NamedTuple, cast
 
@@ -29,6 +29,10 @@ NAMESPACE = "REACTIVE_ARM_NAMESPACE"  # the environment variable that tells of a
 SETTINGS = "settings"  # the directory, in that of the system, in which services keep what was set by hand
 GROUP = "arm"  # of all programs, in supervisord.conf
 READY_GRACE = 20.0  # s that supervisord has to answer its first call
+LOCK_INTERVAL = 0.05  # s between two looks whether another start or stop is over
+
+Check = Callable[[], None]
+"""Is called often while something is awaited, and raises what is to end that."""
 
 
 class DeploymentError(Exception):
@@ -110,13 +114,15 @@ class System:
         """The environment that the running system was started with; empty when none runs."""
         return next((processes.environment_of(process.pid) for process in self.members()), {})
 
-    def start(self, parameters: Mapping[str, object]) -> None:
+    def start(self, parameters: Mapping[str, object], check: Check = lambda: None) -> None:
         """Start supervisord with its programs, all with these parameters (content of a ROS parameter file).
 
         What a killed supervisord left behind is ended first: no service ever lives twice. Returns as soon as
         supervisord answers. Raises DeploymentError when a system runs already.
+
+        :param check: is called while another start or stop is awaited
         """
-        with self._alone():
+        with self._alone(check):
             if pid := self.supervisor():
                 raise DeploymentError(f"Already running: supervisord has pid {pid} and works in {self.run}")
             self._environment = dict(os.environ)  # also for `start_again`
@@ -125,9 +131,9 @@ class System:
             self.parameters.write_text(yaml.safe_dump(dict(parameters), sort_keys=False))
             self._start_supervisor()
 
-    def start_again(self) -> bool:
+    def start_again(self, check: Check = lambda: None) -> bool:
         """Start it as it was, after supervisord died; whether that was right: its end may have been meant."""
-        with self._alone():
+        with self._alone(check):
             if not self.is_wanted:
                 return False
             if self.supervisor():
@@ -145,9 +151,9 @@ class System:
             self._supervisor = os.pidfd_open(pid)
         return not processes.await_end([self._supervisor], 0.0)
 
-    def stop(self) -> None:
+    def stop(self, check: Check = lambda: None) -> None:
         """End every process of the system, with supervisord's help or without."""
-        with self._alone():
+        with self._alone(check):
             self.parameters.unlink(missing_ok=True)  # from here on it is not wanted
             if pid := self.supervisor():
                 handles = processes.open_handles(self.run, [p.pid for p in self.members()])
@@ -252,12 +258,17 @@ class System:
             return cast(object, getattr(server, method)(*arguments))
 
     @contextmanager
-    def _alone(self) -> Iterator[None]:
+    def _alone(self, check: Check) -> Iterator[None]:
         """Hold the run directory: only one start or stop at a time."""
         self.run.mkdir(mode=0o700, parents=True, exist_ok=True)
         directory = os.open(self.run, os.O_RDONLY)
         try:
-            fcntl.flock(directory, fcntl.LOCK_EX)
+            if not _locked(directory):
+                with suppress(OSError):  # perhaps nobody reads it any more
+                    print("Waiting for another make to end its start or stop.", flush=True)
+                while not _locked(directory):
+                    check()
+                    time.sleep(LOCK_INTERVAL)
             yield
         finally:
             os.close(directory)
@@ -289,6 +300,15 @@ class _UnixTransport(xmlrpc.client.Transport):
 
     def close(self) -> None:
         self._unix_connection.close()
+
+
+def _locked(descriptor: int) -> bool:
+    """Lock a file or directory unless somebody else has; whether that has worked."""
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    return True
 
 
 def namespace_of(environment: Mapping[str, str]) -> str:

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
 import signal
 import sys
-from contextlib import closing
+from collections.abc import Iterator
+from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 
 import pytest
 
-from tests.system.sites import Site
+from tests.system.sites import Command, Site
 
 STEADY = str(Path(__file__).with_name("steady.yaml"))
 
@@ -54,11 +56,68 @@ def test_ctrl_c_before_anything_has_started_ends_it_without_a_traceback(site: Si
     assert site.members == {}
 
 
+def test_ctrl_c_while_a_parameter_file_is_checked_is_no_mistake_in_it(site: Site, tmp_path: Path) -> None:
+    file = tmp_path / "mine.yaml"
+    os.mkfifo(file)
+    command = site.begin("run", STEADY, str(file))
+    with writer_to_a_reader_of(file, command):
+        command.signal(signal.SIGINT)
+        assert command.wait(10) == 0
+    assert command.output == ""
+    assert not site.run.exists()
+
+
+@contextmanager
+def writer_to_a_reader_of(fifo: Path, command: Command) -> Iterator[None]:
+    """Somebody on whose words a reader of a fifo, one of a command's processes, waits already."""
+    writer = None
+    while writer is None:
+        assert command.is_alive, command.output
+        with suppress(OSError):  # nobody reads yet
+            writer = os.open(fifo, os.O_WRONLY | os.O_NONBLOCK)
+    try:
+        yield
+    finally:
+        os.close(writer)
+
+
 def caught_signals(pid: int) -> set[int]:
     """The signals that a process handles itself."""
     status = Path(f"/proc/{pid}/status").read_text()
     mask = int(status.partition("SigCgt:")[2].split()[0], 16)
     return {number for number in range(1, 65) if mask >> (number - 1) & 1}
+
+
+@contextmanager
+def another_at_work(site: Site) -> Iterator[None]:
+    """A start or stop of the system that takes its time."""
+    site.run.mkdir()
+    directory = os.open(site.run, os.O_RDONLY)
+    try:
+        fcntl.flock(directory, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(directory)
+
+
+@pytest.mark.parametrize("arguments", [("stop",), ("start", STEADY)], ids=lambda arguments: arguments[0])
+def test_ctrl_c_ends_the_waiting_for_another_start_or_stop(site: Site, arguments: tuple[str, ...]) -> None:
+    with another_at_work(site):
+        command = site.begin(*arguments)
+        command.await_line("Waiting for another make to end its start or stop")
+        command.signal(signal.SIGINT)
+        assert command.wait(10) == 0
+    assert "Traceback" not in command.output
+    assert site.members == {}
+
+
+def test_a_start_goes_on_when_another_start_or_stop_is_over(site: Site) -> None:
+    with another_at_work(site):
+        command = site.begin("start", STEADY)
+        command.await_line("Waiting for another make to end its start or stop")
+        assert site.members == {}
+    command.await_line("It runs in the background")
+    assert command.wait(10) == 0
 
 
 def test_closing_the_terminal_ends_everything(site: Site) -> None:
