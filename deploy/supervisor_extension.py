@@ -2,7 +2,7 @@
 
 - It counts how often it started each program: RPC `arm.starts`.
 - It tells the sentinel about them (RPC `arm.watch`), and kills a sentinel that has stopped asking.
-- It survives a full disk: a line that cannot be logged is lost, and nothing else.
+- It survives a full disk and a log that cannot be opened: what cannot be logged is lost, and nothing else.
 - It looks after its children every 100 ms and at once after each change, instead of once a second: a killed
   service is started again 1–2 s later otherwise.
 
@@ -16,6 +16,7 @@ import signal
 import time
 from collections import Counter
 from contextlib import suppress
+from pathlib import Path
 from typing import Any
 
 from supervisor import events, loggers
@@ -26,6 +27,39 @@ _ENDS = (events.ProcessStateExitedEvent, events.ProcessStateBackoffEvent)
 SENTINEL = "sentinel"
 SENTINEL_START = 30.0  # s until it has to ask for the first time, on a machine that is just starting a fleet
 SENTINEL_PATIENCE = 3.0  # s that it may be silent then
+
+
+class LossyLog(loggers.RotatingFileHandler):  # type: ignore[misc]
+    """
+    A log file that loses what it cannot take.
+
+    Its base raises where a file cannot be opened, and then the program does not start; it raises where one
+    cannot be rolled over, which ends supervisord; and it complains to standard error, on the same full disk.
+    """
+
+    def __init__(self, filename: str, *arguments: Any) -> None:
+        super().__init__(os.devnull, *arguments)  # which can be opened always
+        self.baseFilename = filename
+        with suppress(OSError):
+            self.reopen()
+
+    def reopen(self) -> None:
+        """Open the file again, also where somebody has removed its directory. Raises OSError."""
+        self.close()
+        Path(self.baseFilename).parent.mkdir(parents=True, exist_ok=True)
+        super().reopen()
+
+    def emit(self, record: Any) -> None:
+        """Log it, or lose it."""
+        try:
+            if self.stream.closed:
+                self.reopen()
+            super().emit(record)
+        except OSError:
+            self.closed = self.stream.closed  # by a rollover, which does not say so
+
+    def handleError(self) -> None:
+        """Complain to nobody."""
 
 
 class ArmInterface:
@@ -105,11 +139,9 @@ class ArmInterface:
         return self._poll(wait)
 
 
-def _lose(handler: Any) -> None:
-    """Complain to nobody: supervisord's own way, to standard error on the same full disk, would end it."""
-
-
 def make_interface(supervisord: Any, **config: str) -> ArmInterface:
     """The factory that supervisord.conf names."""
-    loggers.Handler.handleError = _lose
+    loggers.RotatingFileHandler = LossyLog  # of the programs: each start of one opens it
+    for handler in supervisord.options.logger.handlers:
+        handler.__class__ = LossyLog  # supervisord's own, which is open already
     return ArmInterface(supervisord)

@@ -155,6 +155,19 @@ def test_a_killed_service_comes_back_and_is_counted(module_site: Site, peer: Pee
     assert int(pid) != killed
 
 
+def test_a_killed_service_comes_back_though_its_log_cannot_be_opened(module_site: Site) -> None:
+    killed = module_site.members["velocity"]
+    logs, away = module_site.run / "logs", module_site.run / "away"
+    logs.rename(away)
+    logs.touch()
+    try:
+        os.kill(killed, signal.SIGKILL)
+        module_site.await_members(lambda left: left.get("velocity", killed) != killed)
+    finally:
+        logs.unlink()
+        away.rename(logs)
+
+
 def test_the_operator_commands_switch_and_engines_from_the_console(module_site: Site) -> None:
     console = module_site.begin("console")
     console.await_line("Engines are off")
