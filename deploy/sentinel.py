@@ -3,9 +3,10 @@
 User story (ours): as a robot operator, I find a service that hangs replaced within five seconds, and one that
 was given up tried again, without anybody's help; and I see on /diagnostics what happened to which process.
 
-It is a service like the others, supervised like them. It kills what reports no health, ends what lives beside
-its supervised double, and revives what supervisord has given up, ever more patiently. Whoever guards must not
-become the danger: where the sentinel itself, the network or supervisord may be what fails, it does nothing.
+It is a service like the others, supervised like them. It kills what is stopped or reports no health, ends
+what lives beside its supervised double, and revives what supervisord has given up, ever more patiently.
+Whoever guards must not become the danger: where the network or the sentinel itself may be what fails, it
+kills nothing for its silence; where supervisord is gone or does not answer, it does nothing at all.
 """
 
 from __future__ import annotations
@@ -98,7 +99,7 @@ def wire(node: ServiceNode) -> None:
             node.remark(action.program, f"{action.verb}: {action.why}")
             eyes.act(action)
         if judge.confused:
-            node.remark(NAME, f"does nothing: {judge.confused}")
+            node.remark(NAME, f"kills nothing for its silence: {judge.confused}")
         before, known = known, list(sight.programs)
         for gone in heard.keys() - {(program.name, program.pid) for program in known}:
             del heard[gone]  # also what is of other hosts

@@ -61,7 +61,7 @@ class Judge:
 
     def __init__(self, patience: Patience | None = None) -> None:
         self.confused = ""
-        """why nothing is done, in words; '' where the sentinel trusts what it sees"""
+        """why nothing is killed for its silence, in words; '' where the sentinel trusts what it hears"""
         self.reasons: dict[str, str] = {}
         """why a program was acted on last"""
         self.recent: dict[str, int] = {}

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable
+from pathlib import Path
 
+import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
 
 from deploy.processes import Process
 from deploy.sentinel import states
+from deploy.sentinel_eyes import Eyes
 from deploy.sentinel_judge import NAME, Action, Judge, Sight
-from deploy.system import Watched
+from deploy.system import DeploymentError, System, Watched
 
 SERVICES = ("engine_controller", "kinematics", "operator_watchdog", "velocity", NAME)
 PIDS = {name: 100 + index for index, name in enumerate(SERVICES)}
@@ -111,7 +115,7 @@ def test_lets_a_process_be_that_was_stopped_briefly() -> None:
         assert run.look(1.0) == []
 
 
-def test_does_nothing_when_it_does_not_hear_itself() -> None:
+def test_kills_nothing_for_its_silence_when_it_does_not_hear_itself() -> None:
     run = Run()
     run.look(20.0)
     assert run.look(10.0, silent=[NAME, "kinematics"]) == []
@@ -128,7 +132,7 @@ def test_makes_room_for_a_successor_when_it_has_not_heard_itself_for_long() -> N
     assert 32.0 < decided[0][0] < 34.0
 
 
-def test_does_nothing_when_most_are_silent_at_once() -> None:
+def test_kills_nothing_for_its_silence_when_most_are_silent_at_once() -> None:
     run = Run()
     run.look(20.0)
     assert run.look(30.0, silent=[name for name in SERVICES if name != NAME]) == []
@@ -137,7 +141,7 @@ def test_does_nothing_when_most_are_silent_at_once() -> None:
     assert not run.judge.confused
 
 
-def test_does_nothing_while_it_has_heard_nobody_yet() -> None:
+def test_kills_nothing_for_its_silence_while_it_has_heard_nobody_yet() -> None:
     run = Run()
     assert {action.program for _, action in run.look(60.0, silent=SERVICES)} <= {NAME}
 
@@ -226,3 +230,10 @@ def test_tells_state_pid_restarts_last_exit_and_why_of_every_process() -> None:
         "last exit": "code 2",
         "why": "no health",
     }
+
+
+def test_sees_nothing_to_act_on_when_supervisord_is_gone(tmp_path: Path) -> None:
+    with pytest.raises(DeploymentError, match="supervisord has died"):
+        Eyes(System(tmp_path), os.getpid()).see({})  # which is not whose child this process is
+    with pytest.raises(DeploymentError, match="does not answer"):
+        Eyes(System(tmp_path), os.getppid()).see({})
