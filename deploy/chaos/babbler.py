@@ -18,6 +18,7 @@ from builtin_interfaces.msg import Time
 from geometry_msgs.msg import Point, PointStamped
 from rclpy.node import Node
 from rclpy.serialization import serialize_message
+from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import Bool, Float64, Header
 
 from deploy.chaos.marks import GARBAGE, TEXT, nan
@@ -78,7 +79,7 @@ def _ticks(rate: float) -> Iterator[None]:
 def main(arguments: list[str]) -> None:
     """Speak until killed."""
     namespace = os.environ.get("ARM_NAMESPACE", "/")
-    rclpy.init(args=[])
+    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)  # no signal is worth a last word
     node = Node(f"babbler_{os.getpid()}", namespace=namespace)
     {"flood": flood, "babble": babble}[arguments[0]](node)
 

@@ -172,6 +172,7 @@ def _babbler(*arguments: str) -> Callable[[Arm, str], Undo]:
             cwd=processes.ROOT,
             env=arm.environment() | {"ARM_NAMESPACE": arm.namespace, "SUPERVISOR_PROCESS_NAME": BABBLER},
             stdout=subprocess.DEVNULL,
+            start_new_session=True,  # Ctrl-C is for the monkey
         )
         return _ender(process)
 

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import os
 import resource
+import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 import yaml
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from std_msgs.msg import Float64
 
 from deploy import processes
 from deploy.chaos.faults import FAULTS, Undo
@@ -19,6 +23,7 @@ from deploy.chaos.history import ALL, NOTHING, Life
 from deploy.chaos.marks import BABBLER
 from deploy.chaos.observer import Arm, Census
 from deploy.system import System
+from interfaces import topics
 
 
 class Nobody:
@@ -98,6 +103,27 @@ def test_a_babbler_is_not_taken_for_supervisord_but_ends_with_its_system(
     assert nobody.system.supervisor() is None
     nobody.system.stop()
     assert nobody.system.members() == []
+
+
+def test_a_babbler_that_is_ended_in_the_middle_of_a_word_does_not_complain(
+    nobody: Nobody,
+    babbler: int,
+    make_node: Callable[..., Node],
+    executor: SingleThreadedExecutor,
+    spin_until: Callable[..., None],
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    heard: list[Float64] = []
+    node = make_node(namespace=nobody.namespace)
+    node.create_subscription(Float64, topics.L1.name, heard.append, topics.L1.qos)
+    executor.add_node(node)
+    spin_until(lambda: heard)
+    assert os.getsid(babbler) == babbler  # no Ctrl-C at the terminal of the monkey reaches it
+    nobody.system.stop()
+    end = os.waitid(os.P_PID, babbler, os.WEXITED | os.WNOWAIT)
+    assert end is not None
+    assert end.si_status == signal.SIGTERM
+    assert capfd.readouterr().err == ""
 
 
 def test_a_babbler_is_not_taken_for_a_program(
