@@ -8,7 +8,7 @@ A service's module ends with ::
     def main() -> None:
         service.run("velocity", wire)
 
-and :func:`run` does the rest: it starts, refuses to be a second instance, spins, reports its health at 1 Hz,
+and :func:`run` does the rest: it starts, refuses to be a second instance, spins, reports its health,
 and ends with one of these exit codes: 0 on SIGTERM or Ctrl-C, 1 after an error of the recipe or as a second
 instance, 2 after a mistake in its parameters, scenario or command line. Errors take one line, or one log
 message.
@@ -39,7 +39,7 @@ from rcl_interfaces.msg import (
     SetParametersResult,
 )
 from rclpy.clock import Clock, ClockType
-from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.exceptions import NameValidationException, ParameterException
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.parameter import Parameter
@@ -75,7 +75,13 @@ class ServiceNode(ReactiveNode):
         self._remarks: dict[str, Counter[str]] = {}  # since the last report: about what, why, how often
         self._logged: set[str] = set()  # those of the last report
         self.add_on_set_parameters_callback(_only_finite)
-        self._health = self.create_publisher(DIAGNOSTICS.type, DIAGNOSTICS.name, DIAGNOSTICS.qos)
+        self._health = self.create_publisher(
+            DIAGNOSTICS.type,
+            DIAGNOSTICS.name,
+            DIAGNOSTICS.qos,
+            # Who has just come need not wait: the launcher for a start, the sentinel after its own.
+            event_callbacks=PublisherEventCallbacks(matched=self._greet),
+        )
         # By the steady clock even while ROS time is simulated: a simulation that pauses is no hung service.
         self.create_timer(_HEALTH_PERIOD, self.report_health, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
@@ -239,6 +245,10 @@ class ServiceNode(ReactiveNode):
         """Let the next health message be a warning that says this."""
         reasons = self._remarks.setdefault(what, Counter())
         reasons[why if why in reasons or len(reasons) < _REASONS else _OTHER_REASONS] += 1
+
+    def _greet(self, readers: Any) -> None:
+        if readers.current_count_change > 0:
+            self.report_health()
 
     def report_health(self) -> None:
         """Publish the health, with all remarks since the last time; this happens at 1 Hz anyway."""

@@ -138,7 +138,14 @@ ENGINES_STATE = Topic(
     f"`{ON}` or `{OFF}`, on every change and at 10 Hz: the drive takes an `{ON}` for {1000 * DRIVE:.0f} ms",
     _not_one_of(ON, OFF),
 )
-DIAGNOSTICS = Topic("/diagnostics", DiagnosticArray, _EVENTS, "", ("every service",), "1 Hz health")
+DIAGNOSTICS = Topic(
+    "/diagnostics",
+    DiagnosticArray,
+    _EVENTS,
+    "",
+    ("every service",),
+    "health, at 1 Hz, and at once to who begins to listen",
+)
 
 CONTRACT = (
     L1,

@@ -405,3 +405,16 @@ def test_health_is_reported_once_a_second(make_node: Make, peer: Node, spin_unti
     spin_until(lambda: len(heard) == 2)
 
     assert heard[1] - heard[0] > 0.5
+
+
+def test_who_begins_to_listen_hears_of_the_health_at_once(
+    make_node: Make, spin_until: SpinUntil, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("interfaces.service._HEALTH_PERIOD", 3600.0)
+    make_node("polite", kind=ServiceNode)
+    topic = topics.DIAGNOSTICS
+
+    for listener in ("first", "second"):
+        heard: list[Any] = []
+        make_node(listener).create_subscription(topic.type, topic.name, heard.append, topic.qos)
+        spin_until(lambda heard=heard: heard)
