@@ -26,7 +26,9 @@ _MOVE_NODE = re.compile(rf"{_NODE_PREFIX}__ns:=(?P<to>/(?:{_TOKEN}(?:/{_TOKEN})*
 _NO_NODE = "(?!__(?:node|name|ns):)"
 _KIND = "(?P<kind>rostopic://|rosservice://)?"
 _REMAP = re.compile(rf"{_NODE_PREFIX}{_KIND}{_NO_NODE}(?P<from>{_NAME}):=(?P<to>{_NAME})")
-_PARAMETER_NAME = rf"(?:{_TOKEN}|/)+(?:\.(?:{_TOKEN}|/)+)*"
+# Character by character: of tokens in repetition, those that do not match would take for ever to be refused.
+_PARAMETER_NAME_PART = r"[A-Za-z_/](?:[A-Za-z_/]|(?<!/)[0-9])*"
+_PARAMETER_NAME = rf"{_PARAMETER_NAME_PART}(?:\.{_PARAMETER_NAME_PART})*"
 _PARAMETER = re.compile(rf"{_NODE_PREFIX}(?P<name>{_PARAMETER_NAME}):=(?P<value>.+)", re.DOTALL)
 _ALL_NODES = "/**"
 
