@@ -6,6 +6,7 @@ import threading
 from collections.abc import Callable
 
 import pytest
+import rclpy
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.context import Context
 from rclpy.executors import (
@@ -105,6 +106,55 @@ def test_a_callback_that_ends_on_another_thread_lets_the_next_of_its_group_run(
         second = own_executor.wait_for_ready_callbacks(10, condition=look)[1]
         thread.join()
         assert {entity, second} == set(node.subscriptions)
+
+
+def test_a_callback_that_ends_while_the_next_of_its_group_is_put_aside_lets_that_run(
+    make_node: MakeNode, context: Context
+) -> None:
+    class Untimely(MutuallyExclusiveCallbackGroup):
+        """The callback that runs ends right after somebody has seen that it still does."""
+
+        def can_execute(self, entity: object) -> bool:
+            could = super().can_execute(entity)
+            first()
+            return could
+
+    with OwnExecutor(context=context) as own_executor:
+        node = make_node()
+        own_executor.add_node(node)
+        received: list[float] = []
+        node.create_subscription(
+            Float64, "x", lambda message: received.append(message.data), 10, callback_group=Untimely()
+        )
+        publisher = node.create_publisher(Float64, "x", 10)
+        publisher.publish(Float64(data=1.0))
+        publisher.publish(Float64(data=2.0))
+        first = own_executor.wait_for_ready_callbacks(10)[0]
+        second = own_executor.wait_for_ready_callbacks(10)[0]
+        assert received == [1.0]
+        second()
+        assert received == [1.0, 2.0]
+
+
+def test_what_blocks_on_another_thread_does_not_keep_rclpy_from_shutting_down(domain_id: int) -> None:
+    rclpy.init(args=[])
+    node = Node("node")
+    entered, shut_down = threading.Event(), threading.Event()
+    outcome: list[bool] = []
+
+    def block() -> None:
+        entered.set()
+        outcome.append(shut_down.wait(10))
+
+    node.create_guard_condition(block).trigger()
+    spinning = threading.Thread(target=rclpy.spin, args=(node,))
+    spinning.start()
+    assert entered.wait(10)
+    rclpy.shutdown()
+    shut_down.set()
+    spinning.join(10)
+    node.destroy_node()
+    assert outcome == [True]
 
 
 def test_a_thousand_entities_come_and_go_under_traffic_and_nothing_is_left(

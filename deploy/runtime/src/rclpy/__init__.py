@@ -93,7 +93,8 @@ def get_global_executor() -> Executor:
             global _executor
             ended, _executor = _executor, None
             if ended is not None:
-                ended.shutdown()
+                # Without waiting: what a callback on another thread waits for may be held by who shuts down.
+                ended.shutdown(timeout_sec=0)
 
         get_default_context().on_shutdown(end)
     return _executor

@@ -413,7 +413,9 @@ class Executor(AbstractContextManager["Executor"]):
                 del self._attached[token]
                 self._waitset.detach(handle)
                 self._blocked[token] = (entity, handle)
-        self._groups_changed = self._groups_changed or self.can_execute(entity)
+        # Set or left alone: a thread that ends what is in the way meanwhile sets it, too.
+        if self.can_execute(entity):
+            self._groups_changed = True
 
     def _unblock(self) -> None:
         """Wait again for those whose callback group is free again."""
