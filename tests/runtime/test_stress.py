@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -174,3 +175,29 @@ def test_who_never_spins_keeps_nothing_of_what_peers_announced(
     while any(blocking.dds_triggered(condition) for condition in held):
         assert time.monotonic() < deadline, "DDS still holds what nobody has taken"
         time.sleep(0.01)
+
+
+def test_a_context_ends_while_others_begin_to_wait_for_its_end() -> None:
+    def begin(context: Context, events: list[threading.Event], under_way: threading.Event) -> None:
+        for number in range(2000):
+            events.append(threading.Event())
+            context._wake_on_shutdown(events[-1])
+            if number == 1000:
+                under_way.set()
+
+    interval = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    try:
+        for _ in range(20):
+            context = Context()
+            context.init(args=[])
+            events: list[threading.Event] = []
+            under_way = threading.Event()
+            beginning = threading.Thread(target=begin, args=(context, events, under_way))
+            beginning.start()
+            assert under_way.wait(SECONDS)
+            context.shutdown()
+            beginning.join()
+            assert all(event.is_set() for event in events)
+    finally:
+        sys.setswitchinterval(interval)

@@ -15,6 +15,7 @@ from rclpy import logging
 from rclpy._arguments import RosArguments, parse
 from rclpy._dds import domain
 from rclpy._handle import Handle
+from rclpy._listeners import Listeners
 from rclpy.exceptions import NotInitializedException, RCLError
 
 if TYPE_CHECKING:
@@ -61,8 +62,8 @@ class Context(AbstractContextManager["Context"]):
         self._arguments = RosArguments()
         self._callbacks: list[Callable[[], Callable[[], None] | None]] = []  # as references to them
         self._nodes: weakref.WeakSet[Node] = weakref.WeakSet()
-        self._executors: weakref.WeakSet[Executor] = weakref.WeakSet()
-        self._events: weakref.WeakSet[threading.Event] = weakref.WeakSet()
+        self._executors: Listeners[Executor] = Listeners()
+        self._events: Listeners[threading.Event] = Listeners()
         self._graph: Graph | None = None
 
     @property
@@ -159,9 +160,9 @@ class Context(AbstractContextManager["Context"]):
                 return False
             self._valid = False
             callbacks, self._callbacks = self._callbacks, []
-        for event in list(self._events):
+        for event in self._events:
             event.set()
-        for executor in list(self._executors):
+        for executor in self._executors:
             executor.wake()
         for reference in callbacks:
             if (callback := reference()) is not None:
