@@ -6,13 +6,17 @@ import os
 import signal
 import subprocess
 import sys
+import time
+from pathlib import Path
 
 import pytest
 
 SPIN = """
+import asyncio, signal, threading
 import rclpy
 from rclpy.executors import ExternalShutdownException
 rclpy.init(args=[])
+{}
 node = rclpy.create_node("spinner")
 timer = node.create_timer(0.0, lambda: (timer.cancel(), print("spinning", flush=True)))
 try:
@@ -24,12 +28,40 @@ node.destroy_node()
 rclpy.try_shutdown()
 """
 
+ANOTHER_THREAD_HAS_SHUT_DOWN = """
+thread = threading.Thread(target=rclpy.shutdown)
+thread.start()
+thread.join()
+"""
+BEGUN_ANEW = ANOTHER_THREAD_HAS_SHUT_DOWN + "rclpy.init(args=[])"
+ASYNCIO_HAS_HANDLED_A_SIGNAL = """
+async def handle():
+    loop = asyncio.get_running_loop()
+    loop.add_signal_handler(signal.SIGUSR1, print)
+    loop.remove_signal_handler(signal.SIGUSR1)
+asyncio.run(handle())
+"""
+
+
+def is_asleep(pid: int) -> bool:
+    return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] == "S"
+
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_ends_spinning_and_shuts_the_context_down(number: signal.Signals, domain_id: int) -> None:
+@pytest.mark.parametrize(
+    "before",
+    [
+        pytest.param("", id="plain"),
+        pytest.param(BEGUN_ANEW, id="begun anew"),
+        pytest.param(ASYNCIO_HAS_HANDLED_A_SIGNAL, id="after asyncio"),
+    ],
+)
+def test_a_signal_ends_spinning_and_shuts_the_context_down(
+    number: signal.Signals, before: str, domain_id: int
+) -> None:
     environment = {**os.environ, "ROS_DOMAIN_ID": str(domain_id)}
     with subprocess.Popen(
-        [sys.executable, "-c", SPIN],
+        [sys.executable, "-c", SPIN.format(before)],
         env=environment,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
@@ -38,8 +70,38 @@ def test_a_signal_ends_spinning_and_shuts_the_context_down(number: signal.Signal
     ) as process:
         assert process.stdout is not None
         assert process.stderr is not None
-        assert process.stdout.readline() == "spinning\n"
-        process.send_signal(number)
-        assert process.wait(10) == 0
-        assert process.stdout.read() == "False\n"
-        assert process.stderr.read() == ""
+        try:
+            assert process.stdout.readline() == "spinning\n"
+            while not is_asleep(process.pid):  # in DDS, where no signal ends the wait by itself
+                time.sleep(0.001)
+            process.send_signal(number)
+            assert process.wait(10) == 0
+            assert process.stdout.read() == "False\n"
+            assert process.stderr.read() == ""
+        finally:
+            process.kill()
+
+
+def test_after_a_shutdown_on_another_thread_a_signal_does_what_it_did_before(domain_id: int) -> None:
+    code = f"""
+import signal, threading
+import rclpy
+rclpy.init(args=[])
+{ANOTHER_THREAD_HAS_SHUT_DOWN}
+try:
+    signal.raise_signal(signal.SIGINT)
+except KeyboardInterrupt:
+    print("interrupted", flush=True)
+signal.raise_signal(signal.SIGTERM)
+print("survived")
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        env={**os.environ, "ROS_DOMAIN_ID": str(domain_id)},
+        capture_output=True,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+        check=False,
+    )
+    assert (done.stdout, done.stderr) == ("interrupted\n", "")
+    assert done.returncode == -signal.SIGTERM

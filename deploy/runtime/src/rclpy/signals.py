@@ -9,12 +9,11 @@ from __future__ import annotations
 import os
 import signal
 import threading
-import weakref
-from collections.abc import Callable
 from enum import IntEnum
 from types import FrameType
 from typing import TYPE_CHECKING, Any
 
+from rclpy._listeners import Listeners
 from rclpy.guard_condition import GuardCondition
 
 if TYPE_CHECKING:
@@ -31,9 +30,9 @@ class SignalHandlerOptions(IntEnum):
     ALL = 3
 
 
-_executors: weakref.WeakSet[Executor] = weakref.WeakSet()
-_contexts: weakref.WeakSet[Context] = weakref.WeakSet()
-_guards: weakref.WeakSet[GuardCondition] = weakref.WeakSet()
+_executors: Listeners[Executor] = Listeners()
+_contexts: Listeners[Context] = Listeners()
+_guards: Listeners[GuardCondition] = Listeners()
 _previous: dict[int, Any] = {}  # the handlers that were there before ours
 _options = SignalHandlerOptions.NO
 _wakeup_fd = -1
@@ -53,36 +52,46 @@ class SignalHandlerGuardCondition(GuardCondition):
 
 
 def _handle(signum: int, frame: FrameType | None) -> None:
-    for context in list(_contexts):
+    if not _options and signal.getsignal(signum) is _handle:
+        _restore(signum)  # uninstalled on another thread, which could not
+        signal.raise_signal(signum)
+        return
+    for context in _contexts:
         context.try_shutdown()
-    for guard in list(_guards):
+    for guard in _guards:
         guard.trigger()
     previous = _previous.get(signum)
     if callable(previous):
         previous(signum, frame)
 
 
+def _restore(signum: int) -> None:
+    """Put the handler back that was there before ours, unless ours is no longer there."""
+    previous = _previous.pop(signum, None)
+    if signal.getsignal(signum) is _handle:
+        signal.signal(signum, signal.SIG_DFL if previous is None else previous)
+
+
 def _wake_executors(fd: int) -> None:
     while os.read(fd, 64):
-        for executor in list(_executors):
+        for executor in _executors:
             executor.wake()
 
 
 def _listen() -> None:
-    """Start the thread that wakes the executors, once; a wake-up fd of somebody else stays in place."""
+    """Let the C-level handler wake the executors, unless it has a wake-up fd of somebody else already."""
     global _wakeup_fd
-    if _wakeup_fd >= 0 or threading.current_thread() is not threading.main_thread():
+    if threading.current_thread() is not threading.main_thread():
         return
-    reading, writing = os.pipe()
-    os.set_blocking(writing, False)
-    theirs = signal.set_wakeup_fd(writing, warn_on_full_buffer=False)
-    if theirs >= 0:
-        signal.set_wakeup_fd(theirs)
-        os.close(reading)
-        os.close(writing)
+    there = signal.set_wakeup_fd(-1)
+    if there not in (-1, _wakeup_fd):
+        signal.set_wakeup_fd(there)
         return
-    _wakeup_fd = writing
-    threading.Thread(target=_wake_executors, args=(reading,), name="rclpy-signals", daemon=True).start()
+    if _wakeup_fd < 0:
+        reading, _wakeup_fd = os.pipe()
+        os.set_blocking(_wakeup_fd, False)
+        threading.Thread(target=_wake_executors, args=(reading,), name="rclpy-signals", daemon=True).start()
+    signal.set_wakeup_fd(_wakeup_fd, warn_on_full_buffer=False)
 
 
 def _watch(executor: Executor) -> None:
@@ -105,6 +114,8 @@ def install_signal_handlers(options: SignalHandlerOptions = SignalHandlerOptions
     global _options
     if threading.current_thread() is not threading.main_thread():
         return
+    if not _options:
+        uninstall_signal_handlers()  # in case that it was called on another thread
     for number, option in (
         (signal.SIGINT, SignalHandlerOptions.SIGINT),
         (signal.SIGTERM, SignalHandlerOptions.SIGTERM),
@@ -116,13 +127,13 @@ def install_signal_handlers(options: SignalHandlerOptions = SignalHandlerOptions
 
 
 def uninstall_signal_handlers() -> None:
-    """Put the handlers back that were there before."""
+    """
+    Handle signals no more: put the handlers back that were there before.
+
+    Only the main thread can. After a call on another one the next signal does it, and is handled by them.
+    """
     global _options
-    if threading.current_thread() is not threading.main_thread():
-        return
-    restore: Callable[[int, Any], Any] = signal.signal
-    for number in list(_previous):
-        previous = _previous.pop(number)
-        if signal.getsignal(number) is _handle:
-            restore(number, signal.SIG_DFL if previous is None else previous)
     _options = SignalHandlerOptions.NO
+    if threading.current_thread() is threading.main_thread():
+        for number in list(_previous):
+            _restore(number)
