@@ -6,6 +6,7 @@ import threading
 from collections.abc import Callable
 from typing import Any
 
+import pytest
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.context import Context
 from rclpy.node import Node
@@ -48,3 +49,18 @@ def test_waiting_ends_with_the_context(make_node: Callable[..., Node], context: 
     context.shutdown()
     thread.join(10)
     assert result == [(False, None)]
+
+
+def test_waiting_ends_with_a_context_that_ends_before_it_has_begun(
+    make_node: Callable[..., Node], context: Context, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    node = make_node()
+    create_subscription = node.create_subscription
+
+    def create_untimely(*args: Any, **options: Any) -> Any:
+        subscription = create_subscription(*args, **options)
+        context.shutdown()
+        return subscription
+
+    monkeypatch.setattr(node, "create_subscription", create_untimely)
+    assert wait_for_message(String, node, "silence") == (False, None)

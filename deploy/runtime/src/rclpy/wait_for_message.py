@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, cast
 
 from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.exceptions import NotInitializedException
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.qos import QoSProfile
 from rclpy.task import Future
@@ -43,7 +44,7 @@ def wait_for_message(
         with SingleThreadedExecutor(context=node.context) as executor:
             executor.add_node(cast("Node", _NodeWithOnly(subscription)))
             executor.spin_until_future_complete(message, None if time_to_wait < 0 else time_to_wait)
-    except ExternalShutdownException:
+    except (ExternalShutdownException, NotInitializedException):  # the latter: before there was the executor
         pass
     finally:
         node.destroy_subscription(subscription)
