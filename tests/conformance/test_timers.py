@@ -144,11 +144,21 @@ def test_sleep_until_ends_when_simulated_time_gets_there(context: Context, clock
     assert ended == [True]
 
 
-def test_sleep_until_ends_when_the_context_does(context: Context) -> None:
+def test_sleep_until_ends_when_the_context_does(context: Context, monkeypatch: pytest.MonkeyPatch) -> None:
     ended: list[bool] = []
+    begun = threading.Event()
+    context_ok = context.ok
+
+    def ok() -> bool:
+        was_ok = context_ok()
+        begun.set()
+        return was_ok
+
+    monkeypatch.setattr(context, "ok", ok)
     clock = Clock(clock_type=ClockType.STEADY_TIME)
     sleeper = threading.Thread(target=lambda: ended.append(clock.sleep_for(Duration(seconds=3600), context)))
     sleeper.start()
+    assert begun.wait(10)
     context.shutdown()
     sleeper.join(10)
     assert ended == [False]
