@@ -103,10 +103,13 @@ def test_a_blocking_call_without_a_server_returns_none_after_its_timeout(make_no
     assert client.call(Trigger.Request(), timeout_sec=0.05) is None
 
 
-def test_waiting_for_a_service_that_never_comes_ends_with_its_timeout(make_node: MakeNode) -> None:
+@pytest.mark.parametrize("timeout", [0.05, 0.0, -1.0])
+def test_waiting_for_a_service_that_never_comes_ends_with_its_timeout(
+    make_node: MakeNode, timeout: float
+) -> None:
     client = make_node().create_client(Trigger, "nobody")
     assert not client.service_is_ready()
-    assert not client.wait_for_service(timeout_sec=0.05)
+    assert not client.wait_for_service(timeout_sec=timeout)
 
 
 def test_a_reply_that_nobody_waits_for_any_more_is_dropped(

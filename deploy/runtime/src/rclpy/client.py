@@ -99,8 +99,9 @@ class Client(ServiceSide):
         return server_is_matched(self.handle, self._replies)
 
     def wait_for_service(self, timeout_sec: float | None = None) -> bool:
-        """Wait until a server is there; ``False`` if that takes longer than ``timeout_sec``."""
-        return self._node._graph.wait_for(self.service_is_ready, timeout_sec, self.context.ok)
+        """Wait for a server, at most ``timeout_sec`` (``None``: for ever). ``False`` if none came."""
+        timeout = None if timeout_sec is None else max(0.0, timeout_sec)
+        return self._node._graph.wait_for(self.service_is_ready, timeout, self.context.ok)
 
     # What the executor asks of everything it waits for.
 

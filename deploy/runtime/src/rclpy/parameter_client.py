@@ -84,7 +84,7 @@ class AsyncParameterClient:
         """
         deadline = None if timeout_sec is None else time.monotonic() + timeout_sec
         for client in self._clients():
-            rest = None if deadline is None else max(0.0, deadline - time.monotonic())
+            rest = None if deadline is None else deadline - time.monotonic()
             if not client.wait_for_service(timeout_sec=rest):
                 return False
         return self.services_are_ready()
