@@ -8,14 +8,19 @@ CYCLONEDDS_URI, whose settings win.
 from __future__ import annotations
 
 import os
+import re
 import threading
 from collections.abc import Mapping
+from contextlib import suppress
+from pathlib import Path
 
 from rclpy.exceptions import RCLError
 
 from .library import PRECONDITION_NOT_MET, blocking, checked
 
 RANGES = ("SUBNET", "LOCALHOST", "OFF", "SYSTEM_DEFAULT")
+_COMMENT = re.compile("<!--.*?-->", re.DOTALL)
+_NO_MULTICAST = "<General><AllowMulticast>false</AllowMulticast></General>"
 
 _lock = threading.Lock()
 _users: dict[int, int] = {}  # domain id -> participants of this process in it
@@ -35,38 +40,56 @@ def configuration(environment: Mapping[str, str] = os.environ) -> str:
 
     In LOCALHOST the loopback interface is the only one. Multicast on it lets our own processes meet at once;
     real Jazzy nodes do not multicast there but probe participant indices on localhost, so we take an index
-    and probe, too. Up to 100 processes fit (Jazzy's own limit of 33 would stop a fleet).
+    and probe, too. Up to 100 processes fit (Jazzy's own limit of 33 would stop a fleet). Who names peers
+    besides is to meet them, on whatever interface leads there: then it is done as in Jazzy.
     """
     discovery_range = environment.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "").strip().upper() or "SUBNET"
     if discovery_range not in RANGES:
         raise RCLError(
             f"ROS_AUTOMATIC_DISCOVERY_RANGE must be one of {', '.join(RANGES)}, not '{discovery_range}'"
         )
-    if environment.get("ROS_LOCALHOST_ONLY", "0") == "1" and discovery_range == "SUBNET":
-        discovery_range = "LOCALHOST"
     peers = [peer.strip() for peer in environment.get("ROS_STATIC_PEERS", "").split(";") if peer.strip()]
     if any(character in peer for peer in peers for character in "<>&\"'"):
         raise RCLError(f"ROS_STATIC_PEERS must be addresses or host names with ';' between, not {peers}")
+    if environment.get("ROS_LOCALHOST_ONLY", "0") == "1":
+        discovery_range, peers = "LOCALHOST", []
+    uri = environment.get("CYCLONEDDS_URI", "")
     general, discovery = "", ""
     if discovery_range == "LOCALHOST":
-        # Cyclone would add interfaces up and fail on one named twice: who names some means only these.
-        if "<NetworkInterface" not in environment.get("CYCLONEDDS_URI", ""):
+        if peers:
+            # Without the latter, Cyclone drops what comes by an interface that it does not use: what Jazzy
+            # sends to localhost.
+            general = f"{_NO_MULTICAST}<Internal><ExtendedPacketInfo>false</ExtendedPacketInfo></Internal>"
+        elif not _names_interfaces(uri):
             interface = '<NetworkInterface name="lo" multicast="true"/>'
             general = f"<General><Interfaces>{interface}</Interfaces></General>"
         peers = ["localhost", *peers]
     elif discovery_range == "OFF":
-        general = "<General><AllowMulticast>false</AllowMulticast></General>"
+        general = _NO_MULTICAST
         tag = f"<Tag>ros_discovery_off_{os.getpid()}</Tag>"
         discovery = f"<Discovery><ParticipantIndex>none</ParticipantIndex>{tag}</Discovery>"
-    if discovery_range == "LOCALHOST" or (discovery_range == "SUBNET" and peers):
+    if discovery_range in ("LOCALHOST", "SUBNET"):
         addresses = "".join(f'<Peer address="{peer}"/>' for peer in peers)
         discovery = (
             "<Discovery><ParticipantIndex>auto</ParticipantIndex>"
             "<MaxAutoParticipantIndex>99</MaxAutoParticipantIndex>"
             f"<Peers>{addresses}</Peers></Discovery>"
         )
-    own = f"<CycloneDDS><Domain>{general}{discovery}</Domain></CycloneDDS>" if general or discovery else ""
-    return ",".join(part for part in (own, environment.get("CYCLONEDDS_URI", "")) if part)
+    own = f"<CycloneDDS><Domain>{general}{discovery}</Domain></CycloneDDS>" if discovery else ""
+    return ",".join(part for part in (own, uri) if part)
+
+
+def _names_interfaces(uri: str) -> bool:
+    """Whether the settings of CYCLONEDDS_URI, there or in files, name network interfaces.
+
+    Cyclone would add interfaces up and fail on one named twice: who names some means only these.
+    """
+    settings = [uri]
+    for source in uri.split(","):
+        with suppress(OSError):  # Cyclone itself tells what it cannot read
+            settings.append(Path(source.strip().removeprefix("file://")).read_text(errors="replace"))
+    # It does not care about the case of a name.
+    return any("<networkinterface" in _COMMENT.sub("", text).lower() for text in settings)
 
 
 def enter(domain_id: int) -> None:
