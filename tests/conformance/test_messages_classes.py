@@ -18,6 +18,7 @@ from rcl_interfaces.msg import (
     ParameterDescriptor,
     ParameterType,
 )
+from rclpy.serialization import deserialize_message, serialize_message
 from rmw_dds_common.msg import Gid
 from rosidl_parser.definition import (
     AbstractType,
@@ -32,7 +33,7 @@ from rosidl_parser.definition import (
 from sensor_msgs.msg import Image, JointState, NavSatStatus
 from service_msgs.msg import ServiceEventInfo
 from shape_msgs.msg import MeshTriangle, SolidPrimitive
-from std_msgs.msg import Byte, Empty, Float32, Float64, Header, UInt8MultiArray
+from std_msgs.msg import Byte, Empty, Float32, Float64, Header, String, UInt8MultiArray
 from std_srvs.srv import SetBool, Trigger
 from type_description_interfaces.srv import GetTypeDescription
 
@@ -94,6 +95,26 @@ def test_messages_are_equal_if_their_types_and_fields_are() -> None:
 def test_messages_are_unhashable_as_they_can_change() -> None:
     with pytest.raises(TypeError, match="unhashable"):
         hash(Float64())
+
+
+def test_all_slots_of_a_message_are_set_and_tell_its_fields() -> None:
+    for message in (
+        Float64(data=1.0),
+        deserialize_message(serialize_message(Float64(data=1.0)), Float64),
+        Float64(data=1.0, check_fields=False),
+    ):
+        assert {slot: getattr(message, slot) for slot in message.__slots__} == {
+            "_data": 1.0,
+            "_check_fields": False,
+        }
+    assert Float64(check_fields=True)._check_fields is True
+    assert PointStamped.__slots__ == ["_header", "_point", "_check_fields"]
+    assert Empty.__slots__ == ["_check_fields"]
+    assert isinstance(PoseWithCovariance()._covariance, np.ndarray)
+    assert JointState(position=[1.0])._position == array("d", [1.0])
+    message = String()
+    message._data = "new"
+    assert message.data == "new"
 
 
 def test_messages_survive_copy_and_pickle() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import importlib
 import itertools
 import subprocess
@@ -345,8 +346,8 @@ def test_a_field_may_have_any_name(define: Define) -> None:
     assert arm._deserialize(arm._serialize(again)) == message
 
 
-@pytest.mark.parametrize("name", ["self", "check_fields"])
-def test_a_field_may_be_named_as_a_parameter_that_constructors_have(
+@pytest.mark.parametrize("name", ["self", "check_fields", "serialize", "fields_and_field_types"])
+def test_a_field_may_be_named_as_what_a_message_needs_itself(
     define: Define, tmp_path: Path, name: str
 ) -> None:
     package = define({"Plain.msg": f"string {name}\n", "Numbers.msg": f"float64[2] {name}\n"})
@@ -354,5 +355,8 @@ def test_a_field_may_be_named_as_a_parameter_that_constructors_have(
         message = cls(**{name: value})
         assert list(getattr(message, name)) == list(value)
         assert cls._deserialize(cls._serialize(message)) == message != cls()
+        assert copy.copy(message) == message
+        for slot in message.__slots__:
+            getattr(message, slot)
     stubs.write_stubs(package, tmp_path)
     compile((tmp_path / package / "msg" / "__init__.pyi").read_text(), "stub", "exec")

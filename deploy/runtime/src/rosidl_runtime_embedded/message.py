@@ -81,16 +81,13 @@ def _make_constructor(cls: type[Message]) -> Callable[..., None]:
     names: dict[str, Any] = {
         "_unset": object(),
         "_default": _CHECK_FIELDS,
-        "_check_assignments": _check_assignments,
-        "_cls": cls,
     }
     parameters: list[str] = []
     body: list[str] = []
     options: list[str] = []
     if all(field.name != "check_fields" for field in cls._DEFINITION.fields):
         options.append("check_fields=_default")
-        flag = f"_self.{_FLAG} = check_fields"
-        body.append(f"if check_fields is not _default: {flag}; _check_assignments(_cls)")
+        body.append("if check_fields is not _default: _self._check_fields = check_fields")
     for field in cls._DEFINITION.fields:
         name, initial = field.name, f"_initial_{field.name}"
         names[initial], is_factory = initial_value(field, message_class)
@@ -178,6 +175,18 @@ class Message:
         _TYPE_HASH = _OnFirstUse(_make_type_hash)
         SLOT_TYPES = _OnFirstUse(_make_slot_types)
 
+    @property
+    def _check_fields(self) -> bool:
+        """Whether this message checks what it is assigned."""
+        return bool(getattr(self, _FLAG, _CHECK_FIELDS))
+
+    @_check_fields.setter
+    def _check_fields(self, check: bool) -> None:
+        setattr(self, _FLAG, check)
+        if check:
+            cls: type = _message_class(type(self))
+            _check_assignments(cls)
+
     @classmethod
     def get_fields_and_field_types(cls) -> dict[str, str]:
         """Names of the fields and of their types, in order."""
@@ -225,6 +234,16 @@ def make_message_class(definition: MessageDefinition) -> type[Message]:
     for constant in definition.constants:
         namespace[constant.name] = python_value(constant.type, constant.value)
     cls = type(name, (Message,), namespace)
+    # Whoever walks the slots is to find those of rclpy; ours are the fields as such: no property is as fast.
+    slots = []
+    for field in definition.fields:
+        slot = f"_{field.name}"
+        if hasattr(cls, slot):  # messages need it themselves
+            slot = field.name
+        else:
+            setattr(cls, slot, vars(cls)[field.name])
+        slots.append(slot)
+    cls.__slots__ = [*slots, "_check_fields"]  # type: ignore[attr-defined]
     if _CHECK_FIELDS:
         _check_assignments(cls)
     return cls
