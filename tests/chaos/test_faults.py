@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -75,25 +76,38 @@ def test_two_crash_loops_at_a_time_leave_the_good_parameters(nobody: Nobody) -> 
     assert yaml.safe_load(nobody.system.parameters.read_text()) == good
 
 
+def await_members(system: System, count: int) -> list[processes.Process]:
+    """The processes of a system: the kernel shows the environment of a new one a moment later."""
+    deadline = time.monotonic() + 10.0
+    while len(members := system.members()) < count:
+        assert time.monotonic() < deadline
+    return members
+
+
 @pytest.fixture
 def babbler(nobody: Nobody, domain_id: int) -> Iterator[int]:
     """The process of a babbler beside the arm."""
     undo: Undo | None = FAULTS["babble"].do(nobody, NOTHING)
     assert undo is not None
-    (member,) = nobody.system.members()
-    yield member.pid
-    undo()
+    try:
+        (member,) = await_members(nobody.system, 1)
+        yield member.pid
+    finally:
+        undo()
 
 
 @pytest.fixture
-def velocity(nobody: Nobody) -> Iterator[subprocess.Popen[bytes]]:
-    """A process of the arm."""
+def velocity(nobody: Nobody, babbler: int) -> Iterator[subprocess.Popen[bytes]]:
+    """A process of the arm, beside the babbler."""
     environment = nobody.environment() | {"SUPERVISOR_PROCESS_NAME": "velocity"}
     with subprocess.Popen(
         [sys.executable, "-c", "import signal; signal.pause()"], env=environment
     ) as process:
-        yield process
-        process.kill()
+        try:
+            await_members(nobody.system, 2)
+            yield process
+        finally:
+            process.kill()
 
 
 def test_a_babbler_is_not_taken_for_supervisord_but_ends_with_its_system(
