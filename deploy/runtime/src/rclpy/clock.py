@@ -216,15 +216,18 @@ class _ClockSource(Handle):
 
     def _change(self, override: int | None, change: ClockChange) -> None:
         delta = (self._read() if override is None else override) - self.nanoseconds()
-        affected = [one.jump_handle for one in self._listeners if one.hears(change, delta)]
-        for handle in affected:
+        for handle in self._affected(change, delta):
             if handle.pre_callback is not None:
                 handle.pre_callback()
         self._override = override
         jump = TimeJumpDictionary(clock_change=change, delta=delta)
-        for handle in affected:
+        # Anew: who came meanwhile may have read the time from before.
+        for handle in self._affected(change, delta):
             if handle.post_callback is not None:
                 handle.post_callback(jump)
+
+    def _affected(self, change: ClockChange, delta: int) -> list[JumpHandle]:
+        return [one.jump_handle for one in self._listeners if one.hears(change, delta)]
 
 
 class Clock:
