@@ -58,6 +58,9 @@ def comes_back(history: History) -> Finding:
             ):
                 unknown += 1
                 continue
+            if time > SLOWEST >= time - history.missed(fault.begin, fault.begin + time):
+                unknown += 1  # a pause of the whole machine
+                continue
             times.setdefault(fault.target, []).append(time)
             if time > SLOWEST:
                 what = f"{fault.target} is silent {_seconds(time)} after SIGKILL"

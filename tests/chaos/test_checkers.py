@@ -310,6 +310,14 @@ def test_l2_catches_a_stream_that_pauses_meanwhile() -> None:
     assert "config_theta1 is silent" in evidence.what
 
 
+def test_l1_a_pause_of_the_whole_machine_stays_unknown() -> None:
+    history = killed(good(), "kinematics", 20.0, 2.5)
+    assert verdict("L1", history) == VIOLATED
+    assert verdict("L1", faulty(history, Fault("overload", NOTHING, 20.5, 20.8))) == VIOLATED
+    finding = CHECKERS["L1"](faulty(history, Fault("overload", NOTHING, 20.5, 21.5)))
+    assert (finding.verdict, finding.unknown) == (UNKNOWN, 1)
+
+
 @pytest.mark.parametrize("end", [23.0, END])
 def test_l2_catches_a_pause_that_outlasts_the_return_of_the_victim(end: float) -> None:
     history = silent(killed(good(), "kinematics", 20.0, 0.25), "theta1", 20.1, end)
