@@ -14,6 +14,7 @@ from typing import Any
 
 import pytest
 import rclpy
+from hypothesis import settings
 from rclpy.clock import ROSClock
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
@@ -25,6 +26,9 @@ from deploy.chaos.domain import reserved_domain
 
 # What any rclpy does is in tests/conformance; on that of ROS 2 there is no embedded runtime to test besides.
 collect_ignore = [] if importlib.util.find_spec("rosidl_runtime_embedded") else ["runtime"]
+
+settings.register_profile("reactive-arm", deadline=None)  # a machine that pauses is no defect
+settings.load_profile("reactive-arm")
 
 MARK = f"REACTIVE_ARM_TESTS={uuid.uuid4()}"
 DISCOVERY_RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"

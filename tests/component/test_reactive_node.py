@@ -652,8 +652,8 @@ def test_a_publisher_that_is_not_alive_is_an_event(
 
     publisher = peer.create_publisher(String, "topic", qos)
     spin_until(lambda: publisher.get_subscription_count() == 1)
-    publisher.assert_liveliness()
-    spin_until(lambda: alive[-1:] == [1])
+    # More than once: what is told is how it is when it is told, and 0.2 s are soon over.
+    spin_until(lambda: publisher.assert_liveliness() or alive[-1:] == [1])
     spin_until(lambda: alive[-1:] == [0])
 
 

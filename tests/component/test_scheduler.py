@@ -35,7 +35,7 @@ def test_what_is_due_first_runs_first_and_what_is_due_at_once_in_order(
     scheduler: NodeScheduler, spin_until: SpinUntil
 ) -> None:
     ran: list[str] = []
-    scheduler.schedule_relative(0.02, lambda *_: ran.append("later"))
+    scheduler.schedule_relative(0.5, lambda *_: ran.append("later"))
     for name in "abc":
         scheduler.schedule(lambda _, state: ran.append(state), name)
     scheduler.schedule_absolute(scheduler.now + timedelta(milliseconds=10), lambda *_: ran.append("soon"))
@@ -77,8 +77,8 @@ def test_all_runs_on_the_thread_of_the_executor_and_no_thread_is_started(
 def test_what_is_cancelled_does_not_run(scheduler: NodeScheduler, spin_until: SpinUntil) -> None:
     ran: list[str] = []
     first = scheduler.schedule_relative(0.01, lambda *_: ran.append("first"))
-    second = scheduler.schedule_relative(0.02, lambda *_: ran.append("second"))
     scheduler.schedule_relative(0.01, lambda *_: second.dispose())
+    second = scheduler.schedule_relative(0.02, lambda *_: ran.append("second"))
     scheduler.schedule_relative(0.03, lambda *_: ran.append("third"))
     first.dispose()
     first.dispose()
@@ -209,7 +209,7 @@ def test_setting_the_wall_clock_changes_nothing(
 
         spin_until(lambda seen=seen: len(ticks) >= seen + 5)
 
-    assert all(timedelta(0) < b - a < timedelta(seconds=1) for a, b in pairwise(ticks))
+    assert all(timedelta(0) < b - a < timedelta(minutes=1) for a, b in pairwise(ticks))
 
 
 def test_now_begins_as_the_time_of_day(scheduler: NodeScheduler) -> None:

@@ -154,7 +154,7 @@ def test_a_signal_ends_a_service_in_order_that_is_about_to_publish(
 
 
 def test_further_signals_end_a_service_at_once(start: Start) -> None:
-    process = start("-c", HANGING)
+    process = start("-c", f"from interfaces import stopping\nstopping._PATIENCE = 3600.0\n{HANGING}")
     assert process.wait_for_line() == "hangs"
     begin = time.monotonic()
     while process.popen.poll() is None and time.monotonic() - begin < 10.0:
@@ -163,7 +163,6 @@ def test_further_signals_end_a_service_at_once(start: Start) -> None:
             process.popen.wait(0.05)
 
     assert process.end() == (0, "")
-    assert time.monotonic() - begin < 0.7  # a single one would take 0.8 s
 
 
 @pytest.mark.parametrize(

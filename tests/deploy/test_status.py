@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import time
 
+import pytest
+
 from deploy.health import Health
 from deploy.status import of_services
 from deploy.system import Program
@@ -13,7 +15,8 @@ def health(pid: int, *, since_output: float | None = 0.0, reason: str = "") -> H
     return Health(time.monotonic(), pid, ok=not reason, reason=reason, since_output=since_output)
 
 
-def test_the_table_says_how_each_service_is() -> None:
+def test_the_table_says_how_each_service_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(time, "monotonic", lambda: 100.0)
     programs = [
         Program("kinematics", "RUNNING", 101, 3725.9, 2, ""),
         Program("velocity", "RUNNING", 102, 5.0, 0, ""),

@@ -102,7 +102,7 @@ def as_rosbags(message: Any) -> Any:
 
 
 @pytest.mark.parametrize("name", MESSAGES)
-@settings(max_examples=10, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=10, suppress_health_check=list(HealthCheck))
 @given(data=st.data())
 def test_any_message_is_written_as_by_rosbags_and_read_back(name: str, data: st.DataObject) -> None:
     message = data.draw(messages(name))
@@ -114,7 +114,7 @@ def test_any_message_is_written_as_by_rosbags_and_read_back(name: str, data: st.
 
 
 @pytest.mark.parametrize("name", MAIN_TYPES)
-@settings(max_examples=100, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=100, suppress_health_check=list(HealthCheck))
 @given(data=st.data())
 def test_every_truncation_of_a_sample_is_refused(name: str, data: st.DataObject) -> None:
     message = data.draw(messages(name))
@@ -166,7 +166,7 @@ def prefix(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
         yield path
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=60, suppress_health_check=list(HealthCheck))
 @given(data=st.data())
 def test_messages_of_any_definition_are_written_as_by_rosbags_and_read_back(
     data: st.DataObject, prefix: Path
@@ -339,7 +339,7 @@ def test_malformed_samples_are_refused_or_read_as_valid_messages(name: str) -> N
 
 
 @pytest.mark.parametrize("name", MAIN_TYPES)
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(noise=st.binary(max_size=200))
 def test_noise_is_refused_or_read_as_a_valid_message(name: str, noise: bytes) -> None:
     cls: Any = message_class(name)

@@ -8,6 +8,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -85,7 +86,7 @@ def other(domain_id: int) -> Iterator[Node]:
     context.shutdown()
 
 
-@pytest.fixture(params=[SingleThreadedExecutor, MultiThreadedExecutor])
+@pytest.fixture(params=[SingleThreadedExecutor, partial(MultiThreadedExecutor, 2)], ids=["single", "multi"])
 def flood(
     request: pytest.FixtureRequest, make_node: Callable[..., Node], context: Context, other: Node
 ) -> Iterator[Flood]:

@@ -86,6 +86,18 @@ class Command:
         self._process.stdin.write(text)
         self._process.stdin.flush()
 
+    def insist(self, text: str, pattern: str) -> None:
+        """Type until a line shows that it was heard: who was met just now may not hear the first word."""
+        deadline = time.monotonic() + LIMIT
+        heard = False
+        while not heard:
+            assert time.monotonic() < deadline, f"no {pattern!r}:\n{self.output}"
+            self.type(text)
+            with self._changed:
+                heard = self._changed.wait_for(
+                    lambda: any(re.search(pattern, line) for _, line in self.lines), 2.0
+                )
+
     def signal(self, number: int) -> None:
         """Send a signal to it and whom it started beside the system, as a terminal does."""
         os.killpg(self._process.pid, number)
