@@ -66,6 +66,11 @@ class Command:
 
     def await_line(self, pattern: str, seconds: float = LIMIT, after: int = 0) -> re.Match[str]:
         """The first line with this pattern, as soon as it is there; ``after`` so many that do not count."""
+        found = self._find(pattern, seconds, after)
+        assert found is not None, f"no {pattern!r} within {seconds} s:\n{self.output}"
+        return found
+
+    def _find(self, pattern: str, seconds: float, after: int = 0) -> re.Match[str] | None:
         found: re.Match[str] | None = None
 
         def is_there() -> bool:
@@ -77,7 +82,6 @@ class Command:
 
         with self._changed:
             self._changed.wait_for(is_there, seconds)
-        assert found is not None, f"no {pattern!r} within {seconds} s:\n{self.output}"
         return found
 
     def type(self, text: str) -> None:
@@ -89,14 +93,10 @@ class Command:
     def insist(self, text: str, pattern: str) -> None:
         """Type until a line shows that it was heard: who was met just now may not hear the first word."""
         deadline = time.monotonic() + LIMIT
-        heard = False
-        while not heard:
+        self.type(text)
+        while not self._find(pattern, 2.0):
             assert time.monotonic() < deadline, f"no {pattern!r}:\n{self.output}"
             self.type(text)
-            with self._changed:
-                heard = self._changed.wait_for(
-                    lambda: any(re.search(pattern, line) for _, line in self.lines), 2.0
-                )
 
     def signal(self, number: int) -> None:
         """Send a signal to it and whom it started beside the system, as a terminal does."""
