@@ -100,6 +100,14 @@ def executor(context: Context) -> Iterator[SingleThreadedExecutor]:
 
 
 @pytest.fixture
+def node(make_node: Callable[..., Node], executor: SingleThreadedExecutor) -> Node:
+    """A node that the test's executor spins."""
+    node = make_node()
+    executor.add_node(node)
+    return node
+
+
+@pytest.fixture
 def spin_until(executor: SingleThreadedExecutor) -> Callable[..., None]:
     """Spins the test's executor until a condition is true; fails when that takes too long."""
 

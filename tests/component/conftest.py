@@ -37,19 +37,6 @@ def make_node(context: Context, executor: SingleThreadedExecutor) -> Iterator[Ca
 
 
 @pytest.fixture
-def spin_until(executor: SingleThreadedExecutor) -> Callable[..., None]:
-    """Spins until a condition is true; fails when that takes too long."""
-
-    def spin(condition: Callable[[], object], seconds: float = 10.0) -> None:
-        deadline = time.monotonic() + seconds
-        while not condition():
-            assert time.monotonic() < deadline, f"not within {seconds} s"
-            executor.spin_once(timeout_sec=0.05)
-
-    return spin
-
-
-@pytest.fixture
 def spin_for(executor: SingleThreadedExecutor) -> Callable[[float], None]:
     """Spins for so many seconds: for what must not happen."""
 

@@ -7,7 +7,6 @@ from typing import Any
 
 import pytest
 from rclpy.duration import Duration, Infinite
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.qos import (
@@ -21,7 +20,6 @@ from rclpy.qos import (
 from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 
-MakeNode = Callable[..., Node]
 SpinUntil = Callable[..., None]
 Created = Callable[..., QoSProfile]
 
@@ -29,13 +27,6 @@ BEST_EFFORT, RELIABLE = ReliabilityPolicy.BEST_EFFORT, ReliabilityPolicy.RELIABL
 VOLATILE, LATCHED = DurabilityPolicy.VOLATILE, DurabilityPolicy.TRANSIENT_LOCAL
 AUTOMATIC, MANUAL = LivelinessPolicy.AUTOMATIC, LivelinessPolicy.MANUAL_BY_TOPIC
 SECOND, HOUR = Duration(seconds=1), Duration(seconds=3600)
-
-
-@pytest.fixture
-def node(make_node: MakeNode, executor: SingleThreadedExecutor) -> Node:
-    node = make_node()
-    executor.add_node(node)
-    return node
 
 
 @pytest.fixture

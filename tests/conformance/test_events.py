@@ -17,7 +17,6 @@ from rclpy.event_handler import (
     QoSSubscriptionMatchedInfo,
     SubscriptionEventCallbacks,
 )
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import (
     DurabilityPolicy,
@@ -31,15 +30,7 @@ from std_msgs.msg import Bool, Float64
 # rclpy 7.1.3 warns of what it uses itself.
 pytestmark = pytest.mark.filterwarnings("ignore:QoSEventHandler is deprecated")
 
-MakeNode = Callable[..., Node]
 SpinUntil = Callable[..., None]
-
-
-@pytest.fixture
-def node(make_node: MakeNode, executor: SingleThreadedExecutor) -> Node:
-    node = make_node()
-    executor.add_node(node)
-    return node
 
 
 def ignore(message: Float64) -> None:

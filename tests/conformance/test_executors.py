@@ -29,10 +29,8 @@ STEADY = Clock(clock_type=ClockType.STEADY_TIME)
 
 
 def test_a_subscription_gets_what_a_publisher_of_the_same_process_publishes(
-    make_node: MakeNode, executor: SingleThreadedExecutor, spin_until: SpinUntil
+    spin_until: SpinUntil, node: Node
 ) -> None:
-    node = make_node()
-    executor.add_node(node)
     received: list[float] = []
     publisher = node.create_publisher(Float64, "x", 10)
     node.create_subscription(Float64, "x", lambda message: received.append(message.data), 10)
@@ -48,11 +46,7 @@ def test_spin_once_returns_after_its_timeout_when_nothing_happens(executor: Sing
     assert (STEADY.now() - before).nanoseconds >= 50_000_000
 
 
-def test_spin_once_with_timeout_zero_runs_what_is_ready(
-    make_node: MakeNode, executor: SingleThreadedExecutor
-) -> None:
-    node = make_node()
-    executor.add_node(node)
+def test_spin_once_with_timeout_zero_runs_what_is_ready(executor: SingleThreadedExecutor, node: Node) -> None:
     triggered: list[bool] = []
     node.create_guard_condition(lambda: triggered.append(True)).trigger()
     executor.spin_once(timeout_sec=0)
@@ -60,11 +54,8 @@ def test_spin_once_with_timeout_zero_runs_what_is_ready(
 
 
 def test_an_exception_in_a_callback_comes_out_of_spin_once(
-    make_node: MakeNode, executor: SingleThreadedExecutor
+    executor: SingleThreadedExecutor, node: Node
 ) -> None:
-    node = make_node()
-    executor.add_node(node)
-
     def fail() -> None:
         raise ZeroDivisionError("planted")
 
@@ -74,11 +65,8 @@ def test_an_exception_in_a_callback_comes_out_of_spin_once(
 
 
 def test_an_exception_in_a_coroutine_callback_comes_out_of_spinning(
-    make_node: MakeNode, executor: SingleThreadedExecutor, spin_until: SpinUntil
+    spin_until: SpinUntil, node: Node
 ) -> None:
-    node = make_node()
-    executor.add_node(node)
-
     async def fail() -> None:
         raise ZeroDivisionError("planted")
 
@@ -88,10 +76,8 @@ def test_an_exception_in_a_coroutine_callback_comes_out_of_spinning(
 
 
 def test_a_callback_may_await_a_future_that_another_callback_completes(
-    make_node: MakeNode, executor: SingleThreadedExecutor, spin_until: SpinUntil
+    spin_until: SpinUntil, node: Node
 ) -> None:
-    node = make_node()
-    executor.add_node(node)
     future: Future = Future()
     results: list[int] = []
 
@@ -107,10 +93,8 @@ def test_a_callback_may_await_a_future_that_another_callback_completes(
 
 
 def test_while_a_coroutine_holds_its_group_nothing_else_of_the_group_runs(
-    make_node: MakeNode, executor: SingleThreadedExecutor, spin_until: SpinUntil
+    spin_until: SpinUntil, node: Node
 ) -> None:
-    node = make_node()
-    executor.add_node(node)
     future: Future = Future()
     events: list[str] = []
 
@@ -157,10 +141,8 @@ def test_spin_until_future_complete_gives_up_after_its_timeout(executor: SingleT
 
 
 def test_spin_until_future_complete_with_timeout_zero_runs_what_is_ready(
-    make_node: MakeNode, executor: SingleThreadedExecutor
+    executor: SingleThreadedExecutor, node: Node
 ) -> None:
-    node = make_node()
-    executor.add_node(node)
     future: Future = Future()
     node.create_guard_condition(lambda: future.set_result("done")).trigger()
     executor.spin_until_future_complete(future, timeout_sec=0)
@@ -180,10 +162,8 @@ def test_spin_until_future_complete_leaves_a_node_with_the_executor_that_had_it(
 
 
 def test_an_entity_created_on_another_thread_while_the_executor_waits_is_seen_at_once(
-    make_node: MakeNode, executor: SingleThreadedExecutor
+    executor: SingleThreadedExecutor, node: Node
 ) -> None:
-    node = make_node()
-    executor.add_node(node)
     called = threading.Event()
     spinning = threading.Thread(target=executor.spin_once)  # waits for ever: nothing is there yet
     spinning.start()
@@ -193,10 +173,8 @@ def test_an_entity_created_on_another_thread_while_the_executor_waits_is_seen_at
 
 
 def test_a_subscription_destroyed_in_its_own_callback_is_not_called_again(
-    make_node: MakeNode, executor: SingleThreadedExecutor, spin_until: SpinUntil
+    spin_until: SpinUntil, node: Node
 ) -> None:
-    node = make_node()
-    executor.add_node(node)
     received: list[float] = []
 
     def once(message: Float64) -> None:
@@ -214,11 +192,7 @@ def test_a_subscription_destroyed_in_its_own_callback_is_not_called_again(
     assert received == [0.0]
 
 
-def test_a_flooded_subscription_does_not_starve_a_timer(
-    make_node: MakeNode, executor: SingleThreadedExecutor, spin_until: SpinUntil
-) -> None:
-    node = make_node()
-    executor.add_node(node)
+def test_a_flooded_subscription_does_not_starve_a_timer(spin_until: SpinUntil, node: Node) -> None:
     publisher = node.create_publisher(Float64, "x", 10)
     received = 0
 
@@ -271,10 +245,8 @@ def test_shutting_the_executor_down_on_another_thread_ends_spinning(
 
 
 def test_a_callback_may_shut_its_executor_down(
-    make_node: MakeNode, context: Context, executor: SingleThreadedExecutor
+    context: Context, executor: SingleThreadedExecutor, node: Node
 ) -> None:
-    node = make_node()
-    executor.add_node(node)
     node.create_guard_condition(lambda: executor.shutdown()).trigger()
     executor.spin()
     assert executor.get_nodes() == []
@@ -454,9 +426,7 @@ def test_a_second_thread_cannot_spin_an_executor_meanwhile(
     assert called == [True]
 
 
-def test_a_callback_may_spin_its_executor(make_node: MakeNode, executor: SingleThreadedExecutor) -> None:
-    node = make_node()
-    executor.add_node(node)
+def test_a_callback_may_spin_its_executor(executor: SingleThreadedExecutor, node: Node) -> None:
     called: list[str] = []
 
     def spin() -> None:

@@ -24,11 +24,7 @@ GOLDEN = json.loads((Path(__file__).parents[1] / "facts" / "cdr_golden.json").re
 
 
 @pytest.mark.parametrize("name", ["float64", "float64_pi4"])
-def test_on_the_wire_is_the_recorded_cdr(
-    name: str, make_node: MakeNode, executor: SingleThreadedExecutor, spin_until: SpinUntil
-) -> None:
-    node = make_node()
-    executor.add_node(node)
+def test_on_the_wire_is_the_recorded_cdr(name: str, spin_until: SpinUntil, node: Node) -> None:
     received: list[bytes] = []
     node.create_subscription(Float64, "x", received.append, 10, raw=True)
     expected = bytes.fromhex(GOLDEN[name]["cdr"])
@@ -40,10 +36,8 @@ def test_on_the_wire_is_the_recorded_cdr(
 
 
 def test_a_message_is_padded_on_the_wire_as_dds_wants_and_read_without(
-    make_node: MakeNode, executor: SingleThreadedExecutor, spin_until: SpinUntil
+    spin_until: SpinUntil, node: Node
 ) -> None:
-    node = make_node()
-    executor.add_node(node)
     received: list[str] = []
     node.create_subscription(String, "x", lambda message: received.append(message.data), 10)
     publisher = node.create_publisher(String, "x", 10)
@@ -54,10 +48,8 @@ def test_a_message_is_padded_on_the_wire_as_dds_wants_and_read_without(
 
 
 def test_a_callback_with_two_arguments_learns_when_a_message_was_written(
-    make_node: MakeNode, executor: SingleThreadedExecutor, spin_until: SpinUntil
+    spin_until: SpinUntil, node: Node
 ) -> None:
-    node = make_node()
-    executor.add_node(node)
     infos: list[dict[str, int]] = []
     node.create_subscription(Float64, "x", lambda message, info: infos.append(info), 10)
     before = time.time_ns()
@@ -66,11 +58,7 @@ def test_a_callback_with_two_arguments_learns_when_a_message_was_written(
     assert before <= infos[0]["source_timestamp"] <= infos[0]["received_timestamp"] <= time.time_ns()
 
 
-def test_only_the_last_messages_wait_for_a_slow_subscription(
-    make_node: MakeNode, executor: SingleThreadedExecutor, spin_until: SpinUntil
-) -> None:
-    node = make_node()
-    executor.add_node(node)
+def test_only_the_last_messages_wait_for_a_slow_subscription(spin_until: SpinUntil, node: Node) -> None:
     received: list[float] = []
     node.create_subscription(Float64, "x", lambda message: received.append(message.data), QoSProfile(depth=2))
     publisher = node.create_publisher(Float64, "x", 10)

@@ -29,11 +29,7 @@ def negate(request: SetBool.Request, response: SetBool.Response) -> SetBool.Resp
     return response
 
 
-def test_a_call_gets_its_reply(
-    make_node: MakeNode, executor: SingleThreadedExecutor, spin_until: SpinUntil
-) -> None:
-    node = make_node()
-    executor.add_node(node)
+def test_a_call_gets_its_reply(spin_until: SpinUntil, node: Node) -> None:
     node.create_service(Trigger, "turn_on", answer)
     client = node.create_client(Trigger, "turn_on")
     assert client.wait_for_service(timeout_sec=10)
@@ -63,11 +59,7 @@ def test_each_of_several_clients_gets_its_own_replies(
     assert [future.result().success for _, future in calls] == [not value for value, _ in calls]
 
 
-def test_a_coroutine_may_answer_later(
-    make_node: MakeNode, executor: SingleThreadedExecutor, spin_until: SpinUntil
-) -> None:
-    node = make_node()
-    executor.add_node(node)
+def test_a_coroutine_may_answer_later(spin_until: SpinUntil, node: Node) -> None:
     ready: Future = Future()
 
     async def answer_later(request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
@@ -112,11 +104,7 @@ def test_waiting_for_a_service_that_never_comes_ends_with_its_timeout(
     assert not client.wait_for_service(timeout_sec=timeout)
 
 
-def test_a_reply_that_nobody_waits_for_any_more_is_dropped(
-    make_node: MakeNode, executor: SingleThreadedExecutor, spin_until: SpinUntil
-) -> None:
-    node = make_node()
-    executor.add_node(node)
+def test_a_reply_that_nobody_waits_for_any_more_is_dropped(spin_until: SpinUntil, node: Node) -> None:
     served: list[bool] = []
 
     def note(request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
@@ -156,12 +144,7 @@ def test_after_a_server_has_died_another_one_answers(
     assert not lost.done()
 
 
-def test_an_exception_in_a_service_callback_comes_out_of_spinning(
-    make_node: MakeNode, executor: SingleThreadedExecutor, spin_until: SpinUntil
-) -> None:
-    node = make_node()
-    executor.add_node(node)
-
+def test_an_exception_in_a_service_callback_comes_out_of_spinning(spin_until: SpinUntil, node: Node) -> None:
     def fail(request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         raise ZeroDivisionError("planted")
 
@@ -180,10 +163,8 @@ def test_calling_with_something_else_than_a_request_is_a_type_error(make_node: M
 
 
 def test_answering_with_something_else_than_a_response_is_a_type_error(
-    make_node: MakeNode, executor: SingleThreadedExecutor, spin_until: SpinUntil
+    spin_until: SpinUntil, node: Node
 ) -> None:
-    node = make_node()
-    executor.add_node(node)
     node.create_service(Trigger, "wrong", lambda request, response: True)
     client = node.create_client(Trigger, "wrong")
     assert client.wait_for_service(timeout_sec=10)

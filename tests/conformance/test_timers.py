@@ -36,10 +36,8 @@ def test_a_timer_of_simulated_time_is_due_exactly_after_its_period(
 
 @pytest.mark.parametrize(("now", "left"), [(4300, 700), (3000, 1000)])  # the latter: exactly some periods
 def test_a_timer_skips_missed_periods_and_does_not_drift(
-    make_node: MakeNode, clock: ROSClock, executor: SingleThreadedExecutor, now: int, left: int
+    clock: ROSClock, executor: SingleThreadedExecutor, now: int, left: int, node: Node
 ) -> None:
-    node = make_node()
-    executor.add_node(node)
     calls: list[int] = []
     timer = node.create_timer(1e-6, lambda: calls.append(clock.now().nanoseconds), clock=clock)
     clock.set_ros_time_override(simulated(now))
@@ -84,10 +82,8 @@ def test_a_timer_without_autostart_waits_for_its_reset(make_node: MakeNode, cloc
 
 
 def test_a_new_period_counts_from_the_next_call_on(
-    make_node: MakeNode, clock: ROSClock, executor: SingleThreadedExecutor
+    clock: ROSClock, executor: SingleThreadedExecutor, node: Node
 ) -> None:
-    node = make_node()
-    executor.add_node(node)
     timer = node.create_timer(1e-6, lambda: None, clock=clock)
     timer.timer_period_ns = 5000
     assert timer.time_until_next_call() == 1000
@@ -106,10 +102,8 @@ def test_a_destroyed_timer_cannot_be_used(make_node: MakeNode) -> None:
 
 
 def test_a_timer_shortened_on_another_thread_is_called_at_once(
-    make_node: MakeNode, executor: SingleThreadedExecutor
+    executor: SingleThreadedExecutor, node: Node
 ) -> None:
-    node = make_node()
-    executor.add_node(node)
     called = threading.Event()
     timer = node.create_timer(3600.0, called.set)
     spinning = threading.Thread(target=executor.spin_once)
@@ -164,11 +158,7 @@ def test_sleep_until_ends_when_the_context_does(context: Context, monkeypatch: p
     assert ended == [False]
 
 
-def test_a_rate_wakes_its_sleeper_once_a_period(
-    make_node: MakeNode, executor: SingleThreadedExecutor
-) -> None:
-    node = make_node()
-    executor.add_node(node)
+def test_a_rate_wakes_its_sleeper_once_a_period(executor: SingleThreadedExecutor, node: Node) -> None:
     rate = node.create_rate(100.0)
     slept: list[bool] = []
 

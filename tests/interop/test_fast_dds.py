@@ -202,9 +202,8 @@ def test_a_fast_dds_client_calls_a_service_of_a_node(
     def is_answered() -> bool:
         if peer.samples("rr/switchReply"):
             return True
-        peer.send(
-            "rq/switchRequest", b"\0\1\0\0" + header + b"\1"
-        )  # the node may not have met its writer yet
+        # Again and again: the node may not have met its writer yet.
+        peer.send("rq/switchRequest", b"\0\1\0\0" + header + b"\1")
         return False
 
     spin_until(is_answered)

@@ -27,13 +27,6 @@ QUEUE = QoSProfile(depth=1000)
 LATCHED = QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
-@pytest.fixture
-def node(make_node: MakeNode, executor: SingleThreadedExecutor) -> Node:
-    node = make_node()
-    executor.add_node(node)
-    return node
-
-
 def writer_for(participant: Participant, topic: str, type_name: str, spin_until: SpinUntil) -> Writer:
     """A writer that has found its reader."""
     writer = participant.create_writer(topic, type_name, LATCHED, "")

@@ -47,13 +47,8 @@ def test_shut_down_between_taking_and_running_an_executor_runs_what_it_took(
 
 
 def test_a_message_that_cannot_be_taken_does_not_keep_its_callback_group_busy(
-    make_node: MakeNode,
-    executor: SingleThreadedExecutor,
-    spin_until: SpinUntil,
-    monkeypatch: pytest.MonkeyPatch,
+    executor: SingleThreadedExecutor, spin_until: SpinUntil, monkeypatch: pytest.MonkeyPatch, node: Node
 ) -> None:
-    node = make_node()
-    executor.add_node(node)
     received: list[float] = []
     subscription = node.create_subscription(Float64, "x", lambda message: received.append(message.data), 10)
     publisher = node.create_publisher(Float64, "x", 10)
@@ -71,11 +66,7 @@ def test_a_message_that_cannot_be_taken_does_not_keep_its_callback_group_busy(
     assert received == [2.0]
 
 
-def test_a_node_has_no_executor_once_that_was_shut_down(
-    make_node: MakeNode, executor: SingleThreadedExecutor
-) -> None:
-    node = make_node()
-    executor.add_node(node)
+def test_a_node_has_no_executor_once_that_was_shut_down(executor: SingleThreadedExecutor, node: Node) -> None:
     executor.shutdown()
     assert node.executor is None
 
@@ -158,10 +149,8 @@ def test_what_blocks_on_another_thread_does_not_keep_rclpy_from_shutting_down(do
 
 
 def test_a_thousand_entities_come_and_go_under_traffic_and_nothing_is_left(
-    make_node: MakeNode, context: Context, executor: SingleThreadedExecutor
+    context: Context, executor: SingleThreadedExecutor, node: Node
 ) -> None:
-    node = make_node()
-    executor.add_node(node)
     publisher = node.create_publisher(Float64, "x", 10)
     spinning = threading.Thread(target=executor.spin)
     spinning.start()

@@ -5,17 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from rcl_interfaces.msg import Parameter as ParameterMsg
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.parameter_event_handler import ParameterEventHandler
 
 
-def test_a_callback_may_remove_itself(
-    make_node: Callable[..., Node], executor: SingleThreadedExecutor, spin_until: Callable[..., None]
-) -> None:
-    node = make_node()
-    executor.add_node(node)
+def test_a_callback_may_remove_itself(spin_until: Callable[..., None], node: Node) -> None:
     handler = ParameterEventHandler(node)
     called: list[str] = []
     heard: list[object] = []

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from rclpy._dds.discovery import Discovery
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.service_introspection import ServiceIntrospectionState
@@ -13,10 +12,8 @@ from std_srvs.srv import SetBool
 
 
 def test_a_client_is_named_by_the_identifier_it_announces_and_in_a_server_by_its_requests(
-    make_node: Callable[..., Node], executor: SingleThreadedExecutor, spin_until: Callable[..., None]
+    spin_until: Callable[..., None], node: Node
 ) -> None:
-    node = make_node()
-    executor.add_node(node)
     service = node.create_service(SetBool, "negate", lambda request, response: response)
     client = node.create_client(SetBool, "negate")
     events: list[SetBool.Event] = []

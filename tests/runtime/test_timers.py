@@ -35,13 +35,8 @@ def test_a_simulated_time_that_was_never_heard_changes_nothing_for_a_timer(make_
 
 
 def test_a_tick_that_came_while_nobody_slept_lets_the_next_sleeper_go_at_once(
-    make_node: MakeNode,
-    clock: ROSClock,
-    executor: SingleThreadedExecutor,
-    monkeypatch: pytest.MonkeyPatch,
+    clock: ROSClock, executor: SingleThreadedExecutor, monkeypatch: pytest.MonkeyPatch, node: Node
 ) -> None:
-    node = make_node()
-    executor.add_node(node)
     rate = node.create_rate(1e6, clock)
     waits: list[bool] = []
     monkeypatch.setattr(rate._ticks, "wait_for", lambda woken: waits.append(woken()))
@@ -54,13 +49,8 @@ def test_a_tick_that_came_while_nobody_slept_lets_the_next_sleeper_go_at_once(
 
 
 def test_a_tick_that_woke_its_sleeper_does_not_let_him_go_again(
-    make_node: MakeNode,
-    clock: ROSClock,
-    executor: SingleThreadedExecutor,
-    monkeypatch: pytest.MonkeyPatch,
+    clock: ROSClock, executor: SingleThreadedExecutor, monkeypatch: pytest.MonkeyPatch, node: Node
 ) -> None:
-    node = make_node()
-    executor.add_node(node)
     rate = node.create_rate(1e6, clock)
     waits: list[bool] = []
 
