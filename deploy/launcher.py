@@ -93,10 +93,8 @@ def _started(system: System, scenario: str, parameter_file: str) -> Iterator[tup
 
     parameters.check_environment()
     with Member() as member:
-        try:
-            given = parameters.of_system(scenario, parameter_file, loading=time.monotonic() - began)
-        finally:
-            interruption.check()  # Ctrl-C ends the check of a parameter file, too: that is no mistake in it
+        loading = time.monotonic() - began
+        given = parameters.of_system(scenario, parameter_file, loading, interruption.check)
         system.start(given, interruption.check)
         try:
             place = f"ROS domain {os.environ.get('ROS_DOMAIN_ID') or 0}"

@@ -5,11 +5,13 @@
         silence: 2.0
 
 with `/**` for all services that have the parameter; an arm in a namespace may name its services with it, or
-without. This is done in a process of its own, which a Ctrl-C ends wherever it is: the launcher only notes it.
+without. This is done in a process of its own, which the launcher can end wherever it is: what the user names
+may be a pipe or a device that never says anything.
 """
 
 from __future__ import annotations
 
+import json
 import os
 import sys
 from collections.abc import Callable, Iterator
@@ -122,16 +124,17 @@ class _Declarations:
 
 
 def main(path: str) -> str | None:
-    """The first mistake with file, key and reason; None for a good file."""
+    """Print what a good file says, as JSON; the first mistake of another, with file, key and reason."""
     try:
         document = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
     except OSError as error:
         return f"{path}: {error.strerror}"
     except (ValueError, yaml.YAMLError) as error:  # the former also of a date that does not exist
         return f"{path}: {' '.join(str(error).split())}"
-    return next(
-        (f"{path}: {key}: {fault}" for key, fault in faults(document, namespace_of(os.environ))), None
-    )
+    for key, fault in faults(document, namespace_of(os.environ)):
+        return f"{path}: {key}: {fault}"
+    print(json.dumps(document))
+    return None
 
 
 if __name__ == "__main__":

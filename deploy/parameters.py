@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +16,7 @@ from rclpy.exceptions import InvalidNamespaceException
 from rclpy.validate_namespace import validate_namespace
 
 from deploy.processes import ROOT
-from deploy.system import NAMESPACE, SETTINGS, DeploymentError, System, namespace_of
+from deploy.system import NAMESPACE, SETTINGS, Check, DeploymentError, System, namespace_of
 from interfaces import scenario
 
 SCENARIOS = ROOT / "deploy" / "scenarios"
@@ -23,7 +25,7 @@ SETTLING = 3.0  # s in which they find each other and report
 ALL, KEY = "/**", "ros__parameters"  # the form of ROS 2's parameter files
 
 
-def of_system(scenario_name: str, user_file: str, loading: float) -> dict[str, Any]:
+def of_system(scenario_name: str, user_file: str, loading: float, check: Check) -> dict[str, Any]:
     """
     The content of the parameter file of all services. Raises DeploymentError for any mistake of the user's.
 
@@ -32,13 +34,14 @@ def of_system(scenario_name: str, user_file: str, loading: float) -> dict[str, A
 
     :param scenario_name: name or file of a scenario
     :param user_file: a parameter file, '' for none
+    :param check: called again and again while the file is read; what it raises ends that
     """
     path = _scenario_file(scenario_name)
     try:
         scenario.load(path)
     except scenario.ScenarioError as error:
         raise DeploymentError(str(error)) from error
-    given = _checked(user_file, namespace_of(os.environ)) if user_file else {}
+    given = _checked(user_file, namespace_of(os.environ), check) if user_file else {}
     origin = time.monotonic() + SETTLING + loading * PROCESSES / (os.cpu_count() or 1)
     shared = {"scenario": str(path), "scenario_epoch": round(origin, 3), "settings": SETTINGS}
     return {ALL: {KEY: given.pop(ALL, {KEY: {}})[KEY] | shared}, **given}
@@ -62,13 +65,24 @@ def program_of(node: str, namespace: str) -> str:
     return node.removeprefix(namespace.rstrip("/") + "/")
 
 
-def _checked(user_file: str, namespace: str) -> dict[str, Any]:
+def _checked(user_file: str, namespace: str, check: Check) -> dict[str, Any]:
     """What a user's file says, with the full name of each node: ROS applies no other in a namespace."""
-    check = [sys.executable, "-m", "deploy.parameter_file", user_file]
-    done = subprocess.run(check, cwd=ROOT, capture_output=True, text=True)
-    if done.returncode:
-        raise DeploymentError(done.stderr.strip())
-    given = yaml.safe_load(Path(user_file).read_text(encoding="utf-8"))
+    command = [sys.executable, "-m", "deploy.parameter_file", user_file]
+    said = None
+    with subprocess.Popen(
+        command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as reader:
+        try:
+            while said is None:
+                check()
+                with suppress(subprocess.TimeoutExpired):
+                    said, complaint = reader.communicate(timeout=0.1)
+        finally:
+            reader.kill()
+    check()  # a Ctrl-C ends the reader, too: that is no mistake in the file
+    if reader.returncode:
+        raise DeploymentError(complaint.strip())
+    given = json.loads(said)
     prefix = namespace.rstrip("/") + "/"
     return {node if node == ALL else prefix + program_of(node, namespace): given[node] for node in given}
 

@@ -6,7 +6,7 @@ import fcntl
 import os
 import signal
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 
@@ -56,19 +56,22 @@ def test_ctrl_c_before_anything_has_started_ends_it_without_a_traceback(site: Si
     assert site.members == {}
 
 
-def test_ctrl_c_while_a_parameter_file_is_checked_is_no_mistake_in_it(site: Site, tmp_path: Path) -> None:
+@pytest.mark.parametrize("send", [os.killpg, os.kill], ids=["at the terminal", "to it alone"])
+def test_a_signal_while_a_parameter_file_is_read_is_no_mistake_in_it(
+    site: Site, tmp_path: Path, send: Callable[[int, int], None]
+) -> None:
     file = tmp_path / "mine.yaml"
     os.mkfifo(file)
     command = site.begin("run", STEADY, str(file))
     with writer_to_a_reader_of(file, command):
-        command.signal(signal.SIGINT)
+        send(command.pid, signal.SIGINT)
         assert command.wait(10) == 0
     assert command.output == ""
     assert not site.run.exists()
 
 
 @contextmanager
-def writer_to_a_reader_of(fifo: Path, command: Command) -> Iterator[None]:
+def writer_to_a_reader_of(fifo: Path, command: Command) -> Iterator[int]:
     """Somebody on whose words a reader of a fifo, one of a command's processes, waits already."""
     writer = None
     while writer is None:
@@ -76,7 +79,7 @@ def writer_to_a_reader_of(fifo: Path, command: Command) -> Iterator[None]:
         with suppress(OSError):  # nobody reads yet
             writer = os.open(fifo, os.O_WRONLY | os.O_NONBLOCK)
     try:
-        yield
+        yield writer
     finally:
         os.close(writer)
 
@@ -302,6 +305,15 @@ def test_a_parameter_file_reaches_the_services(site: Site, tmp_path: Path) -> No
     file = tmp_path / "mine.yaml"
     file.write_text("dead_mans_switch: {ros__parameters: {pressed: true}}")
     command = site.begin("run", STEADY, str(file))
+    command.await_line("Operator is alive")
+
+
+def test_a_parameter_file_may_be_a_pipe(site: Site, tmp_path: Path) -> None:
+    file = tmp_path / "mine.yaml"
+    os.mkfifo(file)
+    command = site.begin("run", STEADY, str(file))
+    with writer_to_a_reader_of(file, command) as writer:
+        os.write(writer, b"dead_mans_switch: {ros__parameters: {pressed: true}}")
     command.await_line("Operator is alive")
 
 
