@@ -159,12 +159,14 @@ def _show(system: System, member: Member, epoch: float, *, owner: bool = False) 
 
 def _stop(system: System, check: Check = lambda: None) -> None:
     """Stop the system and say so, as far as there still is somebody to tell; `check` may end the waiting."""
-    count = len(system.members())
-    with suppress(OSError):
-        print(f"Stopping {count} processes ..." if count else "Nothing runs.", flush=True)
-    system.stop(check)
-    with suppress(OSError):
-        print("All have ended." if count else "", end="\n" if count else "", flush=True)
+
+    def tell(count: int) -> None:
+        with suppress(OSError):
+            print(f"Stopping {count} processes ..." if count else "Nothing runs.", flush=True)
+
+    if system.stop(check, tell):
+        with suppress(OSError):
+            print("All have ended.", flush=True)
 
 
 def _adopt_environment(system: System) -> bool:

@@ -151,9 +151,15 @@ class System:
             self._supervisor = os.pidfd_open(pid)
         return not processes.await_end([self._supervisor], 0.0)
 
-    def stop(self, check: Check = lambda: None) -> None:
-        """End every process of the system, with supervisord's help or without."""
+    def stop(self, check: Check = lambda: None, tell: Callable[[int], None] = lambda count: None) -> int:
+        """End every process of the system, with supervisord's help or without.
+
+        :param tell: is given their number before they are ended
+        :return: their number
+        """
         with self._alone(check):
+            count = len(self.members())
+            tell(count)
             self.parameters.unlink(missing_ok=True)  # from here on it is not wanted
             if pid := self.supervisor():
                 handles = processes.open_handles(self.run, [p.pid for p in self.members()])
@@ -165,6 +171,7 @@ class System:
                 finally:
                     processes.close(handles)
             self._end_members()
+        return count
 
     def programs(self) -> list[Program]:
         """All programs as supervisord sees them. Raises DeploymentError when it does not answer."""
