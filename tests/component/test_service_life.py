@@ -74,6 +74,12 @@ service.run("ready", wire)
 """
 
 
+NO_LAST_RESORT = """
+from interfaces import stopping
+stopping._PATIENCE = 3600.0
+"""
+
+
 class Process:
     """A Python process whose output is at hand."""
 
@@ -116,8 +122,9 @@ def service(name: str, announce: bool = False) -> tuple[str, ...]:
     if not announce:
         return "-m", f"services.{name}"
     # With -m, too, sys.argv[0] is "-m" until the module is found.
-    announced = "import sys; sys.argv[0] = '-m'; import services; print('begun', flush=True); import runpy; "
-    return "-c", announced + f"runpy.run_module('services.{name}', run_name='__main__', alter_sys=True)"
+    announced = "import sys; sys.argv[0] = '-m'; import services; print('begun', flush=True); import runpy"
+    script = f"runpy.run_module('services.{name}', run_name='__main__', alter_sys=True)"
+    return "-c", f"{NO_LAST_RESORT}\n{announced}\n{script}"
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
@@ -147,14 +154,14 @@ def test_a_signal_ends_a_service_that_hangs(start: Start, number: signal.Signals
 def test_a_signal_ends_a_service_in_order_that_is_about_to_publish(
     start: Start, number: signal.Signals
 ) -> None:
-    process = start("-c", SPEAKING)
+    process = start("-c", NO_LAST_RESORT + SPEAKING)
     assert process.wait_for_line() == "speaks"
 
     assert process.end(by=number) == (0, "")
 
 
 def test_further_signals_end_a_service_at_once(start: Start) -> None:
-    process = start("-c", f"from interfaces import stopping\nstopping._PATIENCE = 3600.0\n{HANGING}")
+    process = start("-c", NO_LAST_RESORT + HANGING)
     assert process.wait_for_line() == "hangs"
     begin = time.monotonic()
     while process.popen.poll() is None and time.monotonic() - begin < 10.0:
