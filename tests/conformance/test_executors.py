@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import threading
+import time
+import weakref
 from collections.abc import Callable, Iterator
 
 import pytest
@@ -10,6 +12,7 @@ import rclpy
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
 from rclpy.clock import Clock, ClockType
 from rclpy.context import Context
+from rclpy.duration import Duration
 from rclpy.executors import (
     ConditionReachedException,
     Executor,
@@ -134,6 +137,30 @@ def test_a_future_completed_on_another_thread_ends_spinning_at_once(
     assert (STEADY.now() - before).nanoseconds < 10_000_000_000
 
 
+def test_what_has_run_does_not_live_on_while_the_executor_waits_for_more(
+    executor: SingleThreadedExecutor,
+) -> None:
+    class Job:
+        def __call__(self) -> None:
+            pass
+
+    job = Job()
+    left = weakref.ref(job)
+    executor.create_task(job)
+    del job
+    future: Future = Future()
+
+    def watch() -> None:
+        end = STEADY.now() + Duration(seconds=10)
+        while left() is not None and STEADY.now() < end:
+            time.sleep(0.001)
+        future.set_result(left() is None)
+
+    threading.Thread(target=watch).start()
+    executor.spin_until_future_complete(future, timeout_sec=20)
+    assert future.result()
+
+
 def test_spin_until_future_complete_gives_up_after_its_timeout(executor: SingleThreadedExecutor) -> None:
     future: Future = Future()
     executor.spin_until_future_complete(future, timeout_sec=0.05)
@@ -242,6 +269,15 @@ def test_shutting_the_executor_down_on_another_thread_ends_spinning(
 ) -> None:
     threading.Timer(0.05, executor.shutdown).start()
     executor.spin()
+
+
+def test_spinning_for_a_future_returns_when_a_callback_shuts_the_context_down(
+    context: Context, executor: SingleThreadedExecutor, node: Node
+) -> None:
+    node.create_guard_condition(context.shutdown).trigger()
+    executor.spin_until_future_complete(Future(), timeout_sec=20)
+    assert not context.ok()
+    executor.spin_until_future_complete(Future(), timeout_sec=20)
 
 
 def test_a_callback_may_shut_its_executor_down(

@@ -232,7 +232,7 @@ class Executor(AbstractContextManager["Executor"]):
 
         An executor of your own defines this, and gets its work from :meth:`wait_for_ready_callbacks`.
         """
-        self._spin_once(_deadline(timeout_sec), None)
+        raise NotImplementedError
 
     def spin_until_future_complete(self, future: Future, timeout_sec: float | None = None) -> None:
         """Run callbacks until ``future`` is done or cancelled, but no longer than ``timeout_sec``."""
@@ -251,11 +251,6 @@ class Executor(AbstractContextManager["Executor"]):
 
         An executor of your own defines this, if somebody is to wait for futures with it.
         """
-        future._call_when_complete(self.wake)
-        self._spin_once(_deadline(timeout_sec), future._is_over)
-
-    def _spin_once(self, deadline: int | None, condition: Callable[[], bool] | None) -> None:
-        """Run one callback, unless the time is over or the condition true before one is ready."""
         raise NotImplementedError
 
     def wait_for_ready_callbacks(
@@ -295,9 +290,9 @@ class Executor(AbstractContextManager["Executor"]):
 
     def _next(self, deadline: int | None, condition: Callable[[], bool] | None) -> tuple[Any, Any]:
         """Wait for work: an entity and what was taken from it; for a task, the task and ``None``."""
+        self._check(condition)
         waited = False
         while True:
-            self._check(condition)
             if self._entities_changed:
                 self._update_entities()
             if self._groups_changed:
@@ -324,7 +319,9 @@ class Executor(AbstractContextManager["Executor"]):
                 return entity, taken
             if waited and deadline is not None and time.monotonic_ns() >= deadline:
                 raise TimeoutException
-            self._collect(deadline)
+            # Without a word from anybody there is no new reason to end.
+            if self._collect(deadline) or not self._ready:
+                self._check(condition)
             waited = True
 
     def _check(self, condition: Callable[[], bool] | None) -> None:
@@ -336,8 +333,12 @@ class Executor(AbstractContextManager["Executor"]):
         if condition is not None and condition():
             raise ConditionReachedException
 
-    def _collect(self, deadline: int | None) -> None:
-        """Wait until something is ready, ``deadline`` is over or somebody wakes us; note what is ready."""
+    def _collect(self, deadline: int | None) -> bool:
+        """
+        Wait until something is ready, ``deadline`` is over or somebody wakes us; note what is ready.
+
+        :return: whether somebody woke us.
+        """
         timeout = _remaining(deadline)
         while self._tasks:
             timeout = 0
@@ -346,32 +347,26 @@ class Executor(AbstractContextManager["Executor"]):
             if guard._is_ready() and self.can_execute(guard):
                 timeout = 0
                 self._ready.append((guard, 0))
-        next_timer, wait = self._collect_timers()
-        if wait < timeout:
-            timeout = wait
-        else:
-            next_timer = None
-        tokens = self._waitset.wait(timeout)
-        if not tokens and next_timer is not None:
-            self._ready.append((next_timer, 0))  # its time has come
-        for token in tokens:
-            if token == _WAKE:
-                self._guard.take()
-            elif token in self._attached:
-                self._ready.append((self._attached[token][0], _MESSAGES_A_TURN - 1))
-
-    def _collect_timers(self) -> tuple[Timer | None, int]:
-        """Note the timers that are due; return the next one to be, and how long [ns] to wait for it."""
-        next_timer, wait = None, INFINITY
+        next_timer: Timer | None = None
         for timer in self._timers:
             remaining = timer._remaining()
             if remaining <= 0:
                 if self.can_execute(timer):
-                    next_timer, wait = None, 0
+                    next_timer, timeout = None, 0
                     self._ready.append((timer, 0))
-            elif remaining < wait:
-                next_timer, wait = timer, remaining
-        return next_timer, wait
+            elif remaining < timeout:
+                next_timer, timeout = timer, remaining
+        tokens = self._waitset.wait(timeout)
+        if not tokens and next_timer is not None:
+            self._ready.append((next_timer, 0))  # its time has come
+        woken = False
+        for token in tokens:
+            if token == _WAKE:
+                woken = True
+                self._guard.take()
+            elif token in self._attached:
+                self._ready.append((self._attached[token][0], _MESSAGES_A_TURN - 1))
+        return woken
 
     # What is waited for
 
@@ -457,24 +452,6 @@ class Executor(AbstractContextManager["Executor"]):
         """Whether no thread spins or runs a callback."""
         return self._spinning_thread is None
 
-    def _begin_spin(self) -> int | None:
-        """
-        Make this the spinning thread; it may be that already, if it spins in a callback.
-
-        :return: what to give to :meth:`_end_spin`.
-        """
-        thread, outer = threading.get_ident(), self._spinning_thread
-        if outer is not None and outer != thread:
-            raise ValueError("another thread spins this executor: it can only be spun by one at a time")
-        self._spinning_thread = thread
-        return outer
-
-    def _end_spin(self, outer: int | None) -> None:
-        self._spinning_thread = self._callback_thread = outer
-        if self._is_shutdown:  # somebody may be waiting for this; who comes later finds it done
-            with self._idle:
-                self._idle.notify_all()
-
     def shutdown(self, timeout_sec: float | None = None) -> bool:
         """
         Stop, and wait for callbacks that run on other threads.
@@ -523,36 +500,71 @@ def _raise_exception_of(task: Task) -> None:
 
 
 class _ReadyMadeExecutor(Executor):
-    """An executor of this module: no other call stands between its spinning and a callback."""
+    """An executor of this module: as little as possible stands between its waiting and a callback."""
+
+    _ENDS: tuple[type[Exception], ...] = (TimeoutException, ShutdownException, ConditionReachedException)
+    """what ends its spinning without an error"""
+
+    def spin_once(self, timeout_sec: float | None = None) -> None:
+        """Run one callback, waiting at most ``timeout_sec`` for it (``None`` or negative: for ever)."""
+        self._spin(_deadline(timeout_sec), None, once=True)
+
+    def spin_once_until_future_complete(
+        self, future: Future, timeout_sec: float | TimeoutObject | None = None
+    ) -> None:
+        """Run one callback, unless ``future`` is or gets done before one is ready."""
+        future._call_when_complete(self.wake)
+        self._spin(_deadline(timeout_sec), future._is_over, once=True)
 
     def spin_until_future_complete(self, future: Future, timeout_sec: float | None = None) -> None:
         """Run callbacks until ``future`` is done or cancelled, but no longer than ``timeout_sec``."""
         future._call_when_complete(self.wake)
-        deadline = _deadline(timeout_sec)
-        while self._context._valid and not self._is_shutdown and not future._is_over():
-            self._spin_once(deadline, future._is_over)
-            if deadline is not None and time.monotonic_ns() >= deadline:
-                return
+        if self._context._valid:
+            self._spin(_deadline(timeout_sec), future._is_over)
+
+    def _spin(
+        self, deadline: int | None, condition: Callable[[], bool] | None, *, once: bool = False
+    ) -> None:
+        """Run callbacks, or one, unless the time is over or the condition true before one is ready."""
+        thread, outer = threading.get_ident(), self._spinning_thread
+        if outer is not None and outer != thread:
+            raise ValueError("another thread spins this executor: it can only be spun by one at a time")
+        self._spinning_thread = thread  # it may be that already, if it spins in a callback
+        try:
+            while True:
+                self._callback_thread = None
+                try:
+                    entity, taken = self._next(deadline, condition)
+                except self._ENDS:
+                    return
+                self._callback_thread = thread
+                self._dispatch(entity, taken)
+                if once or not self._context._valid:
+                    return
+                if deadline is not None and time.monotonic_ns() >= deadline:
+                    return
+                del entity, taken  # the next may be long in coming: nothing lives on for that
+        finally:
+            self._spinning_thread = self._callback_thread = outer
+            if self._is_shutdown:  # somebody may be waiting for this; who comes later finds it done
+                with self._idle:
+                    self._idle.notify_all()
+
+    def _dispatch(self, entity: Any, taken: Any) -> None:
+        """Have run, here or elsewhere, what :meth:`_next` returned."""
+        raise NotImplementedError
 
 
 class SingleThreadedExecutor(_ReadyMadeExecutor):
     """Runs all callbacks on the thread that spins."""
 
-    def _spin_once(self, deadline: int | None, condition: Callable[[], bool] | None) -> None:
-        outer = self._begin_spin()
-        try:
-            try:
-                entity, taken = self._next(deadline, condition)
-            except (TimeoutException, ShutdownException, ConditionReachedException):
-                return
-            self._callback_thread = self._spinning_thread
-            self._run(entity, taken)
-        finally:
-            self._end_spin(outer)
+    _dispatch = Executor._run
 
 
 class MultiThreadedExecutor(_ReadyMadeExecutor):
     """Runs callbacks on a pool of threads, as far as their callback groups let them run in parallel."""
+
+    _ENDS = (*_ReadyMadeExecutor._ENDS, ExternalShutdownException)  # unlike on one thread, as in rclpy
 
     def __init__(self, num_threads: int | None = None, *, context: Context | None = None) -> None:
         """
@@ -587,29 +599,22 @@ class MultiThreadedExecutor(_ReadyMadeExecutor):
                 self._guard.take()
         return super()._next(deadline, condition)
 
-    def _spin_once(self, deadline: int | None, condition: Callable[[], bool] | None) -> None:
-        outer = self._begin_spin()
-        try:
-            entity, taken = self._next(
-                deadline, lambda: bool(self._errors) or (condition is not None and condition())
-            )
-            with self._idle:
-                self._in_pool += 1
-            try:
-                self._pool.submit(self._run_in_pool, entity, taken)
-            except RuntimeError:  # shut down meanwhile, by a signal's handler on this thread
-                self._run_in_pool(entity, taken)
-        except (
-            TimeoutException,
-            ShutdownException,
-            ExternalShutdownException,  # unlike on a single-threaded executor, as in rclpy
-            ConditionReachedException,
-        ):
-            pass
-        finally:
-            self._end_spin(outer)
+    def _spin(
+        self, deadline: int | None, condition: Callable[[], bool] | None, *, once: bool = False
+    ) -> None:
+        super()._spin(
+            deadline, lambda: bool(self._errors) or (condition is not None and condition()), once=once
+        )
         if self._errors:
             raise self._errors.popleft()
+
+    def _dispatch(self, entity: Any, taken: Any) -> None:
+        with self._idle:
+            self._in_pool += 1
+        try:
+            self._pool.submit(self._run_in_pool, entity, taken)
+        except RuntimeError:  # shut down meanwhile, by a signal's handler on this thread
+            self._run_in_pool(entity, taken)
 
     def _run_in_pool(self, entity: Any, taken: Any) -> None:
         try:

@@ -138,11 +138,11 @@ class Timer:
         """Nanoseconds to wait for it; for ever while it rests, or while its time is a simulator's."""
         if self._canceled or self._destroyed:
             return INFINITY
-        source = self._source
-        if source._override is None:
-            return self._next_call - source._read()
+        override = self._source._override
+        if override is None:
+            return self._next_call - self._source._read()
         # Simulated time comes as a message: there is nothing to wait for until it is there.
-        return INFINITY if self._next_call > source._override else 0
+        return INFINITY if self._next_call > override else 0
 
     def _take(self) -> tuple[()] | None:
         if self._destroyed or self._canceled:
