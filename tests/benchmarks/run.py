@@ -1,8 +1,9 @@
-"""What rclpy costs: ``make bench``, or ``python -m tests.benchmarks.run [--rounds 5] [NAME=COMMAND ...]``.
+"""What rclpy costs: ``make bench``, or ``python -m tests.benchmarks.run [OPTION ...] [NAME=COMMAND ...]``.
 
 Each COMMAND runs Python with an rclpy of its own, such as ``embedded=.venv/bin/python`` or a script that
 sources ROS 2 first and ends with ``exec python "$@"``; without any, this interpreter's rclpy is measured.
 Every round measures all of them, so that a busy machine harms all alike; medians of the rounds are printed.
+With ``--awake`` no processor sleeps meanwhile: see :mod:`tests.benchmarks.awake`.
 CPU time is that of the whole process, with all its threads.
 """
 
@@ -16,9 +17,11 @@ import statistics
 import subprocess
 import sys
 from collections import defaultdict
+from contextlib import nullcontext
 from pathlib import Path
 
 from deploy.chaos.domain import reserved_domain
+from tests.benchmarks.awake import processors_awake
 from tests.conftest import DISCOVERY_RANGE
 
 NODES = Path(__file__).with_name("nodes.py")
@@ -76,16 +79,18 @@ def table(results: dict[str, dict[str, list[float]]]) -> str:
 def main() -> None:
     parser = argparse.ArgumentParser(description="Measure what rclpy costs.")
     parser.add_argument("--rounds", type=int, default=3, help="how often everything is measured")
+    parser.add_argument("--awake", action="store_true", help="let no processor sleep meanwhile")
     parser.add_argument("commands", nargs="*", metavar="NAME=COMMAND", help="a Python with its rclpy")
     arguments = parser.parse_args()
     commands = dict(command.split("=", 1) for command in arguments.commands) or {"rclpy": sys.executable}
     results: dict[str, dict[str, list[float]]] = {name: defaultdict(list) for name in commands}
-    for _ in range(arguments.rounds):
-        for roles in MEASUREMENTS:
-            for name, command in commands.items():
-                with reserved_domain() as domain_id:
-                    for figure, value in measure(shlex.split(command), roles, domain_id).items():
-                        results[name][figure].append(value)
+    with processors_awake() if arguments.awake else nullcontext():
+        for _ in range(arguments.rounds):
+            for roles in MEASUREMENTS:
+                for name, command in commands.items():
+                    with reserved_domain() as domain_id:
+                        for figure, value in measure(shlex.split(command), roles, domain_id).items():
+                            results[name][figure].append(value)
     print(table(results))
 
 
