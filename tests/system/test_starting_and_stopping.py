@@ -301,14 +301,7 @@ def test_a_mistake_in_a_parameter_file_is_told_before_anything_starts(site: Site
     assert not site.run.exists()
 
 
-def test_a_parameter_file_reaches_the_services(site: Site, tmp_path: Path) -> None:
-    file = tmp_path / "mine.yaml"
-    file.write_text("dead_mans_switch: {ros__parameters: {pressed: true}}")
-    command = site.begin("run", STEADY, str(file))
-    command.await_line("Operator is alive")
-
-
-def test_a_parameter_file_may_be_a_pipe(site: Site, tmp_path: Path) -> None:
+def test_a_parameter_file_reaches_the_services_and_may_be_a_pipe(site: Site, tmp_path: Path) -> None:
     file = tmp_path / "mine.yaml"
     os.mkfifo(file)
     command = site.begin("run", STEADY, str(file))
