@@ -17,6 +17,7 @@ from reactivex import Observable
 from std_msgs.msg import String
 
 from deploy import terminal
+from deploy.output import say
 from interfaces import age, topics
 from interfaces.reactive_node import ReactiveNode
 
@@ -75,18 +76,18 @@ class Console:
 
     def _show(self, line: terminal.Line) -> None:
         milliseconds = (line.time - self._origin) / timedelta(milliseconds=1)
-        print(f"[{milliseconds:.0f}] {line.text}", flush=True)
+        say(f"[{milliseconds:.0f}] {line.text}")
 
     def _obey(self, word: str) -> None:
         meant = [command for command in self._commands if command.startswith(word)]
         if len(meant) == 1:
             self._commands[meant[0]]()
         else:
-            print(f"{word}? Commands: {', '.join(self._commands)}", flush=True)
+            say(f"{word}? Commands: {', '.join(self._commands)}")
 
     def _hold_switch(self, pressed: bool) -> None:
         if not self._switch.services_are_ready():
-            print("dead_mans_switch is not there", flush=True)
+            say("dead_mans_switch is not there")
             return
         self._switch.set_parameters([Parameter("pressed", value=pressed)])
 

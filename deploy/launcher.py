@@ -13,6 +13,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING
 
+from deploy.output import say
 from deploy.system import NAMESPACE, Check, DeploymentError, Program, System
 
 if TYPE_CHECKING:
@@ -95,6 +96,7 @@ def _started(system: System, scenario: str, parameter_file: str) -> Iterator[tup
     with Member() as member:
         loading = time.monotonic() - began
         given = parameters.of_system(scenario, parameter_file, loading, interruption.check)
+        interruption.check()  # for the last time before anything lives that would have to be ended
         system.start(given, interruption.check)
         try:
             place = f"ROS domain {os.environ.get('ROS_DOMAIN_ID') or 0}"
@@ -145,16 +147,16 @@ def _show(system: System, member: Member, epoch: float, *, owner: bool = False) 
     from deploy.console import HELP, Console
 
     console = Console(member.node, epoch)
-    print(HELP, flush=True)
+    say(HELP)
     while not console.has_quit:
         interruption.check()
         member.spin_once()
         console.read_commands()
         if system.supervisor_has_ended():
             if not owner or not system.start_again(interruption.check):
-                print(system.unattended() if system.is_wanted else "The system has ended.", flush=True)
+                say(system.unattended() if system.is_wanted else "The system has ended.")
                 return
-            print("supervisord was killed: everything has been started anew.", flush=True)
+            say("supervisord was killed: everything has been started anew.")
 
 
 def _stop(system: System, check: Check = lambda: None) -> None:
@@ -162,11 +164,11 @@ def _stop(system: System, check: Check = lambda: None) -> None:
 
     def tell(count: int) -> None:
         with suppress(OSError):
-            print(f"Stopping {count} processes ..." if count else "Nothing runs.", flush=True)
+            say(f"Stopping {count} processes ..." if count else "Nothing runs.")
 
     if system.stop(check, tell):
         with suppress(OSError):
-            print("All have ended.", flush=True)
+            say("All have ended.")
 
 
 def _adopt_environment(system: System) -> bool:
@@ -182,6 +184,7 @@ def _adopt_environment(system: System) -> bool:
                 os.environ[name] = environment[name]
     if any(os.environ.get(name) != before.get(name) for name in LOADER):
         # Only a new process finds the rclpy that the system has: this shell may have sourced another one.
+        interruption.check()  # it knows nothing of what was noted here
         os.execv(sys.executable, [sys.executable, *sys.orig_argv[1:]])
     return True
 

@@ -19,6 +19,7 @@ from typing import Any, NamedTuple, cast
 import yaml
 
 from deploy import processes
+from deploy.output import say
 
 CONFIGURATION = processes.ROOT / "deploy" / "supervisord.conf"
 SERVICE_GRACE = 1.0  # s from SIGTERM to SIGKILL of a service, as in supervisord.conf
@@ -272,7 +273,7 @@ class System:
         try:
             if not _locked(directory):
                 with suppress(OSError):  # perhaps nobody reads it any more
-                    print("Waiting for another make to end its start or stop.", flush=True)
+                    say("Waiting for another make to end its start or stop.")
                 while not _locked(directory):
                     check()
                     time.sleep(LOCK_INTERVAL)
