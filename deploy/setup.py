@@ -17,7 +17,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
 from types import FrameType
@@ -152,7 +152,12 @@ def _step(title: str, command: list[str], log: Path | None = LOG) -> None:
     lines: list[str] = []
     environment = os.environ | {"PIP_DISABLE_PIP_VERSION_CHECK": "1"}
     process = subprocess.Popen(
-        command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+        command,
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        start_new_session=True,  # so that all of it can be ended: venv and pip have children of their own
     )
     try:
         assert process.stdout is not None
@@ -163,8 +168,9 @@ def _step(title: str, command: list[str], log: Path | None = LOG) -> None:
                 print(f"\r\x1b[K  {title}: {words[0].lower()} {words[1]}", end="", flush=True)
         process.wait()
     except BaseException:
-        process.terminate()
-        process.wait()
+        with suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGTERM)
+        process.communicate()  # until the last of them has ended
         raise
     finally:
         if live:

@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import os
 import shutil
+import signal
 import subprocess
 import sys
+import threading
+import time
 from pathlib import Path
 
 import pytest
+
+from deploy import setup
 
 ROOT = Path(__file__).parents[2]
 STAMP = ".venv/made-from"
@@ -73,3 +78,21 @@ def test_half_a_set_up_runs_nothing(checkout: Path, command: str) -> None:
     assert make(checkout, command) == "Nothing runs: .venv is not set up (make setup)."
     (checkout / STAMP).touch()
     assert make(checkout, command) == f"runs -m deploy.launcher {command}"
+
+
+def test_an_interrupted_step_ends_with_all_its_children(tmp_path: Path) -> None:
+    begun = tmp_path / "pid"
+
+    def interrupt() -> None:
+        while not begun.exists():
+            time.sleep(0.01)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    interrupter = threading.Thread(target=interrupt)
+    interrupter.start()
+    with pytest.raises(KeyboardInterrupt):
+        setup._step("a long sleep", ["sh", "-c", f"sleep 60 & echo $! > {begun}; wait"], log=None)
+    interrupter.join()
+    child = Path(f"/proc/{begun.read_text().strip()}/stat")
+    # Whoever adopts it may not have looked after it yet.
+    assert not child.exists() or child.read_text().rpartition(")")[2].split()[0] == "Z"
