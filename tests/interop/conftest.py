@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 import queue
 import shutil
 import subprocess
@@ -54,7 +55,8 @@ def peer_program(pytestconfig: pytest.Config, tmp_path_factory: pytest.TempPathF
         built = tmp_path_factory.mktemp("build") / "peer"
         options = ["-std=c++17", "-O1", "-Wall", "-Wextra", "-Werror"]
         subprocess.run([compiler, *options, "-o", str(built), str(SOURCE), *LIBRARIES], check=True)
-        shutil.move(built, program)
+        # Its name has all of it or nothing: from another file system it is copied.
+        os.replace(shutil.copy(built, program.with_suffix(".new")), program)
     return program
 
 

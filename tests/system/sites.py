@@ -10,7 +10,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any
 
@@ -119,7 +119,8 @@ class Command:
         self._reader.join()
         assert self._process.stdin is not None
         assert self._process.stdout is not None
-        self._process.stdin.close()
+        with suppress(BrokenPipeError):  # where it has ended before it was told what was typed
+            self._process.stdin.close()
         self._process.stdout.close()
 
     def _read(self) -> None:
@@ -198,8 +199,10 @@ class Site:
 
     def close(self) -> None:
         """Leave nothing behind."""
-        self._commands.close()
-        System(self.run).stop()
+        try:
+            self._commands.close()
+        finally:
+            System(self.run).stop()
 
 
 class Peer:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.system import pauses
 from tests.system.sites import Site
 
 LISTING = Path(__file__).with_name("listing_5_9.txt").read_text()
@@ -36,21 +37,22 @@ def by_words(output: str) -> dict[str, list[tuple[float, list[float]]]]:
 @pytest.mark.timeout(240)
 def test_the_operator_reads_what_the_thesis_shows(site: Site) -> None:
     for attempt in range(3):
-        command = site.begin("run", "listing_5_9")
-        command.await_line("Turning off engines", 60)
-        command.type("quit\n")
-        assert command.wait() == 0
+        with pauses.watched() as paused:
+            command = site.begin("run", "listing_5_9")
+            command.await_line("Turning off engines", 60)
+            command.type("quit\n")
+            assert command.wait() == 0
         try:
-            assert_as_in_the_thesis(command.output)
-        except AssertionError:  # where a machine pauses for a tenth of a second, times are others
+            assert_as_in_the_thesis(command.output, paused.total)
+        except AssertionError:  # where a machine pauses, lines may come twice, or not at all
             if attempt == 2:
                 raise
         else:
             break
 
 
-def assert_as_in_the_thesis(output: str) -> None:
-    """The same lines, with the same numbers, at the same times."""
+def assert_as_in_the_thesis(output: str, paused: float) -> None:
+    """The same lines, with the same numbers, at the same times, but for what the machine has paused [s]."""
     shown, listing = by_words(output), by_words(LISTING)
     shown.pop("Engines are off")  # the thesis' engines say nothing
     assert {words: len(some) for words, some in shown.items()} == {
@@ -61,11 +63,11 @@ def assert_as_in_the_thesis(output: str) -> None:
         for (time, numbers), (listed_time, listed_numbers) in zip(shown[words], expected, strict=True):
             deviations.append(time - listed_time)
             assert numbers == listed_numbers or words.startswith("Speed")
-    assert max(deviations) - min(deviations) <= SAME
-    speeds_fit_their_positions(output)
+    assert max(deviations) - min(deviations) <= SAME + paused
+    speeds_fit_their_positions(output, JITTER + paused)
 
 
-def speeds_fit_their_positions(output: str) -> None:
+def speeds_fit_their_positions(output: str, jitter: float) -> None:
     """A speed is a distance by the time that has really passed, not by the thesis' time."""
     positions: list[tuple[float, list[float]]] = []
     for time, words, numbers in lines(output):
@@ -74,4 +76,4 @@ def speeds_fit_their_positions(output: str) -> None:
         elif words.startswith("Speed"):
             (before, start), (after, end) = positions[-2:]
             (speed,) = numbers
-            assert math.dist(start, end) == pytest.approx(speed * (after - before), abs=speed * JITTER + 1e-4)
+            assert math.dist(start, end) == pytest.approx(speed * (after - before), abs=speed * jitter + 1e-4)

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.system import pauses
 from tests.system.sites import Command, Site
 
 STEADY = str(Path(__file__).with_name("steady.yaml"))
@@ -31,7 +32,7 @@ def test_a_signal_ends_everything(site: Site, number: int, moment: str) -> None:
     command = site.begin("run", STEADY)
     command.await_line(moment)
     command.signal(number)
-    assert command.wait(10) == 0
+    assert command.wait() == 0
     assert "All have ended." in command.output
     assert site.members == {}
 
@@ -41,7 +42,7 @@ def test_ctrl_c_at_the_terminal_of_make_run_ends_everything(site: Site, moment: 
     terminal = site.begin_in_terminal("make", "run", f"SCENARIO={STEADY}")
     terminal.await_line(moment)
     terminal.type("\x03\x03")
-    terminal.wait(10)
+    terminal.wait()
     assert "All have ended." in terminal.output
     assert site.members == {}
 
@@ -51,9 +52,9 @@ def test_ctrl_c_before_anything_has_started_ends_it_without_a_traceback(site: Si
     while signal.SIGHUP not in caught_signals(command.pid):
         assert command.is_alive
     command.signal(signal.SIGINT)
-    assert command.wait(10) == 0
-    assert "Traceback" not in command.output
-    assert site.members == {}
+    assert command.wait() == 0
+    assert command.output == ""
+    assert not site.run.exists()
 
 
 @pytest.mark.parametrize("send", [os.killpg, os.kill], ids=["at the terminal", "to it alone"])
@@ -65,7 +66,7 @@ def test_a_signal_while_a_parameter_file_is_read_is_no_mistake_in_it(
     command = site.begin("run", STEADY, str(file))
     with writer_to_a_reader_of(file, command):
         send(command.pid, signal.SIGINT)
-        assert command.wait(10) == 0
+        assert command.wait() == 0
     assert command.output == ""
     assert not site.run.exists()
 
@@ -109,7 +110,7 @@ def test_ctrl_c_ends_the_waiting_for_another_start_or_stop(site: Site, arguments
         command = site.begin(*arguments)
         command.await_line("Waiting for another make to end its start or stop")
         command.signal(signal.SIGINT)
-        assert command.wait(10) == 0
+        assert command.wait() == 0
     assert len(command.lines) == 1, command.output
     assert site.members == {}
 
@@ -120,7 +121,7 @@ def test_a_start_goes_on_when_another_start_or_stop_is_over(site: Site) -> None:
         command.await_line("Waiting for another make to end its start or stop")
         assert site.members == {}
     command.await_line("It runs in the background")
-    assert command.wait(10) == 0
+    assert command.wait() == 0
 
 
 def test_closing_the_terminal_ends_everything(site: Site) -> None:
@@ -139,7 +140,7 @@ def test_nohup_lets_it_go_on_when_the_terminal_closes(site: Site) -> None:
     command.type("turn_on\n")
     command.await_line("Turning on engines")
     command.type("quit\n")
-    assert command.wait(10) == 0
+    assert command.wait() == 0
 
 
 def test_the_end_of_a_pipe_ends_everything(site: Site) -> None:
@@ -158,7 +159,7 @@ def test_it_is_started_anew_when_supervisord_is_killed(site: Site) -> None:
     after = site.members
     assert set(after.values()).isdisjoint(before.values())
     command.type("quit\n")
-    assert command.wait(10) == 0
+    assert command.wait() == 0
     assert site.members == {}
 
 
@@ -172,7 +173,7 @@ def test_the_switch_stays_in_the_hand_of_who_took_it_though_its_process_dies(sit
     for _ in range(3):  # the first may be of the dead process' last heartbeat
         command.await_line("Operator is alive", after=len(command.lines))
     command.type("quit\n")
-    assert command.wait(10) == 0
+    assert command.wait() == 0
 
 
 def test_stopping_from_elsewhere_ends_the_terminal_too(site: Site) -> None:
@@ -180,7 +181,7 @@ def test_stopping_from_elsewhere_ends_the_terminal_too(site: Site) -> None:
     command.await_line("Engines are off")
     assert site.do("stop")[0] == 0
     command.await_line("The system has ended")
-    assert command.wait(10) == 0
+    assert command.wait() == 0
     assert site.members == {}
 
 
@@ -208,7 +209,7 @@ def test_a_console_tells_that_the_services_go_on_without_supervisord(site: Site)
     console.await_line("Engines are off")
     os.kill(site.members[""], signal.SIGKILL)
     console.await_line("supervisord has died; .* services go on without it")
-    assert console.wait(10) == 0
+    assert console.wait() == 0
 
 
 def test_start_replaces_what_a_killed_supervisord_left_behind(site: Site) -> None:
@@ -221,11 +222,12 @@ def test_start_replaces_what_a_killed_supervisord_left_behind(site: Site) -> Non
 def test_stop_ends_what_hangs_within_two_seconds(site: Site, hung: str) -> None:
     assert site.do("start", STEADY)[0] == 0
     os.kill(site.members[hung], signal.SIGSTOP)
-    command = site.begin("stop")
-    assert command.wait(10) == 0
+    with pauses.watched() as paused:
+        command = site.begin("stop")
+        assert command.wait() == 0
     assert site.members == {}
     (begin, _), (end, _) = command.lines
-    assert end - begin < 2.0
+    assert end - begin < 2.0 + paused.total
 
 
 MISTAKES = [
@@ -316,4 +318,4 @@ def test_a_signal_to_make_alone_ends_everything(site: Site, number: int) -> None
     command.await_line("Engines are off")
     os.kill(command.pid, number)
     site.await_members(lambda left: not left)
-    command.wait(10)
+    command.wait()

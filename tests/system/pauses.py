@@ -1,0 +1,46 @@
+"""How long the machine as a whole stood still, where something is promised within a time that it has."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+_INTERVAL = 0.01  # [s]
+_USUAL = 0.01  # [s] by which a thread that sleeps so long may be late on a machine that is only busy
+
+
+class Pauses:
+    """What a thread that does nothing but sleep was late."""
+
+    def __init__(self) -> None:
+        self.total = 0.0
+        """[s]"""
+        self._end = threading.Event()
+
+    def watch(self) -> None:
+        """Count, until told to end."""
+        while not self._end.is_set():
+            begin = time.monotonic()
+            time.sleep(_INTERVAL)
+            late = time.monotonic() - begin - _INTERVAL
+            if late > _USUAL:
+                self.total += late
+
+    def end(self) -> None:
+        """Count no longer."""
+        self._end.set()
+
+
+@contextmanager
+def watched() -> Iterator[Pauses]:
+    """Count the pauses within the block."""
+    pauses = Pauses()
+    watcher = threading.Thread(target=pauses.watch)
+    watcher.start()
+    try:
+        yield pauses
+    finally:
+        pauses.end()
+        watcher.join()
