@@ -16,6 +16,8 @@ from collections.abc import Callable
 from typing import Any
 
 import reactivex as rx
+from rclpy.client import Client
+from rclpy.clock import Clock, ClockType
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -31,6 +33,7 @@ from interfaces.age import Timestamp
 from interfaces.scheduler import NodeScheduler
 
 _SERVER_POLL = 0.05  # [s]: ROS does not tell when a server appears
+_STEADY = Clock(clock_type=ClockType.STEADY_TIME)
 
 
 class ReactiveNode(Node):
@@ -79,7 +82,7 @@ class ReactiveNode(Node):
         """
         Return the values of a declared parameter: the present one at once, then each that is set.
 
-        One that is set on another thread just then may come twice.
+        One that is set just then, on another thread or by another observer, may come twice.
         """
 
         def subscribe(
@@ -89,9 +92,9 @@ class ReactiveNode(Node):
 
             def changed(parameters: list[Parameter]) -> None:
                 with lock:
-                    for parameter in parameters:
-                        if parameter.name == name:
-                            observer.on_next(parameter.value)
+                    if any(parameter.name == name for parameter in parameters):
+                        # Not the one that was set: who has heard of it before us may have set another one.
+                        observer.on_next(self.get_parameter(name).value)
 
             end = Disposable(lambda: self.remove_post_set_parameters_callback(changed))
             with lock:
@@ -153,14 +156,35 @@ class ReactiveNode(Node):
                         observer.on_completed()
 
                 future = client.call_async(request)
-                future.add_done_callback(done)
+                # A future's callbacks belong to no callback group, what else happens to this node does.
+                future.add_done_callback(lambda future: self.scheduler.schedule(lambda *_: done(future)))
                 return Disposable(lambda: client.remove_pending_request(future))
 
-            ready = rx.timer(0.0, _SERVER_POLL, self.scheduler).filter(lambda _: client.service_is_ready())
+            ready = self._when_ready(client)
             response = ready.take(1).flat_map(lambda _: Observable(send)).take_until(self._end)
             return response if timeout is None else response.timeout(timeout, late, self.scheduler)
 
         return call
+
+    def _when_ready(self, client: Client) -> Observable[None]:
+        """Emit as soon as there is a server; one appears by real time, also while ROS time is simulated."""
+
+        def subscribe(
+            observer: abc.ObserverBase[None], scheduler: abc.SchedulerBase | None = None
+        ) -> abc.DisposableBase:
+            def look() -> None:
+                if client.service_is_ready():
+                    observer.on_next(None)
+
+            timer = self.create_timer(_SERVER_POLL, look, clock=_STEADY)
+            self.scheduler.schedule(lambda *_: look())
+
+            def end() -> None:
+                self.destroy_timer(timer)
+
+            return Disposable(end)
+
+        return Observable(subscribe)
 
     def publish_observable(
         self,

@@ -16,6 +16,7 @@ from typing import Any, TypeVar
 from rclpy.clock import Clock, ClockType, JumpThreshold, ROSClock, TimeJump
 from rclpy.duration import Duration
 from rclpy.node import Node
+from rclpy.time import Time
 from rclpy.timer import Timer
 from reactivex import abc, typing
 from reactivex.scheduler.periodicscheduler import PeriodicScheduler
@@ -24,6 +25,7 @@ from interfaces import age
 
 _TState = TypeVar("_TState")
 _CATCH_UP = 50_000_000  # [ns] by which a periodic action may be late and still keep its rate
+_NOT_HEARD = Time(clock_type=ClockType.ROS_TIME)  # what simulated time is before the first /clock
 _FEW = 64  # so many cancelled items in the heap are not worth a clean-up
 
 
@@ -53,7 +55,8 @@ class NodeScheduler(PeriodicScheduler):
     Time is monotonic: it begins as the time of day and then follows the steady clock, so setting the clock of
     the machine changes nothing. While the node's ROS time is simulated (``use_sim_time``), it follows that
     instead, and begins as that if it is simulated from the start. When simulated time jumps back, begins or
-    ends, it goes on from where it is: what was to come in so many seconds still comes in so many.
+    ends, what was to come in so many seconds still comes in so many. What is due at once does not wait for a
+    simulation that stands still.
     """
 
     def __init__(self, node: Node) -> None:
@@ -72,7 +75,11 @@ class NodeScheduler(PeriodicScheduler):
         if not self._simulated:
             self._offset = node.get_clock().now().nanoseconds - self._read()
         self._jumps = node.get_clock().create_jump_callback(
-            JumpThreshold(min_forward=None, min_backward=Duration(nanoseconds=-1), on_clock_change=True),
+            JumpThreshold(
+                min_forward=Duration(nanoseconds=1),
+                min_backward=Duration(nanoseconds=-1),
+                on_clock_change=True,
+            ),
             post_callback=self._time_has_jumped,
         )
 
@@ -158,9 +165,9 @@ class NodeScheduler(PeriodicScheduler):
 
     def _run(self) -> None:
         """Run what is due by now; what that schedules waits until the executor has seen to other work."""
-        horizon = self._read()
+        horizon, limit = self._read(), next(self._orders)
         try:
-            while (due := self._pop(horizon)) is not None:
+            while (due := self._pop(horizon, limit)) is not None:
                 item, action, state = due
                 result = action(self, state)
                 if isinstance(result, abc.DisposableBase):
@@ -170,9 +177,10 @@ class NodeScheduler(PeriodicScheduler):
                 self._armed_for = None
                 self._arm()
 
-    def _pop(self, horizon: int) -> tuple[_Item, Any, Any] | None:
+    def _pop(self, horizon: int, limit: int) -> tuple[_Item, Any, Any] | None:
+        """Take out the first item, if it is due by `horizon` [ns] and was scheduled before `limit`."""
         with self._lock:
-            while self._heap and self._heap[0][0] <= horizon:
+            while self._heap and self._heap[0][0] <= horizon and self._heap[0][1] < limit:
                 item = heapq.heappop(self._heap)[2]
                 if not item.cancelled:
                     action, state = item.action, item.state
@@ -202,7 +210,7 @@ class NodeScheduler(PeriodicScheduler):
         if self._armed_for is not None and self._armed_for <= due:
             return  # it rings early at worst, and looks again
         self._armed_for = due
-        self._timer.timer_period_ns = max(1, due - self._read())
+        self._timer.timer_period_ns = max(0, due - self._read())
         self._timer.reset()  # which wakes an executor that waits
 
     # The clock
@@ -231,10 +239,25 @@ class NodeScheduler(PeriodicScheduler):
                 self._node.destroy_timer(self._timer)
                 self._use_clock(simulated)
                 self._offset += before - self._read()
-            elif simulated:
-                self._offset -= min(0, jump.delta.nanoseconds)
+            elif not simulated:
+                return
+            elif jump.delta.nanoseconds < 0:
+                self._offset -= jump.delta.nanoseconds
+            elif self._node.get_clock().now() == _NOT_HEARD + jump.delta:
+                self._begin_simulation(jump.delta.nanoseconds)
+            else:
+                return  # time just goes on, which the timer sees
             self._armed_for = None
             self._arm()
+
+    def _begin_simulation(self, delta: int) -> None:
+        """Follow the first simulated time that is heard: until then that clock has stood at 0."""
+        if self._offset:  # there was time before: it goes on from where it is
+            self._offset -= delta
+            return
+        self._heap = [(due + delta, order, item) for due, order, item in self._heap]
+        for _, _, item in self._heap:
+            item.due += delta
 
     def dispose(self) -> None:
         """Forget everything, for ever: the node ends."""

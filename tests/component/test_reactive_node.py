@@ -473,6 +473,24 @@ def test_a_parameter_is_an_observable_of_its_value_and_of_each_that_is_set(node:
     assert gains == [1.0, 2.0, 3.0]
 
 
+def test_two_observers_of_a_parameter_agree_though_one_of_them_sets_it(node: ReactiveNode) -> None:
+    node.declare_parameter("speed", 1.0)
+    seen: dict[str, list[float]] = {"obedient": [], "bounded": []}
+
+    def bound(value: float) -> None:
+        seen["bounded"].append(value)
+        if value > 2.0:
+            node.set_parameters([Parameter("speed", value=2.0)])
+
+    speed = node.create_parameter_observable("speed")
+    speed.subscribe(seen["obedient"].append)
+    speed.subscribe(bound)
+    node.set_parameters([Parameter("speed", value=5.0)])
+
+    assert node.get_parameter("speed").value == 2.0
+    assert [values[-1] for values in seen.values()] == [2.0, 2.0]
+
+
 def test_an_observer_may_set_the_parameter_when_it_gets_the_present_value(node: ReactiveNode) -> None:
     node.declare_parameter("gain", 1.0)
     gains: list[float] = []
@@ -565,6 +583,18 @@ def test_a_call_waits_for_a_server_without_blocking_anything(
     assert responses == []
     peer.create_service(SetBool, "switch", answer)
 
+    spin_until(lambda: responses)
+
+
+def test_a_call_waits_for_a_server_though_simulated_time_stands_still(
+    make_node: Make, peer: Node, spin_until: SpinUntil, spin_for: SpinFor
+) -> None:
+    node = make_node("simulated", parameter_overrides=[Parameter("use_sim_time", value=True)])
+    responses: list[Any] = []
+    node.create_call(SetBool, "unpause", timeout=1.0)(SetBool.Request()).subscribe(responses.append)
+    spin_for(0.1)
+
+    peer.create_service(SetBool, "unpause", answer)
     spin_until(lambda: responses)
 
 

@@ -258,6 +258,76 @@ def test_simulated_time_is_followed_and_stands_still_with_the_simulator(
     assert simulation.node.scheduler.now == datetime.fromtimestamp(103, UTC)
 
 
+@pytest.mark.parametrize("heard", [False, True])
+def test_what_is_due_at_once_does_not_wait_for_a_simulation_that_stands_still(
+    simulation: Simulation, spin_until: SpinUntil, heard: bool
+) -> None:
+    if heard:
+        simulation.set(100.0)
+    items: list[int] = []
+    rx.merge(rx.of(1, 2), rx.just(3)).subscribe(items.append, scheduler=simulation.node.scheduler)
+    spin_until(lambda: len(items) == 3)
+
+
+def test_what_schedules_itself_again_at_once_lets_others_have_their_turn(
+    simulation: Simulation, spin_until: SpinUntil
+) -> None:
+    simulation.set(100.0)
+    scheduler, most = simulation.node.scheduler, 10_000
+    ran, others = 0, []
+    other = simulation.node.create_guard_condition(lambda: others.append(ran))
+
+    def again(*_: Any) -> None:
+        nonlocal ran
+        ran += 1
+        if ran == 1:
+            other.trigger()
+        if ran < most and not others:
+            scheduler.schedule(again)
+
+    scheduler.schedule(again)
+    spin_until(lambda: others)
+    assert others[0] < most
+
+
+def test_with_the_first_simulated_time_nothing_is_due_that_was_to_come_later(
+    simulation: Simulation, spin_for: SpinFor, spin_until: SpinUntil
+) -> None:
+    ran: list[datetime] = []
+    scheduler = simulation.node.scheduler
+    scheduler.schedule_relative(5.0, lambda *_: ran.append(scheduler.now))
+    rx.interval(10.0).timestamp().subscribe(lambda it: ran.append(it.timestamp), scheduler=scheduler)
+
+    simulation.set(1234.0)
+    simulation.set(1238.9)
+    spin_for(0.05)
+    assert ran == []
+    simulation.set(1239.0)
+    spin_until(lambda: len(ran) == 1)
+    simulation.set(1244.0)
+    spin_until(lambda: len(ran) == 2)
+    assert ran == [datetime.fromtimestamp(at, UTC) for at in (1239, 1244)]
+
+
+def test_the_first_simulated_time_of_a_node_that_has_run_without_lets_its_time_go_on(
+    simulation: Simulation, make_node: Make, spin_for: SpinFor, spin_until: SpinUntil
+) -> None:
+    node = make_node("later")
+    ran: list[bool] = []
+    node.set_parameters([Parameter("use_sim_time", value=True)])
+    spin_until(lambda: simulation.publisher.get_subscription_count() == 2)
+    node.scheduler.schedule_relative(5.0, lambda *_: ran.append(True))
+    before = node.scheduler.now
+
+    simulation.set(1234.0)
+    spin_until(lambda: node.get_clock().now().nanoseconds == 1234_000_000_000)
+    assert node.scheduler.now == before
+    spin_for(0.05)
+    assert ran == []
+    simulation.set(1239.0)
+    spin_until(lambda: ran)
+
+
 def test_an_interval_does_not_drift_and_skips_what_it_missed(
     simulation: Simulation, spin_for: SpinFor, spin_until: SpinUntil
 ) -> None:
