@@ -51,12 +51,12 @@ from interfaces import stopping
 from interfaces.age import Timestamp
 from interfaces.reactive_node import ReactiveNode
 from interfaces.scenario import Scenario, ScenarioError, Timeline, follow, load, play
-from interfaces.settings import Settings
+from interfaces.settings import Settings, SettingsError
 from interfaces.topics import DIAGNOSTICS, Topic, is_latched
 
 T = TypeVar("T")
 _HEALTH_PERIOD = 1.0  # [s]
-_MISTAKES = (NameValidationException, ParameterException, ScenarioError)  # of who started the service
+_MISTAKES = (NameValidationException, ParameterException, ScenarioError, SettingsError)  # of who started it
 _REASONS, _OTHER_REASONS = 4, "other reasons"  # that a report tells of a topic
 _RECENT = 16  # messages of which a second reader may bring a copy
 
@@ -140,19 +140,22 @@ class ServiceNode(ReactiveNode):
         Return what a virtual source does: see :func:`interfaces.scenario.follow`.
 
         What was set by hand holds beyond the end of this process.
+
+        :raises SettingsError: if what was set can no longer be set, or read.
         """
         kept = self._settings.read()
         if name in kept:
-            self.set_parameters([Parameter(name, value=kept[name])])
+            (result,) = self.set_parameters([Parameter(name, value=kept[name])])
+            if not result.successful:
+                raise SettingsError(f"{name} was set to {kept[name]!r}: {result.reason}")
             timeline = None
 
         def keep(parameters: list[Parameter]) -> None:
-            for parameter in parameters:
-                if parameter.name == name:
-                    try:
-                        self._settings.keep(name, parameter.value)
-                    except OSError as error:
-                        self.remark(name, f"would be forgotten by a restart: {error.strerror}")
+            if any(parameter.name == name for parameter in parameters):
+                try:
+                    self._settings.keep(name, self.get_parameter(name).value)
+                except SettingsError as error:
+                    self.remark(name, f"would be forgotten by a restart: {error}")
 
         self.add_post_set_parameters_callback(keep)
         return follow(self.create_parameter_observable(name), timeline)
@@ -199,6 +202,7 @@ class ServiceNode(ReactiveNode):
         ) -> abc.DisposableBase:
             readers = CompositeDisposable()
             recent: deque[datetime] = deque(maxlen=_RECENT)
+            listens = False  # to volatile publishers, too
 
             def forward(item: Timestamp[Any]) -> None:
                 if item.timestamp not in recent:
@@ -210,7 +214,9 @@ class ServiceNode(ReactiveNode):
                 readers.add(messages.subscribe(forward, observer.on_error, observer.on_completed))
 
             def incompatible(_: Any) -> None:
-                if readers.length == 1:
+                nonlocal listens
+                if not listens:
+                    listens = True
                     add(QoSProfile(depth=topic.qos.depth, durability=DurabilityPolicy.VOLATILE))
 
             add(topic.qos, event_callbacks=SubscriptionEventCallbacks(incompatible_qos=incompatible))

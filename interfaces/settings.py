@@ -12,6 +12,10 @@ from typing import Any
 import yaml
 
 
+class SettingsError(Exception):
+    """Why something could not be kept, or what was kept cannot be used: file and reason."""
+
+
 class Settings:
     """The parameters of one service that were set by hand, in a file of its own."""
 
@@ -20,16 +24,26 @@ class Settings:
         self._path = Path(directory) / f"{service}.yaml" if directory else None
 
     def read(self) -> dict[str, Any]:
-        """Return what was set, by name."""
+        """Return what was set, by name. Raises SettingsError: to forget it would not be safe."""
         if self._path is None or not self._path.exists():
             return {}
-        return dict(yaml.safe_load(self._path.read_text(encoding="utf-8")))
+        try:
+            settings = yaml.safe_load(self._path.read_text(encoding="utf-8"))
+        except (OSError, ValueError, yaml.YAMLError) as error:
+            raise SettingsError(f"{self._path}: {error}") from error
+        if not isinstance(settings, dict):
+            raise SettingsError(f"{self._path}: holds no settings; remove it to begin anew")
+        return settings
 
     def keep(self, name: str, value: Any) -> None:
-        """Keep a value, all of it or nothing. Raises OSError if that is not possible."""
+        """Keep a value, all of it or nothing. Raises SettingsError if that is not possible."""
         if self._path is None:
             return
-        self._path.parent.mkdir(exist_ok=True)
+        settings = self.read() | {name: value}
         new = self._path.with_suffix(".new")
-        new.write_text(yaml.safe_dump(self.read() | {name: value}), encoding="utf-8")
-        os.replace(new, self._path)
+        try:
+            self._path.parent.mkdir(exist_ok=True)
+            new.write_text(yaml.safe_dump(settings), encoding="utf-8")
+            os.replace(new, self._path)
+        except OSError as error:
+            raise SettingsError(f"{self._path}: {error.strerror}") from error

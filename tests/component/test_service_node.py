@@ -24,6 +24,7 @@ from std_msgs.msg import Bool, Float64, Header, String
 from interfaces import topics
 from interfaces.scenario import ScenarioError
 from interfaces.service import ServiceNode
+from interfaces.settings import SettingsError
 
 Make = Callable[..., Any]
 SpinUntil = Callable[..., None]
@@ -371,7 +372,20 @@ def test_it_is_told_when_a_setting_would_be_forgotten(
     spin_until(lambda: heard)
     node.set_parameters([Parameter("value", value=5.0)])
     assert values == [1.0, 5.0]
-    spin_until(lambda: heard[-1] == "value: would be forgotten by a restart: Not a directory")
+    spin_until(lambda: heard[-1].startswith("value: would be forgotten by a restart: "))
+    assert heard[-1].endswith("settings/service.yaml: Not a directory")
+
+
+@pytest.mark.parametrize("text", ["", "- 1", "value: [", "value: -1.0", "value: long"])
+def test_a_setting_that_cannot_be_used_is_a_mistake_and_not_forgotten(
+    make_node: Make, tmp_path: Path, text: str
+) -> None:
+    node = overridden(make_node, settings=str(tmp_path))
+    (tmp_path / f"{node.get_name()}.yaml").write_text(text)
+    node.declare("value", 1.0, (0.0, 9.0), "length [m]", settable=True)
+    node.declare_scenario()
+    with pytest.raises(SettingsError, match=r"value was set to|\.yaml: "):
+        node.follow("value")
 
 
 def test_what_waits_for_the_origin_begins_there_or_at_once(make_node: Make, spin_until: SpinUntil) -> None:
