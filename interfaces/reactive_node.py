@@ -63,7 +63,8 @@ class ReactiveNode(Node):
 
         Nothing is on the network before the first observer subscribes. All observers share one DDS reader,
         the last one that leaves ends it, and the next one gets another. A further observer of a
-        transient-local topic first gets what the reader has kept, like the observer of a reader of its own.
+        transient-local topic first gets what the reader has kept, like the observer of a reader of its own
+        (not with BEST_AVAILABLE durability: what becomes of it, a reader does not tell).
         When the node ends, the observable completes. Subscribing and disposing are safe on any thread, also
         inside a callback.
 
