@@ -31,6 +31,12 @@ def test_whoever_does_not_read_stops_nobody() -> None:
     assert set(lines) == {b"#" * 99}
 
 
+def test_without_standard_output_nothing_is_said() -> None:
+    command = f'exec "{sys.executable}" -c "from deploy.output import say; say(0)" >&-'
+    done = subprocess.run(["sh", "-c", command], cwd=ROOT, stderr=subprocess.PIPE)
+    assert (done.returncode, done.stderr) == (0, b"")
+
+
 def test_to_nobody_it_is_an_error() -> None:
     with subprocess.Popen(
         [sys.executable, "-c", FLOOD], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE
