@@ -6,6 +6,7 @@ import inspect
 import math
 import subprocess
 import sys
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,7 @@ from rmw_dds_common.msg import Gid
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Byte, Float32, Float64, Header, Int8, String, UInt8MultiArray
 from std_srvs.srv import SetBool
+from visualization_msgs.msg import Marker
 
 
 def test_messages_are_equal_only_if_all_numbers_of_their_arrays_are() -> None:
@@ -144,6 +146,20 @@ def test_values_of_subclasses_and_other_sequences_are_accepted_as_by_rclpy() -> 
     assert serialize(JointState(name=("a", "b"))) == serialize(JointState(name=["a", "b"]))  # type: ignore[arg-type]
     assert serialize(Float32(data=math.inf))[4:] == bytes.fromhex("0000807f")
     assert math.isnan(Float64._deserialize(serialize(Float64(data=math.nan))).data)
+
+
+def test_a_message_is_validated_once_however_many_of_its_values_are_not_exactly_of_their_types() -> None:
+    class Points(list[Point]):
+        walks = 0
+
+        def __iter__(self) -> Iterator[Point]:
+            self.walks += 1
+            return super().__iter__()
+
+    exact = Marker(points=[Point(x=1.0)] * 100)
+    marker = Marker(points=Points([Point(x=np.float64(1.0))] * 100))
+    assert Marker._serialize(marker) == Marker._serialize(exact)
+    assert marker.points.walks == 2  # type: ignore[attr-defined]
 
 
 def test_a_class_derived_from_a_message_is_that_message_on_the_wire() -> None:

@@ -56,6 +56,7 @@ class _SerializerGenerator(Generator):
         first = next(number for number, line in enumerate(self._lines) if "out = " in line)
         if has_loop:
             self._lines[first] = self._lines[first].replace("out = ", "out = bytearray(") + ")"
+            self._lines.insert(0, "  valid = False")
         code = [
             "def serialize(m):",
             " try:",
@@ -153,7 +154,12 @@ class _SerializerGenerator(Generator):
     def _flush(self) -> None:
         """Check and write the values gathered so far."""
         if self._checks:
-            self._emit(f"if {' or '.join(self._checks)}: validate(m, cls)")
+            wrong = " or ".join(self._checks)
+            if self._indent > 2:
+                # in a loop: once for all the values that are of their types, but not exactly
+                self._emit(f"if ({wrong}) and not valid: validate(m, cls); valid = True")
+            else:
+                self._emit(f"if {wrong}: validate(m, cls)")
             self._checks.clear()
         if not self._run:
             return
