@@ -30,7 +30,7 @@ from rosidl_parser.definition import (
     UnboundedSequence,
     UnboundedString,
 )
-from sensor_msgs.msg import Image, JointState, NavSatStatus
+from sensor_msgs.msg import Image, JointState, LaserScan, NavSatStatus
 from service_msgs.msg import ServiceEventInfo
 from shape_msgs.msg import MeshTriangle, SolidPrimitive
 from std_msgs.msg import Byte, Empty, Float32, Float64, Header, String, UInt8MultiArray
@@ -147,6 +147,21 @@ def test_a_sequence_of_numbers_is_an_array_array_whatever_was_assigned() -> None
     joints.position = mine
     mine.append(4.0)
     assert joints.position == array("d", [3.0])
+
+
+def test_a_sequence_of_numbers_takes_an_iterator() -> None:
+    for make in (lambda: map(float, [1, 2]), lambda: (x for x in [1.0, 2.0]), lambda: reversed([2.0, 1.0])):
+        scan, joints = LaserScan(ranges=make()), JointState(position=make())
+        assert scan.ranges == array("f", [1.0, 2.0])
+        assert joints.position == array("d", [1.0, 2.0])
+        scan.ranges = make()
+        assert scan.ranges == array("f", [1.0, 2.0])
+
+
+def test_bytes_are_a_sequence_of_numbers_as_they_lie_in_memory() -> None:
+    for kind in (bytes, bytearray):
+        assert LaserScan(ranges=kind(array("f", [1.0, 2.0]))).ranges == array("f", [1.0, 2.0])
+        assert JointState(position=kind(array("d", [1.0, 2.0]))).position == array("d", [1.0, 2.0])
 
 
 def test_bytes_are_a_sequence_of_octets_of_an_image() -> None:

@@ -21,7 +21,7 @@ from rcl_interfaces.msg import (
     ParameterValue,
 )
 from rmw_dds_common.msg import Gid
-from sensor_msgs.msg import JointState
+from sensor_msgs.msg import JointState, LaserScan
 from std_msgs.msg import Bool, Byte, Float32, Float64, Header, Int8, String, UInt8MultiArray
 from std_srvs.srv import SetBool
 from visualization_msgs.msg import Marker
@@ -72,6 +72,13 @@ def test_numbers_out_of_range_are_refused_when_they_are_assigned(values: list[in
         ValueError, match="std_msgs/msg/UInt8MultiArray: field 'data' must be sequence<uint8>"
     ):
         UInt8MultiArray(data=values)
+
+
+def test_a_number_too_great_for_a_float_is_refused_though_an_infinite_one_is_not() -> None:
+    for make in (list, iter, np.array):
+        assert LaserScan(ranges=make([math.inf, -math.inf])).ranges.tolist() == [math.inf, -math.inf]
+        with pytest.raises(ValueError, match=r"must be sequence<float>, .*: it has elements out of range"):
+            LaserScan(ranges=make([1.0, 1e39]))
 
 
 @pytest.mark.parametrize(

@@ -143,12 +143,11 @@ def _to_array(code: str, value: Any) -> array[Any]:
             raise TypeError(f"it has {view.ndim} dimensions")
         if view.format in _SAME_NUMBERS.get(code, code):
             return array(code, view.tobytes())
-    numbers = array(code, value)
-    if code == "f":
-        # array makes infinities of what is too great for a float
-        infinite = [
-            number for number, given in zip(numbers, value, strict=True) if isinf(number) and not isinf(given)
-        ]
-        if infinite:
-            raise OverflowError("it has elements out of range")
+    if code != "f" or isinstance(value, (bytes, bytearray)):
+        return array(code, value)
+    given = list(value)  # to be looked at twice, which an iterator cannot be
+    numbers = array(code, given)
+    # array makes infinities of what is too great for a float
+    if [number for number, one in zip(numbers, given, strict=True) if isinf(number) and not isinf(one)]:
+        raise OverflowError("it has elements out of range")
     return numbers
