@@ -131,6 +131,29 @@ def test_a_users_package_is_found_in_a_process_that_imports_it_first(define: Def
     assert done.stdout == f"{package}.msg.Joint(name='', angle=0.5)\n"
 
 
+def test_a_users_package_wins_over_a_mere_directory_of_its_name(
+    define: Define, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    package = define({"Joint.msg": JOINT})
+    (tmp_path / "src" / package / "msg").mkdir(parents=True)
+    monkeypatch.chdir(tmp_path / "src")
+    code = f"from {package}.msg import Joint; print(Joint())"
+    done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
+    assert done.stdout == f"{package}.msg.Joint(name='', angle=0.5)\n"
+
+
+def test_a_users_package_yields_to_what_python_finds_by_itself(
+    define: Define, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    package, module = define({"Joint.msg": JOINT}), define({"Joint.msg": JOINT})
+    (tmp_path / "src" / package).mkdir(parents=True)
+    (tmp_path / "src" / package / "__init__.py").write_text("msg = 'mine'\n")
+    (tmp_path / "src" / f"{module}.py").write_text("msg = 'mine'\n")
+    monkeypatch.syspath_prepend(tmp_path / "src")
+    assert importlib.import_module(package).msg == "mine"
+    assert importlib.import_module(module).msg == "mine"
+
+
 def test_every_kind_of_type_is_understood(define: Define) -> None:
     package = define(
         {

@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 import sys
 from functools import cache
-from importlib.machinery import ModuleSpec
+from importlib.machinery import ModuleSpec, PathFinder
 from typing import TYPE_CHECKING, Any, cast
 
 from .definition import InvalidDefinition, MessageDefinition, ServiceDefinition, parse_message, parse_service
@@ -144,11 +144,17 @@ class _UserPackages:
     def find_spec(
         self, name: str, path: Sequence[str] | None = None, target: ModuleType | None = None
     ) -> ModuleSpec | None:
-        """Spec of ``<package>``, ``<package>.msg`` and the like; None if it is no message package."""
+        """Spec of ``<package>``, ``<package>.msg`` and the like, if Python has at most a directory for it.
+
+        What else it has is passed on: to find that twice would make every import slower.
+        """
         package, _, kind = name.partition(".")
         kinds = [kind] if kind in _KINDS else [] if kind else _KINDS
-        if not any(interface_names(package, kind) for kind in kinds):
+        if not kinds:
             return None
+        found = PathFinder.find_spec(name, path, target)
+        if (found and found.loader) or not any(interface_names(package, kind) for kind in kinds):
+            return found
         return ModuleSpec(name, cast("Loader", self), origin=f"definitions of {package}", is_package=not kind)
 
     def create_module(self, spec: ModuleSpec) -> None:
@@ -163,6 +169,11 @@ class _UserPackages:
 
 
 def install() -> None:
-    """Make the packages in AMENT_PREFIX_PATH importable, after everything else that Python finds."""
+    """Make the packages in AMENT_PREFIX_PATH importable, after all that Python finds but mere directories.
+
+    Python's own finder comes later: to it, any directory of a package's name, as that of its sources, is the
+    package.
+    """
     if not any(isinstance(finder, _UserPackages) for finder in sys.meta_path):
-        sys.meta_path.append(_UserPackages())
+        finders: list[object] = [*sys.meta_path, PathFinder]
+        sys.meta_path.insert(finders.index(PathFinder), _UserPackages())
