@@ -215,6 +215,34 @@ def test_every_kind_of_type_is_understood(define: Define) -> None:
 
 
 @pytest.mark.parametrize(
+    ("text", "value", "element"),
+    [
+        (r"\t", "\t", "\t"),
+        (r"\x41\101\u0041", "AAA", "AAA"),
+        (r"C:\\dir", r"C:\dir", r"C:\dir"),
+        (r"a\\\\b", r"a\b", r"a\\b"),
+        (r"\q\?", r"\q\?", r"\q\?"),
+        (r"\\t", "\t", r"\t"),
+        (r"\\\\t", r"\t", r"\\t"),
+        (r"\\x41\\101\\u0041", r"AA\u0041", r"\x41\101\u0041"),
+        (r"\\\\\\x41", r"\A", r"\\\x41"),
+        (r"it\'s", "it's", "it's"),
+        ("ż\\t", "ż\t", "ż\t"),
+        (r"\xc3\xa9", "é", "Ã©"),
+    ],
+)
+def test_escapes_in_a_string_mean_what_ros_2_makes_of_them(
+    define: Define, text: str, value: str, element: str
+) -> None:
+    fields = f'string text "{text}"\nwstring wide "{text}"\nstring[] all ["{text}", b]\n'
+    package = define({"Text.msg": f'string TEXT="{text}"\n{fields}'})
+    cls = load(package, "Text")
+    message = cls()
+    assert (cls.TEXT, message.text, message.wide, message.all) == (value, value, value, [element, "b"])
+    assert cls._deserialize(cls._serialize(message)) == message
+
+
+@pytest.mark.parametrize(
     ("line", "reason"),
     [
         ("flot64 x", r"unknown type 'flot64'"),
@@ -237,6 +265,18 @@ def test_every_kind_of_type_is_understood(define: Define) -> None:
         ("float64[ x", r"'float64\[' is no type"),
         ("string<=2 x abc", "longer than 2 characters"),
         ('string x "a"b"', "must be escaped"),
+        (r'string<=1 x "\t"', "longer than 1 characters"),
+        (r'string x "\x4"', r'"\\x4" is no string: .*truncated \\xXX escape'),
+        (r'string[] x ["\x4"]', r'"\\x4" is no string: .*truncated \\xXX escape'),
+        (r'string X="\xe9"', "is no string: 'utf-8' codec can't decode"),
+        (r'string x "\u017c"', "is no string: .*can't encode"),
+        ("string x a\\", r"is no string: .* \\ at end of string"),
+        (r"string x a\\", "by fours"),
+        (r"string x a\\\"b", "by fours"),
+        (r'string x "\n"', "no end of a line"),
+        (r'string x "C:\\new"', "no end of a line"),
+        (r'string[] x ["\0"]', "no NUL"),
+        (r'string[] x ["\udcff"]', "surrogates not allowed"),
         ("uint8 lower=1", "'lower' is no constant name"),
         ("uint8 TWO__=1", "'TWO__' is no constant name"),
         ("uint8 " + "X" * 40 + "-=1", "is no constant name"),

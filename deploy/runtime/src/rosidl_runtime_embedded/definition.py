@@ -35,6 +35,10 @@ _NAME = re.compile(r"[a-z][a-z0-9]*(?:_[a-z0-9]+)*")
 _CONSTANT_NAME = re.compile(r"[A-Z][A-Z0-9]*(?:_[A-Z0-9]+)*")
 _TYPE_NAME = re.compile(r"[A-Z][A-Za-z0-9]*")
 _QUOTED = re.compile(r"""'(?:\\.|[^'\\])*'|"(?:\\.|[^"\\])*\"""")
+# what Python takes for an escape, also for a bad one; other backslashes stay
+_ESCAPE = re.compile(r"""\\(?:[\\'"abfnrtv]|[0-7]{1,3}|x.{0,2}|u.{0,4}|U.{0,8}|N(?:\{[^}]*\})?|$)""")
+_IDL_ESCAPE = re.compile(r"""\\(?:[\\'"abfnrtv]|[0-7]{1,3}|x[0-9a-fA-F]{1,2})""")
+_IDL_STRING = re.compile(r"""(?:[^\\]|\\[^"])*""")
 
 
 class InvalidDefinition(ImportError):
@@ -199,8 +203,8 @@ def _parse_field(type_name: str, name: str, default: str, package: str) -> Field
     if type_.is_message:
         raise ValueError(f"field '{name}' is a message and can have no default value")
     if not type_.is_plural:
-        return Field(name, type_, _parse_value(type_.base, default, type_.string_bound))
-    values = tuple(_parse_value(type_.base, value, type_.string_bound) for value in _split(default))
+        return Field(name, type_, _parse_value(type_, default))
+    values = tuple(_parse_value(type_, value) for value in _split(default))
     most = type_.array_size or type_.sequence_bound
     if len(values) > most > 0 or len(values) < type_.array_size:
         raise ValueError(f"{len(values)} default values are given for '{name}', which is {type_}")
@@ -215,7 +219,8 @@ def _parse_constant(type_name: str, rest: str) -> Constant:
         raise ValueError(
             f"'{name}' is no constant name: upper case letters, digits and single underscores make one"
         )
-    return Constant(name, _IDL_NAMES[type_name], _parse_value(_IDL_NAMES[type_name], value))
+    type_ = FieldType(_IDL_NAMES[type_name])
+    return Constant(name, type_.base, _parse_value(type_, value))
 
 
 def _parse_type(text: str, package: str) -> FieldType:
@@ -252,12 +257,16 @@ def _message_name(text: str, package: str) -> str:
     return f"{parts[0]}/msg/{parts[1]}"
 
 
-def _parse_value(type_: str, text: str, string_bound: int = 0) -> Literal:
+def _parse_value(field_type: FieldType, text: str) -> Literal:
+    type_ = field_type.base
     if type_ in ("string", "wstring"):
         value = _unquote(text)
-        if len(value) > string_bound > 0:
-            raise ValueError(f"{text} is longer than {string_bound} characters")
-        return value
+        if len(value) > field_type.string_bound > 0:
+            raise ValueError(f"{text} is longer than {field_type.string_bound} characters")
+        try:
+            return _unescape_element(value) if field_type.is_plural else _unescape(value)
+        except ValueError as error:
+            raise ValueError(f"{text} is no string: {error}") from None
     if type_ == "boolean":
         if text.lower() not in ("true", "false", "0", "1"):
             raise ValueError(f"'{text}' is no bool: it must be true, false, 1 or 0")
@@ -289,6 +298,34 @@ def _unquote(text: str) -> str:
                 raise ValueError(f"the quotes inside of {text} must be escaped")
             return text[1:-1].replace("\\" + quote, quote)
     return text
+
+
+def _unescape(text: str) -> str:
+    """A string of the definition as ROS 2 has it.
+
+    There an escape means a byte of UTF-8, and what comes of it is a literal of IDL, with escapes of its own.
+    """
+    literal = _ESCAPE.sub(_character, text.encode().decode("latin-1")).encode("latin-1").decode()
+    if not _IDL_STRING.fullmatch(literal):
+        raise ValueError("before a quote or the end, backslashes are written by fours")
+    value = _IDL_ESCAPE.sub(_character, literal)
+    return _in_one_line(re.sub(r'\\(["\\])', r"\1", value))
+
+
+def _unescape_element(text: str) -> str:
+    """A string in an array as ROS 2 has it: there an array is a literal of Python."""
+    return _in_one_line(_ESCAPE.sub(_character, text))
+
+
+def _character(escape: re.Match[str]) -> str:
+    return escape[0].encode().decode("unicode_escape")
+
+
+def _in_one_line(value: str) -> str:
+    if re.search(r"[\0\n\r]", value):
+        raise ValueError("ROS 2 takes no NUL and no end of a line")
+    value.encode()  # no half of a character
+    return value
 
 
 def _split(text: str) -> list[str]:
