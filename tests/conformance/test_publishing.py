@@ -7,8 +7,11 @@ import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
+from rcl_interfaces.msg import ParameterValue
 from rclpy.context import Context
 from rclpy.exceptions import InvalidHandle
 from rclpy.executors import SingleThreadedExecutor
@@ -45,6 +48,29 @@ def test_a_message_is_padded_on_the_wire_as_dds_wants_and_read_without(
         publisher.publish(String(data=text))
     spin_until(lambda: len(received) == 5)
     assert received == ["", "a", "ab", "abc", "Wrocław"]
+
+
+def test_bytes_and_numpy_arrays_are_published_as_the_lists_that_they_mean(
+    spin_until: SpinUntil, node: Node
+) -> None:
+    received: list[ParameterValue] = []
+    node.create_subscription(ParameterValue, "x", received.append, 10)
+    publisher = node.create_publisher(ParameterValue, "x", 10)
+    values: list[tuple[str, list[Any], list[Any]]] = [
+        (
+            "byte_array_value",
+            [b"\0\1", bytearray(b"\0\1"), memoryview(b"\0\1"), np.array([0, 1], np.uint8)],
+            [b"\0", b"\1"],
+        ),
+        ("bool_array_value", [np.array([True, False, True])], [True, False, True]),
+        ("string_array_value", [np.array(["a", "żb"]), np.array(["a", "żb"], object)], ["a", "żb"]),
+    ]
+    for field, given, expected in values:
+        for value in given:
+            publisher.publish(ParameterValue(**{field: value}))
+        spin_until(lambda given=given: len(received) == len(given))
+        assert received == [ParameterValue(**{field: expected})] * len(given)
+        received.clear()
 
 
 def test_a_callback_with_two_arguments_learns_when_a_message_was_written(

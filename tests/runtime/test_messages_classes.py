@@ -116,7 +116,14 @@ def test_a_number_too_great_for_a_float_is_refused_though_an_infinite_one_is_not
             r"diagnostic_msgs/msg/DiagnosticArray: field 'status\[0\]\.values\[0\]\.value' must be string",
         ),
         (JointState(name="ab"), TypeError, "field 'name' must be sequence<string>"),  # type: ignore[arg-type]
-        (Parameter(value=ParameterValue(byte_array_value=b"ab")), TypeError, "byte_array_value"),  # type: ignore[arg-type]
+        (
+            Parameter(value=ParameterValue(byte_array_value=[1])),  # type: ignore[list-item]
+            TypeError,
+            r"'value\.byte_array_value\[0\]' must be octet",
+        ),
+        (ParameterValue(string_array_value=b"ab"), TypeError, r"string_array_value\[0\]"),  # type: ignore[arg-type]
+        (ParameterValue(bool_array_value=np.ones((2, 2), np.bool_)), TypeError, "it is no list"),  # type: ignore[arg-type]
+        (ParameterValue(bool_array_value=np.ones(2)), TypeError, r"bool_array_value\[0\]"),  # type: ignore[arg-type]
         (ParameterDescriptor(integer_range=[IntegerRange()] * 2), ValueError, "2 elements"),
     ],
 )

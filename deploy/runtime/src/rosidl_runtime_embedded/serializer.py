@@ -17,7 +17,7 @@ from .fields import ARRAY_CODES, slot_of
 from .generator import Generator
 from .layout import CODES, HEADER_SIZE, SIZES, Item, run_alignment, run_format
 from .packages import message_class
-from .validation import validate
+from .validation import elements, validate
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -43,7 +43,7 @@ def make_serializer(cls: type[Message]) -> Callable[[Any], bytes]:
 
 class _SerializerGenerator(Generator):
     def __init__(self, cls: type[Message]) -> None:
-        super().__init__(cls, array=array, validate=validate, error=struct_error)
+        super().__init__(cls, array=array, elements=elements, validate=validate, error=struct_error)
         self._checks: list[str] = []  # what must not be true of the values in the run
 
     def compile(self) -> Callable[[Any], bytes]:
@@ -128,7 +128,7 @@ class _SerializerGenerator(Generator):
         self._append(value)
 
     def _list(self, value: str, type_: FieldType) -> None:
-        self._checks.append(f"type({value}) is not list")
+        self._emit(f"if type({value}) is not list: {value} = elements({value}, {type_.base!r})")
         if type_.array_size:
             self._checks.append(f"len({value}) != {type_.array_size}")
         else:

@@ -71,11 +71,29 @@ def _wrong(
     return kind(f"{top}: field '{where}' must be {type_}, not {shown(value)}{reason and ': ' + reason}")
 
 
-def _list(value: Any, type_: FieldType, top: str, where: str, nested: bool = True) -> None:
+def elements(value: Any, base: str) -> list[Any]:
+    """What rclpy publishes of a value as a list of the base type. Raises TypeError if it is no such thing."""
+    if getattr(value, "ndim", 0) == 1:  # a NumPy array or the like
+        value = value.tobytes() if base == "octet" and value.itemsize == 1 else value.tolist()
+    if base == "octet" and isinstance(value, (bytes, bytearray)):
+        return [bytes((octet,)) for octet in value]
+    return _as_list(value)
+
+
+def _as_list(value: Any) -> list[Any]:
     if not isinstance(value, (Sequence, Set, UserList)) or isinstance(value, (str, UserString)):
-        raise _wrong(TypeError, top, where, type_, value, "it is no list")
+        raise TypeError("it is no list")
+    return list(value)
+
+
+def _list(given: Any, type_: FieldType, top: str, where: str, nested: bool = True) -> None:
+    try:
+        # rclpy is more particular about what is assigned than about what is published
+        value = elements(given, type_.base) if nested else _as_list(given)
+    except TypeError as error:
+        raise _wrong(TypeError, top, where, type_, given, str(error)) from None
     if (type_.array_size and len(value) != type_.array_size) or len(value) > type_.sequence_bound > 0:
-        raise _wrong(ValueError, top, where, type_, value, f"it has {len(value)} elements")
+        raise _wrong(ValueError, top, where, type_, given, f"it has {len(value)} elements")
     element_type = type_._replace(array_size=0, is_sequence=False, sequence_bound=0)
     for number, element in enumerate(value):
         _single(element, element_type, top, f"{where}[{number}]", nested)
