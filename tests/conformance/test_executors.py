@@ -24,6 +24,7 @@ from rclpy.executors import (
 )
 from rclpy.node import Node
 from rclpy.task import Future
+from rclpy.utilities import get_default_context
 from std_msgs.msg import Float64
 
 MakeNode = Callable[..., Node]
@@ -253,15 +254,28 @@ def test_a_multi_threaded_executor_returns_from_spinning_when_the_context_is_shu
     assert not context.ok()
 
 
-def test_shutting_rclpy_down_on_another_thread_lets_spin_return(domain_id: int) -> None:
+@pytest.mark.parametrize(
+    "shut_down",
+    [
+        rclpy.shutdown,
+        rclpy.try_shutdown,
+        lambda: get_default_context().shutdown(),
+        lambda: get_default_context().try_shutdown(),
+    ],
+    ids=["shutdown", "try_shutdown", "Context.shutdown", "Context.try_shutdown"],
+)
+def test_shutting_rclpy_down_on_another_thread_lets_spin_return(
+    domain_id: int, shut_down: Callable[[], None]
+) -> None:
     rclpy.init(args=[])
     node = Node("node")
-    thread = threading.Thread(target=rclpy.shutdown)
+    thread = threading.Thread(target=shut_down)
     node.create_guard_condition(thread.start).trigger()
     rclpy.spin(node)
     thread.join()
     node.destroy_node()
     assert not rclpy.ok()
+    rclpy.try_shutdown()  # so that there may be another beginning
 
 
 def test_shutting_the_executor_down_on_another_thread_ends_spinning(

@@ -148,3 +148,11 @@ def test_a_filtered_message_below_the_level_does_not_count() -> None:
     assert not log()
     logger.set_level(LoggingSeverity.DEBUG)
     assert log()
+
+
+@pytest.mark.parametrize(("message", "shown"), [(None, "(null)"), (b"bytes", "bytes")])
+def test_what_c_takes_for_a_string_is_logged(
+    message: object, shown: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    assert get_logger("strings").error(message)  # type: ignore[arg-type]
+    assert capfd.readouterr().err.rstrip().endswith(shown)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable
 from typing import Any
 
@@ -27,6 +28,21 @@ class Collector:
 
 def future_of(executor: Collector) -> Future:
     return Future(executor=executor)  # type: ignore[arg-type]
+
+
+def test_a_future_may_be_awaited_in_asyncio() -> None:
+    future = Future()
+
+    async def wait() -> Any:
+        return await future
+
+    async def complete() -> Any:
+        waiting = asyncio.create_task(wait())
+        await asyncio.sleep(0)
+        future.set_result(42)
+        return await asyncio.wait_for(waiting, 10)
+
+    assert asyncio.run(complete()) == 42
 
 
 def test_a_future_begins_pending() -> None:

@@ -334,7 +334,7 @@ def test_what_nobody_defines_cannot_be_imported(define: Define) -> None:
 
 def test_actions_are_said_to_be_missing(define: Define) -> None:
     package = define({"Move.action": "---\n---\n"})
-    with pytest.raises(NotImplementedError, match=rf"{package}\.action: the embedded runtime has no actions"):
+    with pytest.raises(ImportError, match=rf"{package}\.action: the embedded runtime has no actions"):
         importlib.import_module(f"{package}.action")
 
 

@@ -105,3 +105,36 @@ print("survived")
     )
     assert (done.stdout, done.stderr) == ("interrupted\n", "")
     assert done.returncode == -signal.SIGTERM
+
+
+FOREIGN = """
+import ctypes, threading
+import rclpy
+from rclpy.executors import ExternalShutdownException
+rclpy.init(args=[])
+node = rclpy.create_node("spinner")
+libc, mutex = ctypes.CDLL(None), ctypes.create_string_buffer(64)
+def spin():
+    timer = node.create_timer(0.0, lambda: (timer.cancel(), print("spinning", flush=True)))
+    try:
+        rclpy.spin(node)
+    except ExternalShutdownException:
+        print("ended", flush=True)
+threading.Thread(target=spin).start()
+libc.pthread_mutex_lock(mutex)
+libc.pthread_mutex_lock(mutex)  # for ever
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_spinning_on_another_thread_though_the_main_one_never_runs_python(
+    number: signal.Signals, domain_id: int
+) -> None:
+    with subprocess.Popen([sys.executable, "-c", FOREIGN], stdout=subprocess.PIPE, text=True) as process:
+        try:
+            assert process.stdout is not None
+            assert process.stdout.readline() == "spinning\n"
+            process.send_signal(number)
+            assert process.stdout.readline() == "ended\n"
+        finally:
+            process.kill()

@@ -88,6 +88,7 @@ def get_global_executor() -> Executor:
         from rclpy.executors import SingleThreadedExecutor
 
         _executor = SingleThreadedExecutor()
+        _executor._is_global = True
 
         def end() -> None:
             global _executor
@@ -108,8 +109,6 @@ def shutdown(*, context: Context | None = None, uninstall_handlers: bool | None 
     :param uninstall_handlers: whether to handle signals no longer; by default so for the default context.
     :raises RuntimeError: if the context does not run.
     """
-    if _executor is not None and _executor.context is (context or get_default_context()):
-        _executor._told_to_end = True  # so that spin() on another thread just returns
     _shutdown(context=context)
     if uninstall_handlers is None:
         uninstall_handlers = context is None or context is get_default_context()

@@ -159,7 +159,11 @@ class Graph:
         """Leave the domain."""
         self._closing.set()
         with self._lock:  # in which the listening thread does what it does
+            for own in self._own.values():
+                for endpoint in own.endpoints:  # DDS ends them, too, but who writes on would not know
+                    endpoint.close()
             self._own.clear()
+            self._writer.close()
             self._waitset.close()
             self._drops.close()
             self.participant.close()

@@ -25,6 +25,13 @@ if TYPE_CHECKING:
 
 g_logging_ref_count = 0
 _logging_lock = threading.Lock()
+_in_a_domain: set[Context] = set()
+
+
+@atexit.register  # as soon as rclpy is imported: what users register runs before, and may still publish
+def _leave_domains() -> None:
+    for context in list(_in_a_domain):
+        context._leave_domain()
 
 
 class ContextHandle(Handle):
@@ -57,6 +64,7 @@ class Context(AbstractContextManager["Context"]):
         self._lock = threading.RLock()
         self._initialized = False
         self._valid = False
+        self._ended_by_signal = False
         self._logging = False
         self._domain_id = 0
         self._arguments = RosArguments()
@@ -154,10 +162,11 @@ class Context(AbstractContextManager["Context"]):
         self._end()
         self._leave_domain()
 
-    def _end(self) -> bool:
+    def _end(self, by_signal: bool = False) -> bool:
         with self._lock:
             if not self._valid:
                 return False
+            self._ended_by_signal = by_signal
             self._valid = False
             callbacks, self._callbacks = self._callbacks, []
         for event in self._events:
@@ -203,7 +212,7 @@ class Context(AbstractContextManager["Context"]):
                 raise NotInitializedException("cannot create node")
             if self._graph is None:
                 self._graph = Graph(self._domain_id, self._arguments.enclave)
-                atexit.register(self._leave_domain)
+                _in_a_domain.add(self)
             self._nodes.add(node)
             return self._graph
 
@@ -222,5 +231,5 @@ class Context(AbstractContextManager["Context"]):
         with self._lock:
             graph, self._graph = self._graph, None
             if graph is not None:
-                atexit.unregister(self._leave_domain)
+                _in_a_domain.discard(self)
                 graph.close()

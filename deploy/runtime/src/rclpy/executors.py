@@ -119,7 +119,7 @@ class Executor(AbstractContextManager["Executor"]):
         self._nodes_lock = threading.RLock()
         self._tasks: deque[Task] = deque()
         self._is_shutdown = False
-        self._told_to_end = False  # by rclpy.shutdown(), as opposed to a signal
+        self._is_global = False  # rclpy.spin()'s: unless a signal ends the context, spinning just returns
         self._closed = False
         self._idle = threading.Condition()
 
@@ -327,7 +327,8 @@ class Executor(AbstractContextManager["Executor"]):
     def _check(self, condition: Callable[[], bool] | None) -> None:
         """Raise the reason for which no more work is to be waited for, if there is one."""
         if not self._context._valid:
-            raise ShutdownException if self._told_to_end else ExternalShutdownException
+            in_order = self._is_global and not self._context._ended_by_signal
+            raise ShutdownException if in_order else ExternalShutdownException
         if self._is_shutdown:
             raise ShutdownException
         if condition is not None and condition():

@@ -2,6 +2,7 @@
 
 A thread that waits in DDS cannot notice a signal. So the C-level handler of Python writes to a pipe
 (``signal.set_wakeup_fd``), and a thread that reads it wakes the executors; then Python runs the handler.
+Where the main thread never comes to that, in the event loop of a GUI for instance, that thread shuts down.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import os
 import signal
 import threading
+import time
 from enum import IntEnum
 from types import FrameType
 from typing import TYPE_CHECKING, Any
@@ -36,6 +38,7 @@ _guards: Listeners[GuardCondition] = Listeners()
 _previous: dict[int, Any] = {}  # the handlers that were there before ours
 _options = SignalHandlerOptions.NO
 _wakeup_fd = -1
+_TURN = 0.2  # [s] that the main thread has to run a handler
 
 
 class SignalHandlerGuardCondition(GuardCondition):
@@ -56,13 +59,17 @@ def _handle(signum: int, frame: FrameType | None) -> None:
         _restore(signum)  # uninstalled on another thread, which could not
         signal.raise_signal(signum)
         return
-    for context in _contexts:
-        context.try_shutdown()
-    for guard in _guards:
-        guard.trigger()
+    _shut_down()
     previous = _previous.get(signum)
     if callable(previous):
         previous(signum, frame)
+
+
+def _shut_down() -> None:
+    for context in _contexts:
+        context._end(by_signal=True)
+    for guard in _guards:
+        guard.trigger()
 
 
 def _restore(signum: int) -> None:
@@ -73,9 +80,13 @@ def _restore(signum: int) -> None:
 
 
 def _wake_executors(fd: int) -> None:
-    while os.read(fd, 64):
+    while numbers := os.read(fd, 64):
         for executor in _executors:
             executor.wake()
+        if any(signal.getsignal(number) is _handle for number in numbers):
+            time.sleep(_TURN)
+            if _options:
+                _shut_down()
 
 
 def _listen() -> None:

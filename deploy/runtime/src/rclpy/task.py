@@ -39,9 +39,11 @@ class Future:
         if self._exception is not None and not self._exception_fetched:
             print(f"The following exception was never retrieved: {self._exception}", file=sys.stderr)
 
-    def __await__(self) -> Generator[Future, None, Any]:
+    def __await__(self) -> Generator[None, None, Any]:
         while not self._is_over():
-            yield self
+            # Told aside: asyncio, whose tasks may await this too, takes None for "again later".
+            _step.awaited = self
+            yield
         return self.result()
 
     def cancel(self) -> None:
@@ -154,6 +156,14 @@ def _no_executor() -> None:
     return None
 
 
+class _Step(threading.local):
+    awaited: Future | None = None
+    """what the coroutine that runs in this thread awaits now"""
+
+
+_step = _Step()
+
+
 class Task(Future):
     """
     A function or coroutine that an executor runs; the future of what it returns.
@@ -223,9 +233,9 @@ class Task(Future):
             self.set_result(result)
 
     def _step(self, coroutine: Coroutine[Any, Any, Any]) -> None:
-        self._awaited = None
+        self._awaited = _step.awaited = None
         try:
-            awaited = coroutine.send(None)
+            coroutine.send(None)
         except StopIteration as stop:
             self._drop_handler()
             self.set_result(stop.value)
@@ -237,7 +247,7 @@ class Task(Future):
             self.cancel()
             raise
         else:
-            self._awaited = awaited if isinstance(awaited, Future) else None
+            self._awaited, _step.awaited = _step.awaited, None
 
     def _drop_handler(self) -> None:
         """Let go of what the handler holds; a coroutine that was cancelled runs its `finally` clauses."""

@@ -138,6 +138,10 @@ def interfaces(module_name: str) -> tuple[Callable[[str], Any], Callable[[], lis
     return get, names
 
 
+class NoActions(ImportError, NotImplementedError):
+    """Actions are not there; who can do without them expects an ImportError."""
+
+
 class _UserPackages:
     """Meta path finder and loader of the message packages in AMENT_PREFIX_PATH."""
 
@@ -163,7 +167,7 @@ class _UserPackages:
     def exec_module(self, module: ModuleType) -> None:
         """Give the module its classes."""
         if module.__name__.endswith(".action"):
-            raise NotImplementedError(f"{module.__name__}: the embedded runtime has no actions")
+            raise NoActions(f"{module.__name__}: the embedded runtime has no actions")
         if "." in module.__name__:
             vars(module)["__getattr__"], vars(module)["__dir__"] = interfaces(module.__name__)
 

@@ -182,6 +182,8 @@ class RcutilsLogger:
         name = kwargs.pop("name", self.name) if kwargs else self.name
         if kwargs:
             _check_options(kwargs)
+        if message is None or isinstance(message, bytes):  # to C, these are strings
+            message = "(null)" if message is None else message.decode(errors="replace")
         if not isinstance(message, str):
             raise TypeError(f"a log message must be a str, not {type(message).__name__}: {message!r}")
 
