@@ -203,7 +203,7 @@ def test_what_nobody_can_read_in_ros_discovery_info_is_dropped_counted_and_logge
 
     def all_are_counted() -> bool:
         node.get_node_names()  # who asks has it looked at
-        return node._graph._bad_input.count == 200
+        return node._rclpy_graph._bad_input.count == 200
 
     spin_until(all_are_counted)
     assert node.get_node_names() == ["node"]

@@ -56,7 +56,7 @@ def is_alone(node: Node) -> bool:
 
 
 def comes_true(node: Node, condition: Callable[[], bool]) -> bool:
-    return node._graph.wait_for(condition, 10, node.context.ok)
+    return node._rclpy_graph.wait_for(condition, 10, node.context.ok)
 
 
 def comes_true_by_collecting(condition: Callable[[], bool]) -> bool:
@@ -111,7 +111,7 @@ def test_a_node_that_is_dropped_waits_for_no_lock(make_node: MakeNode, context: 
     held, free = threading.Event(), threading.Event()
 
     def hold() -> None:
-        with other._graph._lock, _logging_output._rosout_lock, context._lock:
+        with other._rclpy_graph._lock, _logging_output._rosout_lock, context._lock:
             held.set()
             free.wait(10)
 
@@ -131,7 +131,7 @@ def test_the_last_node_that_is_dropped_after_the_shutdown_leaves_the_domain(doma
     context = Context()
     rclpy.init(args=[], context=context, domain_id=domain_id)
     node = Furnished("dropped", context=context)
-    listener = node._graph._listener
+    listener = node._rclpy_graph._listener
     context.shutdown()
     assert listener.is_alive()
     del node

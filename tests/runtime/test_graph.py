@@ -41,19 +41,19 @@ def announced(endpoints: list[object]) -> dict[str, tuple[str, str]]:
 
 def test_a_node_announces_the_same_writers_and_readers_as_a_real_one(make_node: MakeNode) -> None:
     node = facts_node(make_node)
-    discovery = Discovery(node._graph.participant.handle)
+    discovery = Discovery(node._rclpy_graph.participant.handle)
     assert announced(discovery.writers()) == recorded("PUB")
     assert announced(discovery.readers()) == recorded("SUB")
 
 
 def test_a_participant_announces_its_enclave_as_a_real_one(make_node: MakeNode) -> None:
     node = make_node()
-    graph = node._graph
+    graph = node._rclpy_graph
     assert Discovery(graph.participant.handle).participants()[graph.participant.gid] == "enclave=/;"
 
 
 def test_service_identifiers_have_the_form_of_the_recorded_ones(make_node: MakeNode) -> None:
-    graph = facts_node(make_node)._graph
+    graph = facts_node(make_node)._rclpy_graph
     data = [endpoint.user_data for endpoint in Discovery(graph.participant.handle).writers()]
     identifiers = [
         match[1] for text in data if (match := re.match(r"serviceid=( [0-9a-f.]+);typehash", text))

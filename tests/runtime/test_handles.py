@@ -28,7 +28,7 @@ def test_nothing_is_left_of_a_service_or_client_that_cannot_read(
 
     node = make_node()
     with monkeypatch.context() as patch:
-        patch.setattr(node._graph, "create_reader", fail)
+        patch.setattr(node._rclpy_graph, "create_reader", fail)
         with pytest.raises(RCLError, match="planted"):
             create(node)
     assert node.get_publishers_info_by_topic(topic, no_mangle=True) == []

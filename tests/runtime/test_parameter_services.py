@@ -32,7 +32,7 @@ class Node(NodeParameters):
 
     def __init__(self, *, allow_undeclared: bool = False) -> None:
         self.services: dict[str, tuple[Any, Callable[[Any, Any], Any], QoSProfile]] = {}
-        self._init_parameters({}, allow_undeclared=allow_undeclared)
+        self._rclpy_init_parameters({}, allow_undeclared=allow_undeclared)
 
     def get_name(self) -> str:
         return "node"
@@ -43,7 +43,7 @@ class Node(NodeParameters):
     def get_clock(self) -> ROSClock:
         return ROSClock()
 
-    def _publish_parameter_event(self, event: object) -> None:
+    def _rclpy_publish_parameter_event(self, event: object) -> None:
         pass
 
     def create_service(

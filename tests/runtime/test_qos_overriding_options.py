@@ -31,7 +31,7 @@ class Node(NodeParameters):
     """A node that is nothing but its parameters."""
 
     def __init__(self, **overrides: Any) -> None:
-        self._init_parameters(
+        self._rclpy_init_parameters(
             {name: Parameter(name, value=value) for name, value in overrides.items()}, allow_undeclared=False
         )
 
@@ -41,7 +41,7 @@ class Node(NodeParameters):
     def get_clock(self) -> ROSClock:
         return ROSClock()
 
-    def _publish_parameter_event(self, event: object) -> None:
+    def _rclpy_publish_parameter_event(self, event: object) -> None:
         pass
 
 

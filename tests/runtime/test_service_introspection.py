@@ -29,7 +29,7 @@ def test_a_client_is_named_by_the_identifier_it_announces_and_in_a_server_by_its
 
     (announced,) = (
         endpoint.user_data
-        for endpoint in Discovery(node._graph.participant.handle).writers()
+        for endpoint in Discovery(node._rclpy_graph.participant.handle).writers()
         if endpoint.topic == "rq/negateRequest"
     )
     identifier = ".".join(f"{octet:x}" for octet in sent)

@@ -126,7 +126,7 @@ def test_a_thousand_of_everything_leave_nothing_behind(flood: Flood, context: Co
 
     def come_to(condition: Callable[[], object]) -> None:
         """Wait for discovery, which takes its own time."""
-        assert node._graph.wait_for(lambda: bool(condition()), SECONDS, context.ok)
+        assert node._rclpy_graph.wait_for(lambda: bool(condition()), SECONDS, context.ok)
 
     def run(cycles: int) -> None:
         threads = [
@@ -170,7 +170,7 @@ def test_who_never_spins_keeps_nothing_of_what_peers_announced(
         assert node.wait_for_node("flooding", SECONDS)
     for _ in range(CYCLES):
         other.destroy_publisher(other.create_publisher(Float64, "flood", 10))
-    graph = node._graph
+    graph = node._rclpy_graph
     held = [graph._reader.condition, *(graph._discovery.gone if graph._discovery else ())]
     deadline = time.monotonic() + SECONDS
     while any(blocking.dds_triggered(condition) for condition in held):

@@ -67,4 +67,4 @@ class Owner:
             self._destroyed = True
             for handler in self.event_handlers:
                 handler.destroy()
-            self._node._graph.destroy(self._node, *self._entities)
+            self._node._rclpy_graph.destroy(self._node, *self._entities)

@@ -22,100 +22,100 @@ class NodeGraph(NodeNames):
     Everything here raises InvalidHandle when the node was destroyed, and RCLError after the shutdown.
     """
 
-    _graph: Graph
+    _rclpy_graph: Graph
 
-    def _asked(self) -> Graph:
+    def _rclpy_asked(self) -> Graph:
         """The graph, for a node that may ask."""
-        self._check_usable()
-        return self._graph
+        self._rclpy_check_usable()
+        return self._rclpy_graph
 
     def get_node_names(self) -> list[str]:
         """Return the names of all nodes, without namespaces."""
-        return [name for name, _, _ in self._asked().node_names()]
+        return [name for name, _, _ in self._rclpy_asked().node_names()]
 
     def get_fully_qualified_node_names(self) -> list[str]:
         """Return the names of all nodes, with their namespaces."""
-        return _full_names(self._asked())
+        return _full_names(self._rclpy_asked())
 
     def get_node_names_and_namespaces(self) -> list[tuple[str, str]]:
         """Return name and namespace of every node."""
-        return [(name, namespace) for name, namespace, _ in self._asked().node_names()]
+        return [(name, namespace) for name, namespace, _ in self._rclpy_asked().node_names()]
 
     def get_node_names_and_namespaces_with_enclaves(self) -> list[tuple[str, str, str]]:
         """Return name, namespace and enclave of every node."""
-        return self._asked().node_names()
+        return self._rclpy_asked().node_names()
 
     def get_topic_names_and_types(self, no_demangle: bool = False) -> NamesAndTypes:
         """Return every topic with its types; with ``no_demangle`` by its DDS names, ROS or not."""
-        return self._asked().topic_names_and_types(no_demangle)
+        return self._rclpy_asked().topic_names_and_types(no_demangle)
 
     def get_service_names_and_types(self) -> NamesAndTypes:
         """Return every service with its types."""
-        return self._asked().service_names_and_types()
+        return self._rclpy_asked().service_names_and_types()
 
     def get_publisher_names_and_types_by_node(
         self, node_name: str, node_namespace: str, no_demangle: bool = False
     ) -> NamesAndTypes:
         """Return the topics that a node publishes. Raises NodeNameNonExistentError if it is not known."""
-        return self._asked().publishers_of_node(node_name, node_namespace, no_demangle)
+        return self._rclpy_asked().publishers_of_node(node_name, node_namespace, no_demangle)
 
     def get_subscriber_names_and_types_by_node(
         self, node_name: str, node_namespace: str, no_demangle: bool = False
     ) -> NamesAndTypes:
         """Return the topics that a node subscribes to. Raises NodeNameNonExistentError if it is not known."""
-        return self._asked().subscriptions_of_node(node_name, node_namespace, no_demangle)
+        return self._rclpy_asked().subscriptions_of_node(node_name, node_namespace, no_demangle)
 
     def get_service_names_and_types_by_node(self, node_name: str, node_namespace: str) -> NamesAndTypes:
         """Return the services that a node serves. Raises NodeNameNonExistentError if it is not known."""
-        return self._asked().services_of_node(node_name, node_namespace)
+        return self._rclpy_asked().services_of_node(node_name, node_namespace)
 
     def get_client_names_and_types_by_node(self, node_name: str, node_namespace: str) -> NamesAndTypes:
         """Return the services that a node calls. Raises NodeNameNonExistentError if it is not known."""
-        return self._asked().clients_of_node(node_name, node_namespace)
+        return self._rclpy_asked().clients_of_node(node_name, node_namespace)
 
     def count_publishers(self, topic_name: str) -> int:
         """Return how many publishers a topic has; its name is not remapped."""
-        return self._asked().count_writers(self._counted_topic(topic_name))
+        return self._rclpy_asked().count_writers(self._rclpy_counted_topic(topic_name))
 
     def count_subscribers(self, topic_name: str) -> int:
         """Return how many subscriptions a topic has; its name is not remapped."""
-        return self._asked().count_readers(self._counted_topic(topic_name))
+        return self._rclpy_asked().count_readers(self._rclpy_counted_topic(topic_name))
 
     def count_services(self, service_name: str) -> int:
         """Return how many servers a service has; its name is not remapped."""
-        return self._asked().count_readers(self._counted_requests(service_name))
+        return self._rclpy_asked().count_readers(self._rclpy_counted_requests(service_name))
 
     def count_clients(self, service_name: str) -> int:
         """Return how many clients a service has; its name is not remapped."""
-        return self._asked().count_writers(self._counted_requests(service_name))
+        return self._rclpy_asked().count_writers(self._rclpy_counted_requests(service_name))
 
     def get_publishers_info_by_topic(
         self, topic_name: str, no_mangle: bool = False
     ) -> list[TopicEndpointInfo]:
         """Return who publishes a topic, and how; with ``no_mangle`` the topic's name is a DDS name."""
-        found = self._asked().writers_of(self._dds_topic(topic_name, no_mangle))
+        found = self._rclpy_asked().writers_of(self._rclpy_dds_topic(topic_name, no_mangle))
         return [_info(*one, TopicEndpointTypeEnum.PUBLISHER) for one in found]
 
     def get_subscriptions_info_by_topic(
         self, topic_name: str, no_mangle: bool = False
     ) -> list[TopicEndpointInfo]:
         """Return who subscribes to a topic, and how; with ``no_mangle`` the topic's name is a DDS name."""
-        found = self._asked().readers_of(self._dds_topic(topic_name, no_mangle))
+        found = self._rclpy_asked().readers_of(self._rclpy_dds_topic(topic_name, no_mangle))
         return [_info(*one, TopicEndpointTypeEnum.SUBSCRIPTION) for one in found]
 
-    def _dds_topic(self, name: str, no_mangle: bool = False) -> str:
-        return name if no_mangle else _names.topic_to_dds(self._remapped(name))
+    def _rclpy_dds_topic(self, name: str, no_mangle: bool = False) -> str:
+        return name if no_mangle else _names.topic_to_dds(self._rclpy_remapped(name))
 
-    def _counted_topic(self, name: str) -> str:
-        return _names.topic_to_dds(self._expanded(name))
+    def _rclpy_counted_topic(self, name: str) -> str:
+        return _names.topic_to_dds(self._rclpy_expanded(name))
 
-    def _counted_requests(self, name: str) -> str:
-        return _names.request_to_dds(self._expanded(name, is_service=True))
+    def _rclpy_counted_requests(self, name: str) -> str:
+        return _names.request_to_dds(self._rclpy_expanded(name, is_service=True))
 
     def wait_for_node(self, fully_qualified_node_name: str, timeout: float) -> bool:
         """Wait until a node is there; ``False`` if that takes longer than ``timeout`` seconds."""
         name = "/" + fully_qualified_node_name.lstrip("/")
-        graph = self._asked()
+        graph = self._rclpy_asked()
         return graph.wait_for(lambda: name in _full_names(graph), timeout, self.context.ok)
 
 

@@ -15,14 +15,19 @@ if TYPE_CHECKING:
 
 
 class NodeNames:
-    """The node's own name, and those that it gives to topics and services."""
+    """
+    The node's own name, and those that it gives to topics and services.
+
+    Users subclass `Node`, and take any private name that rclpy's does not have for their own: what only the
+    embedded runtime has, here and in the other parts of `Node`, begins with ``_rclpy_``.
+    """
 
     _context: Context
-    _arguments: RosArguments
-    _name: str
-    _namespace: str
-    _fully_qualified_name: str
-    _destroyed = False
+    _rclpy_arguments: RosArguments
+    _rclpy_name: str
+    _rclpy_namespace: str
+    _rclpy_fully_qualified_name: str
+    _rclpy_destroyed = False
 
     @property
     def context(self) -> Context:
@@ -32,35 +37,35 @@ class NodeNames:
     @property
     def handle(self) -> Handle:
         """What stands for the node. Raises InvalidHandle when it was destroyed."""
-        self._check_exists()
+        self._rclpy_check_exists()
         return Handle()
 
-    def _check_exists(self) -> None:
-        if self._destroyed:
-            raise InvalidHandle(f"cannot use node {self._fully_qualified_name}: it was destroyed")
+    def _rclpy_check_exists(self) -> None:
+        if self._rclpy_destroyed:
+            raise InvalidHandle(f"cannot use node {self._rclpy_fully_qualified_name}: it was destroyed")
 
-    def _check_usable(self) -> None:
+    def _rclpy_check_usable(self) -> None:
         """
         Check that it can be used in its domain.
 
         :raises InvalidHandle: if it was destroyed.
         :raises RCLError: if the context was shut down.
         """
-        self._check_exists()
+        self._rclpy_check_exists()
         if not self._context.ok():
-            raise RCLError(f"cannot use node {self._fully_qualified_name}: the context was shut down")
+            raise RCLError(f"cannot use node {self._rclpy_fully_qualified_name}: the context was shut down")
 
     def get_name(self) -> str:
         """Return its name."""
-        return self._name
+        return self._rclpy_name
 
     def get_namespace(self) -> str:
         """Return its namespace."""
-        return self._namespace
+        return self._rclpy_namespace
 
     def get_fully_qualified_name(self) -> str:
         """Return its namespace and name."""
-        return self._fully_qualified_name
+        return self._rclpy_fully_qualified_name
 
     def resolve_topic_name(self, topic: str, *, only_expand: bool = False) -> str:
         """
@@ -68,7 +73,7 @@ class NodeNames:
 
         :raises RCLError: if the name is invalid.
         """
-        return self._resolve(topic, only_expand, is_service=False)
+        return self._rclpy_resolve(topic, only_expand, is_service=False)
 
     def resolve_service_name(self, service: str, *, only_expand: bool = False) -> str:
         """
@@ -76,27 +81,29 @@ class NodeNames:
 
         :raises RCLError: if the name is invalid.
         """
-        return self._resolve(service, only_expand, is_service=True)
+        return self._rclpy_resolve(service, only_expand, is_service=True)
 
-    def _resolve(self, name: str, only_expand: bool, *, is_service: bool) -> str:
+    def _rclpy_resolve(self, name: str, only_expand: bool, *, is_service: bool) -> str:
         try:
-            expand = self._expanded if only_expand else self._remapped
+            expand = self._rclpy_expanded if only_expand else self._rclpy_remapped
             return expand(name, is_service=is_service)
         except (ValueError, NameValidationException) as error:
             raise RCLError(f"failed to resolve name: {error}") from error
 
-    def _expanded(self, name: str, *, is_service: bool = False) -> str:
+    def _rclpy_expanded(self, name: str, *, is_service: bool = False) -> str:
         """
         Return the fully qualified name of a topic or service.
 
         :raises ValueError: if the name as it stands is invalid.
         :raises InvalidTopicNameException, InvalidServiceNameException: if it is once expanded.
         """
-        expanded = expand_topic_name(name, self._name, self._namespace)
+        expanded = expand_topic_name(name, self._rclpy_name, self._rclpy_namespace)
         validate_full_topic_name(expanded, is_service=is_service)
         return expanded
 
-    def _remapped(self, name: str, *, is_service: bool = False) -> str:
-        """Return the fully qualified name as the arguments remap it. Raises what :meth:`_expanded` does."""
-        remap = self._arguments.remap_service if is_service else self._arguments.remap_topic
-        return remap(self._expanded(name, is_service=is_service), self._name, self._namespace)
+    def _rclpy_remapped(self, name: str, *, is_service: bool = False) -> str:
+        """Return the fully qualified name, remapped. Raises what :meth:`_rclpy_expanded` does."""
+        remap = self._rclpy_arguments.remap_service if is_service else self._rclpy_arguments.remap_topic
+        return remap(
+            self._rclpy_expanded(name, is_service=is_service), self._rclpy_name, self._rclpy_namespace
+        )

@@ -40,14 +40,14 @@ class NodeParameters(NodeNames):
     """
     Parameters by name, each with a descriptor, and the callbacks that have a say in them.
 
-    A node inherits from this class, calls `_init_parameters` when its clock exists and publishes what it is
-    handed in `_publish_parameter_event`.
+    A node inherits from this class, calls `_rclpy_init_parameters` when its clock exists and publishes what
+    it is handed in `_rclpy_publish_parameter_event`.
     """
 
     PARAM_REL_TOL = 1e-6
     """How close a double must be to a bound or step of its range, relative to its value."""
 
-    def _init_parameters(self, overrides: dict[str, Parameter], *, allow_undeclared: bool) -> None:
+    def _rclpy_init_parameters(self, overrides: dict[str, Parameter], *, allow_undeclared: bool) -> None:
         """
         Begin without parameters.
 
@@ -62,7 +62,7 @@ class NodeParameters(NodeNames):
         self._on_set_parameters_callbacks: list[Callable[[list[Parameter]], SetParametersResult]] = []
         self._post_set_parameters_callbacks: list[Callable[[list[Parameter]], None]] = []
 
-    def _declare_overrides(self) -> None:
+    def _rclpy_declare_overrides(self) -> None:
         """Declare a parameter for each override (`automatically_declare_parameters_from_overrides`)."""
         self.declare_parameters(
             "",
@@ -70,7 +70,7 @@ class NodeParameters(NodeNames):
             ignore_override=True,
         )
 
-    def _publish_parameter_event(self, event: ParameterEvent) -> None:
+    def _rclpy_publish_parameter_event(self, event: ParameterEvent) -> None:
         """Tell the world what has changed: the node publishes on `/parameter_events`."""
         raise NotImplementedError
 
@@ -134,11 +134,11 @@ class NodeParameters(NodeNames):
         if again:
             raise ParameterAlreadyDeclaredException(again)
         for parameter, descriptor in declared:
-            self._declare(parameter, descriptor)
+            self._rclpy_declare(parameter, descriptor)
         return [self._parameters[parameter.name] for parameter, _ in declared]
 
-    def _declare(self, parameter: Parameter, descriptor: ParameterDescriptor) -> None:
-        result = self._change([parameter], {parameter.name: descriptor}, keep_unset=True)
+    def _rclpy_declare(self, parameter: Parameter, descriptor: ParameterDescriptor) -> None:
+        result = self._rclpy_change([parameter], {parameter.name: descriptor}, keep_unset=True)
         if result.successful:
             return
         if result.reason.startswith("Wrong parameter type"):
@@ -293,9 +293,9 @@ class NodeParameters(NodeNames):
         ]
         if undeclared and not self._allow_undeclared_parameters:
             raise ParameterNotDeclaredException(undeclared)
-        return self._change(parameter_list)
+        return self._rclpy_change(parameter_list)
 
-    def _change(
+    def _rclpy_change(
         self,
         parameters: list[Parameter],
         descriptors: dict[str, ParameterDescriptor] | None = None,
@@ -309,7 +309,7 @@ class NodeParameters(NodeNames):
         """
         for parameter in parameters:
             descriptor = (descriptors or self._descriptors).get(parameter.name)
-            reason = self._objection(parameter, descriptor, new=descriptors is not None)
+            reason = self._rclpy_objection(parameter, descriptor, new=descriptors is not None)
             if reason:
                 return SetParametersResult(successful=False, reason=reason)
         # A copy, since a callback may remove itself.
@@ -328,14 +328,16 @@ class NodeParameters(NodeNames):
             (event.new_parameters if is_new else event.changed_parameters).append(
                 parameter.to_parameter_msg()
             )
-            self._store(parameter, descriptors[parameter.name] if descriptors else None)
+            self._rclpy_store(parameter, descriptors[parameter.name] if descriptors else None)
         event.stamp = self.get_clock().now().to_msg()
-        self._publish_parameter_event(event)
+        self._rclpy_publish_parameter_event(event)
         for tell in list(self._post_set_parameters_callbacks):
             tell(parameters)
         return SetParametersResult(successful=True)
 
-    def _objection(self, parameter: Parameter, descriptor: ParameterDescriptor | None, *, new: bool) -> str:
+    def _rclpy_objection(
+        self, parameter: Parameter, descriptor: ParameterDescriptor | None, *, new: bool
+    ) -> str:
         """Say why a parameter cannot be set so; '' if it can. A new descriptor's read-only is for later."""
         if descriptor is None:
             return ""
@@ -346,7 +348,7 @@ class NodeParameters(NodeNames):
             return "Static parameter cannot be undeclared"
         return objection(parameter, descriptor, self.PARAM_REL_TOL)
 
-    def _store(self, parameter: Parameter, descriptor: ParameterDescriptor | None) -> None:
+    def _rclpy_store(self, parameter: Parameter, descriptor: ParameterDescriptor | None) -> None:
         """Set a parameter that passed all checks; without any descriptor it is dynamically typed."""
         if descriptor is None:
             descriptor = self._descriptors.get(parameter.name) or ParameterDescriptor(dynamic_typing=True)
@@ -428,13 +430,13 @@ class NodeParameters(NodeNames):
 
         parameter = self.get_parameter(name)
         descriptor = copy.copy(descriptor)
-        reason = self._objection(parameter, descriptor, new=True)
+        reason = self._rclpy_objection(parameter, descriptor, new=True)
         if reason and alternative_value is not None:
             parameter = Parameter.from_parameter_msg(ParameterMsg(name=name, value=alternative_value))
-            reason = self._objection(parameter, descriptor, new=True)
+            reason = self._rclpy_objection(parameter, descriptor, new=True)
         if reason:
             raise InvalidParameterValueException(name, parameter.value, reason)
-        self._store(parameter, descriptor)
+        self._rclpy_store(parameter, descriptor)
         return parameter.get_parameter_value()
 
 

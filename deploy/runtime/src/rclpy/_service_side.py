@@ -74,7 +74,7 @@ class ServiceSide(Owner):
         elif self._introspection is not None:
             self._introspection = replace(self._introspection, state=introspection_state)
         else:
-            publisher = self._node._create_own_publisher(
+            publisher = self._node._rclpy_create_own_publisher(
                 self.srv_type.Event, f"{self._name}/_service_event", service_event_qos_profile
             )
             self._introspection = _Introspection(publisher, clock, introspection_state)

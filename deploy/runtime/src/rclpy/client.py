@@ -101,7 +101,7 @@ class Client(ServiceSide):
     def wait_for_service(self, timeout_sec: float | None = None) -> bool:
         """Wait for a server, at most ``timeout_sec`` (``None``: for ever). ``False`` if none came."""
         timeout = None if timeout_sec is None else max(0.0, timeout_sec)
-        return self._node._graph.wait_for(self.service_is_ready, timeout, self.context.ok)
+        return self._node._rclpy_graph.wait_for(self.service_is_ready, timeout, self.context.ok)
 
     # What the executor asks of everything it waits for.
 

@@ -163,7 +163,7 @@ class Executor(AbstractContextManager["Executor"]):
             if node.executor is not None:
                 node.executor.remove_node(node)
             self._nodes.append(node)
-        node._set_executor(self)
+        node._rclpy_set_executor(self)
         self._entities_have_changed()
         return True
 
@@ -173,7 +173,7 @@ class Executor(AbstractContextManager["Executor"]):
             if node not in self._nodes:
                 return
             self._nodes.remove(node)
-        node._set_executor(None)
+        node._rclpy_set_executor(None)
         self._entities_have_changed()
 
     def get_nodes(self) -> list[Node]:
@@ -274,7 +274,7 @@ class Executor(AbstractContextManager["Executor"]):
             if nodes is not None:
                 self._wait_only_for(None)
         candidates = self.get_nodes() if nodes is None else nodes
-        node = next((node for node in candidates if entity in node._entities()), None)
+        node = next((node for node in candidates if entity in node._rclpy_entities()), None)
         task = Task(self._run, (entity, taken), executor=self)
         # Whoever waits here on another thread than the task's may have to wait for more from then on.
         task._call_when_complete(self.wake)
@@ -375,7 +375,7 @@ class Executor(AbstractContextManager["Executor"]):
         """Bring the wait set up to the entities that the nodes have now."""
         self._entities_changed = False  # first: what changes from now on is seen in the next round
         nodes = self.get_nodes() if self._only_nodes is None else self._only_nodes
-        seen = [(node, node._entities_version) for node in nodes]
+        seen = [(node, node._rclpy_entities_version) for node in nodes]
         if seen == self._seen:
             return  # rclpy.spin_once() adds and removes its node with every call
         self._seen = seen
@@ -384,7 +384,7 @@ class Executor(AbstractContextManager["Executor"]):
         for node in nodes:
             self._timers.extend(node.timers)
             self._guards.extend(node.guards)
-            for entity in node._waitables():
+            for entity in node._rclpy_waitables():
                 for handle in entity._handles:
                     wanted[handle] = entity
         for handle in [handle for handle in self._tokens if handle not in wanted]:

@@ -117,42 +117,46 @@ class Node(NodeParameters, NodeGraph):
         validate_namespace(namespace)
         process_arguments = self._context._arguments if use_global_arguments else parse([])
         own_arguments = parse(cli_args or [])
-        self._arguments = own_arguments.before(process_arguments)
-        self._name, self._namespace = self._arguments.node_name(node_name, namespace)
-        self._fully_qualified_name = f"{self._namespace.rstrip('/')}/{self._name}"
-        self._logger = get_logger(self._fully_qualified_name.lstrip("/").replace("/", "."))
+        self._rclpy_arguments = own_arguments.before(process_arguments)
+        self._rclpy_name, self._rclpy_namespace = self._rclpy_arguments.node_name(node_name, namespace)
+        self._rclpy_fully_qualified_name = f"{self._rclpy_namespace.rstrip('/')}/{self._rclpy_name}"
+        self._logger = get_logger(self._rclpy_fully_qualified_name.lstrip("/").replace("/", "."))
         self._clock = ROSClock()
-        self._executor: weakref.ref[Executor] | None = None
+        self._rclpy_executor: weakref.ref[Executor] | None = None
         self._publishers: list[Publisher] = []
         self._subscriptions: list[Subscription] = []
         self._services: list[Service] = []
         self._clients: list[Client] = []
         self._timers: list[Timer] = []
         self._guards: list[GuardCondition] = []
-        self._rates: dict[Rate, Timer] = {}
-        self._events: dict[Publisher | Subscription, EndpointEvents] = {}
-        self._used_types: set[Any] = set()  # of messages and services, for who asks what they look like
-        self._entities_version = 0
+        self._rclpy_rates: dict[Rate, Timer] = {}
+        self._rclpy_events: dict[Publisher | Subscription, EndpointEvents] = {}
+        self._rclpy_used_types: set[Any] = set()  # of messages and services, for who asks what they look like
+        self._rclpy_entities_version = 0
         self._default_callback_group = MutuallyExclusiveCallbackGroup()
 
-        overrides = self._arguments.parameter_overrides(self._fully_qualified_name)
+        overrides = self._rclpy_arguments.parameter_overrides(self._rclpy_fully_qualified_name)
         overrides.update({parameter.name: parameter for parameter in parameter_overrides or []})
-        self._init_parameters(overrides, allow_undeclared=allow_undeclared_parameters)
+        self._rclpy_init_parameters(overrides, allow_undeclared=allow_undeclared_parameters)
 
-        self._rosout_publisher: Publisher | None = None
-        self._log_listener = _weakly(self._publish_log)
-        self._graph = self._context._join_domain(self)
-        with self._graph.one_announcement():
-            self._graph.add_node(self, partial(_forget_dropped, self._context, self._log_listener))
+        self._rclpy_rosout_publisher: Publisher | None = None
+        self._rclpy_log_listener = _weakly(self._rclpy_publish_log)
+        self._rclpy_graph = self._context._join_domain(self)
+        with self._rclpy_graph.one_announcement():
+            self._rclpy_graph.add_node(
+                self, partial(_forget_dropped, self._context, self._rclpy_log_listener)
+            )
             try:
                 if enable_rosout and self._context._arguments.rosout_logs:
-                    self._rosout_publisher = self._create_own_publisher(Log, "/rosout", _ROSOUT_QOS)
-                    _logging_output.add_rosout_publisher(self._logger.name, self._log_listener)
+                    self._rclpy_rosout_publisher = self._rclpy_create_own_publisher(
+                        Log, "/rosout", _ROSOUT_QOS
+                    )
+                    _logging_output.add_rosout_publisher(self._logger.name, self._rclpy_log_listener)
                 self._parameter_event_publisher = self.create_publisher(
                     ParameterEvent, "/parameter_events", qos_profile_parameter_events
                 )
                 if automatically_declare_parameters_from_overrides:
-                    self._declare_overrides()
+                    self._rclpy_declare_overrides()
                 self._time_source = TimeSource(node=self)
                 self._time_source.attach_clock(self._clock)
                 if start_parameter_services:
@@ -184,7 +188,7 @@ class Node(NodeParameters, NodeGraph):
     @property
     def executor(self) -> Executor | None:
         """The executor that runs its callbacks, if there is one."""
-        return None if self._executor is None else self._executor()
+        return None if self._rclpy_executor is None else self._rclpy_executor()
 
     @executor.setter
     def executor(self, new_executor: Executor | None) -> None:
@@ -196,32 +200,32 @@ class Node(NodeParameters, NodeGraph):
         if new_executor is not None:
             new_executor.add_node(self)
 
-    def _set_executor(self, executor: Executor | None) -> None:
-        self._executor = None if executor is None else weakref.ref(executor)
+    def _rclpy_set_executor(self, executor: Executor | None) -> None:
+        self._rclpy_executor = None if executor is None else weakref.ref(executor)
 
     def _wake_executor(self) -> None:
         executor = self.executor
         if executor is not None:
             executor._wake_if_waiting()
 
-    def _entities_have_changed(self) -> None:
-        self._entities_version += 1
+    def _rclpy_entities_have_changed(self) -> None:
+        self._rclpy_entities_version += 1
         executor = self.executor
         if executor is not None:
             executor._entities_have_changed()
 
-    def _waitables(self) -> list[Any]:
+    def _rclpy_waitables(self) -> list[Any]:
         """What an executor waits for in DDS."""
         return [
             *list(self._subscriptions),
             *list(self._services),
             *list(self._clients),
-            *list(self._events.values()),
+            *list(self._rclpy_events.values()),
         ]
 
-    def _entities(self) -> list[Any]:
+    def _rclpy_entities(self) -> list[Any]:
         """Everything that runs a callback."""
-        return [*self._waitables(), *list(self._timers), *list(self._guards)]
+        return [*self._rclpy_waitables(), *list(self._timers), *list(self._guards)]
 
     # What it has
 
@@ -292,11 +296,11 @@ class Node(NodeParameters, NodeGraph):
         :param qos_overriding_options: which policies parameters may override.
         :raises InvalidTopicNameException: if the topic's name is invalid.
         """
-        profile, name = self._endpoint_options(
+        profile, name = self._rclpy_endpoint_options(
             Publisher, msg_type, topic, qos_profile, qos_overriding_options
         )
         dds_name = _names.topic_to_dds(name, avoid_conventions=profile.avoid_ros_namespace_conventions)
-        writer = self._graph.create_writer(self, dds_name, msg_type, profile)
+        writer = self._rclpy_graph.create_writer(self, dds_name, msg_type, profile)
         try:
             publisher = publisher_class(
                 PublisherEndpoint(self, name, writer),
@@ -307,14 +311,14 @@ class Node(NodeParameters, NodeGraph):
                 callback_group=callback_group or self._default_callback_group,
             )
         except Exception:
-            self._graph.destroy(self, writer)
+            self._rclpy_graph.destroy(self, writer)
             raise
         if publisher.event_handlers:
-            self._events[publisher] = EndpointEvents(publisher.event_handlers, writer)
-        self._add(self._publishers, publisher)
+            self._rclpy_events[publisher] = EndpointEvents(publisher.event_handlers, writer)
+        self._rclpy_add(self._publishers, publisher)
         return publisher
 
-    def _create_own_publisher(self, msg_type: Any, topic: str, qos_profile: QoSProfile) -> Publisher:
+    def _rclpy_create_own_publisher(self, msg_type: Any, topic: str, qos_profile: QoSProfile) -> Publisher:
         """A publisher that is not the user's: it is not listed, and nobody hears of its events."""
         silent = PublisherEventCallbacks(use_default_callbacks=False)
         publisher = self.create_publisher(msg_type, topic, qos_profile, event_callbacks=silent)
@@ -343,11 +347,11 @@ class Node(NodeParameters, NodeGraph):
         :param raw: whether to call back with serialized messages (``bytes``).
         :raises InvalidTopicNameException: if the topic's name is invalid.
         """
-        profile, name = self._endpoint_options(
+        profile, name = self._rclpy_endpoint_options(
             Subscription, msg_type, topic, qos_profile, qos_overriding_options
         )
         dds_name = _names.topic_to_dds(name, avoid_conventions=profile.avoid_ros_namespace_conventions)
-        reader = self._graph.create_reader(self, dds_name, msg_type, profile)
+        reader = self._rclpy_graph.create_reader(self, dds_name, msg_type, profile)
         group = callback_group or self._default_callback_group
         try:
             subscription = Subscription(
@@ -361,15 +365,15 @@ class Node(NodeParameters, NodeGraph):
                 event_callbacks or SubscriptionEventCallbacks(),
             )
         except Exception:
-            self._graph.destroy(self, reader)
+            self._rclpy_graph.destroy(self, reader)
             raise
         group.add_entity(subscription)
         if subscription.event_handlers:
-            self._events[subscription] = EndpointEvents(subscription.event_handlers, reader)
-        self._add(self._subscriptions, subscription)
+            self._rclpy_events[subscription] = EndpointEvents(subscription.event_handlers, reader)
+        self._rclpy_add(self._subscriptions, subscription)
         return subscription
 
-    def _endpoint_options(
+    def _rclpy_endpoint_options(
         self,
         kind: type[Publisher] | type[Subscription],
         msg_type: Any,
@@ -378,9 +382,9 @@ class Node(NodeParameters, NodeGraph):
         overriding: QoSOverridingOptions | None,
     ) -> tuple[QoSProfile, str]:
         """The profile, with its overrides, and the fully qualified name of a new endpoint's topic."""
-        self._check_usable()
+        self._rclpy_check_usable()
         check_is_valid_msg_type(msg_type)
-        self._used_types.add(msg_type)
+        self._rclpy_used_types.add(msg_type)
         if isinstance(qos_profile, QoSProfile):
             profile = qos_profile
         elif isinstance(qos_profile, int):
@@ -390,7 +394,7 @@ class Node(NodeParameters, NodeGraph):
         else:
             raise TypeError(f"Expected QoSProfile or int, but received {type(qos_profile)!r}")
         validate_topic_name(topic)
-        name = self._remapped(topic)
+        name = self._rclpy_remapped(topic)
         if overriding is not None:
             _declare_qos_parameters(kind, self, name, profile, overriding)
         return profile, name
@@ -411,10 +415,10 @@ class Node(NodeParameters, NodeGraph):
         :raises InvalidServiceNameException: if its name is invalid.
         """
         group = callback_group or self._default_callback_group
-        endpoint = self._service_endpoint(srv_type, srv_name, qos_profile, is_server=True)
+        endpoint = self._rclpy_service_endpoint(srv_type, srv_name, qos_profile, is_server=True)
         service = Service(endpoint, srv_type, srv_name, callback, group, qos_profile)
         group.add_entity(service)
-        self._add(self._services, service)
+        self._rclpy_add(self._services, service)
         return service
 
     def create_client(
@@ -431,22 +435,22 @@ class Node(NodeParameters, NodeGraph):
         :raises InvalidServiceNameException: if the service's name is invalid.
         """
         group = callback_group or self._default_callback_group
-        endpoint = self._service_endpoint(srv_type, srv_name, qos_profile, is_server=False)
+        endpoint = self._rclpy_service_endpoint(srv_type, srv_name, qos_profile, is_server=False)
         client = Client(self._context, endpoint, srv_type, srv_name, qos_profile, group)
         group.add_entity(client)
-        self._add(self._clients, client)
+        self._rclpy_add(self._clients, client)
         return client
 
-    def _service_endpoint(
+    def _rclpy_service_endpoint(
         self, srv_type: Any, srv_name: str, profile: QoSProfile, *, is_server: bool
     ) -> ServiceEndpoint:
-        self._check_usable()
+        self._rclpy_check_usable()
         check_is_valid_srv_type(srv_type)
-        self._used_types.add(srv_type)
+        self._rclpy_used_types.add(srv_type)
         validate_topic_name(srv_name, is_service=True)
-        name = self._remapped(srv_name, is_service=True)
+        name = self._rclpy_remapped(srv_name, is_service=True)
         profile = _best_available.for_service(profile)
-        graph = self._graph
+        graph = self._rclpy_graph
         identifier = graph.next_service_id()
         text = ".".join(f"{octet:x}" for octet in identifier)
         identity = f"{'serviceid' if is_server else 'clientid'}= {text};"
@@ -476,7 +480,7 @@ class Node(NodeParameters, NodeGraph):
         :param clock: the clock it runs by; the node's if ``None``.
         :param autostart: whether it runs at once, or waits for :meth:`rclpy.timer.Timer.reset`.
         """
-        self._check_usable()
+        self._rclpy_check_usable()
         group = callback_group or self._default_callback_group
         timer = Timer(
             callback,
@@ -488,19 +492,19 @@ class Node(NodeParameters, NodeGraph):
         )
         timer._on_change = self._wake_executor
         group.add_entity(timer)
-        self._add(self._timers, timer)
+        self._rclpy_add(self._timers, timer)
         return timer
 
     def create_guard_condition(
         self, callback: Callable[[], Any], callback_group: CallbackGroup | None = None
     ) -> GuardCondition:
         """Create a guard condition, whose callback runs after each trigger."""
-        self._check_usable()
+        self._rclpy_check_usable()
         group = callback_group or self._default_callback_group
         guard = GuardCondition(callback, group, context=self._context)
         guard._on_change = self._wake_executor
         group.add_entity(guard)
-        self._add(self._guards, guard)
+        self._rclpy_add(self._guards, guard)
         return guard
 
     def create_rate(self, frequency: float, clock: Clock | None = None) -> Rate:
@@ -516,52 +520,52 @@ class Node(NodeParameters, NodeGraph):
         group = MutuallyExclusiveCallbackGroup()
         timer = self.create_timer(1.0 / frequency, lambda: None, group, clock)
         rate = Rate(timer, context=self._context)
-        self._rates[rate] = timer
+        self._rclpy_rates[rate] = timer
         return rate
 
-    def _add(self, entities: list[_Entity], entity: _Entity) -> None:
+    def _rclpy_add(self, entities: list[_Entity], entity: _Entity) -> None:
         entities.append(entity)
-        self._entities_have_changed()
+        self._rclpy_entities_have_changed()
 
     # Destroying
 
-    def _destroy(self, entities: list[Any], entity: Any) -> bool:
+    def _rclpy_destroy(self, entities: list[Any], entity: Any) -> bool:
         try:
             entities.remove(entity)
         except ValueError:
             return False
-        self._events.pop(entity, None)
+        self._rclpy_events.pop(entity, None)
         entity.destroy()
-        self._entities_have_changed()
+        self._rclpy_entities_have_changed()
         return True
 
     def destroy_publisher(self, publisher: Publisher) -> bool:
         """End a publisher; ``False`` if it is none of this node's."""
-        return self._destroy(self._publishers, publisher)
+        return self._rclpy_destroy(self._publishers, publisher)
 
     def destroy_subscription(self, subscription: Subscription) -> bool:
         """End a subscription; ``False`` if it is none of this node's."""
-        return self._destroy(self._subscriptions, subscription)
+        return self._rclpy_destroy(self._subscriptions, subscription)
 
     def destroy_client(self, client: Client) -> bool:
         """End a client; ``False`` if it is none of this node's."""
-        return self._destroy(self._clients, client)
+        return self._rclpy_destroy(self._clients, client)
 
     def destroy_service(self, service: Service) -> bool:
         """End a service; ``False`` if it is none of this node's."""
-        return self._destroy(self._services, service)
+        return self._rclpy_destroy(self._services, service)
 
     def destroy_timer(self, timer: Timer) -> bool:
         """End a timer; ``False`` if it is none of this node's."""
-        return self._destroy(self._timers, timer)
+        return self._rclpy_destroy(self._timers, timer)
 
     def destroy_guard_condition(self, guard: GuardCondition) -> bool:
         """End a guard condition; ``False`` if it is none of this node's."""
-        return self._destroy(self._guards, guard)
+        return self._rclpy_destroy(self._guards, guard)
 
     def destroy_rate(self, rate: Rate) -> bool:
         """End a rate and wake who sleeps by it; ``False`` if it is none of this node's."""
-        timer = self._rates.pop(rate, None)
+        timer = self._rclpy_rates.pop(rate, None)
         if timer is None:
             return False
         rate.destroy()
@@ -569,18 +573,18 @@ class Node(NodeParameters, NodeGraph):
 
     def destroy_node(self) -> None:
         """End the node and everything it has. Nothing of it may be used afterwards."""
-        if self._destroyed:
+        if self._rclpy_destroyed:
             return
         executor = self.executor
         if executor is not None:
             executor.remove_node(self)
-        for rate in list(self._rates):
+        for rate in list(self._rclpy_rates):
             self.destroy_rate(rate)
-        with self._graph.one_announcement():
-            if self._rosout_publisher is not None:
-                _logging_output.remove_rosout_publisher(self._log_listener)
-                self._rosout_publisher.destroy()
-            self._destroyed = True
+        with self._rclpy_graph.one_announcement():
+            if self._rclpy_rosout_publisher is not None:
+                _logging_output.remove_rosout_publisher(self._rclpy_log_listener)
+                self._rclpy_rosout_publisher.destroy()
+            self._rclpy_destroyed = True
             for entities in (
                 self._publishers,
                 self._subscriptions,
@@ -590,18 +594,18 @@ class Node(NodeParameters, NodeGraph):
                 self._guards,
             ):
                 for entity in list(entities):
-                    self._destroy(entities, entity)
-            self._graph.remove_node(self)
+                    self._rclpy_destroy(entities, entity)
+            self._rclpy_graph.remove_node(self)
         self._context._forget(self)
 
     # What it tells the world of itself
 
-    def _publish_parameter_event(self, event: ParameterEvent) -> None:
+    def _rclpy_publish_parameter_event(self, event: ParameterEvent) -> None:
         self._parameter_event_publisher.publish(event)
 
-    def _publish_log(self, record: _logging_output.LogRecord) -> None:
-        publisher = self._rosout_publisher
-        if publisher is None or self._destroyed or not self._context.ok():
+    def _rclpy_publish_log(self, record: _logging_output.LogRecord) -> None:
+        publisher = self._rclpy_rosout_publisher
+        if publisher is None or self._rclpy_destroyed or not self._context.ok():
             return
         message = Log()
         message.stamp.sec, message.stamp.nanosec = divmod(record.stamp, S_TO_NS)

@@ -54,7 +54,7 @@ class TypeDescriptionService:
         """Answer as rcl does: the hash says which type is meant, whatever the name, and it must be in use."""
         from rosidl_runtime_embedded.type_description import type_description, type_sources
 
-        names = {used._TYPE_HASH: used._TYPE_NAME for used in list(self._node._used_types)}
+        names = {used._TYPE_HASH: used._TYPE_NAME for used in list(self._node._rclpy_used_types)}
         name = names.get(request.type_hash)
         if name is None:
             known = TypeHash._parse(request.type_hash) != TypeHash()

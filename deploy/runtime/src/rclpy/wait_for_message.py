@@ -57,13 +57,13 @@ class _NodeWithOnly:
     timers = ()
     guards = ()
     executor = None
-    _entities_version = 0
+    _rclpy_entities_version = 0
 
     def __init__(self, subscription: Subscription) -> None:
         self._subscription = subscription
 
-    def _waitables(self) -> list[Subscription]:
+    def _rclpy_waitables(self) -> list[Subscription]:
         return [self._subscription]
 
-    def _set_executor(self, executor: Executor | None) -> None:
+    def _rclpy_set_executor(self, executor: Executor | None) -> None:
         pass
