@@ -1,4 +1,4 @@
-"""The end of the interpreter while nodes are at work, without rclpy.shutdown(); ROS 2's rclpy aborts there."""
+"""The end of the interpreter while nodes work, without rclpy.shutdown(); ROS 2's own rclpy aborts there."""
 
 from __future__ import annotations
 
