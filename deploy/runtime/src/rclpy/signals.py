@@ -11,6 +11,7 @@ import os
 import signal
 import threading
 import time
+from collections.abc import Iterable
 from enum import IntEnum
 from types import FrameType
 from typing import TYPE_CHECKING, Any
@@ -59,14 +60,14 @@ def _handle(signum: int, frame: FrameType | None) -> None:
         _restore(signum)  # uninstalled on another thread, which could not
         signal.raise_signal(signum)
         return
-    _shut_down()
+    _shut_down(_contexts)
     previous = _previous.get(signum)
     if callable(previous):
         previous(signum, frame)
 
 
-def _shut_down() -> None:
-    for context in _contexts:
+def _shut_down(contexts: Iterable[Context]) -> None:
+    for context in contexts:
         context._end(by_signal=True)
     for guard in _guards:
         guard.trigger()
@@ -81,12 +82,15 @@ def _restore(signum: int) -> None:
 
 def _wake_executors(fd: int) -> None:
     while numbers := os.read(fd, 64):
+        contexts = [context for context in _contexts if context._valid]
         for executor in _executors:
             executor.wake()
-        if any(signal.getsignal(number) is _handle for number in numbers):
+        if contexts and any(signal.getsignal(number) is _handle for number in numbers):
             time.sleep(_TURN)
-            if _options:
-                _shut_down()
+            # Not those that have begun since: whoever began them has heard of the signal.
+            left = [context for context in contexts if context._valid]
+            if left and _options:
+                _shut_down(left)
 
 
 def _listen() -> None:
