@@ -42,7 +42,7 @@ class Future:
     def __await__(self) -> Generator[None, None, Any]:
         while not self._is_over():
             # Told aside: asyncio, whose tasks may await this too, takes None for "again later".
-            _step.awaited = self
+            _running.awaited = self
             yield
         return self.result()
 
@@ -156,12 +156,12 @@ def _no_executor() -> None:
     return None
 
 
-class _Step(threading.local):
+class _Running(threading.local):
     awaited: Future | None = None
     """what the coroutine that runs in this thread awaits now"""
 
 
-_step = _Step()
+_running = _Running()
 
 
 class Task(Future):
@@ -233,7 +233,7 @@ class Task(Future):
             self.set_result(result)
 
     def _step(self, coroutine: Coroutine[Any, Any, Any]) -> None:
-        self._awaited = _step.awaited = None
+        self._awaited = _running.awaited = None
         try:
             coroutine.send(None)
         except StopIteration as stop:
@@ -247,7 +247,7 @@ class Task(Future):
             self.cancel()
             raise
         else:
-            self._awaited, _step.awaited = _step.awaited, None
+            self._awaited, _running.awaited = _running.awaited, None
 
     def _drop_handler(self) -> None:
         """Let go of what the handler holds; a coroutine that was cancelled runs its `finally` clauses."""
