@@ -140,19 +140,9 @@ def test_a_signal_ends_spinning_on_another_thread_though_the_main_one_never_runs
             process.kill()
 
 
-ANEW = """
+ANEW = f"""
 import time
-import rclpy
-from rclpy.executors import ExternalShutdownException
-rclpy.init(args=[])
-node = rclpy.create_node("spinner")
-timer = node.create_timer(0.0, lambda: (timer.cancel(), print("spinning", flush=True)))
-try:
-    rclpy.spin(node)
-except (KeyboardInterrupt, ExternalShutdownException):
-    pass
-node.destroy_node()
-rclpy.try_shutdown()
+{SPIN.format("")}
 rclpy.init(args=[])
 end = time.monotonic() + 0.6
 while rclpy.ok() and time.monotonic() < end:
@@ -167,6 +157,7 @@ def test_a_signal_that_was_handled_leaves_what_begins_thereafter_alone(domain_id
             assert process.stdout is not None
             assert process.stdout.readline() == "spinning\n"
             process.send_signal(signal.SIGINT)
+            assert process.stdout.readline() == "False\n"
             assert process.stdout.readline() == "True\n"
         finally:
             process.kill()
