@@ -14,6 +14,7 @@ from __future__ import annotations
 import ctypes as ct
 import importlib.util
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 Entity = ct.c_int32
@@ -113,18 +114,16 @@ class BuiltinEndpoint(ct.Structure):
     ]
 
 
-def _load() -> tuple[ct.CDLL, ct.PyDLL]:
+def _path() -> str:
     spec = importlib.util.find_spec("cyclonedds")
     if spec is None or not spec.submodule_search_locations:
         raise ImportError("Eclipse Cyclone DDS is not installed: pip install 'cyclonedds>=11.0.1,<12'")
     package = Path(spec.submodule_search_locations[0])
     place = package.parent / "cyclonedds.libs"
     for path in sorted(place.glob("libddsc*")):
-        return ct.CDLL(str(path)), ct.PyDLL(str(path))
+        return str(path)
     raise ImportError(f"the C library of Cyclone DDS is not beside its package: no libddsc* in {place}")
 
-
-blocking, quick = _load()
 
 # name: (result, arguments). Everything here may wait or take a lock that another thread holds for long.
 _BLOCKING: dict[str, tuple[Any, list[Any]]] = {
@@ -198,11 +197,23 @@ _QUICK: dict[str, tuple[Any, list[Any]]] = {
     "dds_qget_liveliness": (ct.c_bool, [Pointer, ct.POINTER(ct.c_int), ct.POINTER(Duration)]),
 }
 
-for _library, _functions in ((blocking, _BLOCKING), (quick, _QUICK)):
-    for _name, (_result, _arguments) in _functions.items():
-        _function = getattr(_library, _name)
-        _function.restype = _result
-        _function.argtypes = _arguments
+
+def functions(library: ct.CDLL, signatures: dict[str, tuple[Any, list[Any]]]) -> SimpleNamespace:
+    """The C functions of these names, with their results and arguments, as plain attributes.
+
+    To a ctypes library they are none: it goes through its ``__getattr__`` each time.
+    """
+    declared = SimpleNamespace()
+    for name, (result, arguments) in signatures.items():
+        function = getattr(library, name)
+        function.restype, function.argtypes = result, arguments
+        setattr(declared, name, function)
+    return declared
+
+
+LOCK_KEEPING = ct.PyDLL(_path())
+blocking = functions(ct.CDLL(_path()), _BLOCKING)
+quick = functions(LOCK_KEEPING, _QUICK)
 
 
 def checked(code: int, what: str) -> int:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes as ct
 from typing import Any
 
-from .library import Entity, blocking, quick
+from .library import LOCK_KEEPING, Entity, blocking, functions
 
 _HANDLE = ("last_instance_handle", ct.c_uint64)
 _COUNTS = [("total_count", ct.c_uint32), ("total_count_change", ct.c_int32)]
@@ -47,9 +47,13 @@ STATUSES: dict[str, tuple[int, type[ct.Structure]]] = {
     "subscription_matched": (1 << 12, _structure("SubscriptionMatched", [*_COUNTS, *_CURRENT, _HANDLE])),
 }
 
-for _name, (_, _struct) in STATUSES.items():
-    _getter = getattr(quick, f"dds_get_{_name}_status")
-    _getter.restype, _getter.argtypes = ct.c_int32, [Entity, ct.POINTER(_struct)]
+_getters = functions(
+    LOCK_KEEPING,
+    {
+        f"dds_get_{name}_status": (ct.c_int32, [Entity, ct.POINTER(structure)])
+        for name, (_, structure) in STATUSES.items()
+    },
+)
 
 
 def watch(handle: int, names: list[str]) -> None:
@@ -67,6 +71,6 @@ def changed(handle: int, name: str) -> Any:
     if blocking.dds_get_status_changes(handle, ct.byref(changes)) != 0 or not changes.value & bit:
         return None
     status = structure()
-    if getattr(quick, f"dds_get_{name}_status")(handle, ct.byref(status)) != 0:
+    if getattr(_getters, f"dds_get_{name}_status")(handle, ct.byref(status)) != 0:
         return None
     return status
