@@ -6,6 +6,7 @@ import itertools
 import threading
 from typing import TYPE_CHECKING, Any
 
+from rclpy import _imports
 from rclpy._dds import Writer
 from rclpy._endpoint import ServiceEndpoint
 from rclpy._service_side import ServiceSide
@@ -17,6 +18,8 @@ from service_msgs.msg import ServiceEventInfo
 
 if TYPE_CHECKING:
     from rclpy.context import Context
+
+_imports.offer(__name__)
 
 
 class Client(ServiceSide):

@@ -10,8 +10,9 @@ import time
 from collections.abc import Callable
 from enum import IntEnum
 from types import TracebackType
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple, Protocol, TypeAlias
 
+from rclpy import _imports
 from rclpy._handle import Handle
 from rclpy.clock_type import ClockType
 from rclpy.constants import S_TO_NS
@@ -22,16 +23,21 @@ from rclpy.time import Time, TimeHandle
 if TYPE_CHECKING:
     from rclpy.context import Context
 
+_imports.offer(__name__)
+
 __all__ = [
     "Clock",
     "ClockChange",
     "ClockType",
     "JumpHandle",
+    "JumpHandlePreCallbackType",
     "JumpThreshold",
     "ROSClock",
     "TimeJump",
     "TimeJumpDictionary",
 ]
+
+JumpHandlePreCallbackType: TypeAlias = Callable[[], None]
 
 
 class ClockChange(IntEnum):
@@ -102,7 +108,7 @@ class JumpHandle:
         *,
         clock: Clock,
         threshold: JumpThreshold,
-        pre_callback: Callable[[], None] | None,
+        pre_callback: JumpHandlePreCallbackType | None,
         post_callback: Callable[[TimeJumpDictionary], None] | None,
     ) -> None:
         if pre_callback is None and post_callback is None:
@@ -266,7 +272,7 @@ class Clock:
         self,
         threshold: JumpThreshold,
         *,
-        pre_callback: Callable[[], None] | None = None,
+        pre_callback: JumpHandlePreCallbackType | None = None,
         post_callback: Callable[[TimeJump], None] | None = None,
     ) -> JumpHandle:
         """

@@ -10,11 +10,13 @@ from enum import IntEnum
 from types import TracebackType
 from typing import Any
 
-from rclpy import logging
+from rclpy import _imports, logging
 from rclpy._dds import Reader, Writer, status
 from rclpy.callback_groups import CallbackGroup
 from rclpy.qos import QoSPolicyKind, qos_policy_name_from_kind
 from rclpy.waitable import NumberOfEntities, Waitable
+
+_imports.offer(__name__)
 
 
 class QoSPublisherEventType(IntEnum):

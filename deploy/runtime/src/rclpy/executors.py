@@ -20,7 +20,7 @@ from contextlib import AbstractContextManager
 from types import CoroutineType, TracebackType
 from typing import TYPE_CHECKING, Any, Protocol
 
-from rclpy import signals
+from rclpy import _imports, signals
 from rclpy._dds import INFINITY, GuardCondition, WaitSet
 from rclpy.callback_groups import CallbackGroup
 from rclpy.constants import S_TO_NS
@@ -32,6 +32,8 @@ if TYPE_CHECKING:
     from rclpy.context import Context
     from rclpy.node import Node
     from rclpy.timer import Timer
+
+_imports.offer(__name__)
 
 # After this many messages of one reader in a row the others get their turn, and the timers theirs.
 _MESSAGES_A_TURN = 8

@@ -8,7 +8,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from rcl_interfaces.msg import Log, ParameterEvent
-from rclpy import _best_available, _names
+from rclpy import _best_available, _imports, _names
 from rclpy._arguments import parse
 from rclpy._endpoint import PublisherEndpoint, ServiceEndpoint, SubscriptionEndpoint
 from rclpy._node_graph import NodeGraph
@@ -54,6 +54,8 @@ from rclpy.waitable import Waitable
 if TYPE_CHECKING:
     from rclpy.context import Context
     from rclpy.executors import Executor
+
+_imports.offer(__name__)
 
 __all__ = [
     "HIDDEN_NODE_PREFIX",

@@ -8,6 +8,9 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 from rcl_interfaces.msg import Parameter as ParameterMsg
 from rcl_interfaces.msg import ParameterType, ParameterValue
+from rclpy import _imports
+
+_imports.offer(__name__)
 
 if TYPE_CHECKING:
     AllowableParameterValue: TypeAlias = (
@@ -29,6 +32,8 @@ if TYPE_CHECKING:
         | tuple[str, ...]
         | None
     )
+else:  # arrays take no subscript when this runs
+    AllowableParameterValue = Any
 
 PARAMETER_SEPARATOR_STRING = "."
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from rcl_interfaces.msg import Parameter as ParameterMsg
 from rcl_interfaces.msg import ParameterEvent
+from rclpy import _imports
 from rclpy.qos import QoSProfile, qos_profile_parameter_events
 
 if TYPE_CHECKING:
@@ -16,6 +17,8 @@ if TYPE_CHECKING:
     from rclpy.event_handler import SubscriptionEventCallbacks
     from rclpy.node import Node
     from rclpy.qos_overriding_options import QoSOverridingOptions
+
+_imports.offer(__name__)
 
 
 class ParameterCallbackHandle:

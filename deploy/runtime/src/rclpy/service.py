@@ -9,6 +9,7 @@ from collections.abc import Callable, Coroutine
 from contextlib import suppress
 from typing import Any
 
+from rclpy import _imports
 from rclpy._dds import Reader
 from rclpy._endpoint import ServiceEndpoint
 from rclpy._service_side import ServiceSide
@@ -17,6 +18,8 @@ from rclpy.callback_groups import CallbackGroup
 from rclpy.exceptions import InvalidHandle
 from rclpy.qos import QoSProfile
 from service_msgs.msg import ServiceEventInfo
+
+_imports.offer(__name__)
 
 # A client may be heard before discovery has told us of its reader: so long a reply waits for it [s].
 _PATIENCE = 0.1

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, cast
 
+from rclpy import _imports
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.exceptions import NotInitializedException
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
@@ -14,6 +15,8 @@ if TYPE_CHECKING:
     from rclpy.executors import Executor
     from rclpy.node import Node
     from rclpy.subscription import Subscription
+
+_imports.offer(__name__)
 
 
 def wait_for_message(
