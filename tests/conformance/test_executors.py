@@ -324,6 +324,20 @@ def test_a_node_moves_to_the_executor_that_it_is_added_to_last(
         assert node.executor is other
 
 
+def test_a_node_knows_the_executor_that_spun_it_last(
+    make_node: MakeNode, executor: SingleThreadedExecutor
+) -> None:
+    node = make_node()
+    rclpy.spin_once(node, executor=executor, timeout_sec=0)
+    assert executor.get_nodes() == []
+    assert node.executor is executor
+    task = node.executor.create_task(lambda: 1)
+    rclpy.spin_once(node, executor=executor, timeout_sec=0)
+    assert task.result() == 1
+    node.executor = None
+    assert node.executor is None
+
+
 def test_what_a_node_had_ready_runs_where_it_went(
     make_node: MakeNode, context: Context, executor: SingleThreadedExecutor
 ) -> None:

@@ -165,7 +165,7 @@ class Executor(AbstractContextManager["Executor"]):
             if node.executor is not None:
                 node.executor.remove_node(node)
             self._nodes.append(node)
-        node._rclpy_set_executor(self)
+        node._rclpy_executor = weakref.ref(self)
         self._entities_have_changed()
         return True
 
@@ -175,7 +175,6 @@ class Executor(AbstractContextManager["Executor"]):
             if node not in self._nodes:
                 return
             self._nodes.remove(node)
-        node._rclpy_set_executor(None)
         self._entities_have_changed()
 
     def get_nodes(self) -> list[Node]:

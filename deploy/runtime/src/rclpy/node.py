@@ -189,8 +189,9 @@ class Node(NodeParameters, NodeGraph):
 
     @property
     def executor(self) -> Executor | None:
-        """The executor that runs its callbacks, if there is one."""
-        return None if self._rclpy_executor is None else self._rclpy_executor()
+        """The executor that it was added to last, as long as there is that: by ``rclpy.spin_once()``, too."""
+        executor = None if self._rclpy_executor is None else self._rclpy_executor()
+        return None if executor is None or executor._closed else executor
 
     @executor.setter
     def executor(self, new_executor: Executor | None) -> None:
@@ -199,11 +200,10 @@ class Node(NodeParameters, NodeGraph):
             return
         if current is not None:
             current.remove_node(self)
-        if new_executor is not None:
+        if new_executor is None:
+            self._rclpy_executor = None
+        else:
             new_executor.add_node(self)
-
-    def _rclpy_set_executor(self, executor: Executor | None) -> None:
-        self._rclpy_executor = None if executor is None else weakref.ref(executor)
 
     def _wake_executor(self) -> None:
         executor = self.executor

@@ -12,7 +12,6 @@ from rclpy.qos import QoSProfile
 from rclpy.task import Future
 
 if TYPE_CHECKING:
-    from rclpy.executors import Executor
     from rclpy.node import Node
     from rclpy.subscription import Subscription
 
@@ -67,6 +66,3 @@ class _NodeWithOnly:
 
     def _rclpy_waitables(self) -> list[Subscription]:
         return [self._subscription]
-
-    def _rclpy_set_executor(self, executor: Executor | None) -> None:
-        pass
