@@ -12,9 +12,11 @@ from rclpy.exceptions import (
     InvalidServiceNameException,
     InvalidTopicNameException,
 )
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.publisher import Publisher
+from rclpy.serialization import deserialize_message
 from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 
@@ -140,3 +142,31 @@ def test_a_with_on_a_handle_changes_nothing(make_node: MakeNode, context: Contex
     assert context.ok()
     assert context.handle.ok()
     assert context.handle.get_domain_id() == context.get_domain_id()
+
+
+def test_a_subscription_can_be_polled(
+    make_node: MakeNode, executor: SingleThreadedExecutor, spin_until: SpinUntil
+) -> None:
+    node = make_node()
+    executor.remove_node(node)  # nobody else takes what comes
+    subscription = node.create_subscription(Float64, "x", print, 10)
+    publisher = node.create_publisher(Float64, "x", 10)
+    spin_until(publisher.get_subscription_count)
+    publisher.publish(Float64(data=1.0))
+    publisher.publish(Float64(data=2.0))
+    taken: list[tuple[Any, dict[str, Any]]] = []
+
+    def take(raw: bool) -> bool:
+        with subscription.handle:
+            one = subscription.handle.take_message(Float64, raw)
+        if one is not None:
+            taken.append(one)
+        return one is not None
+
+    spin_until(lambda: take(raw=False))
+    spin_until(lambda: take(raw=True))
+    assert not take(raw=False)
+    (message, info), (data, _) = taken
+    assert message == Float64(data=1.0)
+    assert 0 < info["source_timestamp"] <= info["received_timestamp"]
+    assert deserialize_message(data, Float64) == Float64(data=2.0)

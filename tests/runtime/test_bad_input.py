@@ -11,7 +11,9 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.srv import SetParameters
 from rclpy._dds import Participant, Writer
+from rclpy._dds.library import blocking
 from rclpy._graph import NodeEntities, encode
+from rclpy.exceptions import RCLError
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -60,6 +62,22 @@ def test_bad_samples_are_dropped_counted_and_logged_once(
     assert received == [2.0]
     assert subscription._bad_input.count == 50
     assert capfd.readouterr().err.count("octets on /x") == 1
+
+
+def test_who_polls_hears_of_a_bad_sample(
+    node: Node, executor: SingleThreadedExecutor, participant: Participant, spin_until: SpinUntil
+) -> None:
+    executor.remove_node(node)  # nobody else takes what comes
+    subscription = node.create_subscription(Float64, "x", lambda message: None, QUEUE)
+    writer = writer_for(participant, "rt/x", "std_msgs::msg::dds_::Float64_", spin_until)
+    writer.write(HEADER + b"\1")
+    writer.write(HEADER + struct.pack("<d", 2.0))
+    spin_until(lambda: blocking.dds_triggered(subscription.handle.condition))
+    with pytest.raises(RCLError, match=r"failed to take message: .*std_msgs/msg/Float64"):
+        subscription.handle.take_message(Float64, False)
+    taken: list[Any] = []
+    spin_until(lambda: taken.append(subscription.handle.take_message(Float64, False)) or taken[-1])
+    assert taken[-1][0] == Float64(data=2.0)
 
 
 def test_each_writer_of_bad_samples_is_logged_for_itself(

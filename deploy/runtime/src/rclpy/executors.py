@@ -472,6 +472,7 @@ class Executor(AbstractContextManager["Executor"]):
             self._closed = True
             for node in self.get_nodes():
                 self.remove_node(node)
+                node.executor = None
             self._context._executors.discard(self)
             self._close()
         return True

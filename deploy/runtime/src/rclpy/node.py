@@ -190,8 +190,7 @@ class Node(NodeParameters, NodeGraph):
     @property
     def executor(self) -> Executor | None:
         """The executor that it was added to last, as long as there is that: by ``rclpy.spin_once()``, too."""
-        executor = None if self._rclpy_executor is None else self._rclpy_executor()
-        return None if executor is None or executor._closed else executor
+        return None if self._rclpy_executor is None else self._rclpy_executor()
 
     @executor.setter
     def executor(self, new_executor: Executor | None) -> None:
@@ -200,9 +199,8 @@ class Node(NodeParameters, NodeGraph):
             return
         if current is not None:
             current.remove_node(self)
-        if new_executor is None:
-            self._rclpy_executor = None
-        else:
+        self._rclpy_executor = None if new_executor is None else weakref.ref(new_executor)
+        if new_executor is not None:
             new_executor.add_node(self)
 
     def _wake_executor(self) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import inspect
-import time
 from collections.abc import Callable
 from enum import Enum
 from typing import Any
@@ -89,13 +88,7 @@ class Subscription(Owner):
                 continue
             if self._callback_type is Subscription.CallbackType.MessageOnly:
                 return (message,)
-            info = {
-                "source_timestamp": sample.source_timestamp,
-                "received_timestamp": time.time_ns(),
-                "publication_sequence_number": None,
-                "reception_sequence_number": None,
-            }
-            return (message, info)
+            return (message, sample.info())
         return None
 
     def _execute(self, taken: tuple[Any, ...]) -> Any:

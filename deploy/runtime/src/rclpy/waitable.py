@@ -26,6 +26,15 @@ class NumberOfEntities:
         self.num_services = num_services
         self.num_events = num_events
 
+    def __add__(self, other: NumberOfEntities) -> NumberOfEntities:
+        mine, others = vars(self), vars(other)
+        total = NumberOfEntities()
+        vars(total).update({kind: mine[kind] + others[kind] for kind in mine})
+        return total
+
+    def __repr__(self) -> str:
+        return f"<NumberOfEntities({', '.join(map(str, vars(self).values()))})>"
+
 
 class Waitable:
     """Something an executor waits for. This runtime's wait sets are not rcl's: see ``Node.add_waitable``."""

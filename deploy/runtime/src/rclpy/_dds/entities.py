@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import ctypes as ct
-from typing import NamedTuple
+import time
+from typing import Any, NamedTuple
 
 from rclpy._handle import Handle
-from rclpy.exceptions import InvalidHandle
+from rclpy.exceptions import InvalidHandle, RCLError
 from rclpy.qos import QoSProfile
 
 from . import domain, qos
@@ -39,6 +40,15 @@ class Sample(NamedTuple):
     data: bytes
     source_timestamp: int
     publication_handle: int
+
+    def info(self) -> dict[str, Any]:
+        """What a callback with two arguments hears of it, as rclpy has it. The numbers DDS does not tell."""
+        return {
+            "source_timestamp": self.source_timestamp,
+            "received_timestamp": time.time_ns(),
+            "publication_sequence_number": None,
+            "reception_sequence_number": None,
+        }
 
 
 def _matched_handles(handle: int, getter: str) -> list[int]:
@@ -204,6 +214,22 @@ class Reader(Handle):
                 break
         self._rooms.append(room)
         return sample
+
+    def take_message(self, msg_type: Any, raw: bool) -> tuple[Any, dict[str, Any]] | None:
+        """
+        The next message and what is known of it, None if there is none: for code that polls its subscription.
+
+        :param raw: whether it is to stay serialized.
+        :raises RCLError: if it is no message of ``msg_type``.
+        """
+        sample = self.take()
+        if sample is None:
+            return None
+        try:
+            message = sample.data if raw else msg_type._deserialize(sample.data)
+        except ValueError as error:
+            raise RCLError(f"failed to take message: {error}") from error
+        return message, sample.info()
 
     def matched(self) -> int:
         """How many writers are matched now."""
