@@ -100,7 +100,8 @@ def wire(node: ServiceNode) -> None:
             eyes.act(action)
         if judge.confused:
             node.remark(NAME, f"kills nothing for its silence: {judge.confused}")
-        before, known = known, list(sight.programs)
+        # But for its age, which is another one at each look.
+        before, known = known, [program._replace(age=0.0) for program in sight.programs]
         for gone in heard.keys() - {(program.name, program.pid) for program in known}:
             del heard[gone]  # also what is of other hosts
         return known != before

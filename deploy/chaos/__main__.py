@@ -30,7 +30,7 @@ from deploy.chaos.faults import FAULTS
 from deploy.chaos.findings import VIOLATED
 from deploy.chaos.history import CIRCUMSTANCES, PROGRAMS, suffix
 from deploy.chaos.page import page
-from deploy.chaos.promises import check
+from deploy.chaos.promises import CHECKERS
 from deploy.chaos.report import text
 from deploy.system import DeploymentError, System
 from interfaces import topics
@@ -63,6 +63,10 @@ def unleash(options: argparse.Namespace) -> int:
         planned = schedule.monkey(
             seed, length, every=options.every, kinds=options.faults, targets=options.targets
         )
+        if not planned:
+            raise DeploymentError(
+                "No fault is planned: the time is too short, or nothing of this can be done to that."
+            )
         schedules = [planned[arm :: options.arms] for arm in range(options.arms)]
         title = f"Random monkey, seed {seed}, {options.minutes:g} min, a fault each {options.every:g} s"
         if options.faults != tuple(FAULTS) or options.targets:
@@ -127,8 +131,12 @@ def conclude(path: Path, title: str, page_name: str = "report") -> int:
 
 def _keeps_its_promises(path: Path, title: str, namespace: str, page_name: str) -> bool:
     """Judge an arm, print the verdict and write the page beside its record."""
+    interruption.check()
     history = record.load(path, namespace)
-    findings = check(history)
+    findings = []
+    for checker in CHECKERS.values():
+        interruption.check()
+        findings.append(checker(history))
     print("\n" + (f"{namespace}\n" if namespace != "/" else "") + text(findings))
     report = path.with_name(f"{page_name}{suffix(namespace)}.html")
     faults = sum(fault.kind not in CIRCUMSTANCES for fault in history.faults)

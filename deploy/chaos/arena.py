@@ -129,6 +129,7 @@ class Arena:
             self.prepare(stack)
             for arm in self.arms:
                 arm.domain = stack.enter_context(reserved_domain())
+                stack.callback(arm.system.stop)  # after the record's end: an arm that stops is no silent one
             observed = [f"{arm.namespace}={arm.domain}={arm.system.run}" for arm in self.arms]
             environment = {"ROS_AUTOMATIC_DISCOVERY_RANGE": self.discovery, **_losing(self._loss)}
             self._observer = stack.enter_context(
@@ -146,7 +147,6 @@ class Arena:
                 [str(INJECTED), *filter(None, [os.environ.get("PYTHONPATH")])]
             )
             for arm in self.arms:
-                stack.callback(arm.system.stop)
                 with _environment(environment | {NAMESPACE: arm.namespace, "ROS_DOMAIN_ID": str(arm.domain)}):
                     self.start(arm, {"/**": {"ros__parameters": shared}})
                 arm.environment()

@@ -153,7 +153,7 @@ class Census:
         self._pending |= dict.fromkeys(pids - self._known, now)
         self._known = pids
         for pid, since in list(self._pending.items()):
-            if self._is_named(pid, now - since) or now - since > UNNAMED:
+            if self._is_named(pid, now - since) or (now - since > UNNAMED and not self._is_to_be(pid)):
                 del self._pending[pid]
 
     def _is_named(self, pid: int, known: float) -> bool:
@@ -163,7 +163,7 @@ class Census:
         program = environment.get("SUPERVISOR_PROCESS_NAME", "")
         if namespace is None or program == BABBLER or not (program or "supervisord" in _command(pid)):
             return False
-        if not program and known < FORK:
+        if not program and (known < FORK or self._is_to_be(pid)):
             return False
         try:
             handle = os.pidfd_open(pid)
@@ -175,6 +175,11 @@ class Census:
         self._poll.register(handle, select.POLLIN)
         self._report(namespace, life)
         return True
+
+    def _is_to_be(self, pid: int) -> bool:
+        """Whether a process is a child of a supervisord, and so is to become one of its programs."""
+        parent = _parent(pid)
+        return any(not life.program and life.pid == parent for _, life in self._alive.values())
 
     def _end(self, handle: int, now: float) -> None:
         self._poll.unregister(handle)
@@ -188,6 +193,13 @@ def _began(pid: int) -> float:
     ticks = int(Path(f"/proc/{pid}/stat").read_text().rpartition(") ")[2].split()[19])
     suspended = time.clock_gettime(time.CLOCK_BOOTTIME) - time.monotonic()
     return ticks / os.sysconf("SC_CLK_TCK") - suspended
+
+
+def _parent(pid: int) -> int:
+    try:
+        return int(Path(f"/proc/{pid}/stat").read_text().rpartition(") ")[2].split()[1])
+    except (OSError, ValueError, IndexError):
+        return 0
 
 
 def _command(pid: int) -> str:

@@ -21,11 +21,6 @@ CHECKERS: dict[str, Callable[[History], Finding]] = {
 }
 
 
-def check(history: History) -> list[Finding]:
-    """The findings on all promises."""
-    return [checker(history) for checker in CHECKERS.values()]
-
-
 def meaning(promise: str) -> str:
     """What is promised, in one sentence."""
     sentence = (CHECKERS[promise].__doc__ or "").partition(": ")[2].strip().replace("`", "")

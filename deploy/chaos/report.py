@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from deploy.chaos.findings import VIOLATED, Finding, percentile
+from deploy.chaos.findings import UNKNOWN, VIOLATED, Finding, percentile
 from deploy.chaos.promises import meaning
 from deploy.table import table
 
@@ -44,5 +44,5 @@ def _row(finding: Finding) -> tuple[str, ...]:
         finding.verdict,
         str(finding.cases),
         str(finding.unknown),
-        finding.figures if finding.cases else "not put to the test",
+        "not put to the test" if finding.verdict == UNKNOWN else finding.figures,
     )

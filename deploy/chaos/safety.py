@@ -5,7 +5,8 @@ from __future__ import annotations
 import itertools
 import math
 from bisect import bisect_left, bisect_right
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from operator import itemgetter
 
 from deploy.chaos.findings import Evidence, Finding
 from deploy.chaos.history import ALL, BLINDING, History, Life, Sample, between, gaps
@@ -30,7 +31,8 @@ def engines_off_in_time(history: History) -> Finding:
     evidence, longest, cases = [], 0.0, 0
     stretches = list(running(history))
     for begin, end in gaps(alive, -math.inf, history.end):
-        late = [(on, off) for on, off in stretches if on < end and off > begin]
+        after = bisect_right(stretches, begin, key=itemgetter(1))
+        late = stretches[after : bisect_left(stretches, end, key=itemgetter(0))]
         if not late:
             continue
         if begin == -math.inf:
@@ -256,8 +258,22 @@ def _absences(history: History, time: float) -> float:
     begin = max((t for t in heartbeats if t <= since), default=0.0)
     # While it was stopped it saw nobody either: that is what S2 does not promise.
     blind = [(max(one, begin), min(two, time)) for one, two in _blind(history) if one < time and two > begin]
-    silences = [*gaps(heartbeats, begin, time), *blind]
+    silences = _merged([*gaps(heartbeats, begin, time), *blind])
     return sum((end - begin + SAMPLING) // STRIKE for begin, end in silences)
+
+
+def _merged(stretches: Iterable[tuple[float, float]]) -> Iterator[tuple[float, float]]:
+    """The stretches, those that overlap as one. Those that only touch stay two: a silence and the next."""
+    last: tuple[float, float] | None = None
+    for begin, end in sorted(stretches):
+        if last is not None and begin < last[1]:
+            last = (last[0], max(last[1], end))
+        else:
+            if last is not None:
+                yield last
+            last = (begin, end)
+    if last is not None:
+        yield last
 
 
 def _abandoned(history: History, off: Sample) -> bool:

@@ -10,6 +10,7 @@ import pytest
 from deploy.chaos.findings import HOLDS, UNKNOWN, VIOLATED, percentile
 from deploy.chaos.history import ALL, NOTHING, OPERATOR, PROGRAMS, Fault, History, Life, Sample
 from deploy.chaos.promises import CHECKERS, meaning
+from deploy.chaos.report import text
 from interfaces.topics import OFF, ON, TURN_OFF
 
 from .histories import END, added, change, faulty, good, killed, says, silent, value_at
@@ -37,6 +38,13 @@ def test_nothing_is_violated_where_nothing_happens(promise: str) -> None:
 @pytest.mark.parametrize("promise", CHECKERS)
 def test_what_was_not_put_to_the_test_is_unknown(promise: str) -> None:
     assert verdict(promise, History(0.0)) == UNKNOWN
+
+
+def test_what_was_violated_is_not_told_to_be_untested() -> None:
+    history = silent(good(), "operator_heartbeat", 20.0, END + 1.0)  # and the engines stay on for ever
+    row = next(line for line in text([CHECKERS["S1"](history)]).splitlines() if line.startswith("S1"))
+    assert "VIOLATED" in row
+    assert "off after 40" in row
 
 
 @pytest.mark.parametrize("promise", CHECKERS)
@@ -118,6 +126,14 @@ def test_s2_three_silences_are_a_good_reason_and_two_are_none() -> None:
     assert verdict("S2", history) == VIOLATED  # of itself: no turn_off was heard
     assert verdict("S2", faulty(history, Fault("overload", NOTHING, 43.5, 43.9))) != VIOLATED
     assert verdict("S2", added(history, "engines", command)) != VIOLATED
+
+
+def test_s2_a_silence_counts_once_though_the_watchdog_was_stopped_in_it() -> None:
+    history = silent(good(), "operator_heartbeat", 40.0, 46.2)  # two strikes
+    history = added(says(history, "engines/state", OFF, 46.2), "engines", (46.15, TURN_OFF))
+    pid = next(life.pid for life in history.lives if life.program == "operator_watchdog")
+    assert verdict("S2", history) == VIOLATED
+    assert verdict("S2", faulty(history, Fault("stop", "operator_watchdog", 40.0, 43.0, pid))) == VIOLATED
 
 
 def test_s2_a_double_that_ends_itself_is_no_successor() -> None:
@@ -382,6 +398,8 @@ def test_l3_a_first_value_that_the_observer_may_have_missed_stays_unknown() -> N
 
     history = killed(good(), "kinematics", 20.0, 0.6)
     assert verdict("L3", of_another_value(history)) == VIOLATED
+    finding = CHECKERS["L3"](faulty(of_another_value(history), Fault("loss", NOTHING, 0.0, END)))
+    assert (len(finding.evidence), finding.unknown) == (0, 1)
     finding = CHECKERS["L3"](of_another_value(killed(history, "config_l1", 21.5, 0.6)))
     assert (len(finding.evidence), finding.unknown) == (0, 1)
 

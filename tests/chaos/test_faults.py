@@ -19,6 +19,7 @@ from rclpy.node import Node
 from std_msgs.msg import Float64
 
 from deploy import processes
+from deploy.chaos import observer
 from deploy.chaos.faults import FAULTS, Undo
 from deploy.chaos.history import ALL, NOTHING, Life
 from deploy.chaos.marks import BABBLER
@@ -138,6 +139,55 @@ def test_a_babbler_that_is_ended_in_the_middle_of_a_word_does_not_complain(
     assert end is not None
     assert end.si_status == signal.SIGTERM
     assert "Traceback" not in capfd.readouterr().err  # our own reader may complain of the babble
+
+
+FORKING = """
+import os, signal, sys  # supervisord, to those who look at the command line
+print(flush=True)
+sys.stdin.readline()
+if os.fork():
+    signal.pause()
+print(os.getpid(), flush=True)
+sys.stdin.readline()
+named = {**os.environ, "SUPERVISOR_PROCESS_NAME": "velocity"}
+os.execve(sys.executable, [sys.executable, "-c", "print(flush=True); input()"], named)
+"""
+
+
+def test_a_child_of_supervisord_is_named_by_its_program_however_long_that_takes(
+    nobody: Nobody, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(observer, "FORK", 0.0)
+    monkeypatch.setattr(observer, "UNNAMED", 0.0)
+    seen: list[Life] = []
+    census = Census(
+        [Arm("/", 0, nobody.system.run)], lambda _, life: seen.append(life), lambda begin, end: None
+    )
+    with subprocess.Popen(
+        [sys.executable, "-c", FORKING],
+        env=nobody.environment(),
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+        bufsize=1,
+    ) as supervisord:
+        assert supervisord.stdin is not None
+        assert supervisord.stdout is not None
+        supervisord.stdout.readline()
+        census.look()
+        supervisord.stdin.write("fork\n")
+        child = int(supervisord.stdout.readline())
+        for _ in range(3):
+            census.look()
+        assert [(life.program, life.pid) for life in seen] == [("", supervisord.pid)]
+        supervisord.stdin.write("become velocity\n")
+        supervisord.stdout.readline()
+        census.look()
+        ended = threading.Event()
+        ended.set()
+        census.run(ended)  # gives back what it holds
+        supervisord.kill()  # its child reads the end of its input then
+    assert [(life.program, life.pid) for life in seen] == [("", supervisord.pid), ("velocity", child)]
 
 
 def test_a_babbler_is_not_taken_for_a_program(

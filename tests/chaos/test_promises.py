@@ -12,7 +12,7 @@ from deploy.chaos.findings import HOLDS, UNKNOWN
 from deploy.chaos.history import PROGRAMS, SILENCE, between
 from deploy.chaos.promises import CHECKERS
 from deploy.chaos.safety import ABSENCE, OFF_WITHIN, SAMPLING, TRANSPORT, running
-from interfaces.topics import DRIVE, ENGINES, OPERATOR_HEARTBEAT
+from interfaces.topics import DRIVE, EFFECTOR_POSITION, ENGINES, OPERATOR_HEARTBEAT
 
 from .plays import Play, play, unleash
 
@@ -42,6 +42,12 @@ def asleep(play: Play) -> tuple[float, float]:
 @pytest.mark.parametrize("promise", CHECKERS)
 def test_no_promise_is_broken(plays: dict[str, Play], name: str, promise: str) -> None:
     assert plays[name].finding(promise).verdict in (HOLDS, UNKNOWN)
+
+
+@pytest.mark.parametrize("namespace", ARMS)
+def test_no_arm_of_a_fleet_ends_before_its_record(plays: dict[str, Play], namespace: str) -> None:
+    history = plays[f"briefly {namespace}"].history
+    assert history.end - history.stream(EFFECTOR_POSITION)[-1].sent < 1.0
 
 
 @pytest.mark.parametrize("promise", CHECKERS)

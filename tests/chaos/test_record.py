@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -39,6 +40,31 @@ def replay(record: Path) -> subprocess.CompletedProcess[str]:
     """Let the monkey judge a record; in a process of its own, as it handles signals."""
     command = [sys.executable, "-m", "deploy.chaos", "--replay", str(record)]
     return subprocess.run(command, cwd=processes.ROOT, capture_output=True, text=True, timeout=60)
+
+
+def test_a_play_without_any_fault_is_refused(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "deploy.chaos", "--faults", "crash_loop", "--targets", "kinematics"]
+    environment = {**os.environ, "REACTIVE_ARM_RUN_DIR": str(tmp_path)}
+    end = subprocess.run(
+        command, cwd=processes.ROOT, env=environment, capture_output=True, text=True, timeout=60
+    )
+    assert end.returncode == 1
+    assert end.stderr.splitlines() == [
+        "No fault is planned: the time is too short, or nothing of this can be done to that."
+    ]
+
+
+def test_ctrl_c_ends_the_judging(tmp_path: Path) -> None:
+    path = tmp_path / "record.mcap"
+    recorded(path, ONE)
+    script = (
+        "import deploy.interruption, os, signal, sys; os.kill(os.getpid(), signal.SIGINT);"
+        f"import deploy.chaos.__main__ as monkey; sys.exit(monkey.main(['--replay', {str(path)!r}]))"
+    )
+    end = subprocess.run(
+        [sys.executable, "-c", script], cwd=processes.ROOT, capture_output=True, text=True, timeout=60
+    )
+    assert (end.returncode, end.stdout) == (130, "Interrupted: everything has been stopped.\n")
 
 
 ONE, OTHER = Life("velocity", 7, 0.0, None), Life("velocity", 8, 5.0, 12.0)
