@@ -54,6 +54,7 @@ def health(service: ServiceNode, peer: Node, spin_until: SpinUntil) -> Callable[
 
     spin_until(lambda: service.count_subscribers(topic.name) == 1)
     spin_until(lambda: peer.count_publishers(topic.name) == 1)
+    spin_until(lambda: heard)  # the greeting: later, it would take along what is to be told then
 
     def following() -> dict[str, Any]:
         before = service.get_clock().now()

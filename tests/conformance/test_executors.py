@@ -44,6 +44,34 @@ def test_a_subscription_gets_what_a_publisher_of_the_same_process_publishes(
     assert received == [0.0, 1.0, 2.0, 3.0, 4.0]
 
 
+def test_a_slow_callback_delays_others_by_no_more_than_itself(
+    executor: SingleThreadedExecutor, node: Node
+) -> None:
+    order: list[str] = []
+
+    def slow(name: str) -> Callable[[Float64], None]:
+        def callback(message: Float64) -> None:
+            order.append(f"{name}{message.data:.0f}")
+            time.sleep(0.02)
+
+        return callback
+
+    publishers = []
+    for name in ("left", "right"):
+        node.create_subscription(Float64, name, slow(name), 10)
+        publishers.append(node.create_publisher(Float64, name, 10))
+    for number in range(3):
+        for publisher in publishers:
+            publisher.publish(Float64(data=float(number)))
+    node.create_timer(0.015, lambda: order.append("timer"))
+    end = Future()
+    executor.spin_until_future_complete(end, timeout_sec=0.5)
+    messages = [one for one in order if one != "timer"]
+    assert [one[-1] for one in messages] == list("001122")  # in turns
+    first, last = order.index(messages[0]), order.index(messages[-1])
+    assert order[first:last].count("timer") >= 2
+
+
 def test_spin_once_returns_after_its_timeout_when_nothing_happens(executor: SingleThreadedExecutor) -> None:
     before = STEADY.now()
     executor.spin_once(timeout_sec=0.05)

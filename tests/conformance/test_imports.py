@@ -27,6 +27,20 @@ def test_an_imported_name_is_what_it_is_at_home() -> None:
     assert node.ReentrantCallbackGroup is callback_groups.ReentrantCallbackGroup
 
 
+def test_an_interface_can_be_imported_from_the_module_that_it_has_in_ros_2() -> None:
+    from geometry_msgs.msg import Pose, _pose
+    from geometry_msgs.msg._pose import Pose as FromModule
+    from sensor_msgs_py import numpy_compat
+    from std_srvs.srv import SetBool
+    from std_srvs.srv._set_bool import SetBool as FromServiceModule
+
+    assert Pose is _pose.Pose is FromModule
+    assert SetBool is FromServiceModule
+    assert callable(numpy_compat.structured_to_unstructured)
+    with pytest.raises(ImportError):
+        importlib.import_module("geometry_msgs.msg._nothing")
+
+
 def test_a_name_that_is_nowhere_cannot_be_imported() -> None:
     with pytest.raises(ImportError, match="cannot import name 'Nod'"):
         exec("from rclpy.node import Nod")

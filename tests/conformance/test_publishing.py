@@ -18,8 +18,8 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
-from rclpy.serialization import deserialize_message
-from std_msgs.msg import Float64, String
+from rclpy.serialization import deserialize_message, serialize_message
+from std_msgs.msg import Float64, Int32, String
 
 MakeNode = Callable[..., Node]
 SpinUntil = Callable[..., None]
@@ -48,6 +48,12 @@ def test_a_message_is_padded_on_the_wire_as_dds_wants_and_read_without(
         publisher.publish(String(data=text))
     spin_until(lambda: len(received) == 5)
     assert received == ["", "a", "ab", "abc", "Wrocław"]
+
+
+def test_integers_of_numpy_are_integers() -> None:
+    for type_ in (np.int8, np.int32, np.int64):
+        data = serialize_message(Int32(data=type_(-3)))
+        assert deserialize_message(data, Int32) == Int32(data=-3)
 
 
 def test_bytes_and_numpy_arrays_are_published_as_the_lists_that_they_mean(

@@ -10,6 +10,7 @@ from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.context import Context
 from rclpy.exceptions import InvalidServiceNameException
 from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.task import Future
 from std_srvs.srv import SetBool, Trigger
@@ -102,6 +103,20 @@ def test_waiting_for_a_service_that_never_comes_ends_with_its_timeout(
     client = make_node().create_client(Trigger, "nobody")
     assert not client.service_is_ready()
     assert not client.wait_for_service(timeout_sec=timeout)
+
+
+def test_whoever_waits_for_a_service_in_a_loop_is_ended_by_the_shutdown(
+    make_node: MakeNode, context: Context
+) -> None:
+    client = make_node().create_client(Trigger, "nowhere")
+    threading.Timer(0.2, context.shutdown).start()
+
+    def wait() -> None:
+        while not client.wait_for_service(timeout_sec=0.1):
+            pass
+
+    with pytest.raises(rclpy_implementation.RCLError, match=r"shut down|context is invalid"):
+        wait()
 
 
 def test_a_reply_that_nobody_waits_for_any_more_is_dropped(spin_until: SpinUntil, node: Node) -> None:

@@ -12,6 +12,7 @@ from rclpy._endpoint import ServiceEndpoint
 from rclpy._service_side import ServiceSide
 from rclpy._service_wire import RequestId, server_is_matched, unwrap, wrap
 from rclpy.callback_groups import CallbackGroup
+from rclpy.exceptions import RCLError
 from rclpy.qos import QoSProfile
 from rclpy.task import Future
 from service_msgs.msg import ServiceEventInfo
@@ -98,13 +99,20 @@ class Client(ServiceSide):
                     del self._pending_requests[number]
 
     def service_is_ready(self) -> bool:
-        """Whether a server would hear a call now, and we its reply."""
+        """Whether a server would hear a call now, and we its reply. Raises RCLError after the shutdown."""
+        if not self.context.ok():
+            raise RCLError(f"cannot look for a server of {self._name}: the context was shut down")
         return server_is_matched(self.handle, self._replies)
 
     def wait_for_service(self, timeout_sec: float | None = None) -> bool:
-        """Wait for a server, at most ``timeout_sec`` (``None``: for ever). ``False`` if none came."""
+        """
+        Wait for a server, at most ``timeout_sec`` (``None``: for ever). ``False`` if none came.
+
+        :raises RCLError: if the context is or gets shut down: whoever asks in a loop must not do so for ever.
+        """
         timeout = None if timeout_sec is None else max(0.0, timeout_sec)
-        return self._node._rclpy_graph.wait_for(self.service_is_ready, timeout, self.context.ok)
+        graph = self._node._rclpy_graph
+        return graph.wait_for(self.service_is_ready, timeout, self.context.ok) or self.service_is_ready()
 
     # What the executor asks of everything it waits for.
 

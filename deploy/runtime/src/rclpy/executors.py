@@ -35,8 +35,9 @@ if TYPE_CHECKING:
 
 _imports.offer(__name__)
 
-# After this many messages of one reader in a row the others get their turn, and the timers theirs.
-_MESSAGES_A_TURN = 8
+# As long as all that was ready is run within this time, readers may have more messages at once, in turns;
+# then the timers get theirs. So a flood costs few waits, and a slow callback delays nobody but by itself.
+_TURNS = 200_000  # ns
 _WAKE = 0  # the wait set's token of the guard condition
 
 
@@ -145,8 +146,10 @@ class Executor(AbstractContextManager["Executor"]):
         self._blocked: dict[int, tuple[_Entity, int]] = {}  # the same, while their callback group is busy
         self._tokens: dict[int, int] = {}  # DDS handle -> token
         self._last_token = _WAKE
-        # An entity or task, and how many more messages it may take in this turn.
-        self._ready: deque[tuple[Any, int]] = deque()
+        # An entity or task, and whether it is a reader, which may have more than one message.
+        self._ready: deque[tuple[Any, bool]] = deque()
+        self._again: deque[tuple[Any, bool]] = deque()  # the readers that had one
+        self._turns_end = 0
         self._context._executors.add(self)
         signals._watch(self)
 
@@ -299,7 +302,7 @@ class Executor(AbstractContextManager["Executor"]):
             if self._groups_changed:
                 self._unblock()
             while self._ready:
-                entity, turns = self._ready.popleft()
+                entity, is_reader = self._ready.popleft()
                 if entity.__class__ is Task:
                     return entity, None
                 group = entity.callback_group
@@ -315,9 +318,14 @@ class Executor(AbstractContextManager["Executor"]):
                     if group is not None:
                         group.ending_execution(entity)
                     continue
-                if turns:
-                    self._ready.appendleft((entity, turns - 1))
+                if is_reader:
+                    self._again.append((entity, True))
                 return entity, taken
+            if self._again:
+                if time.monotonic_ns() < self._turns_end:
+                    self._ready, self._again = self._again, self._ready
+                    continue
+                self._again.clear()
             if waited and deadline is not None and time.monotonic_ns() >= deadline:
                 raise TimeoutException
             # Without a word from anybody there is no new reason to end.
@@ -344,30 +352,31 @@ class Executor(AbstractContextManager["Executor"]):
         timeout = _remaining(deadline)
         while self._tasks:
             timeout = 0
-            self._ready.append((self._tasks.popleft(), 0))
+            self._ready.append((self._tasks.popleft(), False))
         for guard in self._guards:
             if guard._is_ready() and self.can_execute(guard):
                 timeout = 0
-                self._ready.append((guard, 0))
+                self._ready.append((guard, False))
         next_timer: Timer | None = None
         for timer in self._timers:
             remaining = timer._remaining()
             if remaining <= 0:
                 if self.can_execute(timer):
                     next_timer, timeout = None, 0
-                    self._ready.append((timer, 0))
+                    self._ready.append((timer, False))
             elif remaining < timeout:
                 next_timer, timeout = timer, remaining
         tokens = self._waitset.wait(timeout)
         if not tokens and next_timer is not None:
-            self._ready.append((next_timer, 0))  # its time has come
+            self._ready.append((next_timer, False))  # its time has come
         woken = False
         for token in tokens:
             if token == _WAKE:
                 woken = True
                 self._guard.take()
             elif token in self._attached:
-                self._ready.append((self._attached[token][0], _MESSAGES_A_TURN - 1))
+                self._ready.append((self._attached[token][0], True))
+                self._turns_end = time.monotonic_ns() + _TURNS
         return woken
 
     # What is waited for
@@ -399,6 +408,7 @@ class Executor(AbstractContextManager["Executor"]):
                 if self._waitset.attach(handle, self._last_token):
                     self._tokens[handle] = self._last_token
                     self._attached[self._last_token] = (entity, handle)
+        self._again.clear()
         if self._ready:  # what others run from now on is not run here
             here = {*self._timers, *self._guards, *wanted.values()}
             self._ready = deque(one for one in self._ready if one[0].__class__ is Task or one[0] in here)

@@ -6,6 +6,8 @@ import re
 
 from rclpy import validate_namespace, validate_node_name, validate_topic_name
 
+__all__ = ["expand_topic_name"]
+
 
 def expand_topic_name(topic_name: str, node_name: str, node_namespace: str) -> str:
     """

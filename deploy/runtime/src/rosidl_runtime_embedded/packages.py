@@ -8,6 +8,7 @@ The former win.
 from __future__ import annotations
 
 import os
+import re
 import sys
 from functools import cache
 from importlib.machinery import ModuleSpec, PathFinder
@@ -48,6 +49,10 @@ def interface_names(package: str, kind: str) -> list[str]:
     )
     files = {file for directory in directories for file in os.listdir(directory)}
     return sorted(file.removesuffix(f".{kind}") for file in files if file.endswith(f".{kind}"))
+
+
+def _snake_case(name: str) -> str:
+    return re.sub(r"(?<=[a-z0-9])(?=[A-Z])|(?<=.)(?=[A-Z][a-z])", "_", name).lower()
 
 
 @cache
@@ -150,16 +155,22 @@ class _UserPackages:
     ) -> ModuleSpec | None:
         """Spec of ``<package>``, ``<package>.msg`` and the like, if Python has at most a directory for it.
 
+        Also of ``<package>.msg._pose``, in which ROS 2 has the class Pose: editors import it from there.
         What else it has is passed on: to find that twice would make every import slower.
         """
         package, _, kind = name.partition(".")
+        kind, _, module = kind.partition(".")
+        if module:
+            names = interface_names(package, kind) if kind in _KINDS else []
+            known = any(f"_{_snake_case(interface)}" == module for interface in names)
+            return ModuleSpec(name, cast("Loader", self)) if known else None
         kinds = [kind] if kind in _KINDS else [] if kind else _KINDS
         if not kinds:
             return None
         found = PathFinder.find_spec(name, path, target)
         if (found and found.loader) or not any(interface_names(package, kind) for kind in kinds):
             return found
-        return ModuleSpec(name, cast("Loader", self), origin=f"definitions of {package}", is_package=not kind)
+        return ModuleSpec(name, cast("Loader", self), origin=f"definitions of {package}", is_package=True)
 
     def create_module(self, spec: ModuleSpec) -> None:
         """Leave the creation to the import system."""
@@ -169,7 +180,8 @@ class _UserPackages:
         if module.__name__.endswith(".action"):
             raise NoActions(f"{module.__name__}: the embedded runtime has no actions")
         if "." in module.__name__:
-            vars(module)["__getattr__"], vars(module)["__dir__"] = interfaces(module.__name__)
+            of = ".".join(module.__name__.split(".")[:2])
+            vars(module)["__getattr__"], vars(module)["__dir__"] = interfaces(of)
 
 
 def install() -> None:

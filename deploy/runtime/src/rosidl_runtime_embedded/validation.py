@@ -5,6 +5,7 @@ from __future__ import annotations
 from array import array
 from collections import UserList, UserString
 from collections.abc import Sequence, Set
+from operator import index
 from struct import Struct
 from typing import TYPE_CHECKING, Any
 
@@ -127,7 +128,10 @@ def _single(value: Any, type_: FieldType, top: str, where: str, nested: bool = T
                 raise _wrong(ValueError, top, where, type_, value, "it is out of range") from None
     else:
         if not isinstance(value, int):
-            raise _wrong(TypeError, top, where, type_, value)
+            # rclpy publishes whatever is an integer, such as NumPy's; only a check of fields refuses it.
+            if not nested or not hasattr(value, "__index__"):
+                raise _wrong(TypeError, top, where, type_, value)
+            value = index(value)
         low, high = integer_range(base)
         if not low <= value <= high:
             raise _wrong(ValueError, top, where, type_, value, f"it must be in [{low}, {high}]")

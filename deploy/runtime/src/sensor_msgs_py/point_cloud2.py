@@ -12,10 +12,10 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.lib import recfunctions
 from numpy.typing import NDArray
 
 from sensor_msgs.msg import PointCloud2, PointField
+from sensor_msgs_py.numpy_compat import structured_to_unstructured, unstructured_to_structured
 from std_msgs.msg import Header
 
 DUMMY_FIELD_PREFIX = "unnamed_field"
@@ -107,7 +107,7 @@ def read_points_numpy(
     """Return fields of one type as a plain array, a row for each point; see :func:`read_points`."""
     points = read_points(cloud, field_names, skip_nans, uvs, reshape_organized_cloud)
     assert len(_types(points.dtype)) <= 1, "the fields are of several types: use read_points()"
-    return recfunctions.structured_to_unstructured(points)
+    return structured_to_unstructured(points)
 
 
 def read_points_list(
@@ -138,7 +138,7 @@ def create_cloud(
         structured = np.array([tuple(point) for point in points], type_)
     elif points.dtype.names is None:
         assert len(_types(type_)) <= 1, "the fields are of several types: use a structured array"
-        structured = recfunctions.unstructured_to_structured(points, type_)
+        structured = unstructured_to_structured(points, type_)
     else:
         assert points.dtype == type_, f"points of type {points.dtype} do not fit the fields: {type_}"
         structured = points
