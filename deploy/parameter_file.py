@@ -25,7 +25,7 @@ import yaml
 from deploy import sentinel
 from deploy.parameters import ALL, KEY, program_of
 from deploy.system import namespace_of
-from interfaces import topics
+from interfaces import topics, unique_yaml
 from services import (
     config_publisher,
     dead_mans_switch,
@@ -126,7 +126,7 @@ class _Declarations:
 def main(path: str) -> str | None:
     """Print what a good file says, as JSON; the first mistake of another, with file, key and reason."""
     try:
-        document = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
+        document = unique_yaml.load(Path(path).read_text(encoding="utf-8"))
     except OSError as error:
         return f"{path}: {error.strerror}"
     except (ValueError, yaml.YAMLError) as error:  # the former also of a date that does not exist

@@ -12,6 +12,7 @@ import fcntl
 import hashlib
 import importlib.util
 import os
+import shlex
 import signal
 import subprocess
 import sys
@@ -78,9 +79,11 @@ def fingerprint(ros: str) -> str:
 
 
 def fingerprint_of_runtime() -> str:
-    """All that deploy/runtime consists of, as a digest."""
-    sources = (path for path in RUNTIME.rglob("*") if path.is_file() and "__pycache__" not in path.parts)
-    return _digest(sorted(sources))
+    """All that is installed of deploy/runtime, as a digest; without what tools and builds leave there."""
+    made = ("__pycache__", "egg-info")
+    sources = (path for path in (RUNTIME / "src").rglob("*") if path.is_file())
+    kept = (path for path in sources if not any(part.endswith(made) for part in path.parts))
+    return _digest([RUNTIME / "pyproject.toml", *sorted(kept)])
 
 
 def _digest(files: Iterable[Path], *words: str) -> str:
@@ -140,9 +143,8 @@ def install_runtime() -> None:
 
 def _refuse_while_running() -> None:
     for run in using(PYTHON.parent):
-        raise SetupError(
-            f"A system runs from this .venv, which has to be changed: REACTIVE_ARM_RUN_DIR={run} make stop"
-        )
+        stop = f"REACTIVE_ARM_RUN_DIR={shlex.quote(str(run))} make stop"
+        raise SetupError(f"A system runs from this .venv, which has to be changed: {stop}")
 
 
 def _step(title: str, command: list[str], log: Path | None = LOG) -> None:

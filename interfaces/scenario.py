@@ -40,7 +40,7 @@ from reactivex import Observable, abc
 from reactivex.disposable import MultipleAssignmentDisposable
 from reactivex.scheduler import TimeoutScheduler
 
-from interfaces import topics
+from interfaces import topics, unique_yaml
 
 T = TypeVar("T")
 T_co = TypeVar("T_co", covariant=True)
@@ -180,7 +180,7 @@ def load(path: str | Path) -> Scenario:
     """Read a scenario from a file. Raises ScenarioError for any mistake in it."""
     try:
         text = Path(path).read_text(encoding="utf-8")
-        document = yaml.safe_load(text)
+        document = unique_yaml.load(text)
     except OSError as error:
         raise ScenarioError(f"{path}: {error.strerror}") from error
     except (yaml.YAMLError, ValueError) as error:

@@ -26,6 +26,7 @@ from deploy import processes
 from deploy.chaos import partition, record, schedule
 from deploy.chaos.arena import SCENARIO, Arena
 from deploy.chaos.cost import Cost
+from deploy.chaos.domain import DOMAINS
 from deploy.chaos.faults import FAULTS
 from deploy.chaos.findings import VIOLATED
 from deploy.chaos.history import CIRCUMSTANCES, PROGRAMS, suffix
@@ -169,6 +170,12 @@ def _options(arguments: Sequence[str]) -> argparse.Namespace:
     options = parser.parse_args(arguments)
     if options.arms > 1 and options.scenario in partition.SCHEDULES:
         parser.error(f"{options.scenario} is played with one arm")
+    if options.arms > len(DOMAINS):
+        parser.error(f"{options.arms} arms need as many ROS domains, of which there are {len(DOMAINS)}")
+    if options.scenario != "monkey" and any(
+        getattr(options, name) != parser.get_default(name) for name in ("every", "faults", "targets")
+    ):
+        parser.error("--every, --faults and --targets are for the random monkey: not with --scenario")
     return options
 
 
@@ -228,7 +235,12 @@ def _directory() -> Iterator[Path]:
                 System(run).stop()  # what a killed monkey has left behind
         for directory in old[: 1 - KEPT]:
             shutil.rmtree(directory)
-        yield base / time.strftime("%Y%m%d-%H%M%S")
+        directory = base / time.strftime("%Y%m%d-%H%M%S")
+        try:
+            yield directory
+        finally:
+            if not (directory / "record.mcap").exists():  # nothing came of it
+                shutil.rmtree(directory, ignore_errors=True)
 
 
 @contextmanager

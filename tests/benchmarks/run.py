@@ -13,6 +13,7 @@ import argparse
 import json
 import os
 import shlex
+import shutil
 import statistics
 import subprocess
 import sys
@@ -82,6 +83,10 @@ def main() -> None:
     parser.add_argument("--awake", action="store_true", help="let no processor sleep meanwhile")
     parser.add_argument("commands", nargs="*", metavar="NAME=COMMAND", help="a Python with its rclpy")
     arguments = parser.parse_args()
+    for word in arguments.commands:
+        name, _, command = word.partition("=")
+        if not name or not command or shutil.which(shlex.split(command)[0]) is None:
+            parser.error(f"{word} is not NAME=COMMAND, with a command that is there")
     commands = dict(command.split("=", 1) for command in arguments.commands) or {"rclpy": sys.executable}
     results: dict[str, dict[str, list[float]]] = {name: defaultdict(list) for name in commands}
     with processors_awake() if arguments.awake else nullcontext():

@@ -42,16 +42,31 @@ def replay(record: Path) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, cwd=processes.ROOT, capture_output=True, text=True, timeout=60)
 
 
-def test_a_play_without_any_fault_is_refused(tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "deploy.chaos", "--faults", "crash_loop", "--targets", "kinematics"]
+@pytest.mark.parametrize(
+    ("options", "code", "reason"),
+    [
+        (
+            "--faults crash_loop --targets kinematics",
+            1,
+            "No fault is planned: the time is too short, or nothing of this can be done to that.",
+        ),
+        ("--arms 73", 2, "73 arms need as many ROS domains, of which there are 72"),
+        (
+            "--scenario kill_each --faults kill",
+            2,
+            "--every, --faults and --targets are for the random monkey: not with --scenario",
+        ),
+    ],
+)
+def test_a_play_that_cannot_be_is_refused(tmp_path: Path, options: str, code: int, reason: str) -> None:
+    command = [sys.executable, "-m", "deploy.chaos", *options.split()]
     environment = {**os.environ, "REACTIVE_ARM_RUN_DIR": str(tmp_path)}
     end = subprocess.run(
         command, cwd=processes.ROOT, env=environment, capture_output=True, text=True, timeout=60
     )
-    assert end.returncode == 1
-    assert end.stderr.splitlines() == [
-        "No fault is planned: the time is too short, or nothing of this can be done to that."
-    ]
+    assert end.returncode == code
+    assert end.stderr.splitlines()[-1].endswith(reason)
+    assert not list(tmp_path.glob("chaos/*"))
 
 
 def test_ctrl_c_ends_the_judging(tmp_path: Path) -> None:

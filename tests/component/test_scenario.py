@@ -116,6 +116,7 @@ def test_an_empty_scenario_drives_nothing(tmp_path: Path) -> None:
         ),
         ("repeat: 0", "repeat: must be more than 0, not 0"),
         ("l1: [1", "while parsing a flow sequence"),
+        ("l1: 2\nl1: 3", "the key l1 is there twice"),
     ],
 )
 def test_a_mistake_is_one_line_with_file_key_and_reason(tmp_path: Path, text: str, reason: str) -> None:

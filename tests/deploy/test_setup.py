@@ -52,6 +52,24 @@ def make(checkout: Path, command: str) -> str:
     ).stdout.strip()
 
 
+def test_what_tools_leave_behind_is_no_part_of_the_runtime(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(setup, "ROOT", tmp_path)
+    monkeypatch.setattr(setup, "RUNTIME", tmp_path)
+    source = tmp_path / "src" / "rclpy" / "node.py"
+    source.parent.mkdir(parents=True)
+    source.touch()
+    (tmp_path / "pyproject.toml").touch()
+    before = setup.fingerprint_of_runtime()
+    for name in (".ruff_cache/x", "build/x", "src/rclpy.egg-info/x", "src/rclpy/__pycache__/x"):
+        (tmp_path / name).parent.mkdir()
+        (tmp_path / name).touch()
+    assert setup.fingerprint_of_runtime() == before
+    source.write_text("changed")
+    assert setup.fingerprint_of_runtime() != before
+
+
 def test_a_set_up_that_is_refused_leaves_what_there_is(checkout: Path, tmp_path: Path) -> None:
     stamp = checkout / STAMP
     stamp.parent.mkdir()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import socket
 import subprocess
 import sys
 from collections.abc import Callable
@@ -18,6 +19,26 @@ from rclpy.node import Node
 MakeNode = Callable[..., Node]
 SpinUntil = Callable[..., None]
 GOLDEN = json.loads((Path(__file__).parents[1] / "facts" / "cdr_golden.json").read_text())
+
+
+@pytest.fixture(autouse=True)
+def names(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every name has an address but nowhere's."""
+
+    def look_up(name: str, *_: object) -> list[object]:
+        if name == "nowhere":
+            raise socket.gaierror(socket.EAI_NONAME, "Name or service not known")
+        return []
+
+    monkeypatch.setattr(socket, "getaddrinfo", look_up)
+
+
+def test_a_peer_without_an_address_is_left_out(capsys: pytest.CaptureFixture[str]) -> None:
+    configuration = domain.configuration({"ROS_STATIC_PEERS": "nowhere;10.0.0.7;robot1:7410"})
+    assert configuration == domain.configuration({"ROS_STATIC_PEERS": "10.0.0.7;robot1:7410"})
+    assert capsys.readouterr().err == (
+        "[WARN] ROS_STATIC_PEERS: going on without 'nowhere': Name or service not known\n"
+    )
 
 
 def test_the_domain_is_0_unless_the_environment_says_otherwise() -> None:

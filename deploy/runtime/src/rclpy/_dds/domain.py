@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import os
 import re
+import socket
+import sys
 import threading
 from collections.abc import Mapping
 from contextlib import suppress
@@ -51,9 +53,11 @@ def configuration(environment: Mapping[str, str] = os.environ) -> str:
     peers = [peer.strip() for peer in environment.get("ROS_STATIC_PEERS", "").split(";") if peer.strip()]
     if any(character in peer for peer in peers for character in "<>&\"'"):
         raise RCLError(f"ROS_STATIC_PEERS must be addresses or host names with ';' between, not {peers}")
+    uri = environment.get("CYCLONEDDS_URI", "")
     if environment.get("ROS_LOCALHOST_ONLY", "0") == "1":
         discovery_range, peers = "LOCALHOST", []
-    uri = environment.get("CYCLONEDDS_URI", "")
+    if discovery_range in ("LOCALHOST", "SUBNET"):
+        peers = [peer for peer in peers if _has_address(peer, socket.AF_UNSPEC if uri else socket.AF_INET)]
     general, discovery = "", ""
     if discovery_range == "LOCALHOST":
         if peers:
@@ -77,6 +81,20 @@ def configuration(environment: Mapping[str, str] = os.environ) -> str:
         )
     own = f"<CycloneDDS><Domain>{general}{discovery}</Domain></CycloneDDS>" if discovery else ""
     return ",".join(part for part in (own, uri) if part)
+
+
+def _has_address(peer: str, family: int) -> bool:
+    """Whether a peer's name can be looked up: Cyclone aborts the process if not. Warns then.
+
+    Nobody else is to suffer from that: neither the other peers nor, when the network has failed, a restart.
+    """
+    try:
+        socket.getaddrinfo(peer.partition(":")[0] if peer.count(":") == 1 else peer, None, family)
+    except (OSError, UnicodeError) as error:
+        reason = getattr(error, "strerror", None) or error
+        print(f"[WARN] ROS_STATIC_PEERS: going on without '{peer}': {reason}", file=sys.stderr, flush=True)
+        return False
+    return True
 
 
 def _names_interfaces(uri: str) -> bool:
