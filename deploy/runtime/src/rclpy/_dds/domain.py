@@ -14,6 +14,7 @@ import sys
 import threading
 from collections.abc import Mapping
 from contextlib import suppress
+from functools import cache
 from pathlib import Path
 
 from rclpy.exceptions import RCLError
@@ -83,6 +84,7 @@ def configuration(environment: Mapping[str, str] = os.environ) -> str:
     return ",".join(part for part in (own, uri) if part)
 
 
+@cache
 def _has_address(peer: str, family: int) -> bool:
     """Whether a peer's name can be looked up: Cyclone aborts the process if not. Warns then.
 
