@@ -237,7 +237,10 @@ def main(arguments: list[str]) -> int:
         for arm in arms:
             stack.enter_context(listening(arm, recorder))
         stack.enter_context(meanwhile(Census(arms, report, overload).run))
-        obey()
+        try:
+            obey()
+        finally:
+            recorder.close()  # for all at once, while they still speak: to stop listening takes time
     return 0
 
 

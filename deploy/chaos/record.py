@@ -50,8 +50,10 @@ class Recorder:
         self._writer.add_metadata(METADATA, {"origin": str(self._origin + self._offset)})
 
     def message(self, topic: str, type_name: str, qos: str, data: bytes, received: int, sent: int) -> None:
-        """Record a serialized message; times by the monotonic clock [ns]."""
+        """Record a serialized message, until the file is complete; times by the monotonic clock [ns]."""
         with self._lock:
+            if self._file.closed:
+                return
             if topic not in self._channels:
                 self._add(topic, type_name, qos)
             self._counts[topic] += 1
@@ -69,8 +71,10 @@ class Recorder:
         self.message(topic, "std_msgs/msg/String", "", data, time, time)
 
     def close(self) -> None:
-        """Complete the file."""
+        """Complete the file, unless it is already."""
         with self._lock:
+            if self._file.closed:
+                return
             self._writer.finish()  # type: ignore[no-untyped-call]
             self._file.close()
 
