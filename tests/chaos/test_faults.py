@@ -171,22 +171,24 @@ def test_a_child_of_supervisord_is_named_by_its_program_however_long_that_takes(
         text=True,
         bufsize=1,
     ) as supervisord:
-        assert supervisord.stdin is not None
-        assert supervisord.stdout is not None
-        supervisord.stdout.readline()
-        census.look()
-        supervisord.stdin.write("fork\n")
-        child = int(supervisord.stdout.readline())
-        for _ in range(3):
+        try:
+            assert supervisord.stdin is not None
+            assert supervisord.stdout is not None
+            supervisord.stdout.readline()
             census.look()
-        assert [(life.program, life.pid) for life in seen] == [("", supervisord.pid)]
-        supervisord.stdin.write("become velocity\n")
-        supervisord.stdout.readline()
-        census.look()
-        ended = threading.Event()
-        ended.set()
-        census.run(ended)  # gives back what it holds
-        supervisord.kill()  # its child reads the end of its input then
+            supervisord.stdin.write("fork\n")
+            child = int(supervisord.stdout.readline())
+            for _ in range(3):
+                census.look()
+            assert [(life.program, life.pid) for life in seen] == [("", supervisord.pid)]
+            supervisord.stdin.write("become velocity\n")
+            supervisord.stdout.readline()
+            census.look()
+            ended = threading.Event()
+            ended.set()
+            census.run(ended)  # gives back what it holds
+        finally:
+            supervisord.kill()  # its child reads the end of its input then
     assert [(life.program, life.pid) for life in seen] == [("", supervisord.pid), ("velocity", child)]
 
 
