@@ -52,6 +52,14 @@ def _environ(pid: int) -> bytes:
         return b""
 
 
+def stat_of(pid: int) -> list[str]:
+    """State, parent and what else proc(5) has in `stat` after a process' name; empty when it has ended."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(") ")[2].split()
+    except OSError:
+        return []
+
+
 def of_system(run: Path) -> list[Process]:
     """The live processes of the system with this run directory, supervisord first."""
     found = [

@@ -7,7 +7,6 @@ import signal
 import time
 from collections.abc import Mapping
 from contextlib import suppress
-from pathlib import Path
 
 from deploy import processes
 from deploy.sentinel_judge import Action, Sight
@@ -61,8 +60,5 @@ class Eyes:
 
 def _state_of(pid: int) -> tuple[str, int]:
     """State and parent of a process; ('', 0) if it has ended."""
-    try:
-        state, parent = Path(f"/proc/{pid}/stat").read_text().rpartition(") ")[2].split()[:2]
-    except OSError:
-        return "", 0
-    return state, int(parent)
+    stat = processes.stat_of(pid)
+    return (stat[0], int(stat[1])) if stat else ("", 0)

@@ -178,8 +178,8 @@ class Census:
 
     def _is_to_be(self, pid: int) -> bool:
         """Whether a process is a child of a supervisord, and so is to become one of its programs."""
-        parent = _parent(pid)
-        return any(not life.program and life.pid == parent for _, life in self._alive.values())
+        parent = processes.stat_of(pid)[1:2]
+        return any(not life.program and [str(life.pid)] == parent for _, life in self._alive.values())
 
     def _end(self, handle: int, now: float) -> None:
         self._poll.unregister(handle)
@@ -190,16 +190,9 @@ class Census:
 
 def _began(pid: int) -> float:
     """When a process was started, on the monotonic clock."""
-    ticks = int(Path(f"/proc/{pid}/stat").read_text().rpartition(") ")[2].split()[19])
+    ticks = int(processes.stat_of(pid)[19])
     suspended = time.clock_gettime(time.CLOCK_BOOTTIME) - time.monotonic()
     return ticks / os.sysconf("SC_CLK_TCK") - suspended
-
-
-def _parent(pid: int) -> int:
-    try:
-        return int(Path(f"/proc/{pid}/stat").read_text().rpartition(") ")[2].split()[1])
-    except (OSError, ValueError, IndexError):
-        return 0
 
 
 def _command(pid: int) -> str:
@@ -233,14 +226,11 @@ def main(arguments: list[str]) -> int:
             recorder.event(FAULTS, time.monotonic_ns(), event)
 
     with ExitStack() as stack:
-        stack.callback(recorder.close)
         for arm in arms:
             stack.enter_context(listening(arm, recorder))
         stack.enter_context(meanwhile(Census(arms, report, overload).run))
-        try:
-            obey()
-        finally:
-            recorder.close()  # for all at once, while they still speak: to stop listening takes time
+        stack.callback(recorder.close)  # first, and so for all at once: to stop listening takes time
+        obey()
     return 0
 
 

@@ -71,10 +71,8 @@ class Recorder:
         self.message(topic, "std_msgs/msg/String", "", data, time, time)
 
     def close(self) -> None:
-        """Complete the file, unless it is already."""
+        """Complete the file."""
         with self._lock:
-            if self._file.closed:
-                return
             self._writer.finish()  # type: ignore[no-untyped-call]
             self._file.close()
 
