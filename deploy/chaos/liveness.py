@@ -19,7 +19,7 @@ from deploy.chaos.history import (
     History,
     between,
 )
-from deploy.chaos.safety import MEETING, Published, a_source_was_new
+from deploy.chaos.safety import Published, may_have_missed_values
 from interfaces import topics
 
 MEDIAN, SLOWEST = 1.0, 2.0  # s, L1
@@ -162,11 +162,9 @@ def right_after_return(history: History) -> Finding:
             continue
         positions = between(history.stream(topics.EFFECTOR_POSITION), begin, begin + 1.0)
         right = bool(positions) and published.explains(positions[-1], within=SETTLED)
-        if positions and not right:
-            at = positions[-1].sent
-            if a_source_was_new(history, at) or history.may_have_missed(at - MEETING, at):
-                unknown += 1
-                continue
+        if positions and not right and may_have_missed_values(history, positions[-1].sent):
+            unknown += 1
+            continue
         cases += bool(positions)
         if positions and not right:
             what = f"the position is not that of the last values after {fault.kind} of {fault.target}"

@@ -108,9 +108,7 @@ def speeds_and_positions_are_true(history: History) -> Finding:
     for position in positions:
         if published.explains(position, within=LONGEST_PAUSE):
             continue
-        if a_source_was_new(history, position.sent) or history.may_have_missed(
-            position.sent - MEETING, position.sent
-        ):
+        if may_have_missed_values(history, position.sent):
             unknown += 1
         else:
             evidence.append(Evidence(position.sent, f"position {position.value} of no published values"))
@@ -137,8 +135,10 @@ def never_two_alive(history: History) -> Finding:
     return Finding("S5", cases, f"{cases} successors and doubles", sorted(evidence))
 
 
-def a_source_was_new(history: History, time: float) -> bool:
+def may_have_missed_values(history: History, time: float) -> bool:
     """Whether others may have got a value that the observer did not: it may have met its source later."""
+    if history.may_have_missed(time - MEETING, time):
+        return True
     for life in history.lives:
         if life.program.startswith("config_") and life.began < time:
             output = history.output(life.program)
@@ -262,18 +262,15 @@ def _absences(history: History, time: float) -> float:
     return sum((end - begin + SAMPLING) // STRIKE for begin, end in silences)
 
 
-def _merged(stretches: Iterable[tuple[float, float]]) -> Iterator[tuple[float, float]]:
+def _merged(stretches: Iterable[tuple[float, float]]) -> list[tuple[float, float]]:
     """The stretches, those that overlap as one. Those that only touch stay two: a silence and the next."""
-    last: tuple[float, float] | None = None
+    merged: list[tuple[float, float]] = []
     for begin, end in sorted(stretches):
-        if last is not None and begin < last[1]:
-            last = (last[0], max(last[1], end))
+        if merged and begin < merged[-1][1]:
+            merged[-1] = (merged[-1][0], max(merged[-1][1], end))
         else:
-            if last is not None:
-                yield last
-            last = (begin, end)
-    if last is not None:
-        yield last
+            merged.append((begin, end))
+    return merged
 
 
 def _abandoned(history: History, off: Sample) -> bool:
