@@ -369,6 +369,8 @@ class Executor(AbstractContextManager["Executor"]):
         tokens = self._waitset.wait(timeout)
         if not tokens and next_timer is not None:
             self._ready.append((next_timer, False))  # its time has come
+        if tokens:
+            self._turns_end = time.monotonic_ns() + _TURNS
         woken = False
         for token in tokens:
             if token == _WAKE:
@@ -376,7 +378,6 @@ class Executor(AbstractContextManager["Executor"]):
                 self._guard.take()
             elif token in self._attached:
                 self._ready.append((self._attached[token][0], True))
-                self._turns_end = time.monotonic_ns() + _TURNS
         return woken
 
     # What is waited for

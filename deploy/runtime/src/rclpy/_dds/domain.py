@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import os
 import re
-import socket
 import sys
 import threading
 from collections.abc import Mapping
@@ -58,7 +57,7 @@ def configuration(environment: Mapping[str, str] = os.environ) -> str:
     if environment.get("ROS_LOCALHOST_ONLY", "0") == "1":
         discovery_range, peers = "LOCALHOST", []
     if discovery_range in ("LOCALHOST", "SUBNET"):
-        peers = [peer for peer in peers if _has_address(peer, socket.AF_UNSPEC if uri else socket.AF_INET)]
+        peers = [peer for peer in peers if _has_address(peer, only_ipv4=not uri)]
     general, discovery = "", ""
     if discovery_range == "LOCALHOST":
         if peers:
@@ -85,11 +84,14 @@ def configuration(environment: Mapping[str, str] = os.environ) -> str:
 
 
 @cache
-def _has_address(peer: str, family: int) -> bool:
+def _has_address(peer: str, only_ipv4: bool) -> bool:
     """Whether a peer's name can be looked up: Cyclone aborts the process if not. Warns then.
 
     Nobody else is to suffer from that: neither the other peers nor, when the network has failed, a restart.
     """
+    import socket  # here, as hardly anybody names peers, and every start would pay for it
+
+    family = socket.AF_INET if only_ipv4 else socket.AF_UNSPEC
     try:
         socket.getaddrinfo(peer.partition(":")[0] if peer.count(":") == 1 else peer, None, family)
     except (OSError, UnicodeError) as error:
