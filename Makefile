@@ -3,7 +3,7 @@
 PYTHON ?=
 SCENARIO ?= demo
 PARAMETERS ?=
-TESTS ?= tests
+TESTS ?= tests interfaces/reactive_node deploy/runtime
 MINUTES ?= 5
 SEED ?=
 CHAOS ?=
@@ -28,14 +28,14 @@ help:
 	@echo "make setup    only set up .venv                   (PYTHON= chooses the interpreter, 3.11 to 3.13)"
 
 setup:
-	@deploy/setup.sh '$(PYTHON)'
+	@deploy/commands/setup.sh '$(PYTHON)'
 
 run start: setup
-	@$(PY) -m deploy.launcher $@ '$(SCENARIO)' '$(PARAMETERS)'
+	@$(PY) -m deploy.commands.launcher $@ '$(SCENARIO)' '$(PARAMETERS)'
 
 # These do without a set-up: what they look at, or end, runs already. Nothing runs from half of one: it has no stamp.
 console status logs stop:
-	@if test -e $(STAMP); then exec $(PY) -m deploy.launcher $@; else echo "Nothing runs: .venv is not set up (make setup)."; fi
+	@if test -e $(STAMP); then exec $(PY) -m deploy.commands.launcher $@; else echo "Nothing runs: .venv is not set up (make setup)."; fi
 
 chaos: setup
 	@$(PY) -m deploy.chaos --minutes $(MINUTES) $(if $(SEED),--seed $(SEED)) $(CHAOS)
@@ -44,12 +44,12 @@ test: setup
 	@$(PY) -m pytest $(TESTS)
 
 bench: setup
-	@$(PY) -m tests.benchmarks.run
+	@$(PY) deploy/runtime/benchmarks/run.py
 
 check: setup
 	@$(PY) -m ruff check .
 	@$(PY) -m ruff format --check --quiet .
 	@$(PY) -m mypy
 	@$(PY) -m mypy --config-file deploy/runtime/pyproject.toml
-	@.venv/bin/shellcheck deploy/setup.sh .ci/run
+	@.venv/bin/shellcheck deploy/commands/setup.sh .ci/run
 	@$(PY) -m yamllint --strict deploy

@@ -13,10 +13,11 @@ import reactivex as rx
 from reactivex import Observable
 from std_msgs.msg import String
 
-from interfaces import age, service
-from interfaces.age import Timestamp
+from interfaces import service
 from interfaces.service import ServiceNode
 from interfaces.topics import DRIVE, ENGINES, ENGINES_STATE, OFF, ON, OPERATOR_PRESENCE, TURN_OFF, TURN_ON
+from reactive_node import stamps
+from reactive_node.stamps import Timestamp
 
 
 def engine_state(
@@ -27,7 +28,7 @@ def engine_state(
     absence: float = 10.0,
     repeat: float = 0.1,
     drive: float = DRIVE,
-    now: Callable[[], datetime] = age.now,
+    now: Callable[[], datetime] = stamps.now,
     refused: Callable[[str], None] = lambda why: None,
 ) -> Observable[str]:
     """
@@ -72,7 +73,9 @@ def engine_state(
         renewals = late.with_latest_from(states).filter(lambda it: it != (True, ON))
         return rx.merge(renewals.map(lambda it: it[1]), states)
 
-    return age.latest(presences, now=now, dropped=lambda why: refused(f"presence: {why}")).publish(repeated)
+    return stamps.latest(presences, now=now, dropped=lambda why: refused(f"presence: {why}")).publish(
+        repeated
+    )
 
 
 def wire(node: ServiceNode) -> None:
@@ -82,7 +85,7 @@ def wire(node: ServiceNode) -> None:
     repeat = node.declare("repeat", 0.1, (0.02, 0.2), "the state is repeated this often [s]")
     states = engine_state(
         node.observe(ENGINES, timestamped=True).map(lambda item: Timestamp(item.value.data, item.timestamp)),
-        node.observe(OPERATOR_PRESENCE).map(lambda header: age.from_message(header.stamp)),
+        node.observe(OPERATOR_PRESENCE).map(lambda header: stamps.from_message(header.stamp)),
         presence=presence,
         absence=absence,
         repeat=repeat,

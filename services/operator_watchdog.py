@@ -14,10 +14,11 @@ from reactivex import Observable
 from reactivex.subject import Subject
 from std_msgs.msg import Header, String
 
-from interfaces import age, service
-from interfaces.age import Timestamp
+from interfaces import service
 from interfaces.service import ServiceNode
 from interfaces.topics import ENGINES, OPERATOR_HEARTBEAT, OPERATOR_PRESENCE, TURN_OFF
+from reactive_node import stamps
+from reactive_node.stamps import Timestamp
 
 AT_ONCE = 0.1  # s after which a successor says whether it sees the operator
 Heartbeat = Timestamp[Any]  # with its source time
@@ -73,7 +74,7 @@ def wire(node: ServiceNode) -> None:
     node.declare_origin()
     presences: Subject[Heartbeat] = Subject()
     commands = operator_incapacitated(
-        age.fresh(
+        stamps.fresh(
             node.observe(OPERATOR_HEARTBEAT, timestamped=True),
             lifespan=lifespan,
             dropped=lambda why: node.drop(OPERATOR_HEARTBEAT.name, why),
@@ -86,7 +87,7 @@ def wire(node: ServiceNode) -> None:
         strikes=strikes,
         repeat=repeat,
     )
-    node.publish(OPERATOR_PRESENCE, presences.map(lambda it: Header(stamp=age.to_message(it.timestamp))))
+    node.publish(OPERATOR_PRESENCE, presences.map(lambda it: Header(stamp=stamps.to_message(it.timestamp))))
     # Before a scenario begins nobody is expected: no silence counts yet.
     node.publish(ENGINES, node.from_origin(commands).map(lambda command: String(data=command)))
 

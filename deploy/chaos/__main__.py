@@ -7,7 +7,7 @@ usage: python -m deploy.chaos [--minutes 5] [--seed N] [--scenario NAME] [--ever
 
 from __future__ import annotations
 
-from deploy import interruption  # isort: split
+from deploy.commands import interruption  # isort: split
 
 import argparse
 import fcntl
@@ -22,19 +22,19 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from deploy import processes
 from deploy.chaos import partition, record, schedule
 from deploy.chaos.arena import SCENARIO, Arena
 from deploy.chaos.cost import Cost
-from deploy.chaos.domain import DOMAINS
 from deploy.chaos.faults import FAULTS
 from deploy.chaos.findings import VIOLATED
 from deploy.chaos.history import CIRCUMSTANCES, PROGRAMS, suffix
 from deploy.chaos.page import page
 from deploy.chaos.promises import CHECKERS
 from deploy.chaos.report import text
-from deploy.system import DeploymentError, System
+from deploy.supervision import processes
+from deploy.supervision.system import DeploymentError, System
 from interfaces import topics
+from reactive_node.domains import DOMAINS
 
 SCENARIOS = ("monkey", *partition.SCHEDULES, *schedule.NAMED)
 KEPT = 10  # records

@@ -30,13 +30,13 @@ from typing import Any
 
 import yaml
 
-from deploy import processes
-from deploy.chaos.domain import reserved_domain
 from deploy.chaos.faults import FAULTS, INJECTED
 from deploy.chaos.history import LOSS, NOTHING, OPERATOR, PROGRAMS, SILENCE, Fault, suffix
 from deploy.chaos.schedule import AWAKE, FIRST, PERIOD, Planned, Schedule
-from deploy.system import NAMESPACE, SETTINGS, DeploymentError, System
+from deploy.supervision import processes
+from deploy.supervision.system import NAMESPACE, SETTINGS, DeploymentError, System
 from interfaces import topics
+from reactive_node.domains import reserved_domain
 
 UP = 60.0  # s until an arm has to be up
 LEAD = 1.0  # s from the start to the origin of the scenario

@@ -17,10 +17,10 @@ from typing import NamedTuple, Protocol
 
 import yaml
 
-from deploy import processes
 from deploy.chaos.history import ALL, NOTHING, PROGRAMS
 from deploy.chaos.marks import BABBLER
-from deploy.system import System
+from deploy.supervision import processes
+from deploy.supervision.system import System
 
 INJECTED = Path(__file__).parent / "inject"
 """Has to stand on the PYTHONPATH of the system, for `hang`, `raise` and `hog`."""

@@ -27,10 +27,10 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.signals import SignalHandlerOptions
 
-from deploy import processes
 from deploy.chaos.history import NOTHING, OVERLOAD, Fault, Life
 from deploy.chaos.marks import BABBLER
 from deploy.chaos.record import FAULTS, PROCESSES, Recorder, qos_profiles
+from deploy.supervision import processes
 from interfaces import topics
 
 STALL = 0.1  # s for a look: the machine is overloaded, and tells of itself more than of the arms

@@ -16,13 +16,13 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from deploy import processes
 from deploy.chaos.arena import SCENARIO, Arena, ArmUnderTest
 from deploy.chaos.faults import FAULTS, Fault, Undo
 from deploy.chaos.faults import Arm as Victim
 from deploy.chaos.history import OPERATOR
 from deploy.chaos.schedule import Planned
-from deploy.system import System
+from deploy.supervision import processes
+from deploy.supervision.system import System
 
 ROBOT, CONTROL, SWITCH = "robot", "operator", "switch"
 NETWORK = "10.86.86"  # of the namespaces only

@@ -25,7 +25,7 @@ from std_msgs.msg import String
 
 from deploy.chaos.history import Fault, History, Life, Sample
 from deploy.chaos.marks import is_babble
-from deploy.system import DeploymentError
+from deploy.supervision.system import DeploymentError
 from interfaces import topics
 
 PROCESSES, FAULTS = "/chaos/processes", "/chaos/faults"

@@ -7,11 +7,11 @@ import subprocess
 import sys
 from pathlib import Path
 
-from deploy import processes
 from deploy.chaos import record
 from deploy.chaos.findings import Finding
 from deploy.chaos.history import History, suffix
 from deploy.chaos.promises import CHECKERS
+from deploy.supervision import processes
 
 LONGEST = 150.0  # s
 

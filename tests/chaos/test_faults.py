@@ -18,13 +18,13 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from std_msgs.msg import Float64
 
-from deploy import processes
 from deploy.chaos import observer
 from deploy.chaos.faults import FAULTS, Undo
 from deploy.chaos.history import ALL, NOTHING, Life
 from deploy.chaos.marks import BABBLER
 from deploy.chaos.observer import Arm, Census
-from deploy.system import System
+from deploy.supervision import processes
+from deploy.supervision.system import System
 from interfaces import topics
 
 

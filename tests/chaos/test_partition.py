@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from deploy import processes
 from deploy.chaos.findings import HOLDS
 from deploy.chaos.history import Fault, History, between
 from deploy.chaos.partition import missing, namespaces
 from deploy.chaos.promises import CHECKERS
+from deploy.supervision import processes
 from interfaces.topics import ENGINES_STATE, OFF, ON, OPERATOR_HEARTBEAT
 
 from .plays import play

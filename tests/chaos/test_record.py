@@ -14,9 +14,9 @@ from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 from std_msgs.msg import Float64
 
-from deploy import processes
 from deploy.chaos.history import Life
 from deploy.chaos.record import PROCESSES, Recorder, qos_profiles
+from deploy.supervision import processes
 from interfaces import topics
 
 
@@ -73,7 +73,7 @@ def test_ctrl_c_ends_the_judging(tmp_path: Path) -> None:
     path = tmp_path / "record.mcap"
     recorded(path, ONE)
     script = (
-        "import deploy.interruption, os, signal, sys; os.kill(os.getpid(), signal.SIGINT);"
+        "import deploy.commands.interruption, os, signal, sys; os.kill(os.getpid(), signal.SIGINT);"
         f"import deploy.chaos.__main__ as monkey; sys.exit(monkey.main(['--replay', {str(path)!r}]))"
     )
     end = subprocess.run(

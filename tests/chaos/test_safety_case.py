@@ -9,7 +9,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 CASE = (ROOT / "deploy" / "SAFETY.md").read_text(encoding="utf-8")
-CITED = sorted(set(re.findall(r"(tests/\S+\.py)::(\w+)", CASE)))
+CITED = sorted(set(re.findall(r"([\w/]*tests/\S+\.py)::(\w+)", CASE)))
 
 
 @pytest.mark.parametrize(("file", "test"), CITED)

@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from reactivex.testing import ReactiveTest, TestScheduler
 
-from interfaces.age import Timestamp
 from interfaces.topics import OFF, ON, TURN_OFF, TURN_ON
+from reactive_node.stamps import Timestamp
 from services.engine_controller import engine_state
 
 on_next, subscribe = ReactiveTest.on_next, ReactiveTest.subscribe

@@ -15,9 +15,10 @@ from reactivex.subject import Subject
 from reactivex.testing import TestScheduler
 from std_msgs.msg import Bool, Float64, Header, String
 
-from deploy import terminal
-from interfaces import age, scenario, topics
-from interfaces.age import Timestamp
+from deploy.console import view
+from interfaces import scenario, topics
+from reactive_node import stamps
+from reactive_node.stamps import Timestamp
 from services.engine_controller import engine_state
 from services.kinematics import effector_position
 from services.operator_watchdog import operator_incapacitated
@@ -80,7 +81,7 @@ class Arm:
         self.topics: dict[str, Subject[Any]] = {topic.name: Subject() for topic in topics.CONTRACT}
         self.lines: list[str] = []
         played = scenario.load(path)
-        terminal.view(self.seen, WATCH_BEGINS).subscribe(self.print, scheduler=self.scheduler)
+        view.view(self.seen, WATCH_BEGINS).subscribe(self.print, scheduler=self.scheduler)
         self.scheduler.advance_to(START)
         self.wire()
         for name, timeline in played.configuration.items():
@@ -96,7 +97,7 @@ class Arm:
     def publish(self, name: str, messages: Observable[Any]) -> None:
         messages.subscribe(self.topics[name].on_next, scheduler=self.scheduler)
 
-    def print(self, line: terminal.Line) -> None:
+    def print(self, line: view.Line) -> None:
         self.lines.append(f"[{(line.time - ORIGIN) / timedelta(milliseconds=1):.0f}] {line.text}")
 
     def wire(self) -> None:
@@ -110,20 +111,20 @@ class Arm:
         heartbeats = self.seen(topics.OPERATOR_HEARTBEAT)
         presence: Subject[Timestamp[Any]] = Subject()
         self.publish(
-            "operator_presence", presence.map(lambda item: Header(stamp=age.to_message(item.timestamp)))
+            "operator_presence", presence.map(lambda item: Header(stamp=stamps.to_message(item.timestamp)))
         )
         commands = operator_incapacitated(heartbeats, alive=presence.on_next)
         begun = rx.timer(WATCH_BEGINS - START).flat_map(lambda _: commands)
         self.publish("engines", begun.map(lambda command: String(data=command)))
         states = engine_state(
             self.topics["engines"].map(lambda m: m.data).timestamp(scheduler=self.scheduler),
-            self.topics["operator_presence"].map(lambda m: age.from_message(m.stamp)),
+            self.topics["operator_presence"].map(lambda m: stamps.from_message(m.stamp)),
             now=lambda: self.scheduler.now,
         )
         self.publish("engines/state", states.map(lambda state: String(data=state)))
 
     def position(self, position: tuple[float, float]) -> PointStamped:
-        stamp = age.to_message(VirtualTimeScheduler.to_datetime(self.scheduler.clock))
+        stamp = stamps.to_message(VirtualTimeScheduler.to_datetime(self.scheduler.clock))
         return PointStamped(header=Header(stamp=stamp), point=Point(x=position[0], y=position[1]))
 
 

@@ -75,7 +75,7 @@ service.run("ready", wire)
 
 
 NO_LAST_RESORT = """
-from interfaces import stopping
+from interfaces.service import stopping
 stopping._PATIENCE = 3600.0
 """
 
@@ -118,12 +118,14 @@ def start(domain_id: int) -> Iterator[Start]:
 
 
 def service(name: str, announce: bool = False) -> tuple[str, ...]:
-    """The command line of a service, which may say when its first line has run."""
+    """The command line of a service, which may say when it handles signals."""
     if not announce:
         return "-m", f"services.{name}"
-    # With -m, too, sys.argv[0] is "-m" until the module is found.
-    announced = "import sys; sys.argv[0] = '-m'; import services; print('begun', flush=True); import runpy"
-    script = f"runpy.run_module('services.{name}', run_name='__main__', alter_sys=True)"
+    announced = (
+        "from interfaces.service import stopping; prepare = stopping.prepare\n"
+        "stopping.prepare = lambda: (prepare(), print('begun', flush=True))"
+    )
+    script = f"import runpy; runpy.run_module('services.{name}', run_name='__main__', alter_sys=True)"
     return "-c", f"{NO_LAST_RESORT}\n{announced}\n{script}"
 
 

@@ -23,8 +23,8 @@ from std_msgs.msg import Bool, Float64, Header, String
 
 from interfaces import topics
 from interfaces.scenario import ScenarioError
+from interfaces.scenario.settings import SettingsError
 from interfaces.service import ServiceNode
-from interfaces.settings import SettingsError
 
 Make = Callable[..., Any]
 SpinUntil = Callable[..., None]
@@ -34,7 +34,7 @@ SpinFor = Callable[[float], None]
 @pytest.fixture
 def service(make_node: Make, monkeypatch: pytest.MonkeyPatch) -> ServiceNode:
     """A service that reports its health when it is told to."""
-    monkeypatch.setattr("interfaces.service._HEALTH_PERIOD", 3600.0)
+    monkeypatch.setattr("interfaces.service.node._HEALTH_PERIOD", 3600.0)
     node: ServiceNode = make_node("service", kind=ServiceNode)
     return node
 
@@ -427,7 +427,7 @@ def test_health_is_reported_once_a_second(make_node: Make, peer: Node, spin_unti
 def test_who_begins_to_listen_hears_of_the_health_at_once(
     make_node: Make, spin_until: SpinUntil, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("interfaces.service._HEALTH_PERIOD", 3600.0)
+    monkeypatch.setattr("interfaces.service.node._HEALTH_PERIOD", 3600.0)
     make_node("polite", kind=ServiceNode)
     topic = topics.DIAGNOSTICS
 

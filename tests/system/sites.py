@@ -21,8 +21,8 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 
-from deploy import processes
-from deploy.system import System
+from deploy.supervision import processes
+from deploy.supervision.system import System
 from interfaces import topics
 
 ROOT = Path(__file__).parents[2]
@@ -156,7 +156,7 @@ class Site:
 
     def begin(self, *arguments: str) -> Command:
         """Begin a command of the launcher."""
-        return self._begin([sys.executable, "-m", "deploy.launcher", *arguments])
+        return self._begin([sys.executable, "-m", "deploy.commands.launcher", *arguments])
 
     def begin_command(self, *command: str) -> Command:
         """Begin any command."""
@@ -174,7 +174,7 @@ class Site:
     def do(self, *arguments: str) -> tuple[int, str]:
         """A whole command of the launcher: its exit code, and what it has printed."""
         done = subprocess.run(
-            [sys.executable, "-m", "deploy.launcher", *arguments],
+            [sys.executable, "-m", "deploy.commands.launcher", *arguments],
             cwd=ROOT,
             env=self.environment,
             stdin=subprocess.DEVNULL,

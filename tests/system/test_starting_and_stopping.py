@@ -134,7 +134,7 @@ def test_closing_the_terminal_ends_everything(site: Site) -> None:
 
 
 def test_nohup_lets_it_go_on_when_the_terminal_closes(site: Site) -> None:
-    command = site.begin_command("nohup", sys.executable, "-m", "deploy.launcher", "run", STEADY)
+    command = site.begin_command("nohup", sys.executable, "-m", "deploy.commands.launcher", "run", STEADY)
     command.await_line("Engines are off")
     command.signal(signal.SIGHUP)
     command.type("turn_on\n")
@@ -144,7 +144,7 @@ def test_nohup_lets_it_go_on_when_the_terminal_closes(site: Site) -> None:
 
 
 def test_the_end_of_a_pipe_ends_everything(site: Site) -> None:
-    run = f"'{sys.executable}' -m deploy.launcher run '{STEADY}'"
+    run = f"'{sys.executable}' -m deploy.commands.launcher run '{STEADY}'"
     reader = site.begin_in_terminal("sh", "-c", f"{run} | head -n 1")
     reader.await_line("Starting the services")
     site.await_members(lambda left: not left)

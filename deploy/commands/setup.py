@@ -1,0 +1,213 @@
+"""Brings .venv up to date: what the system needs, what its tests need and, without ROS 2, deploy/runtime.
+
+Runs on the bare interpreter, before anything is installed. Stamps in .venv tell what it was made from; where
+the right one is missing (older requirements, another interpreter, ROS 2 sourced since, an interrupted set-up)
+it is made anew, so that half an installation never counts as one. deploy/runtime has a stamp of its own: who
+works on it waits a second.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import hashlib
+import importlib.util
+import os
+import shlex
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, suppress
+from functools import partial
+from pathlib import Path
+from types import FrameType
+
+from deploy.supervision.processes import ROOT, using
+
+VENV = ROOT / ".venv"
+PYTHON = VENV / "bin" / "python"
+STAMP = VENV / "made-from"
+LOG = VENV / "setup.log"
+REQUIREMENTS = ROOT / "deploy" / "requirements"
+PIP = [str(PYTHON), "-m", "pip", "install", "--no-deps", "--no-input", "--progress-bar=off"]
+REACTIVE_NODE = ROOT / "interfaces" / "reactive_node"
+RUNTIME = ROOT / "deploy" / "runtime"
+
+
+class SetupError(Exception):
+    """Why .venv could not be made, in words for the user."""
+
+
+def main() -> int:
+    """Make .venv unless it is up to date; the exit code."""
+    signal.signal(signal.SIGTERM, _interrupt)
+    if signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:  # which is what nohup asks for
+        signal.signal(signal.SIGHUP, _interrupt)
+    try:
+        with _alone():
+            began = time.monotonic()
+            ros = system_rclpy()
+            venv_missing = _update(STAMP, fingerprint(ros), partial(make, ros))
+            for distribution in (REACTIVE_NODE, *([] if ros else [RUNTIME])):
+                stamp = VENV / f"made-from-{distribution.name}"
+                _update(stamp, fingerprint_of(distribution), partial(install, distribution, stamp))
+            if venv_missing:
+                print(f"Set up in {time.monotonic() - began:.0f} s.", flush=True)
+    except SetupError as error:
+        print(error, file=sys.stderr)
+        return 1
+    except OSError as error:  # no space, no permission
+        print(f"Set-up failed: {error}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        print("\nSet-up interrupted; the next make starts it anew.", file=sys.stderr)
+        return 130
+    return 0
+
+
+def system_rclpy() -> str:
+    """Where this interpreter finds an rclpy that is not ours: its file, '' for none (no ROS 2 is sourced)."""
+    spec = importlib.util.find_spec("rclpy")
+    origin = (spec and spec.origin) or ""
+    return "" if Path(origin).is_relative_to(ROOT) else origin
+
+
+def fingerprint(ros: str) -> str:
+    """What .venv is made from, as a digest; `ros` is the system's rclpy."""
+    sources = [*sorted(REQUIREMENTS.glob("*.txt")), Path(__file__)]
+    return _digest(sources, sys.version, os.path.realpath(sys.executable), str(VENV), ros)
+
+
+def fingerprint_of(distribution: Path) -> str:
+    """All that is installed of a distribution, as a digest; without what tools and builds leave there."""
+    made = ("__pycache__", "egg-info")
+    sources = (path for path in (distribution / "src").rglob("*") if path.is_file())
+    kept = (path for path in sources if not any(part.endswith(made) for part in path.parts))
+    return _digest([distribution / "pyproject.toml", *sorted(kept)])
+
+
+def _digest(files: Iterable[Path], *words: str) -> str:
+    digest = hashlib.sha256(repr(words).encode())
+    for file in files:
+        content = file.read_bytes()
+        digest.update(f"{file.relative_to(ROOT)} {len(content)} ".encode())
+        digest.update(content)
+    return digest.hexdigest()
+
+
+def _update(stamp: Path, fingerprint: str, make: Callable[[], None]) -> bool:
+    """Make what a stamp tells of unless it was made from just this; whether it had to be made."""
+    if stamp.exists() and stamp.read_text() == fingerprint:
+        return False
+    make()
+    stamp.write_text(fingerprint)
+    return True
+
+
+def make(ros: str) -> None:
+    """Make .venv from nothing; with ROS 2 (the file of its rclpy) it sees the system's packages."""
+    _refuse_while_running()
+    version = ".".join(map(str, sys.version_info[:3]))
+    if importlib.util.find_spec("ensurepip") is None:  # Debian and Ubuntu pack it apart
+        package = f"python{sys.version_info[0]}.{sys.version_info[1]}-venv"
+        raise SetupError(f"Python {version} ({sys.executable}) lacks ensurepip: apt-get install {package}")
+    if ros:
+        needed = "import rclpy, diagnostic_msgs.msg, geometry_msgs.msg, std_msgs.msg"
+        check = subprocess.run([sys.executable, "-c", needed], capture_output=True, text=True)
+        if check.returncode:
+            raise SetupError(
+                f"ROS 2 is sourced, but its rclpy ({ros}) or common_interfaces do not work with"
+                f" {sys.executable}: {check.stderr.strip().splitlines()[-1]}\n"
+                "Choose its interpreter (make setup PYTHON=/usr/bin/python3), install what it lacks, or use a"
+                " shell without ROS 2"
+            )
+    print(f"Setting up .venv with Python {version}, once; this takes about half a minute.", flush=True)
+    STAMP.unlink(missing_ok=True)  # no sooner: where it cannot be made anew, what there is goes on to count
+    venv = [sys.executable, "-m", "venv", "--clear", *(["--system-site-packages"] if ros else []), str(VENV)]
+    _step("a virtual environment", venv, log=None)
+    files = ["system.txt", "build.txt", "develop.txt", *([] if ros else ["runtime.txt"])]
+    _step(
+        "packages from PyPI", [*PIP, *(word for name in files for word in ("-r", str(REQUIREMENTS / name)))]
+    )
+    if ros:
+        print(f"  rclpy of ROS 2: {Path(ros).parent}")
+
+
+def install(distribution: Path, stamp: Path) -> None:
+    """Install a distribution of this repository into .venv, or install it again."""
+    _refuse_while_running()
+    stamp.unlink(missing_ok=True)
+    command = [*PIP, "--no-build-isolation", "--force-reinstall", str(distribution)]
+    why = ", as this machine has no ROS 2" if distribution == RUNTIME else ""
+    _step(f"{distribution.relative_to(ROOT)}{why}", command)
+
+
+def _refuse_while_running() -> None:
+    for run in using(PYTHON.parent):
+        stop = f"REACTIVE_ARM_RUN_DIR={shlex.quote(str(run))} make stop"
+        raise SetupError(f"A system runs from this .venv, which has to be changed: {stop}")
+
+
+def _step(title: str, command: list[str], log: Path | None = LOG) -> None:
+    """Run a command; show its title and, on a terminal, what pip is at. Raises SetupError with its errors."""
+    live = sys.stdout.isatty()
+    print(f"  {title}", end="" if live else "\n", flush=True)
+    lines: list[str] = []
+    environment = os.environ | {"PIP_DISABLE_PIP_VERSION_CHECK": "1"}
+    process = subprocess.Popen(
+        command,
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        start_new_session=True,  # so that all of it can be ended: venv and pip have children of their own
+    )
+    try:
+        assert process.stdout is not None
+        for line in process.stdout:
+            lines.append(line)
+            words = line.split()
+            if live and words[:1] in (["Collecting"], ["Installing"], ["Building"]):
+                print(f"\r\x1b[K  {title}: {words[0].lower()} {words[1]}", end="", flush=True)
+        process.wait()
+    except BaseException:
+        with suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGTERM)
+        process.communicate()  # until the last of them has ended
+        raise
+    finally:
+        if live:
+            print(f"\r\x1b[K  {title}", flush=True)
+        if log is not None and log.parent.exists():
+            with log.open("a") as file:
+                file.writelines(lines)
+    if process.returncode:
+        reasons = [line for line in lines if line.startswith("ERROR")] or lines[-5:]
+        if any("Retrying" in line for line in lines):  # pip then blames the requirement
+            reasons.append("The package index was not reached: network, proxy, PIP_INDEX_URL?")
+        where = f" (all of it: {log.relative_to(ROOT)})" if log is not None else ""
+        raise SetupError(f"Set-up failed at {title}{where}:\n{''.join(reasons).rstrip()}")
+
+
+@contextmanager
+def _alone() -> Iterator[None]:
+    """Hold the set-up of this checkout: a second make waits for the first one."""
+    directory = os.open(ROOT, os.O_RDONLY)
+    try:
+        try:
+            fcntl.flock(directory, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            print("Waiting for another make to finish its set-up.", flush=True)
+            fcntl.flock(directory, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(directory)
+
+
+def _interrupt(number: int, frame: FrameType | None) -> None:
+    raise KeyboardInterrupt
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,216 @@
+"""QoS events: what publishers and subscriptions are told of each other."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from rclpy.duration import Duration
+from rclpy.event_handler import (
+    PublisherEventCallbacks,
+    QoSLivelinessChangedInfo,
+    QoSOfferedIncompatibleQoSInfo,
+    QoSPublisherMatchedInfo,
+    QoSRequestedIncompatibleQoSInfo,
+    QoSSubscriptionMatchedInfo,
+    SubscriptionEventCallbacks,
+)
+from rclpy.node import Node
+from rclpy.qos import (
+    DurabilityPolicy,
+    LivelinessPolicy,
+    QoSPolicyKind,
+    QoSProfile,
+    ReliabilityPolicy,
+)
+from rclpy.waitable import NumberOfEntities
+from std_msgs.msg import Bool, Float64
+
+# rclpy 7.1.3 warns of what it uses itself.
+pytestmark = pytest.mark.filterwarnings("ignore:QoSEventHandler is deprecated")
+
+SpinUntil = Callable[..., None]
+
+
+def ignore(message: Float64) -> None:
+    """A subscription's callback where the messages do not matter."""
+
+
+def counts(info: QoSPublisherMatchedInfo | QoSSubscriptionMatchedInfo) -> tuple[int, int, int, int]:
+    """All matches and those of now, each with its change."""
+    return info.total_count, info.total_count_change, info.current_count, info.current_count_change
+
+
+def test_both_sides_hear_that_they_are_matched_and_are_no_more(node: Node, spin_until: SpinUntil) -> None:
+    offered: list[QoSPublisherMatchedInfo] = []
+    requested: list[QoSSubscriptionMatchedInfo] = []
+    publisher = node.create_publisher(
+        Float64, "x", 1, event_callbacks=PublisherEventCallbacks(matched=offered.append)
+    )
+    subscription = node.create_subscription(
+        Float64, "x", ignore, 1, event_callbacks=SubscriptionEventCallbacks(matched=requested.append)
+    )
+    spin_until(lambda: offered and requested)
+    assert [counts(info) for info in (*offered, *requested)] == [(1, 1, 1, 1)] * 2
+    node.destroy_subscription(subscription)
+    spin_until(lambda: len(offered) == 2)
+    assert counts(offered[1]) == (1, 0, 0, -1)
+    node.destroy_publisher(publisher)
+
+
+def test_both_sides_hear_of_incompatible_qos_and_of_the_policy(node: Node, spin_until: SpinUntil) -> None:
+    heard: list[Any] = []
+    node.create_publisher(
+        Float64, "x", 1, event_callbacks=PublisherEventCallbacks(incompatible_qos=heard.append)
+    )
+    node.create_subscription(
+        Float64,
+        "x",
+        ignore,
+        QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL),
+        event_callbacks=SubscriptionEventCallbacks(incompatible_qos=heard.append),
+    )
+    spin_until(lambda: len(heard) == 2)
+    assert {type(info) for info in heard} == {
+        QoSOfferedIncompatibleQoSInfo,
+        QoSRequestedIncompatibleQoSInfo,
+    }
+    assert [(info.total_count, info.last_policy_kind) for info in heard] == [
+        (1, QoSPolicyKind.DURABILITY)
+    ] * 2
+
+
+def test_incompatible_qos_is_logged_in_rclpys_words_unless_told_otherwise(
+    node: Node, spin_until: SpinUntil, capfd: pytest.CaptureFixture[str]
+) -> None:
+    best_effort = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+    node.create_publisher(Float64, "x", best_effort)
+    node.create_subscription(Float64, "x", ignore, 1)
+    text = ""
+
+    def logged() -> bool:
+        nonlocal text
+        text += capfd.readouterr().err
+        return text.count("Last incompatible policy") == 2
+
+    spin_until(logged)
+    for sentence in (
+        "New publisher discovered on topic 'x', offering incompatible QoS. No messages will be received "
+        "from it. Last incompatible policy: RELIABILITY",
+        "New subscription discovered on topic 'x', requesting incompatible QoS. No messages will be sent "
+        "to it. Last incompatible policy: RELIABILITY",
+    ):
+        assert f"[node]: {sentence}" in text
+    quiet = SubscriptionEventCallbacks(use_default_callbacks=False)
+    subscription = node.create_subscription(Float64, "x", ignore, 1, event_callbacks=quiet)
+    assert subscription.event_handlers == []
+
+
+def test_a_with_on_an_event_handler_does_not_end_it(node: Node, spin_until: SpinUntil) -> None:
+    matched: list[Any] = []
+    publisher = node.create_publisher(
+        Float64, "x", 1, event_callbacks=PublisherEventCallbacks(matched=matched.append)
+    )
+    for handler in publisher.event_handlers:
+        with handler as nothing:
+            assert nothing is None
+    node.create_subscription(Float64, "x", ignore, 1)
+    spin_until(lambda: matched)
+
+
+def test_both_sides_hear_of_a_missed_deadline(node: Node, spin_until: SpinUntil) -> None:
+    profile = QoSProfile(depth=1, deadline=Duration(seconds=0.05))
+    offered: list[Any] = []
+    requested: list[Any] = []
+    publisher = node.create_publisher(
+        Float64, "x", profile, event_callbacks=PublisherEventCallbacks(deadline=offered.append)
+    )
+    node.create_subscription(
+        Float64, "x", ignore, profile, event_callbacks=SubscriptionEventCallbacks(deadline=requested.append)
+    )
+    spin_until(publisher.get_subscription_count)
+    publisher.publish(Float64())
+    spin_until(lambda: offered and requested)
+    assert offered[0].total_count >= 1
+    assert requested[0].total_count >= 1
+
+
+def test_a_publisher_that_does_not_assert_its_liveliness_is_missed(node: Node, spin_until: SpinUntil) -> None:
+    profile = QoSProfile(
+        depth=1,
+        liveliness=LivelinessPolicy.MANUAL_BY_TOPIC,
+        liveliness_lease_duration=Duration(seconds=0.2),
+    )
+    lost: list[Any] = []
+    changed: list[QoSLivelinessChangedInfo] = []
+    publisher = node.create_publisher(
+        Float64, "x", profile, event_callbacks=PublisherEventCallbacks(liveliness=lost.append)
+    )
+    node.create_subscription(
+        Float64, "x", ignore, profile, event_callbacks=SubscriptionEventCallbacks(liveliness=changed.append)
+    )
+    spin_until(publisher.get_subscription_count)
+    publisher.publish(Float64())
+    spin_until(lambda: lost and any(info.not_alive_count for info in changed))
+    count = len(changed)
+    # More than once: what is told is how it is when it is told, and 0.2 s are soon over.
+    spin_until(lambda: publisher.publish(Float64()) or any(info.alive_count for info in changed[count:]))
+
+
+def test_a_message_whose_lifespan_is_over_is_not_delivered(node: Node, spin_until: SpinUntil) -> None:
+    latched = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    brief = QoSProfile(
+        depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL, lifespan=Duration(nanoseconds=1000)
+    )
+    node.create_publisher(Float64, "x", brief).publish(Float64(data=1.0))
+    node.create_publisher(Float64, "x", latched).publish(Float64(data=2.0))
+
+    def kept() -> list[float]:
+        """What a late subscription gets by now."""
+        received: list[float] = []
+        subscription = node.create_subscription(
+            Float64, "x", lambda message: received.append(message.data), latched
+        )
+        spin_until(lambda: 2.0 in received)
+        node.destroy_subscription(subscription)
+        return received
+
+    spin_until(lambda: kept() == [2.0])
+
+
+def test_an_event_callback_may_be_a_coroutine(node: Node, spin_until: SpinUntil) -> None:
+    heard: list[Any] = []
+
+    async def matched(info: QoSPublisherMatchedInfo) -> None:
+        heard.append(info)
+
+    events = PublisherEventCallbacks(matched=matched)  # type: ignore[arg-type]
+    node.create_publisher(Float64, "x", 1, event_callbacks=events)
+    node.create_subscription(Float64, "x", ignore, 1)
+    spin_until(lambda: heard)
+
+
+def test_who_asks_for_incompatible_types_hears_of_the_rest(node: Node, spin_until: SpinUntil) -> None:
+    heard: list[Any] = []
+    offering = PublisherEventCallbacks(incompatible_type=heard.append, matched=heard.append)
+    requesting = SubscriptionEventCallbacks(incompatible_type=heard.append, matched=heard.append)
+    node.create_publisher(Float64, "x", 1, event_callbacks=offering)
+    node.create_publisher(Bool, "x", 1)
+    node.create_subscription(Float64, "x", ignore, 1, event_callbacks=requesting)
+    spin_until(lambda: len(heard) == 2)
+    assert {type(info) for info in heard} == {QoSPublisherMatchedInfo, QoSSubscriptionMatchedInfo}
+
+
+def test_the_old_name_of_the_module_still_works_with_a_warning() -> None:
+    with pytest.warns(UserWarning, match="deprecated"):
+        qos_event = importlib.import_module("rclpy.qos_event")
+    assert qos_event.SubscriptionEventCallbacks is SubscriptionEventCallbacks
+
+
+def test_numbers_of_entities_add_up() -> None:
+    total = NumberOfEntities(1, 2, 3) + NumberOfEntities(num_events=1)
+    assert (total.num_subscriptions, total.num_guard_conditions, total.num_timers) == (1, 2, 3)
+    assert repr(total) == "<NumberOfEntities(1, 2, 3, 0, 0, 1)>"

@@ -1,0 +1,684 @@
+"""Executors: what runs, in which order, on which thread, and who wakes whom."""
+
+from __future__ import annotations
+
+import threading
+import time
+import weakref
+from collections.abc import Callable, Iterator
+
+import pytest
+
+import rclpy
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
+from rclpy.clock import Clock, ClockType
+from rclpy.context import Context
+from rclpy.duration import Duration
+from rclpy.executors import (
+    ConditionReachedException,
+    Executor,
+    ExternalShutdownException,
+    MultiThreadedExecutor,
+    SingleThreadedExecutor,
+    TimeoutException,
+    TimeoutObject,
+)
+from rclpy.node import Node
+from rclpy.task import Future
+from rclpy.utilities import get_default_context
+from std_msgs.msg import Float64
+
+MakeNode = Callable[..., Node]
+SpinUntil = Callable[..., None]
+STEADY = Clock(clock_type=ClockType.STEADY_TIME)
+
+
+def test_a_subscription_gets_what_a_publisher_of_the_same_process_publishes(
+    spin_until: SpinUntil, node: Node
+) -> None:
+    received: list[float] = []
+    publisher = node.create_publisher(Float64, "x", 10)
+    node.create_subscription(Float64, "x", lambda message: received.append(message.data), 10)
+    for number in range(5):
+        publisher.publish(Float64(data=float(number)))
+    spin_until(lambda: len(received) == 5)
+    assert received == [0.0, 1.0, 2.0, 3.0, 4.0]
+
+
+def test_a_slow_callback_delays_others_by_no_more_than_itself(
+    executor: SingleThreadedExecutor, node: Node
+) -> None:
+    order: list[str] = []
+
+    def slow(name: str) -> Callable[[Float64], None]:
+        def callback(message: Float64) -> None:
+            order.append(f"{name}{message.data:.0f}")
+            time.sleep(0.02)
+
+        return callback
+
+    publishers = []
+    for name in ("left", "right"):
+        node.create_subscription(Float64, name, slow(name), 10)
+        publishers.append(node.create_publisher(Float64, name, 10))
+    for number in range(3):
+        for publisher in publishers:
+            publisher.publish(Float64(data=float(number)))
+    node.create_timer(0.015, lambda: order.append("timer"))
+    end = Future()
+    executor.spin_until_future_complete(end, timeout_sec=0.5)
+    messages = [one for one in order if one != "timer"]
+    assert [one[-1] for one in messages] == list("001122")  # in turns
+    first, last = order.index(messages[0]), order.index(messages[-1])
+    assert order[first:last].count("timer") >= 2
+
+
+def test_spin_once_returns_after_its_timeout_when_nothing_happens(executor: SingleThreadedExecutor) -> None:
+    before = STEADY.now()
+    executor.spin_once(timeout_sec=0.05)
+    assert (STEADY.now() - before).nanoseconds >= 50_000_000
+
+
+def test_spin_once_with_timeout_zero_runs_what_is_ready(executor: SingleThreadedExecutor, node: Node) -> None:
+    triggered: list[bool] = []
+    node.create_guard_condition(lambda: triggered.append(True)).trigger()
+    executor.spin_once(timeout_sec=0)
+    assert triggered == [True]
+
+
+def test_an_exception_in_a_callback_comes_out_of_spin_once(
+    executor: SingleThreadedExecutor, node: Node
+) -> None:
+    def fail() -> None:
+        raise ZeroDivisionError("planted")
+
+    node.create_guard_condition(fail).trigger()
+    with pytest.raises(ZeroDivisionError, match="planted"):
+        executor.spin_once(timeout_sec=5)
+
+
+def test_an_exception_in_a_coroutine_callback_comes_out_of_spinning(
+    spin_until: SpinUntil, node: Node
+) -> None:
+    async def fail() -> None:
+        raise ZeroDivisionError("planted")
+
+    node.create_guard_condition(fail).trigger()
+    with pytest.raises(ZeroDivisionError, match="planted"):
+        spin_until(lambda: False)
+
+
+def test_a_callback_may_await_a_future_that_another_callback_completes(
+    spin_until: SpinUntil, node: Node
+) -> None:
+    future: Future = Future()
+    results: list[int] = []
+
+    async def wait() -> None:
+        results.append(await future)
+
+    node.create_guard_condition(wait).trigger()
+    # The waiting coroutine holds the default group: what completes it needs one of its own.
+    other = MutuallyExclusiveCallbackGroup()
+    node.create_timer(0.02, lambda: future.done() or future.set_result(42), other)
+    spin_until(lambda: results)
+    assert results == [42]
+
+
+def test_while_a_coroutine_holds_its_group_nothing_else_of_the_group_runs(
+    spin_until: SpinUntil, node: Node
+) -> None:
+    future: Future = Future()
+    events: list[str] = []
+
+    async def wait() -> None:
+        events.append("begin")
+        await future
+        events.append("end")
+
+    node.create_subscription(Float64, "x", lambda message: events.append("message"), 10)
+    publisher = node.create_publisher(Float64, "x", 10)
+    node.create_guard_condition(wait).trigger()
+    spin_until(lambda: events == ["begin"])
+    publisher.publish(Float64())
+    ticks: list[bool] = []
+    node.create_timer(0.01, lambda: ticks.append(True), ReentrantCallbackGroup())
+    spin_until(lambda: len(ticks) >= 3)
+    assert events == ["begin"]
+    future.set_result(None)
+    spin_until(lambda: len(events) == 3)
+    assert events == ["begin", "end", "message"]
+
+
+def test_a_task_runs_and_its_future_gets_the_result(executor: SingleThreadedExecutor) -> None:
+    task = executor.create_task(lambda left, right: left + right, 20, 22)
+    executor.spin_until_future_complete(task, timeout_sec=5)
+    assert task.result() == 42
+
+
+def test_a_future_completed_on_another_thread_ends_spinning_at_once(
+    executor: SingleThreadedExecutor,
+) -> None:
+    future: Future = Future()
+    threading.Timer(0.05, lambda: future.set_result("done")).start()
+    before = STEADY.now()
+    executor.spin_until_future_complete(future, timeout_sec=20)
+    assert future.result() == "done"
+    assert (STEADY.now() - before).nanoseconds < 10_000_000_000
+
+
+def test_what_has_run_does_not_live_on_while_the_executor_waits_for_more(
+    executor: SingleThreadedExecutor,
+) -> None:
+    class Job:
+        def __call__(self) -> None:
+            pass
+
+    job = Job()
+    left = weakref.ref(job)
+    executor.create_task(job)
+    del job
+    future: Future = Future()
+
+    def watch() -> None:
+        end = STEADY.now() + Duration(seconds=10)
+        while left() is not None and STEADY.now() < end:
+            time.sleep(0.001)
+        future.set_result(left() is None)
+
+    threading.Thread(target=watch).start()
+    executor.spin_until_future_complete(future, timeout_sec=20)
+    assert future.result()
+
+
+def test_spin_until_future_complete_gives_up_after_its_timeout(executor: SingleThreadedExecutor) -> None:
+    future: Future = Future()
+    executor.spin_until_future_complete(future, timeout_sec=0.05)
+    assert not future.done()
+
+
+def test_spin_until_future_complete_with_timeout_zero_runs_what_is_ready(
+    executor: SingleThreadedExecutor, node: Node
+) -> None:
+    future: Future = Future()
+    node.create_guard_condition(lambda: future.set_result("done")).trigger()
+    executor.spin_until_future_complete(future, timeout_sec=0)
+    assert future.result() == "done"
+
+
+def test_spin_until_future_complete_leaves_a_node_with_the_executor_that_had_it(
+    make_node: MakeNode, executor: SingleThreadedExecutor
+) -> None:
+    node, guest = make_node("node"), make_node("guest")
+    executor.add_node(node)
+    future: Future = Future()
+    future.set_result(None)
+    rclpy.spin_until_future_complete(node, future, executor)
+    rclpy.spin_until_future_complete(guest, future, executor)
+    assert executor.get_nodes() == [node]
+
+
+def test_an_entity_created_on_another_thread_while_the_executor_waits_is_seen_at_once(
+    executor: SingleThreadedExecutor, node: Node
+) -> None:
+    called = threading.Event()
+    spinning = threading.Thread(target=executor.spin_once)  # waits for ever: nothing is there yet
+    spinning.start()
+    node.create_timer(0.0, called.set)
+    spinning.join(10)
+    assert called.is_set()
+
+
+def test_a_subscription_destroyed_in_its_own_callback_is_not_called_again(
+    spin_until: SpinUntil, node: Node
+) -> None:
+    received: list[float] = []
+
+    def once(message: Float64) -> None:
+        received.append(message.data)
+        node.destroy_subscription(subscription)
+
+    subscription = node.create_subscription(Float64, "x", once, 10)
+    publisher = node.create_publisher(Float64, "x", 10)
+    for number in range(3):
+        publisher.publish(Float64(data=float(number)))
+    spin_until(lambda: received)
+    ticks: list[bool] = []
+    node.create_timer(0.01, lambda: ticks.append(True))
+    spin_until(lambda: len(ticks) >= 3)
+    assert received == [0.0]
+
+
+def test_a_flooded_subscription_does_not_starve_a_timer(spin_until: SpinUntil, node: Node) -> None:
+    publisher = node.create_publisher(Float64, "x", 10)
+    received = 0
+
+    def feed_itself(message: Float64) -> None:
+        nonlocal received
+        received += 1
+        publisher.publish(message)  # there is always a next message
+
+    node.create_subscription(Float64, "x", feed_itself, 10)
+    ticks: list[int] = []
+    node.create_timer(0.001, lambda: ticks.append(received))
+    publisher.publish(Float64())
+    spin_until(lambda: len(ticks) >= 20)
+    assert received > len(ticks)
+
+
+def test_shutting_the_context_down_on_another_thread_ends_spinning_with_external_shutdown(
+    context: Context, executor: SingleThreadedExecutor
+) -> None:
+    threading.Timer(0.05, context.shutdown).start()
+    with pytest.raises(ExternalShutdownException):
+        executor.spin_once()
+
+
+def test_a_multi_threaded_executor_returns_from_spinning_when_the_context_is_shut_down(
+    context: Context,
+) -> None:
+    with MultiThreadedExecutor(2, context=context) as executor:
+        threading.Timer(0.05, context.shutdown).start()
+        executor.spin()
+    assert not context.ok()
+
+
+@pytest.mark.parametrize(
+    "shut_down",
+    [
+        rclpy.shutdown,
+        rclpy.try_shutdown,
+        lambda: get_default_context().shutdown(),
+        lambda: get_default_context().try_shutdown(),
+    ],
+    ids=["shutdown", "try_shutdown", "Context.shutdown", "Context.try_shutdown"],
+)
+def test_shutting_rclpy_down_on_another_thread_lets_spin_return(
+    domain_id: int, shut_down: Callable[[], None]
+) -> None:
+    rclpy.init(args=[])
+    node = Node("node")
+    thread = threading.Thread(target=shut_down)
+    node.create_guard_condition(thread.start).trigger()
+    rclpy.spin(node)
+    thread.join()
+    node.destroy_node()
+    assert not rclpy.ok()
+    rclpy.try_shutdown()  # so that there may be another beginning
+
+
+def test_shutting_the_executor_down_on_another_thread_ends_spinning(
+    executor: SingleThreadedExecutor,
+) -> None:
+    threading.Timer(0.05, executor.shutdown).start()
+    executor.spin()
+
+
+def test_spinning_for_a_future_returns_when_a_callback_shuts_the_context_down(
+    context: Context, executor: SingleThreadedExecutor, node: Node
+) -> None:
+    node.create_guard_condition(context.shutdown).trigger()
+    executor.spin_until_future_complete(Future(), timeout_sec=20)
+    assert not context.ok()
+    executor.spin_until_future_complete(Future(), timeout_sec=20)
+
+
+def test_a_callback_may_shut_its_executor_down(
+    context: Context, executor: SingleThreadedExecutor, node: Node
+) -> None:
+    node.create_guard_condition(lambda: executor.shutdown()).trigger()
+    executor.spin()
+    assert executor.get_nodes() == []
+
+
+def test_a_callback_may_shut_its_multi_threaded_executor_down(make_node: MakeNode, context: Context) -> None:
+    node = make_node()
+    executor = MultiThreadedExecutor(2, context=context)
+    executor.add_node(node)
+    node.create_guard_condition(lambda: executor.shutdown()).trigger()
+    executor.spin()
+    assert executor.shutdown(timeout_sec=10)
+    assert executor.get_nodes() == []
+
+
+def test_a_node_moves_to_the_executor_that_it_is_added_to_last(
+    make_node: MakeNode, context: Context, executor: SingleThreadedExecutor
+) -> None:
+    node = make_node()
+    with SingleThreadedExecutor(context=context) as other:
+        assert executor.add_node(node)
+        assert not executor.add_node(node)
+        other.add_node(node)
+        assert executor.get_nodes() == []
+        assert node.executor is other
+
+
+def test_a_node_knows_the_executor_that_spun_it_last(
+    make_node: MakeNode, executor: SingleThreadedExecutor
+) -> None:
+    node = make_node()
+    rclpy.spin_once(node, executor=executor, timeout_sec=0)
+    assert executor.get_nodes() == []
+    assert node.executor is executor
+    task = node.executor.create_task(lambda: 1)
+    rclpy.spin_once(node, executor=executor, timeout_sec=0)
+    assert task.result() == 1
+    node.executor = None
+    assert node.executor is None
+
+
+def test_what_a_node_had_ready_runs_where_it_went(
+    make_node: MakeNode, context: Context, executor: SingleThreadedExecutor
+) -> None:
+    node = make_node()
+    threads: list[str] = []
+    with SingleThreadedExecutor(context=context) as other:
+
+        def leave() -> None:
+            threads.append("first")
+            other.add_node(node)
+
+        executor.add_node(node)
+        node.create_guard_condition(leave).trigger()
+        node.create_guard_condition(lambda: threads.append("second")).trigger()
+        executor.spin_once(timeout_sec=5)
+        task = executor.create_task(lambda: None)
+        executor.spin_once(timeout_sec=0)
+        assert task.done()
+        executor.spin_once(timeout_sec=0)
+        assert threads == ["first"]
+        other.spin_once(timeout_sec=5)
+        assert threads == ["first", "second"]
+
+
+def test_messages_of_a_node_that_left_stay_for_the_executor_that_has_it(
+    make_node: MakeNode, context: Context, executor: SingleThreadedExecutor, spin_until: SpinUntil
+) -> None:
+    node = make_node()
+    received: list[float] = []
+    node.create_subscription(Float64, "x", lambda message: received.append(message.data), 10)
+    publisher = node.create_publisher(Float64, "x", 10)
+    for number in range(3):
+        publisher.publish(Float64(data=float(number)))
+    executor.add_node(node)
+    spin_until(lambda: received)
+    executor.remove_node(node)
+    executor.spin_once(timeout_sec=0)
+    assert received == [0.0]
+    executor.add_node(node)
+    spin_until(lambda: len(received) == 3)
+    assert received == [0.0, 1.0, 2.0]
+
+
+class OwnExecutor(Executor):
+    """An executor as users write them: with what rclpy documents."""
+
+    def spin_once(self, timeout_sec: float | None = None) -> None:
+        self._run_one(timeout_sec, lambda: False)
+
+    def spin_once_until_future_complete(
+        self, future: Future, timeout_sec: float | TimeoutObject | None = None
+    ) -> None:
+        self._run_one(timeout_sec, future.done)
+
+    def _run_one(self, timeout_sec: float | TimeoutObject | None, condition: Callable[[], bool]) -> None:
+        try:
+            task, _, _ = self.wait_for_ready_callbacks(timeout_sec, None, condition)
+        except (TimeoutException, ConditionReachedException):
+            return
+        task()
+        task.result()
+
+
+@pytest.fixture
+def own_executor(context: Context) -> Iterator[OwnExecutor]:
+    """An executor of the test's context, made by a user."""
+    with OwnExecutor(context=context) as executor:
+        yield executor
+
+
+def test_an_executor_of_ones_own_spins_until_a_future_is_complete(
+    make_node: MakeNode, own_executor: OwnExecutor
+) -> None:
+    node = make_node()
+    own_executor.add_node(node)
+    future: Future = Future()
+    calls: list[bool] = []
+
+    def call() -> None:
+        calls.append(True)
+        if len(calls) == 3:
+            future.set_result("done")
+
+    node.create_timer(0.0, call)
+    own_executor.spin_until_future_complete(future)
+    assert future.result() == "done"
+    assert len(calls) == 3
+
+
+def test_an_executor_of_ones_own_gives_up_after_its_timeout(own_executor: OwnExecutor) -> None:
+    future: Future = Future()
+    own_executor.spin_until_future_complete(future, timeout_sec=0.05)
+    assert not future.done()
+
+
+def test_an_executor_of_ones_own_has_to_say_how_it_spins(context: Context) -> None:
+    with Executor(context=context) as executor:
+        with pytest.raises(NotImplementedError):
+            executor.spin_once()
+        with pytest.raises(NotImplementedError):
+            executor.spin_until_future_complete(Future())
+
+
+def test_callbacks_may_be_waited_for_of_some_nodes_only(
+    make_node: MakeNode, own_executor: OwnExecutor
+) -> None:
+    first, second = make_node("first"), make_node("second")
+    guards = []
+    for node in (first, second):
+        own_executor.add_node(node)
+        guards.append(node.create_guard_condition(lambda: None))
+        guards[-1].trigger()
+    task, entity, node_of_it = own_executor.wait_for_ready_callbacks(5, [second])
+    assert (entity, node_of_it) == (guards[1], second)
+    task()
+    with pytest.raises(TimeoutException):
+        own_executor.wait_for_ready_callbacks(0, nodes=[second])
+    task, entity, node_of_it = own_executor.wait_for_ready_callbacks(5)
+    assert (entity, node_of_it) == (guards[0], first)
+    task()
+
+
+def test_a_second_thread_cannot_spin_an_executor_meanwhile(
+    make_node: MakeNode, executor: SingleThreadedExecutor
+) -> None:
+    errors: list[ValueError] = []
+
+    def spin() -> None:
+        try:
+            executor.spin_once(timeout_sec=5)
+        except ValueError as error:
+            errors.append(error)
+
+    class Group(MutuallyExclusiveCallbackGroup):
+        """Is asked on the spinning thread."""
+
+        def can_execute(self, entity: object) -> bool:
+            if not errors:
+                second = threading.Thread(target=spin)
+                second.start()
+                second.join()
+            return super().can_execute(entity)
+
+    node = make_node()
+    called: list[bool] = []
+    node.create_timer(0.0, lambda: called.append(True), Group())
+    executor.add_node(node)
+    executor.spin_once(timeout_sec=5)
+    assert len(errors) == 1
+    assert called == [True]
+
+
+def test_a_callback_may_spin_its_executor(executor: SingleThreadedExecutor, node: Node) -> None:
+    called: list[str] = []
+
+    def spin() -> None:
+        called.append("outer")
+        inner.trigger()
+        executor.spin_once(timeout_sec=5)
+
+    inner = node.create_guard_condition(lambda: called.append("inner"), ReentrantCallbackGroup())
+    node.create_guard_condition(spin).trigger()
+    executor.spin_once(timeout_sec=5)
+    assert called == ["outer", "inner"]
+
+
+def test_a_reentrant_group_lets_callbacks_overlap_on_a_multi_threaded_executor(
+    make_node: MakeNode, context: Context
+) -> None:
+    node = make_node()
+    meeting = threading.Barrier(2)
+    group = ReentrantCallbackGroup()
+    first = node.create_guard_condition(lambda: meeting.wait(10), group)
+    second = node.create_guard_condition(lambda: meeting.wait(10), group)
+    with MultiThreadedExecutor(2, context=context) as executor:
+        executor.add_node(node)
+        first.trigger()
+        second.trigger()
+        executor.spin_once(timeout_sec=5)
+        executor.spin_once(timeout_sec=5)
+        executor.shutdown()
+    assert not meeting.broken
+
+
+def test_a_mutually_exclusive_group_never_overlaps_on_a_multi_threaded_executor(
+    make_node: MakeNode, context: Context
+) -> None:
+    node = make_node()
+    running = threading.Lock()
+    calls: list[bool] = []
+    done: Future = Future()
+
+    def callback(message: Float64) -> None:
+        calls.append(running.acquire(blocking=False))
+        running.release()
+        if len(calls) == 200:
+            done.set_result(None)
+
+    for _ in range(4):
+        node.create_subscription(Float64, "x", callback, 100)
+    publisher = node.create_publisher(Float64, "x", 100)
+    for _ in range(50):
+        publisher.publish(Float64())
+    with MultiThreadedExecutor(4, context=context) as executor:
+        executor.add_node(node)
+        executor.spin_until_future_complete(done, timeout_sec=20)
+    assert calls == [True] * 200
+
+
+class Busy:
+    """A multi-threaded executor, and a subscription whose callbacks keep both its threads busy."""
+
+    def __init__(self, node: Node, executor: MultiThreadedExecutor) -> None:
+        self.received: list[float] = []
+        self.newest: Future = Future()
+        self.release = threading.Event()
+        self.executor = executor
+        self._entered = threading.Semaphore(0)
+        group = ReentrantCallbackGroup()
+        node.create_subscription(Float64, "x", self._callback, 1, callback_group=group)
+        self.publisher = node.create_publisher(Float64, "x", 1)
+        executor.add_node(node)
+
+    def _callback(self, message: Float64) -> None:
+        self.received.append(message.data)
+        self._entered.release()
+        assert self.release.wait(20)
+        if message.data == 49.0:
+            self.newest.set_result(None)
+
+    def fill(self) -> None:
+        """Let each thread run a callback, with the messages 0 and 1."""
+        for number in range(2):
+            self.publisher.publish(Float64(data=float(number)))
+            while not self._entered.acquire(blocking=False):
+                self.executor.spin_once(timeout_sec=0.1)
+
+
+@pytest.fixture
+def busy(make_node: MakeNode, context: Context) -> Iterator[Busy]:
+    with MultiThreadedExecutor(2, context=context) as executor:
+        busy = Busy(make_node(), executor)
+        busy.fill()
+        yield busy
+        busy.release.set()
+
+
+def test_a_message_is_not_taken_before_a_thread_is_free_so_that_the_newest_is(busy: Busy) -> None:
+    for number in range(2, 50):
+        busy.publisher.publish(Float64(data=float(number)))
+        busy.executor.spin_once(timeout_sec=0)
+    busy.release.set()
+    busy.executor.spin_until_future_complete(busy.newest, timeout_sec=20)
+    assert busy.received == [0.0, 1.0, 49.0]
+
+
+def test_while_all_threads_are_busy_a_timeout_still_ends_spin_once(busy: Busy) -> None:
+    busy.publisher.publish(Float64())
+    before = STEADY.now()
+    busy.executor.spin_once(timeout_sec=0.05)
+    busy.executor.spin_once(timeout_sec=0.05)
+    assert (STEADY.now() - before).nanoseconds < 10_000_000_000
+
+
+@pytest.mark.parametrize(
+    "end",
+    [
+        lambda executor, future: future.set_result(None),
+        lambda executor, future: executor.context.shutdown(),
+        lambda executor, future: executor.shutdown(timeout_sec=0),
+    ],
+    ids=["future", "context", "executor"],
+)
+def test_while_all_threads_are_busy_the_end_still_ends_spinning(
+    busy: Busy, end: Callable[[MultiThreadedExecutor, Future], None]
+) -> None:
+    future: Future = Future()
+    spinning = threading.Thread(target=busy.executor.spin_until_future_complete, args=(future,))
+    spinning.start()
+    busy.publisher.publish(Float64())
+    end(busy.executor, future)
+    spinning.join(10)
+    assert not spinning.is_alive()
+
+
+def test_no_thread_that_gets_free_is_overlooked(make_node: MakeNode, context: Context) -> None:
+    node = make_node()
+    left = threading.Semaphore(999)
+    done: Future = Future()
+
+    def callback(message: Float64) -> None:
+        if not left.acquire(blocking=False):
+            done.set_result(None)
+
+    node.create_subscription(Float64, "x", callback, 1000, callback_group=ReentrantCallbackGroup())
+    publisher = node.create_publisher(Float64, "x", 1000)
+    for _ in range(1000):
+        publisher.publish(Float64())
+    with MultiThreadedExecutor(2, context=context) as executor:
+        executor.add_node(node)
+        executor.spin_until_future_complete(done, timeout_sec=20)
+    assert done.done()
+
+
+def test_an_exception_on_a_pool_thread_comes_out_of_spinning(make_node: MakeNode, context: Context) -> None:
+    node = make_node()
+
+    def fail() -> None:
+        raise ZeroDivisionError("planted")
+
+    node.create_guard_condition(fail).trigger()
+    with MultiThreadedExecutor(2, context=context) as executor:
+        executor.add_node(node)
+        with pytest.raises(ZeroDivisionError, match="planted"):
+            executor.spin()

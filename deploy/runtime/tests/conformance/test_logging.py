@@ -1,0 +1,159 @@
+"""Loggers: levels and filters."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+
+import rclpy.logging
+from rclpy.clock import ROSClock
+from rclpy.impl.rcutils_logger import RcutilsLogger
+from rclpy.logging import LoggingSeverity, get_logger
+from rclpy.time import Time
+
+
+@pytest.fixture(autouse=True)
+def fresh_configuration() -> Iterator[None]:
+    rclpy.logging.clear_config()
+    yield
+    rclpy.logging.shutdown()
+
+
+def test_a_logger_without_a_level_has_that_of_its_nearest_ancestor_with_one() -> None:
+    rclpy.logging.set_logger_level("robot", LoggingSeverity.WARN)
+    rclpy.logging.set_logger_level("robot.arm.motor", LoggingSeverity.DEBUG)
+    effective = rclpy.logging.get_logger_effective_level
+    assert effective("robot.arm") == LoggingSeverity.WARN
+    assert effective("robot.arm.motor.left") == LoggingSeverity.DEBUG
+    assert effective("robotic") == LoggingSeverity.INFO
+    rclpy.logging.set_logger_level("robot", LoggingSeverity.UNSET)
+    assert effective("robot.arm") == LoggingSeverity.INFO
+
+
+def test_a_changed_level_counts_at_once() -> None:
+    logger = get_logger("changing")
+    assert not logger.debug("before")
+    logger.set_level(LoggingSeverity.DEBUG)
+    assert logger.debug("after")
+    logger.get_child("child").set_level(LoggingSeverity.FATAL)
+    assert logger.get_child("child").get_effective_level() == LoggingSeverity.FATAL
+    assert logger.get_effective_level() == LoggingSeverity.DEBUG
+
+
+def test_the_level_of_the_empty_name_is_the_default_of_all() -> None:
+    rclpy.logging.set_logger_level("", LoggingSeverity.ERROR)
+    assert rclpy.logging.get_logger_level("") == LoggingSeverity.ERROR
+    assert not get_logger("anyone").warning("left out")
+    assert rclpy.logging.get_logger_level("anyone") == LoggingSeverity.UNSET
+
+
+def test_clearing_the_configuration_forgets_all_levels() -> None:
+    rclpy.logging.set_logger_level("", LoggingSeverity.ERROR)
+    rclpy.logging.set_logger_level("a", LoggingSeverity.DEBUG)
+    rclpy.logging.clear_config()
+    assert rclpy.logging.get_logger_effective_level("a") == LoggingSeverity.INFO
+
+
+def test_severities_have_names_and_only_these_are_levels() -> None:
+    assert rclpy.logging.get_logging_severity_from_string("warn") == LoggingSeverity.WARN
+    assert rclpy.logging.get_logging_severity_from_string("FATAL") == LoggingSeverity.FATAL
+    with pytest.raises(RuntimeError):
+        rclpy.logging.get_logging_severity_from_string("loud")
+    with pytest.raises(ValueError, match="25 is not a valid"):
+        rclpy.logging.set_logger_level("a", 25)
+    assert get_logger("a").is_enabled_for(LoggingSeverity.INFO)
+    assert not get_logger("a").is_enabled_for(LoggingSeverity.DEBUG)
+
+
+def test_loggers_need_names_and_children_have_those_of_their_ancestors() -> None:
+    assert get_logger("a").get_child("b").get_child("c").name == "a.b.c"
+    assert RcutilsLogger().get_child("a").name == "a"
+    for get in (get_logger, get_logger("a").get_child):
+        with pytest.raises(ValueError, match="must not be empty"):
+            get("")
+
+
+def test_a_message_is_a_string() -> None:
+    with pytest.raises(TypeError):
+        get_logger("a").info(5)  # type: ignore[arg-type]
+
+
+def test_an_unknown_option_is_an_error() -> None:
+    with pytest.raises(TypeError, match="twice"):
+        get_logger("a").info("hello", twice=True)
+    with pytest.raises(TypeError, match="throttle_duration_sec"):
+        get_logger("a").info("hello", throttle_time_source_type=ROSClock())
+    with pytest.raises(ValueError, match="is not a clock instance"):
+        get_logger("a").info("hello", throttle_duration_sec=1.0, throttle_time_source_type="wall")
+
+
+def test_a_call_may_not_change_what_it_asks_for() -> None:
+    logger = get_logger("fickle")
+
+    def log(severity: LoggingSeverity, **options: object) -> None:
+        logger.log("hello", severity, **options)
+
+    log(LoggingSeverity.INFO, once=True)
+    with pytest.raises(ValueError, match="severity cannot be changed"):
+        log(LoggingSeverity.WARN, once=True)
+    with pytest.raises(ValueError, match="name cannot be changed"):
+        log(LoggingSeverity.INFO, once=True, name="other")
+    with pytest.raises(ValueError, match="Requested logging filters"):
+        log(LoggingSeverity.INFO, skip_first=True)
+
+
+def test_once_logs_the_first_message_of_a_place_only() -> None:
+    logger = get_logger("once")
+    assert [logger.info(str(i), once=True) for i in range(3)] == [True, False, False]
+    assert logger.info("another place", once=True)
+
+
+def test_two_calls_on_one_line_are_two_places() -> None:
+    logger = get_logger("line")
+    assert (logger.info("a", once=True), logger.info("b", once=True)) == (True, True)
+
+
+def test_skip_first_leaves_out_the_first_message_of_a_place() -> None:
+    logger = get_logger("skip")
+    assert [logger.info(str(i), skip_first=True) for i in range(3)] == [False, True, True]
+
+
+def test_throttle_follows_the_clock_it_is_given(clock: ROSClock) -> None:
+    logger = get_logger("throttle")
+    logged = []
+    for tenth in range(100, 125):
+        clock.set_ros_time_override(Time(nanoseconds=tenth * 100_000_000))
+        if logger.info("now", throttle_duration_sec=1.0, throttle_time_source_type=clock):
+            logged.append(tenth)
+    assert logged == [100, 110, 120]
+
+
+def test_filters_apply_together_throttle_first(clock: ROSClock) -> None:
+    logger = get_logger("both")
+    logged = []
+    for second in range(2, 8):
+        clock.set_ros_time_override(Time(seconds=second))
+        options = {"throttle_duration_sec": 2.0, "throttle_time_source_type": clock, "skip_first": True}
+        if logger.info("now", **options):
+            logged.append(second)
+    assert logged == [4, 6]
+
+
+def test_a_filtered_message_below_the_level_does_not_count() -> None:
+    logger = get_logger("late")
+
+    def log() -> bool:
+        return logger.debug("hello", once=True)
+
+    assert not log()
+    logger.set_level(LoggingSeverity.DEBUG)
+    assert log()
+
+
+@pytest.mark.parametrize(("message", "shown"), [(None, "(null)"), (b"bytes", "bytes")])
+def test_what_c_takes_for_a_string_is_logged(
+    message: object, shown: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    assert get_logger("strings").error(message)  # type: ignore[arg-type]
+    assert capfd.readouterr().err.rstrip().endswith(shown)

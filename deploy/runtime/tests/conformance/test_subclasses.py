@@ -1,0 +1,75 @@
+"""Subclasses of Node have private names of their own, and those are none of rclpy's business."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from rclpy.context import Context
+from rclpy.exceptions import InvalidHandle
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from std_msgs.msg import Float64
+
+FOREIGN: dict[str, Any] = {
+    "_arguments": ["some", "arguments"],
+    "_destroyed": True,
+    "_events": [],
+    "_executor": object(),
+    "_graph": {"a": ["b"]},
+    "_name": None,
+    "_namespace": 1,
+    "_rates": 2.0,
+}
+
+
+def never_called(*arguments: object, **options: object) -> None:
+    raise AssertionError("rclpy calls what is not its own")
+
+
+class Busy(Node):
+    """A node with attributes and methods as a user may call them."""
+
+    _add = _change = _declare = _destroy = _entities = _resolve = _store = never_called
+
+    def __init__(self, context: Context, *, first: bool) -> None:
+        if first:
+            vars(self).update(FOREIGN)
+        super().__init__("busy", namespace="/ns", context=context)
+        if not first:
+            vars(self).update(FOREIGN)
+
+
+@pytest.mark.parametrize("first", [True, False])
+def test_a_subclass_may_call_its_attributes_and_methods_what_it_likes(
+    context: Context, executor: SingleThreadedExecutor, spin_until: Callable[..., None], first: bool
+) -> None:
+    node = Busy(context, first=first)
+    executor.add_node(node)
+    assert node.executor is executor
+    assert node.get_fully_qualified_name() == "/ns/busy"
+    assert node.resolve_topic_name("x") == "/ns/x"
+
+    assert node.declare_parameter("a", 1).value == 1
+    assert node.set_parameters([Parameter("a", value=2)])[0].successful
+    assert node.get_parameter("a").value == 2
+
+    heard: list[float] = []
+    publisher = node.create_publisher(Float64, "x", 1)
+    subscription = node.create_subscription(Float64, "x", lambda message: heard.append(message.data), 1)
+    timer = node.create_timer(0.01, lambda: publisher.publish(Float64(data=1.0)))
+    rate = node.create_rate(1.0)
+    spin_until(lambda: heard)
+
+    assert {name: vars(node)[name] for name in FOREIGN} == FOREIGN
+    assert node.destroy_rate(rate)
+    assert node.destroy_timer(timer)
+    assert node.destroy_subscription(subscription)
+    assert node.destroy_publisher(publisher)
+    node.destroy_node()
+    with pytest.raises(InvalidHandle):
+        node.count_publishers("x")
+    assert {name: vars(node)[name] for name in FOREIGN} == FOREIGN

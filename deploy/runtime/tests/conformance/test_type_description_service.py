@@ -1,0 +1,120 @@
+"""The service ``~/get_type_description``, asked as others ask it: what it tells of the types a node uses."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from std_msgs.msg import Header
+from std_srvs.srv import Trigger
+from type_description_interfaces.srv import GetTypeDescription
+
+MakeNode = Callable[..., Node]
+SpinUntil = Callable[..., None]
+Ask = Callable[..., Any]
+
+# The hashes that every ROS 2 has for these types.
+TRIGGER_REQUEST = "RIHS01_d010825374ce8918e72bfd826c82603e60f45419e932ea976f807b74a863a199"
+TRIGGER_EVENT = "RIHS01_ec4a1d26b0575e61906890342aba9523a2360e9845857c5590fa6e23bc39e1c2"
+HEADER = "RIHS01_f49fb3ae2cf070f793645ff749683ac6b06203e41c891e17701b1cb597ce6a01"
+TRIGGER = "RIHS01_eeff2cd6fa5ad9d27cdf4dec64818317839b62f212a91e6b5304b634b2062c5f"
+FLOAT64 = "RIHS01_705ba9c3d1a09df43737eb67095534de36fd426c0587779bda2bc51fe790182a"
+NOT_IN_USE = "Type not currently in use by this node"
+
+
+@pytest.fixture
+def node(make_node: MakeNode, executor: SingleThreadedExecutor) -> Node:
+    """A node that publishes headers and serves a trigger; an error in one of its callbacks fails the test."""
+    node = make_node("node")
+    executor.add_node(node)
+    node.create_publisher(Header, "x", 1)
+    node.create_service(Trigger, "trigger", lambda request, response: response)
+    return node
+
+
+@pytest.fixture
+def ask(node: Node, make_node: MakeNode, executor: SingleThreadedExecutor, spin_until: SpinUntil) -> Ask:
+    """Asks the node what a type looks like, from another node."""
+    other = make_node("other")
+    executor.add_node(other)
+    client = other.create_client(GetTypeDescription, "node/get_type_description")
+    spin_until(client.service_is_ready)
+
+    def ask(type_name: str, type_hash: str, **request: Any) -> Any:
+        future = client.call_async(
+            GetTypeDescription.Request(type_name=type_name, type_hash=type_hash, **request)
+        )
+        spin_until(future.done)
+        return future.result()
+
+    return ask
+
+
+def described(response: Any) -> list[str]:
+    """Names of the type and of all types it refers to, in the order of the answer."""
+    assert (response.successful, response.failure_reason) == (True, "")
+    description = response.type_description
+    individual = [description.type_description, *description.referenced_type_descriptions]
+    return [one.type_name for one in individual]
+
+
+def test_a_message_is_described_with_the_files_that_define_it(ask: Ask) -> None:
+    response = ask("std_msgs/msg/Header", HEADER)
+    assert described(response) == ["std_msgs/msg/Header", "builtin_interfaces/msg/Time"]
+    header, time = response.type_sources
+    assert (header.type_name, header.encoding) == ("std_msgs/msg/Header", "msg")
+    assert "string frame_id" in header.raw_file_contents
+    assert (time.type_name, time.encoding) == ("builtin_interfaces/msg/Time", "msg")
+    assert "uint32 nanosec" in time.raw_file_contents
+
+
+def test_sources_are_told_only_to_who_wants_them(ask: Ask) -> None:
+    response = ask("std_msgs/msg/Header", HEADER, include_type_sources=False)
+    assert len(described(response)) == 2
+    assert response.type_sources == []
+
+
+def test_the_parts_of_a_service_have_no_file_of_their_own(ask: Ask) -> None:
+    response = ask("std_srvs/srv/Trigger", TRIGGER)
+    names = [
+        "std_srvs/srv/Trigger",
+        "builtin_interfaces/msg/Time",
+        "service_msgs/msg/ServiceEventInfo",
+        "std_srvs/srv/Trigger_Event",
+        "std_srvs/srv/Trigger_Request",
+        "std_srvs/srv/Trigger_Response",
+    ]
+    assert described(response) == names
+    sources = response.type_sources
+    assert [source.type_name for source in sources] == names
+    assert [source.encoding for source in sources] == ["srv", "msg", "msg", *["implicit"] * 3]
+    assert [bool(source.raw_file_contents) for source in sources] == [True, True, True, *[False] * 3]
+
+
+def test_the_hash_alone_says_which_type_is_meant(ask: Ask) -> None:
+    assert described(ask("std_msgs/msg/Nothing", HEADER))[0] == "std_msgs/msg/Header"
+    assert described(ask("std_msgs/msg/Header", TRIGGER))[0] == "std_srvs/srv/Trigger"
+
+
+@pytest.mark.parametrize(
+    ("type_name", "type_hash", "reason"),
+    [
+        ("std_msgs/msg/Float64", FLOAT64, NOT_IN_USE),
+        ("std_srvs/srv/Trigger_Request", TRIGGER_REQUEST, NOT_IN_USE),
+        ("std_srvs/srv/Trigger_Event", TRIGGER_EVENT, NOT_IN_USE),
+        ("example_interfaces/action/Fibonacci", f"RIHS01_{'0' * 64}", NOT_IN_USE),
+        ("std_msgs/msg/Header", f"RIHS01_{'0' * 64}", NOT_IN_USE),
+        ("std_msgs/msg/Header", "RIHS01_0", "Failed to parse type hash"),
+        ("Header", "", "Failed to parse type hash"),
+    ],
+)
+def test_what_the_node_does_not_use_it_does_not_describe(
+    ask: Ask, type_name: str, type_hash: str, reason: str
+) -> None:
+    response = ask(type_name, type_hash)
+    assert (response.successful, response.failure_reason) == (False, reason)
+    assert response.type_sources == []

@@ -1,0 +1,256 @@
+"""Which part of rclpy 7.1.3's public API the embedded runtime has: the table of deploy/runtime/README.md.
+
+``python -m deploy.runtime.tests.runtime.conformance`` prints it, from ``rclpy_api.json``, where the classes,
+functions and signatures of a real rclpy are recorded. A name is *supported* if calls that rclpy accepts are
+accepted here: parameters of the same names, kinds and order, with a default where rclpy has one.
+"""
+
+from __future__ import annotations
+
+import ast
+import importlib
+import inspect
+import json
+import textwrap
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from enum import Enum
+from inspect import Parameter
+from pathlib import Path
+from typing import Any
+
+API = json.loads((Path(__file__).parents[1] / "facts" / "rclpy_api.json").read_text())
+
+_OPENING, _CLOSING = "([{<", ")]}>"
+_ANY_POSITIONAL = Parameter("args", Parameter.VAR_POSITIONAL)
+_ANY_KEYWORD = Parameter("kwargs", Parameter.VAR_KEYWORD)
+_ENUM_METHODS = {"__init__"}  # of a class that is an enumeration: nobody calls it
+
+
+@dataclass
+class Module:
+    """What a module of rclpy has, by what becomes of it here."""
+
+    name: str
+    supported: list[str] = field(default_factory=list)
+    not_implemented: list[str] = field(default_factory=list)
+    missing: list[str] = field(default_factory=list)
+
+
+def modules() -> list[Module]:
+    """Compare every module of the facts with the one that is importable under its name."""
+    return [_module(name, entries) for name, entries in API.items()]
+
+
+def surplus() -> list[str]:
+    """Name what public classes have here and not in rclpy: code that uses it would fail there."""
+    recorded: dict[str, set[str]] = {}
+    classes: list[type] = []
+    for name, entries in API.items():
+        for entry, facts in entries.items():
+            # What is a protocol or an object of C there does not tell all that it has.
+            if entry.startswith("class ") and not {"Protocol", "pybind11_object"} & {*facts["bases"]}:
+                cls = getattr(importlib.import_module(name), entry.split()[-1])
+                recorded[cls.__name__] = {*facts["methods"]}
+                classes.append(cls)
+    found = set()
+    for cls in classes:
+        known = {name for base in cls.__mro__ for name in recorded.get(base.__name__, ())}
+        found |= {f"{cls.__name__}.{name}" for name in _public_members(cls) - known}
+    return sorted(found)
+
+
+def _public_members(cls: type) -> set[str]:
+    """The public methods and properties that a class of rclpy has, also from bases of rclpy."""
+    return {
+        name
+        for base in cls.__mro__
+        if base.__module__.startswith("rclpy") and not issubclass(base, Enum)
+        for name, member in vars(base).items()
+        if not name.startswith("_") or name in ("__enter__", "__exit__")
+        if callable(member) or isinstance(member, property | classmethod | staticmethod)
+    }
+
+
+def table(rows: list[Module]) -> str:
+    """Return a Markdown table, one row for each module."""
+    lines = ["| module | supported | raises NotImplementedError | missing |", "|---|---:|---|---|"]
+    for row in rows:
+        not_implemented = ", ".join(f"`{name}`" for name in row.not_implemented)
+        missing = ", ".join(f"`{name}`" for name in row.missing)
+        lines.append(f"| `{row.name}` | {len(row.supported)} | {not_implemented} | {missing} |")
+    total = sum(len(row.supported) for row in rows)
+    unimplemented = sum(len(row.not_implemented) for row in rows)
+    lines.append(f"| all | {total} | {unimplemented} | {sum(len(row.missing) for row in rows)} |")
+    return "\n".join(lines)
+
+
+def _module(name: str, entries: dict[str, Any]) -> Module:
+    row = Module(name)
+    try:
+        module = importlib.import_module(name)
+    except ImportError:
+        row.missing.append("the module")
+        return row
+    for entry, recorded in entries.items():
+        for path, problem in _problems(module, entry, recorded):
+            if problem is None:
+                row.supported.append(path)
+            elif problem == "NotImplementedError":
+                row.not_implemented.append(path)
+            else:
+                row.missing.append(path + problem)
+    return row
+
+
+def _problems(module: Any, entry: str, recorded: Any) -> Iterator[tuple[str, str | None]]:
+    """Yield each name that stands behind an entry of the facts, and what is wrong with it."""
+    name = entry.split()[-1]
+    if not hasattr(module, name):
+        yield name, " (no such name)"
+    elif entry.startswith("def "):
+        yield name, _callable_problem(getattr(module, name), recorded)
+    elif not entry.startswith("class "):
+        yield name, None
+    else:
+        cls = getattr(module, name)
+        absent = [member for member in recorded.get("members", ()) if member not in cls.__members__]
+        yield name, f" (without {', '.join(absent)})" if absent else None
+        for method, signature in recorded["methods"].items():
+            if not (isinstance(cls, type) and issubclass(cls, Enum) and method in _ENUM_METHODS):
+                yield f"{name}.{method}", _method_problem(cls, method, signature)
+
+
+def _method_problem(cls: Any, name: str, signature: str) -> str | None:
+    try:
+        found = inspect.getattr_static(cls, name)
+    except AttributeError:
+        # What every instance has, though no class says so: set in __init__, or a dataclass's field.
+        if signature == "property" and name in _instance_attributes(cls):
+            return None
+        return " (no such name)"
+    if signature == "property":
+        return None
+    if isinstance(found, classmethod | staticmethod):
+        found = found.__func__
+    return _callable_problem(found, signature[signature.index("(") :])
+
+
+def _instance_attributes(cls: Any) -> set[str]:
+    source = "\n".join(textwrap.dedent(inspect.getsource(base)) for base in cls.__mro__[:-1])
+    return {
+        node.attr
+        for node in ast.walk(ast.parse(source))
+        if isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store)
+    } | set(inspect.get_annotations(cls))
+
+
+def _callable_problem(found: Any, signature: str) -> str | None:
+    if isinstance(found, type) and issubclass(found, Enum):
+        return None  # how it is called is Python's choice, and differs between its versions
+    if _only_raises_not_implemented_error(found):
+        return "NotImplementedError"
+    try:
+        ours = list(inspect.signature(found).parameters.values())
+    except ValueError:  # a method of object, such as __hash__
+        return None
+    difference = _difference(ours, _parse(signature))
+    return f" ({difference})" if difference else None
+
+
+def _difference(ours: list[Parameter], theirs: list[Parameter]) -> str | None:
+    """Say which call that is right there would not be right here, if there is one."""
+    if theirs[-2:] == [_ANY_POSITIONAL, _ANY_KEYWORD]:
+        return None  # only hands on to a private method
+    takes_any = {parameter.kind for parameter in ours} & {Parameter.VAR_KEYWORD, Parameter.VAR_POSITIONAL}
+    if len(takes_any) == 2:
+        return None
+    by_name = {parameter.name: parameter for parameter in ours}
+    positional = [p.name for p in ours if p.kind is not Parameter.KEYWORD_ONLY]
+    for index, parameter in enumerate(theirs):
+        if parameter.kind in (Parameter.VAR_KEYWORD, Parameter.VAR_POSITIONAL):
+            if parameter.kind not in takes_any:
+                return f"takes no *{parameter.name}"
+            continue
+        own = by_name.get(parameter.name)
+        if own is None:
+            if parameter.kind is Parameter.KEYWORD_ONLY and Parameter.VAR_KEYWORD in takes_any:
+                continue
+            return f"has no parameter {parameter.name}"
+        if parameter.default is not Parameter.empty and own.default is Parameter.empty:
+            return f"has no default for {parameter.name}"
+        if parameter.kind is not Parameter.KEYWORD_ONLY and positional[index : index + 1] != [parameter.name]:
+            return f"has {parameter.name} at another place"
+    known = {parameter.name for parameter in theirs}
+    for own in ours:
+        variable = own.kind in (Parameter.VAR_KEYWORD, Parameter.VAR_POSITIONAL)
+        if own.name not in known and own.default is Parameter.empty and not variable:
+            return f"asks for {own.name}"
+    return None
+
+
+def _only_raises_not_implemented_error(function: Any) -> bool:
+    try:
+        body = ast.parse(textwrap.dedent(inspect.getsource(function))).body[0]
+    except (OSError, TypeError):
+        return False
+    if not isinstance(body, ast.FunctionDef | ast.AsyncFunctionDef):
+        return False
+    last = body.body[-1]
+    return (
+        len(body.body) <= 2
+        and isinstance(last, ast.Raise)
+        and last.exc is not None
+        and "NotImplementedError" in ast.unparse(last.exc)
+    )
+
+
+def _parse(signature: str) -> list[Parameter]:
+    """Read a recorded signature: its annotations and defaults are reprs, so it is no valid Python."""
+    parameters: list[Parameter] = []
+    kind: Any = Parameter.POSITIONAL_OR_KEYWORD
+    for text in _split(signature):
+        if text == "/":
+            continue
+        if text == "*":
+            kind = Parameter.KEYWORD_ONLY
+            continue
+        name = text.lstrip("*").split(":")[0].split("=")[0].strip()
+        if text.startswith("**"):
+            own_kind = Parameter.VAR_KEYWORD
+        elif text.startswith("*"):
+            own_kind, kind = Parameter.VAR_POSITIONAL, Parameter.KEYWORD_ONLY
+        else:
+            own_kind = kind
+        default = None if _has_default(text) else Parameter.empty
+        parameters.append(Parameter(name, own_kind, default=default))
+    return parameters
+
+
+def _split(signature: str) -> list[str]:
+    """Split ``(a, b: Dict[c, d] = <e>) -> f`` into its parameters."""
+    parts, depth, start = [], 0, 1
+    for index, character in enumerate(signature):
+        if character in _OPENING:
+            depth += 1
+        elif character in _CLOSING and signature[index - 1] != "-":
+            depth -= 1
+        if (character == "," and depth == 1) or depth == 0:
+            parts.append(signature[start:index].strip())
+            start = index + 1
+        if depth == 0:
+            break
+    return [part for part in parts if part]
+
+
+def _has_default(text: str) -> bool:
+    depth = 0
+    for character in text:
+        depth += (character in _OPENING) - (character in _CLOSING)
+        if character == "=" and depth == 0:
+            return True
+    return False
+
+
+if __name__ == "__main__":
+    print(table(modules()))

@@ -1,0 +1,103 @@
+"""What nodes tell of themselves on the wire."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+
+from deploy.runtime.tests.conformance.test_graph import facts_node
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rclpy._dds.discovery import Discovery
+from rclpy._graph import NodeEntities, decode, encode
+from rclpy.node import Node
+
+MakeNode = Callable[..., Node]
+FACTS = Path(__file__).parents[1] / "facts"
+
+
+def recorded(kind: str) -> dict[str, tuple[str, str]]:
+    """Topic → (type, user data without the service's own identifier) of the recorded endpoints."""
+    endpoints = {}
+    for line in (FACTS / "discovery.txt").read_text().splitlines():
+        if line.startswith(kind):
+            _, _, topic, type_name = line.split(" ")[:4]
+            data = re.search(r"Policy\.Userdata\(data=b'(.*?)'\)", line)
+            assert data
+            endpoints[topic] = (type_name, re.sub(r"serviceid=[^;]*;", "serviceid;", data[1]))
+    return endpoints
+
+
+def announced(endpoints: list[object]) -> dict[str, tuple[str, str]]:
+    return {
+        endpoint.topic: (endpoint.type_name, re.sub(r"serviceid=[^;]*;", "serviceid;", endpoint.user_data))
+        for endpoint in endpoints
+    }
+
+
+def test_a_node_announces_the_same_writers_and_readers_as_a_real_one(make_node: MakeNode) -> None:
+    node = facts_node(make_node)
+    discovery = Discovery(node._rclpy_graph.participant.handle)
+    assert announced(discovery.writers()) == recorded("PUB")
+    assert announced(discovery.readers()) == recorded("SUB")
+
+
+def test_a_participant_announces_its_enclave_as_a_real_one(make_node: MakeNode) -> None:
+    node = make_node()
+    graph = node._rclpy_graph
+    assert Discovery(graph.participant.handle).participants()[graph.participant.gid] == "enclave=/;"
+
+
+def test_service_identifiers_have_the_form_of_the_recorded_ones(make_node: MakeNode) -> None:
+    graph = facts_node(make_node)._rclpy_graph
+    data = [endpoint.user_data for endpoint in Discovery(graph.participant.handle).writers()]
+    identifiers = [
+        match[1] for text in data if (match := re.match(r"serviceid=( [0-9a-f.]+);typehash", text))
+    ]
+    assert len(identifiers) == len(set(identifiers)) == 8
+    prefix = ".".join(f"{octet:x}" for octet in graph.participant.gid[:12])
+    assert set(identifiers) == {f" {prefix}.0.0.0.{number:x}" for number in range(1, 9)}
+
+
+def test_the_recorded_discovery_info_is_read_and_written_back_octet_by_octet() -> None:
+    data = bytes.fromhex(
+        json.loads((FACTS / "wire_samples.json").read_text())["samples"]["ros_discovery_info"]
+    )
+    gid, nodes = decode(data)
+    assert [(node.namespace, node.name) for node in nodes] == [("/arm1", "facts")]
+    assert (len(nodes[0].readers), len(nodes[0].writers)) == (9, 13)
+    assert encode(gid, nodes) == data
+
+
+@given(st.binary(max_size=300))
+def test_discovery_info_from_anybody_is_understood_or_refused(data: bytes) -> None:
+    with suppress(ValueError):
+        decode(b"\x00\x01\x00\x00" + data)
+
+
+@given(
+    st.lists(
+        st.tuples(
+            st.text(alphabet=st.characters(codec="utf-8", exclude_characters="\0"), max_size=8),
+            st.text(alphabet=st.characters(codec="utf-8", exclude_characters="\0"), max_size=8),
+            st.lists(st.binary(min_size=16, max_size=16), max_size=3),
+            st.lists(st.binary(min_size=16, max_size=16), max_size=3),
+        ),
+        max_size=4,
+    )
+)
+def test_discovery_info_survives_writing_and_reading(
+    nodes: list[tuple[str, str, list[bytes], list[bytes]]],
+) -> None:
+    entities = []
+    for namespace, name, readers, writers in nodes:
+        node = NodeEntities(namespace, name)
+        node.readers, node.writers = readers, writers
+        entities.append(node)
+    gid, result = decode(encode(bytes(range(16)), entities))
+    assert gid == bytes(range(16))
+    assert [(node.namespace, node.name, node.readers, node.writers) for node in result] == nodes

@@ -1,0 +1,371 @@
+"""Codecs of the embedded runtime: against rosbags, another implementation, and against malformed input.
+
+``python tests/runtime/test_messages_codec.py 1000000`` feeds each main decoder so many malformed samples.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+import os
+import random
+import struct
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+import rosidl_runtime_embedded
+from rosidl_runtime_embedded import message_class
+from rosidl_runtime_embedded.definition import FieldType, integer_range
+from rosidl_runtime_embedded.fields import ARRAY_CODES
+from rosidl_runtime_embedded.packages import interface_names, message_definition
+
+SOURCE = Path(rosidl_runtime_embedded.__file__).parents[1]
+PACKAGES = sorted({path.parents[1].name for path in SOURCE.glob("*/msg/*.msg")})
+MESSAGES = [f"{package}/msg/{name}" for package in PACKAGES for name in interface_names(package, "msg")]
+MAIN_TYPES = [
+    "std_msgs/msg/Float64",
+    "std_msgs/msg/Bool",
+    "std_msgs/msg/String",
+    "std_msgs/msg/Header",
+    "geometry_msgs/msg/PointStamped",
+    "diagnostic_msgs/msg/DiagnosticArray",
+    "rcl_interfaces/msg/ParameterEvent",
+    "rcl_interfaces/srv/SetParameters_Request",
+    "rmw_dds_common/msg/ParticipantEntitiesInfo",
+    "sensor_msgs/msg/JointState",
+    "sensor_msgs/msg/Image",
+    "nav_msgs/msg/Odometry",
+    "visualization_msgs/msg/InteractiveMarker",
+    "type_description_interfaces/srv/GetTypeDescription_Response",
+]
+STORE = get_typestore(Stores.ROS2_JAZZY)
+NUMBERS = itertools.count()
+
+
+def elements(type_: FieldType) -> st.SearchStrategy[Any]:
+    """Values of a field's base type."""
+    if type_.is_message:
+        return messages(type_.base)
+    if type_.base in ("float", "double"):
+        return st.floats(width=32 if type_.base == "float" else 64, allow_nan=False)
+    if type_.base == "boolean":
+        return st.booleans()
+    if type_.base == "octet":
+        return st.binary(min_size=1, max_size=1)
+    if type_.base in ("string", "wstring"):
+        characters = st.characters(codec="utf-8", exclude_characters="\0")
+        return st.text(characters, max_size=type_.string_bound or 8)
+    low, high = integer_range(type_.base)
+    return st.integers(low, high)
+
+
+def messages(name: str) -> st.SearchStrategy[Any]:
+    """Messages of a type with any values."""
+    fields = {}
+    for field in message_definition(name).fields:
+        size = field.type.array_size
+        values = elements(field.type)
+        if field.type.is_plural:
+            values = st.lists(values, min_size=size, max_size=size or field.type.sequence_bound or 3)
+        fields[field.name] = values
+    return st.builds(message_class(name), **fields)
+
+
+def as_rosbags(message: Any) -> Any:
+    """The same message for rosbags."""
+    cls = STORE.types[message._TYPE_NAME]
+    values = {}
+    for field in message._DEFINITION.fields:
+        value, base = getattr(message, field.name), field.type.base
+        if field.type.is_message:
+            value = [as_rosbags(element) for element in value] if field.type.is_plural else as_rosbags(value)
+        elif base == "octet":
+            value = (
+                np.array([byte[0] for byte in value], np.uint8)
+                if field.type.is_plural
+                else int.from_bytes(value, signed=True)
+            )
+        elif field.type.is_plural and base == "boolean":
+            value = np.array(value, np.bool_)
+        elif field.type.is_plural and base in ARRAY_CODES:
+            value = np.array(value, ARRAY_CODES[base])
+        values[field.name] = value
+    return cls(**values)
+
+
+@pytest.mark.parametrize("name", MESSAGES)
+@settings(max_examples=10, suppress_health_check=list(HealthCheck))
+@given(data=st.data())
+def test_any_message_is_written_as_by_rosbags_and_read_back(name: str, data: st.DataObject) -> None:
+    message = data.draw(messages(name))
+    cls: Any = type(message)
+    written = cls._serialize(message)
+    assert written == bytes(STORE.serialize_cdr(as_rosbags(message), name))
+    assert cls._deserialize(written) == message
+    assert cls._deserialize(written + b"\0\0\0") == message
+
+
+@pytest.mark.parametrize("name", MAIN_TYPES)
+@settings(max_examples=100, suppress_health_check=list(HealthCheck))
+@given(data=st.data())
+def test_every_truncation_of_a_sample_is_refused(name: str, data: st.DataObject) -> None:
+    message = data.draw(messages(name))
+    cls: Any = type(message)
+    written = cls._serialize(message)
+    shorter = data.draw(st.integers(0, len(written) - 1))
+    with pytest.raises(ValueError, match=f"{shorter} bytes are no {name}: "):
+        cls._deserialize(written[:shorter])
+
+
+@pytest.mark.parametrize("header", ["00000000", "00020000", "00030000", "01000000", "00070000", "ffff0000"])
+def test_any_other_header_than_that_of_little_endian_cdr_is_refused(header: str) -> None:
+    with pytest.raises(ValueError, match="header"):
+        message_class("std_msgs/msg/Float64")._deserialize(bytes.fromhex(header) + bytes(8))
+
+
+def test_options_in_the_header_mean_nothing() -> None:
+    cls: Any = message_class("std_msgs/msg/Float64")
+    assert cls._deserialize(bytes.fromhex("00010003") + bytes(8)) == cls()
+
+
+@pytest.mark.parametrize("value", [2, 128, 255])
+def test_a_bool_that_is_neither_true_nor_false_is_refused(value: int) -> None:
+    with pytest.raises(ValueError, match="bool"):
+        message_class("std_msgs/msg/Bool")._deserialize(bytes((0, 1, 0, 0, value)))
+    sample = bytes((0, 1, 0, 0)) + bytes(4 * 8) + struct.pack("<IB", 1, value)
+    with pytest.raises(ValueError, match="a bool is neither 0 nor 1"):
+        message_class("rcl_interfaces/msg/ParameterValue")._deserialize(sample)
+
+
+PRIMITIVES = ["bool", "byte", "char", "float32", "float64", "string"] + [
+    f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)
+]
+PLURALS = st.sampled_from(["", "", "", "[]", "[<=2]", "[1]", "[3]"])
+
+
+def definitions(bases: list[str]) -> st.SearchStrategy[str]:
+    """Definition files of any fields."""
+    types = st.lists(st.builds(str.__add__, st.sampled_from(bases), PLURALS), max_size=6)
+    return types.map(lambda types: "".join(f"{type_} field{n}\n" for n, type_ in enumerate(types)))
+
+
+@pytest.fixture(scope="module")
+def prefix(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """A directory in AMENT_PREFIX_PATH."""
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        path = tmp_path_factory.mktemp("prefix")
+        monkeypatch.setenv("AMENT_PREFIX_PATH", str(path))
+        yield path
+
+
+@settings(max_examples=60, suppress_health_check=list(HealthCheck))
+@given(data=st.data())
+def test_messages_of_any_definition_are_written_as_by_rosbags_and_read_back(
+    data: st.DataObject, prefix: Path
+) -> None:
+    # names of their own for each example: we remember types
+    number = next(NUMBERS)
+    directory = prefix / "share" / "any_msgs" / "msg"
+    directory.mkdir(parents=True, exist_ok=True)
+    bases = PRIMITIVES
+    for level in "ABC":
+        name = f"{level}{number}"
+        text = data.draw(definitions(bases))
+        (directory / f"{name}.msg").write_text(text)
+        STORE.register(get_types_from_msg(text, f"any_msgs/msg/{name}"))
+        bases = [*bases, name, name, name]
+
+    message = data.draw(messages(f"any_msgs/msg/{name}"))
+    cls: Any = type(message)
+    written = cls._serialize(message)
+    assert written == bytes(STORE.serialize_cdr(as_rosbags(message), message._TYPE_NAME))
+    assert cls._deserialize(written) == message
+    if "char" not in "".join(path.read_text() for path in directory.glob(f"?{number}.msg")):
+        assert STORE.hash_rihs01(message._TYPE_NAME) == cls._TYPE_HASH
+    feed(message._TYPE_NAME, 200, random.Random(number))
+
+
+def string_sample(*data: int) -> bytes:
+    return bytes((0, 1, 0, 0)) + struct.pack("<I", len(data)) + bytes(data)
+
+
+def test_strings_are_read_as_rclpy_reads_them() -> None:
+    cls: Any = message_class("std_msgs/msg/String")
+    assert cls._deserialize(string_sample()).data == ""
+    assert cls._deserialize(string_sample(0)).data == ""
+    assert cls._deserialize(string_sample(0x61, 0xFF, 0x62, 0)).data == "a\ufffdb"
+    assert cls._deserialize(string_sample(0x61, 0, 0x62, 0)).data == "a"
+    with pytest.raises(ValueError, match="not terminated"):
+        cls._deserialize(string_sample(0x61, 0x62))
+
+
+@pytest.mark.parametrize("count", [2, 1000, 0x7FFFFFFF, 0xFFFFFFFF])
+def test_a_count_that_the_sample_is_too_short_for_is_refused_at_once(count: int) -> None:
+    claim = bytes((0, 1, 0, 0)) + struct.pack("<I", count)
+    header = bytes((0, 1, 0, 0)) + struct.pack("<iIIxxxx", 0, 0, 1)
+    for name, sample in {
+        "std_msgs/msg/String": claim,
+        "geometry_msgs/msg/Polygon": claim,
+        "rcl_interfaces/srv/GetParameters_Request": claim,
+        "rcl_interfaces/srv/GetParameterTypes_Response": claim,
+        "diagnostic_msgs/msg/DiagnosticArray": header + struct.pack("<I", count),
+        "sensor_msgs/msg/LaserEcho": claim,
+        "std_msgs/msg/ByteMultiArray": claim,
+    }.items():
+        with pytest.raises(ValueError, match=name):
+            message_class(name)._deserialize(sample)
+
+
+def test_a_string_longer_than_its_bound_is_malformed_only_where_messages_check_fields() -> None:
+    code = (
+        "from type_description_interfaces.msg import IndividualTypeDescription as Description\n"
+        "data = bytes.fromhex('00010000 04010000') + b'x' * 259 + bytes(5)\n"
+        "assert len(Description._deserialize(data).type_name) == 259"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+    checked = subprocess.run(
+        [sys.executable, "-c", code],
+        env={**os.environ, "ROS_PYTHON_CHECK_FIELDS": "1"},
+        capture_output=True,
+        text=True,
+    )
+    assert "ValueError: 272 bytes are no type_description_interfaces/msg/Indiv" in checked.stderr
+
+
+def test_a_sequence_longer_than_its_bound_is_refused() -> None:
+    cls: Any = message_class("rcl_interfaces/msg/ParameterDescriptor")
+    sample = bytearray(cls._serialize(cls()))
+    sample[-4:] = struct.pack("<I", 2)  # integer_range, the last field
+    with pytest.raises(ValueError, match="too long"):
+        cls._deserialize(bytes(sample) + bytes(64))
+
+
+def test_wide_strings_are_utf16_code_units_of_4_bytes_each(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("AMENT_PREFIX_PATH", str(tmp_path))
+    directory = tmp_path / "share" / "wide_msgs" / "msg"
+    directory.mkdir(parents=True)
+    (directory / "Wide.msg").write_text("wstring text\nwstring[] texts\nuint8 last\n")
+    cls: Any = message_class("wide_msgs/msg/Wide")
+    message = cls(text="aż\U0001f600", texts=["", "\0"], last=7)
+    units = struct.pack("<IIIII", 4, 0x61, 0x17C, 0xD83D, 0xDE00)
+    expected = bytes((0, 1, 0, 0)) + units + struct.pack("<IIIIB", 2, 0, 1, 0, 7)
+    assert cls._serialize(message) == expected
+    assert cls._deserialize(expected) == message
+    for unit in (0x10000, 0xD83D):
+        with pytest.raises(ValueError, match="wide_msgs/msg/Wide"):
+            cls._deserialize(bytes((0, 1, 0, 0)) + struct.pack("<IIIB", 1, unit, 0, 0))
+    with pytest.raises(ValueError, match="field 'text'"):
+        cls._serialize(cls(text="\ud800"))
+
+
+def populated(name: str) -> Any:
+    """A message whose sequences and strings are not empty."""
+    values: dict[str, Any] = {}
+    for field in message_definition(name).fields:
+        type_ = field.type
+        if type_.is_message:
+            value: Any = populated(type_.base)
+        elif type_.base in ("string", "wstring"):
+            value = "text"[: type_.string_bound or 4]
+        elif type_.base in ARRAY_CODES:
+            value = 1.5 if type_.base in ("float", "double") else 1
+        else:
+            value = True if type_.base == "boolean" else b"\1"
+        if type_.is_plural:
+            value = [value] * (type_.array_size or min(type_.sequence_bound or 2, 2))
+        values[field.name] = value
+    return message_class(name)(**values)
+
+
+def mutated(sample: bytes, source: random.Random) -> bytes:
+    """A sample with random damage: to bits, bytes, counts or its length, or noise behind a good header."""
+    data = bytearray(sample)
+    kind = source.randrange(5)
+    if kind == 0:
+        return sample[:4] + source.randbytes(source.randrange(2 * len(sample)))
+    for _ in range(source.randint(1, 4)):
+        position = source.randrange(len(data))
+        if kind == 1:
+            data[position] ^= 1 << source.randrange(8)
+        elif kind == 2:
+            data[position] = source.choice((0, 1, 2, 0x7F, 0x80, 0xFF, source.randrange(256)))
+        elif kind == 3:
+            count = source.choice((0, 1, 2, 3, 255, 65536, 0x7FFFFFFF, 0x80000000, 0xFFFFFFFF))
+            position = min(position & ~3, max(0, len(data) - 4))
+            data[position : position + 4] = struct.pack("<I", count)
+        elif source.random() < 0.5:
+            del data[position : position + source.randint(1, 8)]
+            data = data or bytearray(1)
+        else:
+            data[position:position] = source.randbytes(source.randint(1, 8))
+    return bytes(data)
+
+
+def feed(name: str, inputs: int, source: random.Random) -> tuple[int, int]:
+    """Numbers of malformed samples that a decoder took and refused; it may do nothing else with them."""
+    cls: Any = message_class(name)
+    samples = [cls._serialize(cls()), cls._serialize(populated(name))]
+    taken = refused = 0
+    for _ in range(inputs):
+        sample = mutated(source.choice(samples), source)
+        try:
+            message = cls._deserialize(sample)
+        except ValueError:
+            refused += 1
+            continue
+        taken += 1
+        if taken % 10 == 0:
+            # what was read is a valid message: it can be written, and read again
+            written = cls._serialize(message)
+            assert cls._serialize(cls._deserialize(written)) == written
+    return taken, refused
+
+
+@pytest.mark.parametrize("name", MAIN_TYPES)
+def test_malformed_samples_are_refused_or_read_as_valid_messages(name: str) -> None:
+    taken, refused = feed(name, 3000, random.Random(name))
+    assert taken
+    assert refused
+
+
+@pytest.mark.parametrize("name", MAIN_TYPES)
+@settings(max_examples=100)
+@given(noise=st.binary(max_size=200))
+def test_noise_is_refused_or_read_as_a_valid_message(name: str, noise: bytes) -> None:
+    cls: Any = message_class(name)
+    for sample in (noise, bytes((0, 1, 0, 0)) + noise):
+        try:
+            message = cls._deserialize(sample)
+        except ValueError:
+            continue
+        assert isinstance(message, cls)
+
+
+def test_floats_that_are_no_numbers_survive() -> None:
+    cls: Any = message_class("geometry_msgs/msg/Point")
+    point = cls._deserialize(cls._serialize(cls(x=math.nan, y=math.inf, z=-math.inf)))
+    assert math.isnan(point.x)
+    assert (point.y, point.z) == (math.inf, -math.inf)
+
+
+def main() -> None:
+    """Feed as many malformed samples to each decoder as the command line says."""
+    inputs = int(sys.argv[1])
+    for name in MAIN_TYPES:
+        taken, refused = feed(name, inputs, random.Random(f"{name} {inputs}"))
+        print(f"{name}: {inputs} inputs, {refused} refused, {taken} read", flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,57 @@
+"""Declaring and setting parameters where rclpy changes what it is given, or refuses or tells less."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+
+from rcl_interfaces.msg import (
+    ParameterDescriptor,
+    ParameterValue,
+)
+from rclpy.exceptions import (
+    ParameterNotDeclaredException,
+)
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+
+def test_the_default_may_be_a_message(make_node: Callable[..., Node]) -> None:
+    assert make_node().declare_parameter("a", ParameterValue(type=2, integer_value=3)).value == 3
+
+
+def test_a_descriptor_may_be_shared_since_it_is_not_changed(make_node: Callable[..., Node]) -> None:
+    node, shared = make_node(), ParameterDescriptor(description="a length [m]")
+    node.declare_parameter("l1", 1.0, shared)
+    node.declare_parameter("l2", 2, shared)
+    assert shared == ParameterDescriptor(description="a length [m]")
+    described = node.describe_parameters(["l1", "l2"])
+    assert [(d.name, d.type, d.description) for d in described] == [
+        ("l1", Parameter.Type.DOUBLE.value, "a length [m]"),
+        ("l2", Parameter.Type.INTEGER.value, "a length [m]"),
+    ]
+
+
+def test_all_undeclared_parameters_of_a_list_are_named(make_node: Callable[..., Node]) -> None:
+    node = make_node()
+    node.declare_parameter("a", 1)
+    with pytest.raises(ParameterNotDeclaredException, match=r"\['b', 'c'\]"):
+        node.set_parameters_atomically([Parameter(name, value=2) for name in "abc"])
+    assert node.get_parameter("a").value == 1
+
+
+def test_the_warning_of_a_declaration_without_a_value_names_the_line_that_makes_it(
+    make_node: Callable[..., Node],
+) -> None:
+    node = make_node()
+    with pytest.warns(UserWarning, match="named 'a'.*deprecated") as caught:
+        node.declare_parameter("a")
+    assert caught[0].filename == __file__
+
+
+def test_who_asks_for_what_is_not_declared_is_told_its_name(make_node: Callable[..., Node]) -> None:
+    node = make_node()
+    for read in (node.get_parameter, node.get_parameter_type, lambda name: node.get_parameters([name])):
+        with pytest.raises(ParameterNotDeclaredException, match="unknown"):
+            read("unknown")

@@ -1,0 +1,79 @@
+"""The DDS reader behind every subscription, service and client."""
+
+from __future__ import annotations
+
+import tracemalloc
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from rclpy._dds import INFINITY, Participant, Reader, WaitSet, Writer, entities
+from rclpy.qos import QoSProfile
+
+HEADER = b"\x00\x01\x00\x00"
+PROFILE = QoSProfile(depth=10)
+
+
+@pytest.fixture
+def writer(participant: Participant) -> Writer:
+    """A writer whose messages the test's reader gets."""
+    return participant.create_writer("rt/x", "Octets_", PROFILE, "")
+
+
+@pytest.fixture
+def reader(participant: Participant) -> Reader:
+    """A reader of the test's participant."""
+    return participant.create_reader("rt/x", "Octets_", PROFILE, "")
+
+
+def wait(reader: Reader) -> None:
+    """Wait until there is something to take."""
+    waitset = WaitSet()
+    waitset.attach(reader.condition, 0)
+    waitset.wait(INFINITY)
+    waitset.close()
+
+
+def test_whoever_takes_in_the_midst_of_taking_gets_the_next_message(
+    reader: Reader, writer: Writer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    quick = entities.quick
+    taken: list[bytes] = []
+
+    def take(*arguments: Any) -> int:
+        count = int(quick.dds_takecdr(*arguments))
+        if not taken:  # here another thread may get its turn
+            taken.append(b"")
+            sample = reader.take()
+            assert sample is not None
+            taken.append(sample.data)
+        return count
+
+    for message in (b"1111", b"2222"):
+        writer.write(HEADER + message)
+        wait(reader)
+    names = ("ddsi_serdata_size", "ddsi_serdata_to_ser", "ddsi_serdata_unref")
+    functions = {name: getattr(quick, name) for name in names}
+    monkeypatch.setattr(entities, "quick", SimpleNamespace(dds_takecdr=take, **functions))
+    sample = reader.take()
+    assert sample is not None
+    assert sample.data == HEADER + b"1111"
+    assert taken[1:] == [HEADER + b"2222"]
+    assert reader.take() is None
+
+
+def test_nothing_stays_of_a_big_message(reader: Reader, writer: Writer) -> None:
+    writer.write(HEADER + bytes(10_000_000))
+    wait(reader)
+    tracemalloc.start()
+    try:
+        sample = reader.take()
+        assert sample is not None
+        assert len(sample.data) == 10_000_004
+        del sample
+        size, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert peak > 10_000_000
+    assert size < 100_000

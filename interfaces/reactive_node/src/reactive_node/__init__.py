@@ -1,0 +1,7 @@
+"""Topics, parameters, events and calls of a ROS 2 node as ReactiveX observables."""
+
+from reactive_node.node import ReactiveNode
+from reactive_node.scheduler import NodeScheduler
+from reactive_node.stamps import Timestamp
+
+__all__ = ["NodeScheduler", "ReactiveNode", "Timestamp"]

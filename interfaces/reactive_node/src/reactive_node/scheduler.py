@@ -1,0 +1,268 @@
+"""Rx time is the node's time: operators run on the node's executor and by its clock.
+
+RxPY's own schedulers start a thread per event or run by the wall clock, and a clock that is set back stops
+their ``timeout`` and ``interval``. This one is a heap of what is due, and one ROS timer, armed for the
+earliest.
+"""
+
+from __future__ import annotations
+
+import heapq
+import itertools
+import threading
+from datetime import datetime
+from typing import Any, TypeVar
+
+from rclpy.clock import Clock, ClockType, JumpThreshold, ROSClock, TimeJump
+from rclpy.duration import Duration
+from rclpy.node import Node
+from rclpy.time import Time
+from rclpy.timer import Timer
+from reactivex import abc, typing
+from reactivex.scheduler.periodicscheduler import PeriodicScheduler
+
+from reactive_node import stamps
+
+_TState = TypeVar("_TState")
+_CATCH_UP = 50_000_000  # [ns] by which a periodic action may be late and still keep its rate
+_NOT_HEARD = Time(clock_type=ClockType.ROS_TIME)  # what simulated time is before the first /clock
+_FEW = 64  # so many cancelled items in the heap are not worth a clean-up
+
+
+class _Item(abc.DisposableBase):
+    """A scheduled action; disposing it cancels it, or ends what it has returned."""
+
+    __slots__ = ("action", "cancelled", "due", "result", "scheduler", "state")
+
+    def __init__(self, scheduler: NodeScheduler, due: int, action: Any, state: Any) -> None:
+        self.scheduler = scheduler
+        self.due = due
+        self.action = action  # None while it is not in the heap
+        self.state = state
+        self.cancelled = False
+        self.result: abc.DisposableBase | None = None
+
+    def dispose(self) -> None:
+        result = self.scheduler._cancel(self)
+        if result is not None:
+            result.dispose()
+
+
+class NodeScheduler(PeriodicScheduler):
+    """
+    Schedules on a node's executor; any thread may schedule and cancel.
+
+    Time is monotonic: it begins as the time of day and then follows the steady clock, so setting the clock of
+    the machine changes nothing. While the node's ROS time is simulated (``use_sim_time``), it follows that
+    instead, and begins as that if it is simulated from the start. When simulated time jumps back, begins or
+    ends, what was to come in so many seconds still comes in so many. What is due at once does not wait for a
+    simulation that stands still.
+    """
+
+    def __init__(self, node: Node) -> None:
+        """Schedule on the executor of ``node``, in its default callback group."""
+        super().__init__()
+        self._node = node
+        self._lock = threading.RLock()
+        self._heap: list[tuple[int, int, _Item]] = []  # when due [ns], order of scheduling, what
+        self._cancelled = 0  # items in the heap
+        self._orders = itertools.count()
+        self._armed_for: int | None = None
+        self._disposed = False
+        self._offset = 0  # [ns] from the clock's time to ours
+        self._steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._use_clock(self._time_is_simulated())
+        if not self._simulated:
+            self._offset = node.get_clock().now().nanoseconds - self._read()
+        self._jumps = node.get_clock().create_jump_callback(
+            JumpThreshold(
+                min_forward=Duration(nanoseconds=1),
+                min_backward=Duration(nanoseconds=-1),
+                on_clock_change=True,
+            ),
+            post_callback=self._time_has_jumped,
+        )
+
+    # What Rx asks of a scheduler
+
+    @property
+    def now(self) -> datetime:
+        """The time by which this scheduler runs."""
+        return stamps.from_nanoseconds(self._read())
+
+    def schedule(
+        self, action: typing.ScheduledAction[_TState], state: _TState | None = None
+    ) -> abc.DisposableBase:
+        """Run an action as soon as the executor gets to it; never at once."""
+        return self._schedule(self._read(), action, state)
+
+    def schedule_relative(
+        self,
+        duetime: typing.RelativeTime,
+        action: typing.ScheduledAction[_TState],
+        state: _TState | None = None,
+    ) -> abc.DisposableBase:
+        """Run an action in ``duetime`` [s, or a timedelta]."""
+        return self._schedule(self._read() + max(0, round(self.to_seconds(duetime) * 1e9)), action, state)
+
+    def schedule_absolute(
+        self,
+        duetime: typing.AbsoluteTime,
+        action: typing.ScheduledAction[_TState],
+        state: _TState | None = None,
+    ) -> abc.DisposableBase:
+        """Run an action at ``duetime`` [a datetime like :attr:`now`, or seconds since 1970]."""
+        return self._schedule(stamps.to_nanoseconds(self.to_datetime(duetime)), action, state)
+
+    def schedule_periodic(
+        self,
+        period: typing.RelativeTime,
+        action: typing.ScheduledPeriodicAction[_TState],
+        state: _TState | None = None,
+    ) -> abc.DisposableBase:
+        """Run an action every ``period``, without drift; what is more than 50 ms late is skipped."""
+        nanoseconds = max(1, round(self.to_seconds(period) * 1e9))
+
+        def run(_: abc.SchedulerBase, state: Any) -> None:
+            following = action(state)
+            late = self._read() - item.due
+            missed = late // nanoseconds if late > _CATCH_UP else 0
+            self._put(item, item.due + (missed + 1) * nanoseconds, run, following)
+
+        with self._lock:  # so that it does not run before it has its name
+            item = self._schedule(self._read() + nanoseconds, run, state)
+        return item
+
+    # The heap
+
+    def _schedule(self, due: int, action: Any, state: Any) -> _Item:
+        item = _Item(self, due, None, None)
+        self._put(item, due, action, state)
+        return item
+
+    def _put(self, item: _Item, due: int, action: Any, state: Any) -> None:
+        with self._lock:
+            if item.cancelled or self._disposed:
+                return
+            item.due, item.action, item.state = due, action, state
+            heapq.heappush(self._heap, (due, next(self._orders), item))
+            if self._heap[0][2] is item:
+                self._arm()
+
+    def _cancel(self, item: _Item) -> abc.DisposableBase | None:
+        """Take an item out, or out of reach; return what its action has returned, if it has run."""
+        with self._lock:
+            item.cancelled = True
+            if item.action is not None:
+                item.action = item.state = None
+                self._cancelled += 1
+                if self._cancelled > _FEW and self._cancelled > len(self._heap) // 2:
+                    self._heap = [entry for entry in self._heap if not entry[2].cancelled]
+                    heapq.heapify(self._heap)
+                    self._cancelled = 0
+            result, item.result = item.result, None
+            return result
+
+    def _run(self) -> None:
+        """Run what is due by now; what that schedules waits until the executor has seen to other work."""
+        horizon, limit = self._read(), next(self._orders)
+        try:
+            while (due := self._pop(horizon, limit)) is not None:
+                item, action, state = due
+                result = action(self, state)
+                if isinstance(result, abc.DisposableBase):
+                    self._keep(item, result)
+        finally:
+            with self._lock:
+                self._armed_for = None
+                self._arm()
+
+    def _pop(self, horizon: int, limit: int) -> tuple[_Item, Any, Any] | None:
+        """Take out the first item, if it is due by `horizon` [ns] and was scheduled before `limit`."""
+        with self._lock:
+            while self._heap and self._heap[0][0] <= horizon and self._heap[0][1] < limit:
+                item = heapq.heappop(self._heap)[2]
+                if not item.cancelled:
+                    action, state = item.action, item.state
+                    item.action = item.state = None
+                    return item, action, state
+                self._cancelled -= 1
+        return None
+
+    def _keep(self, item: _Item, result: abc.DisposableBase) -> None:
+        with self._lock:
+            if not item.cancelled:
+                item.result = result
+                return
+        result.dispose()
+
+    # The timer
+
+    def _arm(self) -> None:
+        """Let the timer ring for the earliest item, or rest."""
+        if self._disposed:
+            return
+        if not self._heap:
+            self._timer.cancel()
+            self._armed_for = None
+            return
+        due = self._heap[0][0]
+        if self._armed_for is not None and self._armed_for <= due:
+            return  # it rings early at worst, and looks again
+        self._armed_for = due
+        self._timer.timer_period_ns = max(0, due - self._read())
+        self._timer.reset()  # which wakes an executor that waits
+
+    # The clock
+
+    def _use_clock(self, simulated: bool) -> None:
+        self._simulated = simulated
+        self._clock = self._node.get_clock() if simulated else self._steady
+        self._timer: Timer = self._node.create_timer(1.0, self._run, clock=self._clock, autostart=False)
+
+    def _read(self) -> int:
+        return int(self._clock.now().nanoseconds) + self._offset
+
+    def _time_is_simulated(self) -> bool:
+        clock = self._node.get_clock()
+        return isinstance(clock, ROSClock) and bool(clock.ros_time_is_active)
+
+    def _time_has_jumped(self, jump: TimeJump) -> None:
+        """Go on from where our time is, by the same clock or another one."""
+        with self._lock:
+            if self._disposed:
+                return
+            simulated = self._time_is_simulated()
+            if simulated != self._simulated:
+                # Simulated time that has just ended is not to be read any more.
+                before = self._read() - (jump.delta.nanoseconds if self._simulated else 0)
+                self._node.destroy_timer(self._timer)
+                self._use_clock(simulated)
+                self._offset += before - self._read()
+            elif not simulated:
+                return
+            elif jump.delta.nanoseconds < 0:
+                self._offset -= jump.delta.nanoseconds
+            elif self._node.get_clock().now() == _NOT_HEARD + jump.delta:
+                self._begin_simulation(jump.delta.nanoseconds)
+            else:
+                return  # time just goes on, which the timer sees
+            self._armed_for = None
+            self._arm()
+
+    def _begin_simulation(self, delta: int) -> None:
+        """Follow the first simulated time that is heard: until then that clock has stood at 0."""
+        if self._offset:  # there was time before: it goes on from where it is
+            self._offset -= delta
+            return
+        self._heap = [(due + delta, order, item) for due, order, item in self._heap]
+        for _, _, item in self._heap:
+            item.due += delta
+
+    def dispose(self) -> None:
+        """Forget everything, for ever: the node ends."""
+        with self._lock:
+            self._disposed = True
+            self._heap.clear()
+            self._jumps.unregister()
+        self._node.destroy_timer(self._timer)

@@ -1,0 +1,406 @@
+"""Rx time on the executor and the clock of a node."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from datetime import UTC, datetime, timedelta
+from itertools import pairwise
+from typing import Any
+
+import pytest
+import reactivex as rx
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.parameter import Parameter
+from reactivex.disposable import BooleanDisposable
+from reactivex.subject import Subject
+from rosgraph_msgs.msg import Clock as ClockMessage
+
+from reactive_node import ReactiveNode
+from reactive_node.scheduler import NodeScheduler
+from reactive_node.stamps import Timestamp
+
+Make = Callable[..., ReactiveNode]
+SpinUntil = Callable[..., None]
+SpinFor = Callable[[float], None]
+
+
+@pytest.fixture
+def scheduler(make_node: Make) -> NodeScheduler:
+    return make_node("timed").scheduler
+
+
+def test_what_is_due_first_runs_first_and_what_is_due_at_once_in_order(
+    scheduler: NodeScheduler, spin_until: SpinUntil
+) -> None:
+    ran: list[str] = []
+    scheduler.schedule_relative(0.5, lambda *_: ran.append("later"))
+    for name in "abc":
+        scheduler.schedule(lambda _, state: ran.append(state), name)
+    scheduler.schedule_absolute(scheduler.now + timedelta(milliseconds=10), lambda *_: ran.append("soon"))
+
+    assert ran == []
+    spin_until(lambda: len(ran) == 5)
+
+    assert ran == ["a", "b", "c", "soon", "later"]
+
+
+def test_all_runs_on_the_thread_of_the_executor_and_no_thread_is_started(
+    scheduler: NodeScheduler, spin_until: SpinUntil
+) -> None:
+    threads: set[int] = set()
+    before = threading.active_count()
+    numbers: Subject[int] = Subject()
+    done: list[Any] = []
+    for stream in (
+        rx.interval(0.001).take(300),
+        rx.interval(0.001).take(300).sample(0.01),
+        rx.interval(0.001).take(300).timeout(1.0),
+        rx.interval(0.001).take(300).debounce(0.0001),
+        rx.interval(0.001).take(300).delay(0.01),
+        numbers.timeout(1.0).take(1),
+    ):
+        stream.subscribe(
+            lambda _: threads.add(threading.get_ident()),
+            on_completed=lambda: done.append(threading.active_count()),
+            scheduler=scheduler,
+        )
+    scheduler.schedule_relative(0.1, lambda *_: numbers.on_next(1))
+
+    spin_until(lambda: len(done) == 6)
+
+    assert threads == {threading.get_ident()}
+    assert set(done) == {before}
+
+
+def test_what_is_cancelled_does_not_run(scheduler: NodeScheduler, spin_until: SpinUntil) -> None:
+    ran: list[str] = []
+    first = scheduler.schedule_relative(0.01, lambda *_: ran.append("first"))
+    scheduler.schedule_relative(0.01, lambda *_: second.dispose())
+    second = scheduler.schedule_relative(0.02, lambda *_: ran.append("second"))
+    scheduler.schedule_relative(0.03, lambda *_: ran.append("third"))
+    first.dispose()
+    first.dispose()
+
+    spin_until(lambda: "third" in ran)
+
+    assert ran == ["third"]
+
+
+def test_a_periodic_action_that_disposes_itself_ends(
+    scheduler: NodeScheduler, spin_until: SpinUntil, spin_for: SpinFor
+) -> None:
+    ran: list[int] = []
+
+    def action(count: int | None) -> int:
+        ran.append(count or 0)
+        if len(ran) == 3:
+            periodic.dispose()
+        return (count or 0) + 1
+
+    periodic = scheduler.schedule_periodic(0.001, action, 0)
+    spin_until(lambda: len(ran) == 3)
+    spin_for(0.02)
+
+    assert ran == [0, 1, 2]
+
+
+def test_disposing_what_ran_disposes_what_it_returned(
+    scheduler: NodeScheduler, spin_until: SpinUntil
+) -> None:
+    inner = BooleanDisposable()
+    ran: list[bool] = []
+
+    def action(*_: Any) -> BooleanDisposable:
+        ran.append(True)
+        return inner
+
+    outer = scheduler.schedule(action)
+    spin_until(lambda: ran)
+    assert not inner.is_disposed
+    outer.dispose()
+
+    assert inner.is_disposed
+
+
+def test_another_thread_wakes_the_waiting_executor(
+    scheduler: NodeScheduler, executor: SingleThreadedExecutor
+) -> None:
+    ran: list[bool] = []
+    scheduler.schedule_relative(60.0, lambda *_: None)
+    executor.spin_once(timeout_sec=0.0)
+
+    def later() -> None:
+        time.sleep(0.1)
+        scheduler.schedule(lambda *_: ran.append(True))
+
+    thread = threading.Thread(target=later)
+    begin = time.monotonic()
+    thread.start()
+    while not ran and time.monotonic() - begin < 20:
+        executor.spin_once(timeout_sec=20)
+    thread.join()
+
+    assert time.monotonic() - begin < 10
+
+
+def test_an_error_of_an_action_ends_the_spinning_and_nothing_else(
+    scheduler: NodeScheduler, spin_until: SpinUntil
+) -> None:
+    ran: list[str] = []
+
+    def fail(*_: Any) -> None:
+        raise ValueError("planted")
+
+    scheduler.schedule(fail)
+    scheduler.schedule(lambda *_: ran.append("next"))
+
+    with pytest.raises(ValueError, match="planted"):
+        spin_until(lambda: False)
+    spin_until(lambda: ran)
+
+
+def test_ten_thousand_items_a_second_under_a_timeout_leave_no_trace(
+    scheduler: NodeScheduler, spin_until: SpinUntil
+) -> None:
+    items: Subject[int] = Subject()
+    seen: list[int] = []
+    items.timeout(3.0).subscribe(seen.append, scheduler=scheduler)
+
+    for item in range(30_000):
+        items.on_next(item)
+
+    assert len(seen) == 30_000
+    assert len(scheduler._heap) < 200
+
+
+def test_what_is_left_of_many_cancelled_items_runs_in_order(
+    scheduler: NodeScheduler, spin_until: SpinUntil
+) -> None:
+    ran: list[int] = []
+    begin = scheduler.now + timedelta(milliseconds=20)
+    order = [(n * 7919) % 1000 for n in range(1000)]
+    items = [
+        scheduler.schedule_absolute(
+            begin + timedelta(microseconds=n), lambda _, state: ran.append(state or 0), n
+        )
+        for n in order
+    ]
+
+    for item, n in zip(items, order, strict=True):
+        if n % 10:
+            item.dispose()
+    spin_until(lambda: len(ran) == 100)
+
+    assert ran == list(range(0, 1000, 10))
+
+
+def test_setting_the_wall_clock_changes_nothing(
+    scheduler: NodeScheduler, spin_until: SpinUntil, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ticks: list[datetime] = []
+    rx.interval(0.01).timeout(1.0).subscribe(lambda _: ticks.append(scheduler.now), scheduler=scheduler)
+    time_ns, timer = time.time_ns, time.time
+    for hours in (1, -1):
+        seen = len(ticks)
+        monkeypatch.setattr(time, "time_ns", lambda hours=hours: time_ns() + hours * 3600 * 10**9)
+        monkeypatch.setattr(time, "time", lambda hours=hours: timer() + hours * 3600)
+
+        spin_until(lambda seen=seen: len(ticks) >= seen + 5)
+
+    assert all(timedelta(0) < b - a < timedelta(minutes=1) for a, b in pairwise(ticks))
+
+
+def test_now_begins_as_the_time_of_day(scheduler: NodeScheduler) -> None:
+    assert abs(scheduler.now - datetime.now(UTC)) < timedelta(seconds=5)
+
+
+class Simulation:
+    """A node on simulated time, and the clock that drives it."""
+
+    def __init__(self, make_node: Make, spin_until: SpinUntil) -> None:
+        self.spin_until = spin_until
+        self.clock = make_node("simulator")
+        self.publisher = self.clock.create_publisher(ClockMessage, "/clock", 10)
+        self.node = make_node("simulated", parameter_overrides=[Parameter("use_sim_time", value=True)])
+        spin_until(lambda: self.publisher.get_subscription_count() > 0)
+
+    def set(self, seconds: float) -> None:
+        self.publisher.publish(_clock(seconds))
+        self.spin_until(lambda: self.node.get_clock().now().nanoseconds == round(seconds * 1e9))
+
+
+def _clock(seconds: float) -> ClockMessage:
+    message = ClockMessage()
+    message.clock.sec, message.clock.nanosec = divmod(round(seconds * 1e9), 10**9)
+    return message
+
+
+@pytest.fixture
+def simulation(make_node: Make, spin_until: SpinUntil) -> Simulation:
+    return Simulation(make_node, spin_until)
+
+
+def test_simulated_time_is_followed_and_stands_still_with_the_simulator(
+    simulation: Simulation, spin_for: SpinFor, spin_until: SpinUntil
+) -> None:
+    ticks: list[int] = []
+    simulation.set(100.0)
+    rx.interval(1.0).subscribe(ticks.append, scheduler=simulation.node.scheduler)
+
+    spin_for(0.1)
+    assert ticks == []
+    for second in range(1, 4):
+        simulation.set(100.0 + second)
+        spin_until(lambda second=second: len(ticks) == second)
+
+    assert simulation.node.scheduler.now == datetime.fromtimestamp(103, UTC)
+
+
+@pytest.mark.parametrize("heard", [False, True])
+def test_what_is_due_at_once_does_not_wait_for_a_simulation_that_stands_still(
+    simulation: Simulation, spin_until: SpinUntil, heard: bool
+) -> None:
+    if heard:
+        simulation.set(100.0)
+    items: list[int] = []
+    rx.merge(rx.of(1, 2), rx.just(3)).subscribe(items.append, scheduler=simulation.node.scheduler)
+    spin_until(lambda: len(items) == 3)
+
+
+def test_what_schedules_itself_again_at_once_lets_others_have_their_turn(
+    simulation: Simulation, spin_until: SpinUntil
+) -> None:
+    simulation.set(100.0)
+    scheduler, most = simulation.node.scheduler, 10_000
+    ran, others = 0, []
+    other = simulation.node.create_guard_condition(lambda: others.append(ran))
+
+    def again(*_: Any) -> None:
+        nonlocal ran
+        ran += 1
+        if ran == 1:
+            other.trigger()
+        if ran < most and not others:
+            scheduler.schedule(again)
+
+    scheduler.schedule(again)
+    spin_until(lambda: others)
+    assert others[0] < most
+
+
+def test_with_the_first_simulated_time_nothing_is_due_that_was_to_come_later(
+    simulation: Simulation, spin_for: SpinFor, spin_until: SpinUntil
+) -> None:
+    ran: list[datetime] = []
+    scheduler = simulation.node.scheduler
+    scheduler.schedule_relative(5.0, lambda *_: ran.append(scheduler.now))
+    rx.interval(10.0).timestamp().subscribe(lambda it: ran.append(it.timestamp), scheduler=scheduler)
+
+    simulation.set(1234.0)
+    simulation.set(1238.9)
+    spin_for(0.05)
+    assert ran == []
+    simulation.set(1239.0)
+    spin_until(lambda: len(ran) == 1)
+    simulation.set(1244.0)
+    spin_until(lambda: len(ran) == 2)
+    assert ran == [datetime.fromtimestamp(at, UTC) for at in (1239, 1244)]
+
+
+def test_the_first_simulated_time_of_a_node_that_has_run_without_lets_its_time_go_on(
+    simulation: Simulation, make_node: Make, spin_for: SpinFor, spin_until: SpinUntil
+) -> None:
+    node = make_node("later")
+    ran: list[bool] = []
+    node.set_parameters([Parameter("use_sim_time", value=True)])
+    spin_until(lambda: simulation.publisher.get_subscription_count() == 2)
+    node.scheduler.schedule_relative(5.0, lambda *_: ran.append(True))
+    before = node.scheduler.now
+
+    simulation.set(1234.0)
+    spin_until(lambda: node.get_clock().now().nanoseconds == 1234_000_000_000)
+    assert node.scheduler.now == before
+    spin_for(0.05)
+    assert ran == []
+    simulation.set(1239.0)
+    spin_until(lambda: ran)
+
+
+def test_an_interval_does_not_drift_and_skips_what_it_missed(
+    simulation: Simulation, spin_for: SpinFor, spin_until: SpinUntil
+) -> None:
+    ticks: list[int] = []
+    simulation.set(100.0)
+    rx.interval(1.0).subscribe(ticks.append, scheduler=simulation.node.scheduler)
+
+    for time_, count in [(101.3, 1), (101.9, 1), (102.0, 2), (105.7, 3), (105.9, 3), (106.0, 4)]:
+        simulation.set(time_)
+        spin_until(lambda count=count: len(ticks) == count)
+        spin_for(0.02)
+        assert ticks == list(range(count))
+
+
+def test_after_a_jump_back_what_was_to_come_in_a_second_comes_in_a_second(
+    simulation: Simulation, spin_for: SpinFor, spin_until: SpinUntil
+) -> None:
+    ran: list[bool] = []
+    simulation.set(1000.0)
+    simulation.node.scheduler.schedule_relative(1.0, lambda *_: ran.append(True))
+
+    simulation.set(10.5)
+    simulation.set(11.4)
+    spin_for(0.05)
+    assert ran == []
+    simulation.set(11.5)
+    spin_until(lambda: ran)
+
+
+def test_after_a_jump_back_what_counts_from_an_absolute_time_goes_on(
+    simulation: Simulation, spin_until: SpinUntil
+) -> None:
+    """`timer` with a period keeps the time of its next item, `timestamp` gives times that others compare."""
+    simulation.set(1000.0)
+    ticks: list[Timestamp[int]] = []
+    rx.timer(1.0, 2.0).timestamp().subscribe(ticks.append, scheduler=simulation.node.scheduler)
+
+    for time_, count in [(1001.0, 1), (10.0, 1), (12.0, 2), (14.0, 3), (5.0, 3), (7.0, 4)]:
+        simulation.set(time_)
+        spin_until(lambda count=count: len(ticks) == count)
+
+    assert [tick.timestamp for tick in ticks] == [
+        datetime.fromtimestamp(at, UTC) for at in (1001, 1003, 1005, 1007)
+    ]
+
+
+def test_simulated_time_may_begin_and_end_while_something_waits(
+    simulation: Simulation, spin_until: SpinUntil, spin_for: SpinFor
+) -> None:
+    node = simulation.node
+    ran: list[str] = []
+    simulation.set(1000.0)
+    node.scheduler.schedule_relative(0.05, lambda *_: ran.append("real again"))
+    spin_for(0.1)
+    assert ran == []
+
+    node.set_parameters([Parameter("use_sim_time", value=False)])
+    spin_until(lambda: ran)
+    node.set_parameters([Parameter("use_sim_time", value=True)])
+    node.scheduler.schedule_relative(5.0, lambda *_: ran.append("simulated"))
+    spin_for(0.05)
+    assert ran == ["real again"]
+    simulation.set(simulation.node.get_clock().now().nanoseconds / 1e9 + 5.0)
+    spin_until(lambda: len(ran) == 2)
+
+
+def test_a_node_that_ended_runs_nothing_more(make_node: Make, spin_for: SpinFor) -> None:
+    node = make_node("ended")
+    ran: list[bool] = []
+    node.scheduler.schedule_relative(0.01, lambda *_: ran.append(True))
+
+    node.destroy_node()
+    node.scheduler.schedule(lambda *_: ran.append(True))
+    spin_for(0.03)
+
+    assert ran == []

@@ -1,0 +1,77 @@
+"""Logs of which supervisord loses lines, and nothing else."""
+
+from __future__ import annotations
+
+from contextlib import closing
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+from supervisor import events, loggers
+
+from deploy.supervision.extension import LossyLog, make_interface
+
+LIMIT = 10  # bytes of a log until it is rolled over
+
+
+def log_to(file: Path) -> closing[loggers.Logger]:
+    """A logger as supervisord makes one."""
+    return closing(loggers.Logger(handlers=[LossyLog(str(file), "a", LIMIT, 1)]))
+
+
+def test_a_full_disk_costs_only_what_is_logged_meanwhile(tmp_path: Path) -> None:
+    file = tmp_path / "velocity.log"
+    file.symlink_to("/dev/full")
+    with log_to(file) as log:
+        for _ in range(3):
+            log.info(b"too long a line\n")  # it cannot be written, nor the file be closed for another one
+        file.unlink()
+        log.info(b"short\n")
+    assert file.read_bytes() == b"short\n"
+
+
+def test_a_log_that_cannot_be_rolled_over_goes_on(tmp_path: Path) -> None:
+    file, obstacle = tmp_path / "velocity.log", tmp_path / "velocity.log.1"
+    with log_to(file) as log:
+        obstacle.mkdir()
+        log.info(b"too long a line\n")
+        obstacle.rmdir()
+        log.info(b"short\n")
+    assert obstacle.read_bytes() == b"too long a line\nshort\n"
+
+
+def test_a_log_that_cannot_be_opened_is_opened_later_and_its_directory_made_again(tmp_path: Path) -> None:
+    directory = tmp_path / "logs"
+    directory.touch()
+    file = directory / "velocity.log"
+    with log_to(file) as log:
+        log.info(b"lost\n")
+        directory.unlink()
+        log.info(b"short\n")
+    assert file.read_bytes() == b"short\n"
+
+
+def test_a_log_that_is_there_is_continued_and_rolled_over(tmp_path: Path) -> None:
+    file = tmp_path / "velocity.log"
+    file.write_bytes(b"first\n")
+    with log_to(file) as log:
+        log.info(b"second\n")
+        log.info(b"third\n")
+    assert (tmp_path / "velocity.log.1").read_bytes() == b"first\nsecond\n"
+    assert file.read_bytes() == b"third\n"
+
+
+def test_it_is_what_supervisord_logs_to_from_then_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(loggers, "RotatingFileHandler", loggers.RotatingFileHandler)  # to be put back
+    monkeypatch.setattr(events, "callbacks", [])
+    file = tmp_path / "supervisord.log"
+    with closing(loggers.Logger()) as own, closing(loggers.Logger()) as program:
+        loggers.handle_file(own, str(file), "%(message)s", True, LIMIT, 1)
+        make_interface(
+            SimpleNamespace(options=SimpleNamespace(logger=own, poller=SimpleNamespace(poll=None)))
+        )
+        (tmp_path / "supervisord.log.1").mkdir()
+        own.info(b"too long a line\n")
+        own.info(b"short\n")
+        loggers.handle_file(program, "/dev/null/velocity.log", "%(message)s", True, LIMIT, 1)
+    assert file.read_bytes() == b"too long a line\nshort\n"

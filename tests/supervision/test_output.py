@@ -1,0 +1,47 @@
+"""What is said to a reader, to one who does not read, and to nobody."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+
+from deploy.console.output import say
+from deploy.supervision.processes import ROOT
+
+LINES = 5000  # of 100 characters, which no pipe takes all
+FLOOD = f"from deploy.console.output import say\nfor _ in range({LINES}): say('#' * 99)"
+
+
+def test_a_line_is_printed(capfd: pytest.CaptureFixture[str]) -> None:
+    say("All have ended.")
+    assert capfd.readouterr().out == "All have ended.\n"
+
+
+def test_whoever_does_not_read_stops_nobody() -> None:
+    with subprocess.Popen([sys.executable, "-c", FLOOD], cwd=ROOT, stdout=subprocess.PIPE) as process:
+        try:
+            assert process.wait(30) == 0
+        finally:
+            process.kill()
+        assert process.stdout is not None
+        lines = process.stdout.read().splitlines()
+    assert 0 < len(lines) < LINES
+    assert set(lines) == {b"#" * 99}
+
+
+def test_without_standard_output_nothing_is_said() -> None:
+    command = f'exec "{sys.executable}" -c "from deploy.console.output import say; say(0)" >&-'
+    done = subprocess.run(["sh", "-c", command], cwd=ROOT, stderr=subprocess.PIPE)
+    assert (done.returncode, done.stderr) == (0, b"")
+
+
+def test_to_nobody_it_is_an_error() -> None:
+    with subprocess.Popen(
+        [sys.executable, "-c", FLOOD], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    ) as process:
+        assert process.stdout is not None
+        process.stdout.close()
+        assert process.stderr is not None
+        assert b"BrokenPipeError" in process.stderr.read()

@@ -1,0 +1,42 @@
+"""The pinned requirements: complete, and within the ranges that the projects declare."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+
+from packaging.requirements import Requirement
+
+ROOT = Path(__file__).parents[2]
+
+
+def pins(*names: str) -> dict[str, str]:
+    lines = [
+        line for name in names for line in (ROOT / f"deploy/requirements/{name}.txt").read_text().splitlines()
+    ]
+    pairs = [line.split("==") for line in lines if line and not line.startswith("#")]
+    return {name.lower().replace("_", "-"): version for name, version in pairs}
+
+
+def unmet(declared: list[str], pinned: dict[str, str]) -> list[str]:
+    requirements = [Requirement(text) for text in declared]
+    return [str(one) for one in requirements if pinned.get(one.name.lower(), "none") not in one.specifier]
+
+
+def test_what_the_project_needs_is_pinned_within_its_ranges() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())
+    assert unmet(project["project"]["dependencies"], pins("system")) == []
+    assert unmet(project["dependency-groups"]["develop"], pins("develop")) == []
+
+
+def test_what_the_embedded_runtime_needs_is_pinned_within_its_ranges() -> None:
+    runtime = tomllib.loads((ROOT / "deploy/runtime/pyproject.toml").read_text())
+    pinned = pins("system", "build", "runtime")
+    assert unmet(runtime["project"]["dependencies"], pinned) == []
+    assert unmet(runtime["build-system"]["requires"], pinned) == []
+
+
+def test_a_package_has_the_same_version_in_every_file() -> None:
+    everything = pins("system", "build", "runtime", "develop")
+    for name in ("system", "build", "runtime", "develop"):
+        assert pins(name).items() <= everything.items()

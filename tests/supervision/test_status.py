@@ -1,0 +1,38 @@
+"""The table of `make status`."""
+
+from __future__ import annotations
+
+import time
+
+import pytest
+
+from deploy.commands.status import of_services
+from deploy.supervision.system import Program
+from interfaces.service.health import Health
+
+
+def health(pid: int, *, since_output: float | None = 0.0, reason: str = "") -> Health:
+    return Health(time.monotonic(), pid, ok=not reason, reason=reason, since_output=since_output)
+
+
+def test_the_table_says_how_each_service_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(time, "monotonic", lambda: 100.0)
+    programs = [
+        Program("kinematics", "RUNNING", 101, 3725.9, 2, ""),
+        Program("velocity", "RUNNING", 102, 5.0, 0, ""),
+        Program("operator_watchdog", "RUNNING", 103, 1.0, 1, ""),
+        Program("engine_controller", "BACKOFF", 0, 0.0, 7, ""),
+    ]
+    heard = {
+        "kinematics": health(101, since_output=0.2, reason="l1: nan is not finite"),
+        "velocity": health(102, since_output=None),
+        "operator_watchdog": health(99),  # of the process before this one
+        "engine_controller": health(104),
+    }
+    assert of_services(programs, heard).splitlines() == [
+        "SERVICE            STATE    PID  UPTIME   RESTARTS  LAST OUTPUT  HEALTH",
+        "kinematics         RUNNING  101  1:02:05  2         0.2 s ago    l1: nan is not finite",
+        "velocity           RUNNING  102  0:00:05  0         never        ok",
+        "operator_watchdog  RUNNING  103  0:00:01  1         -            not heard of",
+        "engine_controller  BACKOFF  -    -        7         -            -",
+    ]
