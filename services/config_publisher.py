@@ -9,19 +9,33 @@ User story (ours): as a developer, I am able to give the manipulator any configu
 from __future__ import annotations
 
 import sys
+from dataclasses import dataclass
 
 from interfaces import service
-from interfaces.service import ServiceNode
-from interfaces.topics import CONFIGURATION, L1, L2, Topic
+from interfaces.service import ServiceNode, parameter
+from interfaces.topics import CONFIGURATION, L1, L2, THETA1, THETA2, Topic
 
-DEFAULTS = {"l1": 2.0, "l2": 3.0, "theta1": 0.785398, "theta2": 0.785398}
-"""As Listing 5.9 begins."""
+
+def _parameters(topic: Topic, default: float, within: tuple[float, float]) -> type:
+    @dataclass(frozen=True)
+    class Parameters:
+        value: float = parameter(default, within, topic.unit, topic.meaning, settable=True)
+
+    return Parameters
+
+
+Parameters = {
+    L1.name: _parameters(L1, 2.0, (0.0, 1000.0)),
+    L2.name: _parameters(L2, 3.0, (0.0, 1000.0)),
+    THETA1.name: _parameters(THETA1, 0.785398, (-1000.0, 1000.0)),
+    THETA2.name: _parameters(THETA2, 0.785398, (-1000.0, 1000.0)),
+}
+"""What a user may set, by source; the defaults are the first values of Listing 5.9."""
 
 
 def wire(node: ServiceNode, topic: Topic) -> None:
     """Connect parameter and scenario with the topic."""
-    within = (0.0, 1000.0) if topic in (L1, L2) else (-1000.0, 1000.0)
-    node.declare("value", DEFAULTS[topic.name], within, f"{topic.meaning} [{topic.unit}]", settable=True)
+    node.declare(Parameters[topic.name])
     timeline = node.declare_scenario().configuration.get(topic.name)
     values = node.follow("value", node.play(timeline))
     node.publish(topic, values.map(lambda value: topic.type(data=value)))

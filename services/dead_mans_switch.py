@@ -6,12 +6,14 @@ User story (ours): as a developer, I am able to hold and release the switch, by 
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import reactivex as rx
 from reactivex import Observable
 from std_msgs.msg import Bool, String
 
 from interfaces import service
-from interfaces.service import ServiceNode
+from interfaces.service import ServiceNode, parameter
 from interfaces.topics import ENGINES, ENGINES_STATE, OFF, ON, OPERATOR_HEARTBEAT, TURN_ON
 
 
@@ -45,10 +47,17 @@ def insisting(
     return commands.switch_map(insist)
 
 
+@dataclass(frozen=True)
+class Parameters:
+    """What a user may set."""
+
+    rate: float = parameter(20.0, (1.0, 10_000.0), "Hz", "heartbeats while pressed", settable=True)
+    pressed: bool = parameter(False, None, "", "whether the switch is pressed", settable=True)
+
+
 def wire(node: ServiceNode) -> None:
     """Connect the recipes with their topics."""
-    node.declare("rate", 20.0, (1.0, 10_000.0), "heartbeats while pressed [Hz]", settable=True)
-    node.declare("pressed", False, None, "whether the switch is held", settable=True)
+    node.declare(Parameters)
     scenario = node.declare_scenario()
     beats = heartbeats(
         node.follow("pressed", node.play(scenario.pressed)),

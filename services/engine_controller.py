@@ -7,6 +7,7 @@ been seen ever since, whatever dies.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from datetime import datetime, timedelta
 
 import reactivex as rx
@@ -14,7 +15,7 @@ from reactivex import Observable
 from std_msgs.msg import String
 
 from interfaces import service
-from interfaces.service import ServiceNode
+from interfaces.service import ServiceNode, parameter
 from interfaces.topics import DRIVE, ENGINES, ENGINES_STATE, OFF, ON, OPERATOR_PRESENCE, TURN_OFF, TURN_ON
 from reactive_node import stamps
 from reactive_node.stamps import Timestamp
@@ -78,17 +79,24 @@ def engine_state(
     )
 
 
+@dataclass(frozen=True)
+class Parameters:
+    """What a user may set."""
+
+    presence: float = parameter(1.0, (0.1, 1.0), "s", "`turn_on` needs an operator seen within this time")
+    absence: float = parameter(10.0, (1.0, 10.0), "s", "engines turn off after this time without operator")
+    repeat: float = parameter(0.1, (0.02, 0.2), "s", "period at which the state is repeated")
+
+
 def wire(node: ServiceNode) -> None:
     """Connect the recipe with its topics."""
-    presence = node.declare("presence", 1.0, (0.1, 1.0), "turn_on needs an operator seen within [s]")
-    absence = node.declare("absence", 10.0, (1.0, 10.0), "off when no operator was seen for [s]")
-    repeat = node.declare("repeat", 0.1, (0.02, 0.2), "the state is repeated this often [s]")
+    parameters = node.declare(Parameters)
     states = engine_state(
         node.observe(ENGINES, timestamped=True).map(lambda item: Timestamp(item.value.data, item.timestamp)),
         node.observe(OPERATOR_PRESENCE).map(lambda header: stamps.from_message(header.stamp)),
-        presence=presence,
-        absence=absence,
-        repeat=repeat,
+        presence=parameters.presence,
+        absence=parameters.absence,
+        repeat=parameters.repeat,
         refused=lambda why: node.remark(ENGINES.name, why),
     )
     node.publish(ENGINES_STATE, states.map(lambda state: String(data=state)))

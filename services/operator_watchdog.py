@@ -7,6 +7,7 @@ incapacitated, that is, releases the dead man's switch 3 times for longer than 3
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import reactivex as rx
@@ -15,7 +16,7 @@ from reactivex.subject import Subject
 from std_msgs.msg import Header, String
 
 from interfaces import service
-from interfaces.service import ServiceNode
+from interfaces.service import ServiceNode, parameter
 from interfaces.topics import ENGINES, OPERATOR_HEARTBEAT, OPERATOR_PRESENCE, TURN_OFF
 from reactive_node import stamps
 from reactive_node.stamps import Timestamp
@@ -64,28 +65,35 @@ def operator_incapacitated(
     return heartbeats.concat(rx.never()).publish(watch)  # a source that ends is silent for ever
 
 
+@dataclass(frozen=True)
+class Parameters:
+    """What a user may set."""
+
+    lifespan: float = parameter(0.5, (0.01, 10.0), "s", "an older heartbeat is no sign of life")
+    sampling: float = parameter(0.5, (0.01, 10.0), "s", "the operator is reported alive at most this often")
+    silence: float = parameter(3.0, (0.1, 60.0), "s", "a silence of this length is a strike")
+    strikes: int = parameter(3, (1, 100), "", "the strike that turns the engines off")
+    repeat: float = parameter(0.5, (0.05, 10.0), "s", "period at which `turn_off` is repeated")
+
+
 def wire(node: ServiceNode) -> None:
     """Connect the recipe with its topics."""
-    lifespan = node.declare("lifespan", 0.5, (0.01, 10.0), "an older heartbeat is no sign of life [s]")
-    sampling = node.declare("sampling", 0.5, (0.01, 10.0), "the operator is alive at most this often [s]")
-    silence = node.declare("silence", 3.0, (0.1, 60.0), "so long a silence is a strike [s]")
-    strikes = node.declare("strikes", 3, (1, 100), "the strike that turns the engines off")
-    repeat = node.declare("repeat", 0.5, (0.05, 10.0), "turn_off is repeated this often [s]")
+    parameters = node.declare(Parameters)
     node.declare_origin()
     presences: Subject[Heartbeat] = Subject()
     commands = operator_incapacitated(
         stamps.fresh(
             node.observe(OPERATOR_HEARTBEAT, timestamped=True),
-            lifespan=lifespan,
+            lifespan=parameters.lifespan,
             dropped=lambda why: node.drop(OPERATOR_HEARTBEAT.name, why),
         ),
         alive=presences.on_next,
         missed=lambda _: node.get_logger().warning("Not received signal from operator..."),
-        sampling=sampling,
-        first=min(AT_ONCE, sampling) if node.resumes else sampling,
-        silence=silence,
-        strikes=strikes,
-        repeat=repeat,
+        sampling=parameters.sampling,
+        first=min(AT_ONCE, parameters.sampling) if node.resumes else parameters.sampling,
+        silence=parameters.silence,
+        strikes=parameters.strikes,
+        repeat=parameters.repeat,
     )
     node.publish(OPERATOR_PRESENCE, presences.map(lambda it: Header(stamp=stamps.to_message(it.timestamp))))
     # Before a scenario begins nobody is expected: no silence counts yet.

@@ -11,63 +11,36 @@ may be a pipe or a device that never says anything.
 
 from __future__ import annotations
 
+import importlib
 import json
 import os
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import suppress
-from functools import partial
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import yaml
 
 from deploy.commands.parameters import ALL, KEY, program_of
-from deploy.supervision import sentinel
+from deploy.supervision import manifest
 from deploy.supervision.system import namespace_of
-from interfaces import topics
 from interfaces.scenario import unique_yaml
-from services import (
-    config_publisher,
-    dead_mans_switch,
-    engine_controller,
-    kinematics,
-    operator_watchdog,
-    velocity,
-)
+from interfaces.service.parameters import Declaration, declarations
 
-KINDS = {bool: "true or false", int: "an integer", float: "a number with a decimal point", str: "a string"}
-
-WIRES: dict[str, Callable[[Any], None]] = {
-    **{f"config_{name}": partial(config_publisher.wire, topic=t) for name, t in topics.CONFIGURATION.items()},
-    "dead_mans_switch": dead_mans_switch.wire,
-    "kinematics": kinematics.wire,
-    "velocity": velocity.wire,
-    "operator_watchdog": operator_watchdog.wire,
-    "engine_controller": engine_controller.wire,
-    "sentinel": sentinel.wire,
-}
+USE_SIM_TIME = Declaration("use_sim_time", False, None, "", "whether time is simulated", False)
 
 
-class Declared(NamedTuple):
-    """A parameter as a service declares it."""
-
-    default: Any
-    within: tuple[Any, Any] | None
-    """the least and the greatest value that are allowed"""
-
-    def fault(self, value: object) -> str:
-        """What is wrong with a value, in words; '' for a good one."""
-        if type(value) is not type(self.default):
-            return f"must be {KINDS[type(self.default)]}, not {value!r}"
-        if self.within and not self.within[0] <= value <= self.within[1]:
-            return f"must be from {self.within[0]:g} to {self.within[1]:g}, not {value!r}"
-        return ""
+def declared() -> dict[str, dict[str, Declaration]]:
+    """Return the parameters that a user may set, by program of the manifest and by name."""
+    return {program.name: _declared_by(program) for program in manifest.programs()}
 
 
-def declared() -> dict[str, dict[str, Declared]]:
-    """The parameters of each service that a user may set."""
-    return {name: _Declarations(wire).parameters for name, wire in WIRES.items()}
+def _declared_by(program: manifest.Program) -> dict[str, Declaration]:
+    parameters = getattr(importlib.import_module(program.module), "Parameters", None)
+    if parameters and program.arguments:  # one module serves several programs
+        parameters = parameters[program.arguments[0]]
+    found = declarations(parameters) if parameters else ()
+    return {each.name: each for each in (*found, USE_SIM_TIME)}
 
 
 def faults(document: Any, namespace: str) -> Iterator[tuple[str, str]]:
@@ -90,38 +63,13 @@ def faults(document: Any, namespace: str) -> Iterator[tuple[str, str]]:
                     yield f"{node}.{name}", fault
 
 
-def _fault(name: str, value: object, services: list[dict[str, Declared]]) -> str:
+def _fault(name: str, value: object, services: list[dict[str, Declaration]]) -> str:
     """What is wrong with a parameter for one of the services that have it, in words; '' for a good one."""
     having = [parameters[name] for parameters in services if name in parameters]
     if not having:
         known = dict.fromkeys(name for parameters in services for name in parameters)
         return f"is no parameter; those are {', '.join(known)}"
-    return next(filter(None, (declared.fault(value) for declared in having)), "")
-
-
-class _Declarations:
-    """Stands for the node while a service wires itself, until it has declared its parameters."""
-
-    class _AllDeclared(Exception):
-        pass
-
-    def __init__(self, wire: Callable[[Any], None]) -> None:
-        self.parameters = {"use_sim_time": Declared(False, None)}
-        with suppress(self._AllDeclared):
-            wire(self)
-
-    def declare(
-        self, name: str, default: Any, within: Any, description: str, *, settable: bool = False
-    ) -> Any:
-        self.parameters[name] = Declared(default, within)
-        return default
-
-    def declare_scenario(self) -> None:
-        """The scenario and its origin are none of the user's parameters."""
-        raise self._AllDeclared
-
-    def __getattr__(self, name: str) -> Any:
-        raise self._AllDeclared
+    return next(filter(None, (declaration.problem(value) for declaration in having)), "")
 
 
 def main(path: str) -> str | None:

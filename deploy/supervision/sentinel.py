@@ -15,6 +15,7 @@ import os
 import socket
 import time
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 import reactivex as rx
@@ -25,7 +26,7 @@ from deploy.supervision.policy import NAME, Judge, Patience
 from deploy.supervision.probe import Eyes
 from deploy.supervision.system import DeploymentError, System, Watched
 from interfaces import service
-from interfaces.service import ServiceNode
+from interfaces.service import ServiceNode, parameter
 from interfaces.topics import DIAGNOSTICS
 
 OFTEN = 3  # restarts within a minute are a warning
@@ -64,15 +65,19 @@ def _state(program: Watched, why: str, recent: int, node: str) -> DiagnosticStat
     )
 
 
+@dataclass(frozen=True)
+class Parameters:
+    """What a user may set."""
+
+    look: float = parameter(0.25, (0.05, 1.0), "s", "period at which the processes are observed")
+    silence: float = parameter(2.7, (1.5, 60.0), "s", "a service without health for this long is killed")
+    start: float = parameter(10.0, (1.0, 300.0), "s", "time of a new process until its first health")
+
+
 def wire(node: ServiceNode) -> None:
     """Connect the judge with what it sees and does."""
-    patience = Patience(
-        look=node.declare("look", 0.25, (0.05, 1.0), "it looks this often [s]"),
-        silence=node.declare(
-            "silence", 2.7, (1.5, 60.0), "a service that is silent for so long is killed [s]"
-        ),
-        start=node.declare("start", 10.0, (1.0, 300.0), "until its first report a service may take [s]"),
-    )
+    parameters = node.declare(Parameters)
+    patience = Patience(parameters.look, parameters.silence, parameters.start)
     own = node.get_fully_qualified_name()
     namespace = node.get_namespace().rstrip("/")
     eyes = Eyes(System(Path(os.environ[processes.MARK])), os.getppid())

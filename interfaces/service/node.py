@@ -50,6 +50,7 @@ from reactivex.disposable import CompositeDisposable
 from interfaces.scenario import Scenario, ScenarioError, Timeline, follow, load, play
 from interfaces.scenario.settings import Settings, SettingsError
 from interfaces.service import stopping
+from interfaces.service.parameters import Declaration, declarations
 from interfaces.topics import DIAGNOSTICS, Topic, is_latched
 from reactive_node import ReactiveNode
 from reactive_node.stamps import Timestamp
@@ -85,29 +86,24 @@ class ServiceNode(ReactiveNode):
         # By the steady clock even while ROS time is simulated: a simulation that pauses is no hung service.
         self.create_timer(_HEALTH_PERIOD, self.report_health, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
-    def declare(
-        self,
-        name: str,
-        default: T,
-        within: tuple[Any, Any] | None,
-        description: str,
-        *,
-        settable: bool = False,
-    ) -> T:
+    def declare(self, parameters: type[T]) -> T:
         """
-        Declare a parameter and return its value.
+        Declare the parameters of a dataclass (:mod:`interfaces.service.parameters`) and return their values.
 
-        :param within: the least and the greatest value that are allowed.
-        :param settable: whether it may change while the service runs.
-        :raises ParameterException: if the value that the user gave has the wrong type or is out of range.
+        :raises ParameterException: if a value that the user gave has the wrong type or is out of range.
         """
+        values = {each.name: self._declare(each) for each in declarations(parameters)}
+        return parameters(**values)
+
+    def _declare(self, declaration: Declaration) -> Any:
+        name, default, within, unit, meaning, settable = declaration
+        description = f"{meaning} [{unit}]" if unit else meaning
         descriptor = ParameterDescriptor(description=description, read_only=not settable)
         if within is not None and isinstance(default, float):
             descriptor.floating_point_range = [FloatingPointRange(from_value=within[0], to_value=within[1])]
         elif within is not None:
             descriptor.integer_range = [IntegerRange(from_value=within[0], to_value=within[1])]
-        value: T = self.declare_parameter(name, default, descriptor).value
-        return value
+        return self.declare_parameter(name, default, descriptor).value
 
     def declare_scenario(self) -> Scenario:
         """
@@ -115,16 +111,19 @@ class ServiceNode(ReactiveNode):
 
         :raises ScenarioError: if there is a mistake in it.
         """
-        path = self.declare("scenario", "", None, "file of the scenario, empty for none")
-        directory = self.declare("settings", "", None, "where what is set by hand is kept, empty for nowhere")
+        path = self._declare(Declaration("scenario", "", None, "", "file of the scenario, or empty", False))
+        kept = "folder that keeps what was set by hand, or empty"
+        directory = self._declare(Declaration("settings", "", None, "", kept, False))
         self._settings = Settings(directory, self.get_name())
         self.declare_origin()
         return load(path) if path else Scenario()
 
     def declare_origin(self) -> None:
         """Declare the parameter that says when the scenario begins, for all processes at once."""
-        origin = "origin of the scenario [s of this host's CLOCK_MONOTONIC], 0 for the start of this process"
-        self._scenario_epoch = self.declare("scenario_epoch", 0.0, (0.0, 1e12), origin)
+        origin = "origin of the scenario by CLOCK_MONOTONIC of this host; 0 is the start of this process"
+        self._scenario_epoch = self._declare(
+            Declaration("scenario_epoch", 0.0, (0.0, 1e12), "s", origin, False)
+        )
 
     def _elapsed(self) -> float:
         return time.monotonic() - self._scenario_epoch if self._scenario_epoch else 0.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import os
 import time
@@ -24,11 +25,17 @@ from std_msgs.msg import Bool, Float64, Header, String
 from interfaces import topics
 from interfaces.scenario import ScenarioError
 from interfaces.scenario.settings import SettingsError
-from interfaces.service import ServiceNode
+from interfaces.service import ServiceNode, parameter
 
 Make = Callable[..., Any]
 SpinUntil = Callable[..., None]
 SpinFor = Callable[[float], None]
+
+
+def one(name: str, default: Any, within: Any, meaning: str, settable: bool = False) -> Any:
+    """A dataclass of one parameter."""
+    field = parameter(default, within, "", meaning, settable=settable)
+    return dataclasses.make_dataclass("Parameters", [(name, type(default), field)], frozen=True)
 
 
 @pytest.fixture
@@ -243,8 +250,8 @@ def overridden(make_node: Make, **values: Any) -> ServiceNode:
 
 
 def test_a_parameter_is_described_and_has_a_range(service: ServiceNode) -> None:
-    assert service.declare("rate", 20.0, (1.0, 100.0), "how often [Hz]") == 20.0
-    assert service.declare("strikes", 3, (1, 9), "how many") == 3
+    assert service.declare(one("rate", 20.0, (1.0, 100.0), "how often [Hz]")).rate == 20.0
+    assert service.declare(one("strikes", 3, (1, 9), "how many")).strikes == 3
 
     rate, strikes = service.describe_parameters(["rate", "strikes"])
 
@@ -258,19 +265,19 @@ def test_a_value_out_of_range_is_refused(make_node: Make, value: float) -> None:
     node = overridden(make_node, rate=value)
 
     with pytest.raises(InvalidParameterValueException, match="rate"):
-        node.declare("rate", 20.0, (1.0, 100.0), "how often [Hz]")
+        node.declare(one("rate", 20.0, (1.0, 100.0), "how often [Hz]"))
 
 
 def test_a_value_of_another_type_is_refused(make_node: Make) -> None:
     node = overridden(make_node, rate="fast")
 
     with pytest.raises(InvalidParameterTypeException, match="rate"):
-        node.declare("rate", 20.0, (1.0, 100.0), "how often [Hz]")
+        node.declare(one("rate", 20.0, (1.0, 100.0), "how often [Hz]"))
 
 
 def test_only_what_is_settable_can_be_set_while_it_runs(service: ServiceNode) -> None:
-    service.declare("fixed", 20.0, (1.0, 100.0), "fixed")
-    service.declare("value", 20.0, (1.0, 100.0), "value", settable=True)
+    service.declare(one("fixed", 20.0, (1.0, 100.0), "fixed"))
+    service.declare(one("value", 20.0, (1.0, 100.0), "value", settable=True))
 
     def set_to(name: str, value: float) -> bool:
         return bool(service.set_parameters([Parameter(name, value=value)])[0].successful)
@@ -316,7 +323,7 @@ def test_what_was_set_by_hand_holds_beyond_a_restart(
             scenario_epoch=time.monotonic() - 1.0,
             settings=str(tmp_path / "settings"),
         )
-        node.declare("value", 1.0, (0.0, 9.0), "length [m]", settable=True)
+        node.declare(one("value", 1.0, (0.0, 9.0), "length [m]", settable=True))
         values: list[float] = []
         timeline = node.play(node.declare_scenario().configuration["l1"])
         node.follow("value", timeline).subscribe(values.append, scheduler=node.scheduler)
@@ -340,7 +347,7 @@ def test_what_a_scenario_does_besides_ends_for_good_when_a_parameter_is_set_by_h
 
     def source() -> tuple[ServiceNode, list[int]]:
         node = overridden(make_node, settings=str(tmp_path / "settings"))
-        node.declare("pressed", False, None, "whether it is held", settable=True)
+        node.declare(one("pressed", False, None, "whether it is held", settable=True))
         node.declare_scenario()
         node.follow("pressed").subscribe(scheduler=node.scheduler)
         received: list[int] = []
@@ -366,7 +373,7 @@ def test_it_is_told_when_a_setting_would_be_forgotten(
     peer.create_subscription(topic.type, topic.name, lambda it: heard.append(it.status[0].message), topic.qos)
     (tmp_path / "file").touch()
     node = overridden(make_node, settings=str(tmp_path / "file" / "settings"))
-    node.declare("value", 1.0, (0.0, 9.0), "length [m]", settable=True)
+    node.declare(one("value", 1.0, (0.0, 9.0), "length [m]", settable=True))
     node.declare_scenario()
     values: list[float] = []
     node.follow("value").subscribe(values.append, scheduler=node.scheduler)
@@ -383,7 +390,7 @@ def test_a_setting_that_cannot_be_used_is_a_mistake_and_not_forgotten(
 ) -> None:
     node = overridden(make_node, settings=str(tmp_path))
     (tmp_path / f"{node.get_name()}.yaml").write_text(text)
-    node.declare("value", 1.0, (0.0, 9.0), "length [m]", settable=True)
+    node.declare(one("value", 1.0, (0.0, 9.0), "length [m]", settable=True))
     node.declare_scenario()
     with pytest.raises(SettingsError, match=r"value was set to|\.yaml: "):
         node.follow("value")

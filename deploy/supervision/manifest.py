@@ -1,0 +1,38 @@
+"""The manifest: the supervised programs, as ``deploy/supervisord.conf`` lists them."""
+
+from __future__ import annotations
+
+import configparser
+import shlex
+from pathlib import Path
+from typing import NamedTuple
+
+PATH = Path(__file__).parents[1] / "supervisord.conf"
+GROUP = "arm"
+"""The supervisor group of all programs."""
+
+
+class Program(NamedTuple):
+    """A supervised program."""
+
+    name: str
+    """Also the name of its node."""
+    module: str
+    """The Python module that the program runs."""
+    arguments: tuple[str, ...]
+    """The arguments before ``--ros-args``."""
+
+
+def programs(path: Path = PATH) -> tuple[Program, ...]:
+    """Return the programs in the order of the group."""
+    manifest = configparser.RawConfigParser(inline_comment_prefixes=(" ;",))
+    manifest.read(path, encoding="utf-8")
+    names = manifest[f"group:{GROUP}"]["programs"].replace(",", " ").split()
+    return tuple(_program(name, manifest[f"program:{name}"]["command"]) for name in names)
+
+
+def _program(name: str, command: str) -> Program:
+    words = shlex.split(command)
+    words = words[: words.index("--ros-args")]
+    module = words.index("-m") + 1
+    return Program(name, words[module], tuple(words[module + 1 :]))
