@@ -29,7 +29,7 @@ from reactive_node.shared_reader import SharedReader, retention
 
 
 class ReactiveNode(Node):
-    """A node that creates observables of topics, parameters, QoS events and calls, and publishes observables."""
+    """A node with observables of topics, parameters, QoS events and calls; it publishes observables."""
 
     def __init__(self, node_name: str, **options: Any) -> None:
         """Create a node; the options are those of :class:`rclpy.node.Node`."""
