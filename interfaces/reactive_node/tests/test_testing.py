@@ -1,6 +1,8 @@
-"""The testing kit: recipes in virtual time."""
+"""The testing kit: recipes in virtual time, nodes in a free domain."""
 
 from __future__ import annotations
+
+import os
 
 import pytest
 import reactivex as rx
@@ -10,6 +12,11 @@ from reactive_node.testing import VirtualTime
 
 on_next, on_error, on_completed = ReactiveTest.on_next, ReactiveTest.on_error, ReactiveTest.on_completed
 subscribe = ReactiveTest.subscribe
+
+
+def test_environment_selects_domain_on_this_machine(domain_id: int) -> None:
+    assert os.environ["ROS_DOMAIN_ID"] == str(domain_id)
+    assert os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] == "LOCALHOST"
 
 
 def test_recipe_is_recorded_in_seconds_from_zero(scheduler: VirtualTime) -> None:

@@ -84,9 +84,10 @@ def scheduler() -> VirtualTime:
 
 @pytest.fixture
 def domain_id(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
-    """A free ROS domain, also set as ROS_DOMAIN_ID."""
+    """A free ROS domain; the environment selects it and keeps its traffic on this machine."""
     with reserved_domain() as domain:
         monkeypatch.setenv("ROS_DOMAIN_ID", str(domain))
+        monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
         yield domain
 
 
