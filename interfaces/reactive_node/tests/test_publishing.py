@@ -80,6 +80,9 @@ def test_message_of_wrong_type_is_raised_by_spin(node: ReactiveNode, spin_until:
 def test_end_of_node_ends_publishing(node: ReactiveNode) -> None:
     numbers: Subject[Float64] = Subject()
     node.publish_observable(numbers, Float64, "numbers")
+    assert numbers.observers
 
     node.destroy_node()
+
+    assert not numbers.observers
     numbers.on_next(Float64(data=1.0))

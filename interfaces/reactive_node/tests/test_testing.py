@@ -14,7 +14,13 @@ on_next, on_error, on_completed = ReactiveTest.on_next, ReactiveTest.on_error, R
 subscribe = ReactiveTest.subscribe
 
 
-def test_environment_selects_domain_on_this_machine(domain_id: int) -> None:
+def test_environment_selects_domain_on_this_machine(
+    monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest
+) -> None:
+    monkeypatch.delenv("ROS_AUTOMATIC_DISCOVERY_RANGE")
+
+    domain_id = request.getfixturevalue("domain_id")
+
     assert os.environ["ROS_DOMAIN_ID"] == str(domain_id)
     assert os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] == "LOCALHOST"
 
