@@ -1,4 +1,4 @@
-"""What waited in a queue is no sign of life."""
+"""Times of messages."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""How old a message is, by the clock of its stamp: the time of day.
+"""Times of messages as ``datetime``.
 
-DDS source times and the stamps of the contract are of that clock, even while ROS time is simulated. It may be
-set, and differ between hosts; where safety depends on an age, only the age at arrival is taken from it.
+DDS source times and stamps count by the time of day, even while ROS time is simulated. That clock may be set,
+and may differ between hosts. Where safety depends on an age, take only the age at arrival from it.
 """
 
 from __future__ import annotations
