@@ -1,4 +1,4 @@
-"""What every test of this repository relies on: DDS on loopback, and nothing left behind."""
+"""Rules for all tests of this repository: DDS stays on loopback, and processes end with the test module."""
 
 from __future__ import annotations
 
@@ -13,30 +13,29 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
-# tests/conformance tests any rclpy; with ROS 2's own there is no embedded runtime to test.
+# These tests need the embedded runtime, which is not installed beside ROS 2's rclpy.
 collect_ignore = (
     [] if importlib.util.find_spec("rosidl_runtime_embedded") else ["deploy/runtime/tests/runtime"]
 )
 
-settings.register_profile("reactive-arm", deadline=None)  # a machine that pauses is no defect
+settings.register_profile("reactive-arm", deadline=None)  # a busy machine is no defect
 settings.load_profile("reactive-arm")
 
-MARK = f"REACTIVE_ARM_TESTS={uuid.uuid4()}"
-DISCOVERY_RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
+MARK = "REACTIVE_ARM_TESTS"
+"""An environment variable that all processes of a test session inherit."""
 
 
 def pytest_configure() -> None:
-    """Mark what the tests start, keep its DDS traffic on loopback, and be signalled like any program."""
-    name, _, value = MARK.partition("=")
-    os.environ[name] = value
-    os.environ[DISCOVERY_RANGE] = "LOCALHOST"
-    signal.signal(signal.SIGHUP, signal.SIG_DFL)  # also under nohup
-    signal.signal(signal.SIGTERM, signal.default_int_handler)  # with clean-up, too
-    signal.signal(signal.SIGINT, signal.default_int_handler)  # also in the background of a shell
+    """Set what the tests' processes inherit: the mark, the discovery range, default signal handling."""
+    os.environ[MARK] = str(uuid.uuid4())
+    os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)  # nohup ignores it
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs ignore it
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # fixtures clean up
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:
-    """Where REACTIVE_ARM_SKIPS=fail, a skipped test is a failure, unless the machine cannot help it."""
+    """With REACTIVE_ARM_SKIPS=fail, fail if a test was skipped for a reason other than "platform: …"."""
     if os.environ.get("REACTIVE_ARM_SKIPS") != "fail":
         return
     skipped = session.config.pluginmanager.get_plugin("terminalreporter").stats.get("skipped", [])
@@ -45,13 +44,14 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
         session.exitstatus = pytest.ExitCode.TESTS_FAILED
 
 
-def _left_behind() -> dict[int, str]:
-    """The live processes that the tests started, also where their parents are gone."""
+def _started_processes() -> dict[int, str]:
+    """Return the live processes of this session with their commands, also orphans."""
+    mark = f"{MARK}={os.environ[MARK]}".encode()
     found = {}
     for entry in Path("/proc").iterdir():
         if entry.name.isdigit() and int(entry.name) != os.getpid():
             try:
-                if MARK.encode() in (entry / "environ").read_bytes().split(b"\0"):
+                if mark in (entry / "environ").read_bytes().split(b"\0"):
                     found[int(entry.name)] = (entry / "cmdline").read_bytes().replace(b"\0", b" ").decode()
             except OSError:
                 continue
@@ -59,12 +59,10 @@ def _left_behind() -> dict[int, str]:
 
 
 @pytest.fixture(scope="module", autouse=True)
-def _no_process_stays_behind() -> Iterator[None]:
-    before = _left_behind()
+def _processes_end_with_module() -> Iterator[None]:
+    before = _started_processes().keys()
     yield
     deadline = time.monotonic() + 5.0
-    while (left := {pid: command for pid, command in _left_behind().items() if pid not in before}) and (
-        time.monotonic() < deadline
-    ):
+    while left := {pid: command for pid, command in _started_processes().items() if pid not in before}:
+        assert time.monotonic() < deadline, f"processes outlive their test module: {left}"
         time.sleep(0.02)
-    assert not left, f"processes stay behind: {left}"

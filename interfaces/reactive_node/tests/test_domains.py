@@ -1,4 +1,4 @@
-"""A domain that is reserved belongs to one alone."""
+"""A reserved ROS domain has one owner."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from reactive_node import domains
 from reactive_node.domains import reserved_domain
 
 
-def test_a_domain_is_reserved_by_one_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_domain_is_reserved_once_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
     with reserved_domain() as first:
         monkeypatch.setattr(domains, "DOMAINS", range(first, first + 1))
         with pytest.raises(RuntimeError, match="no free ROS domain"), reserved_domain():
@@ -18,13 +18,13 @@ def test_a_domain_is_reserved_by_one_at_a_time(monkeypatch: pytest.MonkeyPatch) 
 
 
 @pytest.mark.parametrize("offset", [0, 10])
-def test_a_domain_that_has_participants_is_not_free(offset: int) -> None:
+def test_domain_with_participants_is_not_free(offset: int) -> None:
     with reserved_domain() as free, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as participant:
         assert not domains._has_participants(free)
         participant.bind(("127.0.0.1", 7400 + 250 * free + offset))
         assert domains._has_participants(free)
 
 
-def test_an_error_where_a_domain_is_reserved_is_told() -> None:
+def test_error_inside_reservation_is_raised() -> None:
     with pytest.raises(OSError, match="planted"), reserved_domain():
         raise OSError("planted")

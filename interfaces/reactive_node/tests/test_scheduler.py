@@ -1,10 +1,9 @@
-"""Rx time on the executor and the clock of a node."""
+"""An Rx scheduler on a node's executor and clock."""
 
 from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable
 from datetime import UTC, datetime, timedelta
 from itertools import pairwise
 from typing import Any
@@ -19,19 +18,16 @@ from rosgraph_msgs.msg import Clock as ClockMessage
 
 from reactive_node import ReactiveNode
 from reactive_node.scheduler import NodeScheduler
-from reactive_node.stamps import Timestamp
-
-Make = Callable[..., ReactiveNode]
-SpinUntil = Callable[..., None]
-SpinFor = Callable[[float], None]
+from reactive_node.testing import MakeNode, SpinFor, SpinUntil
 
 
 @pytest.fixture
-def scheduler(make_node: Make) -> NodeScheduler:
-    return make_node("timed").scheduler
+def scheduler(make_node: MakeNode) -> NodeScheduler:
+    node: ReactiveNode = make_node("timed")
+    return node.scheduler
 
 
-def test_what_is_due_first_runs_first_and_what_is_due_at_once_in_order(
+def test_actions_run_in_order_of_due_time_then_of_scheduling(
     scheduler: NodeScheduler, spin_until: SpinUntil
 ) -> None:
     ran: list[str] = []
@@ -46,7 +42,7 @@ def test_what_is_due_first_runs_first_and_what_is_due_at_once_in_order(
     assert ran == ["a", "b", "c", "soon", "later"]
 
 
-def test_all_runs_on_the_thread_of_the_executor_and_no_thread_is_started(
+def test_operators_run_on_executor_thread_and_start_none(
     scheduler: NodeScheduler, spin_until: SpinUntil
 ) -> None:
     threads: set[int] = set()
@@ -74,7 +70,7 @@ def test_all_runs_on_the_thread_of_the_executor_and_no_thread_is_started(
     assert set(done) == {before}
 
 
-def test_what_is_cancelled_does_not_run(scheduler: NodeScheduler, spin_until: SpinUntil) -> None:
+def test_cancelled_action_does_not_run(scheduler: NodeScheduler, spin_until: SpinUntil) -> None:
     ran: list[str] = []
     first = scheduler.schedule_relative(0.01, lambda *_: ran.append("first"))
     scheduler.schedule_relative(0.01, lambda *_: second.dispose())
@@ -88,7 +84,7 @@ def test_what_is_cancelled_does_not_run(scheduler: NodeScheduler, spin_until: Sp
     assert ran == ["third"]
 
 
-def test_a_periodic_action_that_disposes_itself_ends(
+def test_periodic_action_can_dispose_itself(
     scheduler: NodeScheduler, spin_until: SpinUntil, spin_for: SpinFor
 ) -> None:
     ran: list[int] = []
@@ -106,7 +102,7 @@ def test_a_periodic_action_that_disposes_itself_ends(
     assert ran == [0, 1, 2]
 
 
-def test_disposing_what_ran_disposes_what_it_returned(
+def test_disposing_item_disposes_result_of_its_action(
     scheduler: NodeScheduler, spin_until: SpinUntil
 ) -> None:
     inner = BooleanDisposable()
@@ -124,7 +120,7 @@ def test_disposing_what_ran_disposes_what_it_returned(
     assert inner.is_disposed
 
 
-def test_another_thread_wakes_the_waiting_executor(
+def test_scheduling_on_other_thread_wakes_executor(
     scheduler: NodeScheduler, executor: SingleThreadedExecutor
 ) -> None:
     ran: list[bool] = []
@@ -145,7 +141,7 @@ def test_another_thread_wakes_the_waiting_executor(
     assert time.monotonic() - begin < 10
 
 
-def test_an_error_of_an_action_ends_the_spinning_and_nothing_else(
+def test_error_of_action_is_raised_by_spin_and_others_still_run(
     scheduler: NodeScheduler, spin_until: SpinUntil
 ) -> None:
     ran: list[str] = []
@@ -161,7 +157,7 @@ def test_an_error_of_an_action_ends_the_spinning_and_nothing_else(
     spin_until(lambda: ran)
 
 
-def test_ten_thousand_items_a_second_under_a_timeout_leave_no_trace(
+def test_timeouts_of_thirty_thousand_items_do_not_accumulate(
     scheduler: NodeScheduler, spin_until: SpinUntil
 ) -> None:
     items: Subject[int] = Subject()
@@ -175,7 +171,7 @@ def test_ten_thousand_items_a_second_under_a_timeout_leave_no_trace(
     assert len(scheduler._heap) < 200
 
 
-def test_what_is_left_of_many_cancelled_items_runs_in_order(
+def test_actions_left_by_many_cancellations_run_in_order(
     scheduler: NodeScheduler, spin_until: SpinUntil
 ) -> None:
     ran: list[int] = []
@@ -196,7 +192,7 @@ def test_what_is_left_of_many_cancelled_items_runs_in_order(
     assert ran == list(range(0, 1000, 10))
 
 
-def test_setting_the_wall_clock_changes_nothing(
+def test_setting_wall_clock_changes_nothing(
     scheduler: NodeScheduler, spin_until: SpinUntil, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     ticks: list[datetime] = []
@@ -212,14 +208,14 @@ def test_setting_the_wall_clock_changes_nothing(
     assert all(timedelta(0) < b - a < timedelta(minutes=1) for a, b in pairwise(ticks))
 
 
-def test_now_begins_as_the_time_of_day(scheduler: NodeScheduler) -> None:
+def test_now_begins_with_time_of_day(scheduler: NodeScheduler) -> None:
     assert abs(scheduler.now - datetime.now(UTC)) < timedelta(seconds=5)
 
 
 class Simulation:
-    """A node on simulated time, and the clock that drives it."""
+    """A node in simulated time, and a publisher of that time."""
 
-    def __init__(self, make_node: Make, spin_until: SpinUntil) -> None:
+    def __init__(self, make_node: MakeNode, spin_until: SpinUntil) -> None:
         self.spin_until = spin_until
         self.clock = make_node("simulator")
         self.publisher = self.clock.create_publisher(ClockMessage, "/clock", 10)
@@ -238,11 +234,11 @@ def _clock(seconds: float) -> ClockMessage:
 
 
 @pytest.fixture
-def simulation(make_node: Make, spin_until: SpinUntil) -> Simulation:
+def simulation(make_node: MakeNode, spin_until: SpinUntil) -> Simulation:
     return Simulation(make_node, spin_until)
 
 
-def test_simulated_time_is_followed_and_stands_still_with_the_simulator(
+def test_simulated_time_is_followed_and_stands_still(
     simulation: Simulation, spin_for: SpinFor, spin_until: SpinUntil
 ) -> None:
     ticks: list[int] = []
@@ -259,7 +255,7 @@ def test_simulated_time_is_followed_and_stands_still_with_the_simulator(
 
 
 @pytest.mark.parametrize("heard", [False, True])
-def test_what_is_due_at_once_does_not_wait_for_a_simulation_that_stands_still(
+def test_action_without_delay_runs_while_simulation_stands_still(
     simulation: Simulation, spin_until: SpinUntil, heard: bool
 ) -> None:
     if heard:
@@ -269,7 +265,7 @@ def test_what_is_due_at_once_does_not_wait_for_a_simulation_that_stands_still(
     spin_until(lambda: len(items) == 3)
 
 
-def test_what_schedules_itself_again_at_once_lets_others_have_their_turn(
+def test_action_that_reschedules_itself_leaves_executor_other_work(
     simulation: Simulation, spin_until: SpinUntil
 ) -> None:
     simulation.set(100.0)
@@ -290,7 +286,7 @@ def test_what_schedules_itself_again_at_once_lets_others_have_their_turn(
     assert others[0] < most
 
 
-def test_with_the_first_simulated_time_nothing_is_due_that_was_to_come_later(
+def test_first_simulated_time_keeps_remaining_delays(
     simulation: Simulation, spin_for: SpinFor, spin_until: SpinUntil
 ) -> None:
     ran: list[datetime] = []
@@ -309,8 +305,8 @@ def test_with_the_first_simulated_time_nothing_is_due_that_was_to_come_later(
     assert ran == [datetime.fromtimestamp(at, UTC) for at in (1239, 1244)]
 
 
-def test_the_first_simulated_time_of_a_node_that_has_run_without_lets_its_time_go_on(
-    simulation: Simulation, make_node: Make, spin_for: SpinFor, spin_until: SpinUntil
+def test_time_goes_on_when_running_node_gets_first_simulated_time(
+    simulation: Simulation, make_node: MakeNode, spin_for: SpinFor, spin_until: SpinUntil
 ) -> None:
     node = make_node("later")
     ran: list[bool] = []
@@ -328,7 +324,7 @@ def test_the_first_simulated_time_of_a_node_that_has_run_without_lets_its_time_g
     spin_until(lambda: ran)
 
 
-def test_an_interval_does_not_drift_and_skips_what_it_missed(
+def test_interval_does_not_drift_and_skips_missed_ticks(
     simulation: Simulation, spin_for: SpinFor, spin_until: SpinUntil
 ) -> None:
     ticks: list[int] = []
@@ -342,7 +338,7 @@ def test_an_interval_does_not_drift_and_skips_what_it_missed(
         assert ticks == list(range(count))
 
 
-def test_after_a_jump_back_what_was_to_come_in_a_second_comes_in_a_second(
+def test_jump_back_keeps_remaining_delay(
     simulation: Simulation, spin_for: SpinFor, spin_until: SpinUntil
 ) -> None:
     ran: list[bool] = []
@@ -357,12 +353,10 @@ def test_after_a_jump_back_what_was_to_come_in_a_second_comes_in_a_second(
     spin_until(lambda: ran)
 
 
-def test_after_a_jump_back_what_counts_from_an_absolute_time_goes_on(
-    simulation: Simulation, spin_until: SpinUntil
-) -> None:
-    """`timer` with a period keeps the time of its next item, `timestamp` gives times that others compare."""
+def test_jump_back_lets_absolute_times_go_on(simulation: Simulation, spin_until: SpinUntil) -> None:
+    """A periodic `timer` schedules absolute times; recipes compare the times of `timestamp`."""
     simulation.set(1000.0)
-    ticks: list[Timestamp[int]] = []
+    ticks: list[Any] = []
     rx.timer(1.0, 2.0).timestamp().subscribe(ticks.append, scheduler=simulation.node.scheduler)
 
     for time_, count in [(1001.0, 1), (10.0, 1), (12.0, 2), (14.0, 3), (5.0, 3), (7.0, 4)]:
@@ -374,7 +368,7 @@ def test_after_a_jump_back_what_counts_from_an_absolute_time_goes_on(
     ]
 
 
-def test_simulated_time_may_begin_and_end_while_something_waits(
+def test_simulated_time_may_begin_and_end_while_action_waits(
     simulation: Simulation, spin_until: SpinUntil, spin_for: SpinFor
 ) -> None:
     node = simulation.node
@@ -394,7 +388,7 @@ def test_simulated_time_may_begin_and_end_while_something_waits(
     spin_until(lambda: len(ran) == 2)
 
 
-def test_a_node_that_ended_runs_nothing_more(make_node: Make, spin_for: SpinFor) -> None:
+def test_ended_node_runs_no_action(make_node: MakeNode, spin_for: SpinFor) -> None:
     node = make_node("ended")
     ran: list[bool] = []
     node.scheduler.schedule_relative(0.01, lambda *_: ran.append(True))

@@ -1,4 +1,4 @@
-"""What waited in a queue is no sign of life."""
+"""Times of messages."""
 
 from __future__ import annotations
 
@@ -40,5 +40,5 @@ def test_stamps_lose_less_than_a_microsecond(seconds: int, nanoseconds: int) -> 
     )
 
 
-def test_now_is_the_time_of_day() -> None:
+def test_now_is_time_of_day() -> None:
     assert abs(stamps.now() - datetime.now(UTC)) < timedelta(seconds=1)

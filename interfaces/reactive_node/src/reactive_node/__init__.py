@@ -1,4 +1,4 @@
-"""Topics, parameters, events and calls of a ROS 2 node as ReactiveX observables."""
+"""ROS 2 topics, parameters, QoS events and calls as ReactiveX observables."""
 
 from reactive_node.node import ReactiveNode
 from reactive_node.scheduler import NodeScheduler

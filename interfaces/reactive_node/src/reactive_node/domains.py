@@ -1,4 +1,4 @@
-"""A ROS domain of one's own: neither plays nor tests shall meet anybody else on their host."""
+"""Free ROS domains, for tests and simulations that must not meet other nodes on their host."""
 
 from __future__ import annotations
 
@@ -7,22 +7,22 @@ import socket
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 
-DOMAINS = range(30, 102)  # below are those that people choose, above the ports meet those of the system
+DOMAINS = range(30, 102)  # users choose lower ones; the ports of higher ones meet ephemeral ports
 
 
 @contextmanager
 def reserved_domain() -> Iterator[int]:
     """
-    Keep a ROS_DOMAIN_ID that nobody uses from all others who reserve one on this host, until it is left.
+    Reserve a ROS domain without participants on this host; other callers get different ones.
 
-    Raises RuntimeError if there is none.
+    :raises RuntimeError: if no domain is free.
     """
     with ExitStack() as stack:
         for domain in random.sample(DOMAINS, len(DOMAINS)):
-            # An abstract unix socket has one owner, and the kernel takes it back from a killed one.
+            # An abstract unix socket has one owner, and the kernel frees it when the owner dies.
             owner = stack.enter_context(socket.socket(socket.AF_UNIX))
             try:
-                owner.bind(f"\0reactive-arm-domain-{domain}")
+                owner.bind(f"\0reactive-node-domain-{domain}")
             except OSError:
                 continue
             if not _has_participants(domain):
@@ -32,7 +32,7 @@ def reserved_domain() -> Iterator[int]:
 
 
 def _has_participants(domain: int) -> bool:
-    """Whether somebody listens on the domain's ports for discovery (RTPS 9.6.1)."""
+    """Whether a socket listens on a discovery port of the domain (RTPS 9.6.1)."""
     for offset in (0, 10):
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
             try:

@@ -1,7 +1,6 @@
 """Topics as observables, observables as topics (thesis chapter 4).
 
-A :class:`ReactiveNode` is a node like any other that can also hand out observables, as in Listings 4.3 to
-4.5::
+A :class:`ReactiveNode` is a node like any other and creates observables, as in Listings 4.3 to 4.5::
 
     node = ReactiveNode("node_name")
     observable = node.create_observable(String, "topic")
@@ -11,41 +10,32 @@ A :class:`ReactiveNode` is a node like any other that can also hand out observab
 from __future__ import annotations
 
 import threading
-from collections import deque
 from collections.abc import Callable
 from typing import Any
 
 import reactivex as rx
-from rclpy.client import Client
-from rclpy.clock import Clock, ClockType
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile
+from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
-from rclpy.task import Future
 from reactivex import Observable, abc
-from reactivex.disposable import Disposable
+from reactivex.disposable import CompositeDisposable, Disposable
 from reactivex.subject import AsyncSubject
 
-from reactive_node import stamps
+from reactive_node import calls
 from reactive_node.scheduler import NodeScheduler
-from reactive_node.stamps import Timestamp
-
-_SERVER_POLL = 0.05  # [s]: ROS does not tell when a server appears
-_STEADY = Clock(clock_type=ClockType.STEADY_TIME)
+from reactive_node.shared_reader import SharedReader, retention
 
 
 class ReactiveNode(Node):
-    """A node whose topics, parameters, QoS events and calls are observables, and that publishes such."""
+    """A node with observables of topics, parameters, QoS events and calls; it publishes observables."""
 
     def __init__(self, node_name: str, **options: Any) -> None:
         """Create a node; the options are those of :class:`rclpy.node.Node`."""
         super().__init__(node_name, **options)
-        self._readers: set[_SharedReader] = set()
-        self._sinks: set[Disposable] = set()
-        self._ended = False
         self._end: AsyncSubject[None] = AsyncSubject()
+        self._sinks = CompositeDisposable()
         self.scheduler = NodeScheduler(self)
         """Schedules on the executor and clock of this node; for ``observable.subscribe(…, scheduler=…)``."""
 
@@ -61,15 +51,14 @@ class ReactiveNode(Node):
         """
         Return the messages of a topic as an observable, cold and shared (thesis 4.3).
 
-        Nothing is on the network before the first observer subscribes. All observers share one DDS reader,
-        the last one that leaves ends it, and the next one gets another. A further observer of a
-        transient-local topic first gets what the reader has kept, like the observer of a reader of its own
-        (not with BEST_AVAILABLE durability: what becomes of it, a reader does not tell).
-        When the node ends, the observable completes. Subscribing and disposing are safe on any thread, also
+        No DDS reader exists before the first observer subscribes. All observers share one reader. The
+        disposal of the last observer destroys it; a new subscription creates a new one. A late observer of
+        a transient-local topic first gets the retained samples, as with a reader of its own (not with
+        BEST_AVAILABLE durability: a reader does not report which durability that has become).
+        The observable completes when the node ends. Subscribing and disposing are safe on any thread and
         inside a callback.
 
-        :param timestamped: whether items are :class:`Timestamp` s, that hold a message and its DDS source
-        time,
+        :param timestamped: whether items are :class:`Timestamp` s of a message and its DDS source time,
             instead of messages.
         :param options: further arguments of :meth:`rclpy.node.Node.create_subscription`.
         """
@@ -77,24 +66,34 @@ class ReactiveNode(Node):
         def create_reader(callback: Callable[..., None]) -> Subscription:
             return self.create_subscription(msg_type, topic, callback, qos_profile, **options)
 
-        return Observable(_SharedReader(self, create_reader, _retained(qos_profile), timestamped).subscribe)
+        reader = SharedReader(
+            self,
+            create_reader,
+            scheduler=self.scheduler,
+            end=self._end,
+            retained=retention(qos_profile),
+            timestamped=timestamped,
+        )
+        return Observable(reader.subscribe)
 
     def create_parameter_observable(self, name: str) -> Observable[Any]:
         """
-        Return the values of a declared parameter: the present one at once, then each that is set.
+        Return the values of a declared parameter: the present one at once, then each new one.
 
-        One that is set just then, on another thread or by another observer, may come twice.
+        A value that another thread or another observer sets during the subscription may come twice.
+        A parameter that is not declared is an error of the observable. The observable completes when the
+        node ends.
         """
 
         def subscribe(
             observer: abc.ObserverBase[Any], scheduler: abc.SchedulerBase | None = None
         ) -> abc.DisposableBase:
-            lock = threading.RLock()  # the present value comes first, whoever sets another one meanwhile
+            lock = threading.RLock()  # the present value comes first, also if another thread sets a new one
 
             def changed(parameters: list[Parameter]) -> None:
                 with lock:
                     if any(parameter.name == name for parameter in parameters):
-                        # Not the one that was set: who has heard of it before us may have set another one.
+                        # Not the value in `parameters`: an earlier observer may have set another one since.
                         observer.on_next(self.get_parameter(name).value)
 
             end = Disposable(lambda: self.remove_post_set_parameters_callback(changed))
@@ -113,7 +112,7 @@ class ReactiveNode(Node):
         self, msg_type: Any, topic: str, qos_profile: QoSProfile | int, event: str
     ) -> Observable[Any]:
         """
-        Return what happens to a subscription by its QoS as an observable, cold and shared.
+        Return the QoS events of a subscription as an observable, cold and shared.
 
         :param event: ``deadline``, ``liveliness``, ``message_lost``, ``incompatible_qos``,
             ``incompatible_type`` or ``matched``: see :class:`rclpy.event_handler.SubscriptionEventCallbacks`.
@@ -126,7 +125,8 @@ class ReactiveNode(Node):
                 msg_type, topic, lambda _: None, qos_profile, event_callbacks=events
             )
 
-        return Observable(_SharedReader(self, create_reader, None, timestamped=False).subscribe)
+        reader = SharedReader(self, create_reader, scheduler=self.scheduler, end=self._end)
+        return Observable(reader.subscribe)
 
     def create_call(
         self, srv_type: Any, srv_name: str, *, timeout: float | None = None, **options: Any
@@ -134,58 +134,22 @@ class ReactiveNode(Node):
         """
         Return a function from a request to an observable of the response, for ``requests.flat_map(call)``.
 
-        A call begins when it is subscribed to, waits for a server if there is none, and blocks nothing;
-        disposing gives it up.
+        A call begins with its subscription, waits for a server if there is none, and never blocks.
+        Disposing abandons it. It completes when the node ends.
 
-        :param timeout: with no response within so many seconds, the observable ends in a TimeoutError.
+        :param timeout: if no response arrives within so many seconds, the observable ends in a TimeoutError.
         :param options: further arguments of :meth:`rclpy.node.Node.create_client`.
         """
         client = self.create_client(srv_type, srv_name, **options)
+        ready = calls.server_ready(self, client, self.scheduler)
         late = rx.throw(TimeoutError(f"no response of {srv_name} within {timeout} s"))
 
         def call(request: Any) -> Observable[Any]:
-            def send(
-                observer: abc.ObserverBase[Any], scheduler: abc.SchedulerBase | None = None
-            ) -> abc.DisposableBase:
-                def done(future: Future) -> None:
-                    try:
-                        response = future.result()
-                    except Exception as error:
-                        observer.on_error(error)
-                    else:
-                        observer.on_next(response)
-                        observer.on_completed()
-
-                future = client.call_async(request)
-                # A future's callbacks belong to no callback group, what else happens to this node does.
-                future.add_done_callback(lambda future: self.scheduler.schedule(lambda *_: done(future)))
-                return Disposable(lambda: client.remove_pending_request(future))
-
-            ready = self._when_ready(client)
-            response = ready.take(1).flat_map(lambda _: Observable(send)).take_until(self._end)
-            return response if timeout is None else response.timeout(timeout, late, self.scheduler)
+            response = calls.response(client, request, self.scheduler)
+            result = ready.take(1).flat_map(lambda _: response).take_until(self._end)
+            return result if timeout is None else result.timeout(timeout, late, self.scheduler)
 
         return call
-
-    def _when_ready(self, client: Client) -> Observable[None]:
-        """Emit as soon as there is a server; one appears by real time, also while ROS time is simulated."""
-
-        def subscribe(
-            observer: abc.ObserverBase[None], scheduler: abc.SchedulerBase | None = None
-        ) -> abc.DisposableBase:
-            def look() -> None:
-                if client.service_is_ready():
-                    observer.on_next(None)
-
-            timer = self.create_timer(_SERVER_POLL, look, clock=_STEADY)
-            self.scheduler.schedule(lambda *_: look())
-
-            def end() -> None:
-                self.destroy_timer(timer)
-
-            return Disposable(end)
-
-        return Observable(subscribe)
 
     def publish_observable(
         self,
@@ -196,14 +160,14 @@ class ReactiveNode(Node):
         **options: Any,
     ) -> abc.DisposableBase:
         """
-        Publish every message of an observable, until the returned disposable is disposed or the node ends.
+        Publish every message of an observable until the returned disposable is disposed or the node ends.
 
-        The publisher exists from now on: peers need time to discover it, so one that is created with the
-        first message loses it. An error of the observable, or a message of another type, ends the spinning of
-        the node: it is raised there, once.
+        The publisher exists from now on: peers need time to discover it, and a publisher that is created
+        with the first message loses it. An error of the observable, or a message of another type, is raised
+        once out of the spinning of this node.
 
-        :param options: further arguments of :meth:`rclpy.node.Node.create_publisher`. The QoS events of the
-            publisher are an observable by a subject:
+        :param options: further arguments of :meth:`rclpy.node.Node.create_publisher`. A subject makes an
+            observable of the publisher's QoS events:
             ``event_callbacks=PublisherEventCallbacks(deadline=subject.on_next)``.
         """
         publisher = self.create_publisher(msg_type, topic, qos_profile, **options)
@@ -221,7 +185,7 @@ class ReactiveNode(Node):
         return sink
 
     def fail(self, error: Exception) -> None:
-        """Raise an error where it cannot be lost: out of the spinning of this node."""
+        """Raise an error out of the spinning of this node, where it cannot be lost."""
 
         def throw(*_: Any) -> None:
             raise error
@@ -230,100 +194,9 @@ class ReactiveNode(Node):
 
     def destroy_node(self) -> None:
         """End the node; its observables complete first."""
-        if not self._ended:
-            self._ended = True
+        if not self._end.is_stopped:
             self._end.on_next(None)
             self._end.on_completed()
-            for reader in list(self._readers):
-                reader.complete()
-            for sink in list(self._sinks):
-                sink.dispose()
+            self._sinks.dispose()
             self.scheduler.dispose()
         super().destroy_node()
-
-
-def _retained(qos_profile: QoSProfile | int) -> deque[Any] | None:
-    """Return a place for the samples that a reader keeps for late observers, ``None`` if it keeps none."""
-    if isinstance(qos_profile, int) or qos_profile.durability != DurabilityPolicy.TRANSIENT_LOCAL:
-        return None
-    return deque(maxlen=None if qos_profile.history == HistoryPolicy.KEEP_ALL else qos_profile.depth)
-
-
-class _SharedReader:
-    """The one DDS reader behind an observable, while somebody observes it."""
-
-    def __init__(
-        self,
-        node: ReactiveNode,
-        create: Callable[[Callable[..., None]], Subscription],
-        retained: deque[Any] | None,
-        timestamped: bool,
-    ) -> None:
-        self._node = node
-        self._create = create
-        self._retained = retained
-        self._callback = self._receive_with_info if timestamped else self._receive
-        self._lock = threading.RLock()
-        self._subscription: Subscription | None = None
-        self._members: list[abc.ObserverBase[Any]] = []
-        self._listening: tuple[
-            abc.ObserverBase[Any], ...
-        ] = ()  # replaced, never changed: read without the lock
-
-    def subscribe(
-        self, observer: abc.ObserverBase[Any], scheduler: abc.SchedulerBase | None = None
-    ) -> abc.DisposableBase:
-        with self._lock:
-            if self._node._ended:
-                observer.on_completed()
-                return Disposable()
-            self._members.append(observer)
-            if self._subscription is None:
-                self._listening = (observer,)
-                try:
-                    self._subscription = self._create(self._callback)
-                except Exception:
-                    self._members, self._listening = [], ()
-                    raise
-                self._node._readers.add(self)
-            elif self._retained is None:
-                self._listening += (observer,)
-            else:  # on the executor's thread, so that no message slips between the retained ones and the next
-                self._node.scheduler.schedule(lambda *_: self._join(observer))
-        return Disposable(lambda: self._leave(observer))
-
-    def _join(self, observer: abc.ObserverBase[Any]) -> None:
-        with self._lock:
-            if self._subscription is None or not any(member is observer for member in self._members):
-                return
-            self._listening += (observer,)
-            # What a publisher has published dies with it.
-            alive = self._subscription.get_publisher_count() > 0
-            retained = tuple(self._retained) if self._retained and alive else ()
-        for item in retained:
-            observer.on_next(item)
-
-    def _receive(self, item: Any) -> None:
-        if self._retained is not None:
-            self._retained.append(item)
-        for observer in self._listening:
-            observer.on_next(item)
-
-    def _receive_with_info(self, message: Any, info: Any) -> None:
-        self._receive(Timestamp(message, stamps.from_nanoseconds(info["source_timestamp"])))
-
-    def _leave(self, observer: abc.ObserverBase[Any]) -> None:
-        with self._lock:
-            self._members = [member for member in self._members if member is not observer]
-            self._listening = tuple(member for member in self._listening if member is not observer)
-            if self._members or self._subscription is None:
-                return
-            subscription, self._subscription = self._subscription, None
-            if self._retained is not None:
-                self._retained.clear()
-            self._node._readers.discard(self)
-            self._node.destroy_subscription(subscription)
-
-    def complete(self) -> None:
-        for observer in list(self._members):
-            observer.on_completed()

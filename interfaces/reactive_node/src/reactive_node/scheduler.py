@@ -1,8 +1,8 @@
-"""Rx time is the node's time: operators run on the node's executor and by its clock.
+"""An Rx scheduler that runs operators on a node's executor, by the node's clock.
 
-RxPY's own schedulers start a thread per event or run by the wall clock, and a clock that is set back stops
-their ``timeout`` and ``interval``. This one is a heap of what is due, and one ROS timer, armed for the
-earliest.
+RxPY's own schedulers start a thread per event or follow the wall clock; setting that back stops their
+``timeout`` and ``interval``. This scheduler is a heap of actions, ordered by their time, and one ROS timer,
+armed for the earliest.
 """
 
 from __future__ import annotations
@@ -24,21 +24,21 @@ from reactivex.scheduler.periodicscheduler import PeriodicScheduler
 from reactive_node import stamps
 
 _TState = TypeVar("_TState")
-_CATCH_UP = 50_000_000  # [ns] by which a periodic action may be late and still keep its rate
-_NOT_HEARD = Time(clock_type=ClockType.ROS_TIME)  # what simulated time is before the first /clock
-_FEW = 64  # so many cancelled items in the heap are not worth a clean-up
+_CATCH_UP = 50_000_000  # [ns]: a periodic action that is less late keeps its rate
+_NOT_HEARD = Time(clock_type=ClockType.ROS_TIME)  # simulated time before the first message on /clock
+_FEW = 64  # cancelled items in the heap that are not worth a clean-up
 
 
 class _Item(abc.DisposableBase):
-    """A scheduled action; disposing it cancels it, or ends what it has returned."""
+    """A scheduled action; disposing it cancels the action, or disposes the result of the action."""
 
     __slots__ = ("action", "cancelled", "due", "result", "scheduler", "state")
 
-    def __init__(self, scheduler: NodeScheduler, due: int, action: Any, state: Any) -> None:
+    def __init__(self, scheduler: NodeScheduler) -> None:
         self.scheduler = scheduler
-        self.due = due
-        self.action = action  # None while it is not in the heap
-        self.state = state
+        self.due = 0  # [ns]
+        self.action: Any = None  # None while the item is not in the heap
+        self.state: Any = None
         self.cancelled = False
         self.result: abc.DisposableBase | None = None
 
@@ -52,10 +52,10 @@ class NodeScheduler(PeriodicScheduler):
     """
     Schedules on a node's executor; any thread may schedule and cancel.
 
-    Time is monotonic: it begins as the time of day and then follows the steady clock, so setting the clock of
-    the machine changes nothing. While the node's ROS time is simulated (``use_sim_time``), it follows that
-    instead, and begins as that if it is simulated from the start. When simulated time jumps back, begins or
-    ends, what was to come in so many seconds still comes in so many. What is due at once does not wait for a
+    Time is monotonic: it begins with the time of day and then follows the steady clock, so setting the
+    machine's clock changes nothing. While the node's ROS time is simulated (``use_sim_time``), this time
+    follows it, and begins with it if it is simulated from the start. When simulated time jumps back, begins
+    or ends, a pending action keeps its remaining delay. An action without delay does not wait for a
     simulation that stands still.
     """
 
@@ -64,12 +64,12 @@ class NodeScheduler(PeriodicScheduler):
         super().__init__()
         self._node = node
         self._lock = threading.RLock()
-        self._heap: list[tuple[int, int, _Item]] = []  # when due [ns], order of scheduling, what
-        self._cancelled = 0  # items in the heap
+        self._heap: list[tuple[int, int, _Item]] = []  # due time [ns], order of scheduling, item
+        self._cancelled = 0  # number of cancelled items in the heap
         self._orders = itertools.count()
         self._armed_for: int | None = None
         self._disposed = False
-        self._offset = 0  # [ns] from the clock's time to ours
+        self._offset = 0  # [ns]: this scheduler's time minus the clock's time
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._use_clock(self._time_is_simulated())
         if not self._simulated:
@@ -83,17 +83,17 @@ class NodeScheduler(PeriodicScheduler):
             post_callback=self._time_has_jumped,
         )
 
-    # What Rx asks of a scheduler
+    # The interface of Rx schedulers
 
     @property
     def now(self) -> datetime:
-        """The time by which this scheduler runs."""
+        """The present time of this scheduler."""
         return stamps.from_nanoseconds(self._read())
 
     def schedule(
         self, action: typing.ScheduledAction[_TState], state: _TState | None = None
     ) -> abc.DisposableBase:
-        """Run an action as soon as the executor gets to it; never at once."""
+        """Run an action as soon as the executor is free; never inside this call."""
         return self._schedule(self._read(), action, state)
 
     def schedule_relative(
@@ -120,7 +120,7 @@ class NodeScheduler(PeriodicScheduler):
         action: typing.ScheduledPeriodicAction[_TState],
         state: _TState | None = None,
     ) -> abc.DisposableBase:
-        """Run an action every ``period``, without drift; what is more than 50 ms late is skipped."""
+        """Run an action every ``period``, without drift; skip runs that are more than 50 ms late."""
         nanoseconds = max(1, round(self.to_seconds(period) * 1e9))
 
         def run(_: abc.SchedulerBase, state: Any) -> None:
@@ -129,14 +129,14 @@ class NodeScheduler(PeriodicScheduler):
             missed = late // nanoseconds if late > _CATCH_UP else 0
             self._put(item, item.due + (missed + 1) * nanoseconds, run, following)
 
-        with self._lock:  # so that it does not run before it has its name
+        with self._lock:  # the first run needs `item`
             item = self._schedule(self._read() + nanoseconds, run, state)
         return item
 
     # The heap
 
     def _schedule(self, due: int, action: Any, state: Any) -> _Item:
-        item = _Item(self, due, None, None)
+        item = _Item(self)
         self._put(item, due, action, state)
         return item
 
@@ -150,7 +150,7 @@ class NodeScheduler(PeriodicScheduler):
                 self._arm()
 
     def _cancel(self, item: _Item) -> abc.DisposableBase | None:
-        """Take an item out, or out of reach; return what its action has returned, if it has run."""
+        """Cancel an item; return the result of its action, if that has run."""
         with self._lock:
             item.cancelled = True
             if item.action is not None:
@@ -164,7 +164,7 @@ class NodeScheduler(PeriodicScheduler):
             return result
 
     def _run(self) -> None:
-        """Run what is due by now; what that schedules waits until the executor has seen to other work."""
+        """Run the due actions; actions that they schedule wait until the executor has done other work."""
         horizon, limit = self._read(), next(self._orders)
         try:
             while (due := self._pop(horizon, limit)) is not None:
@@ -199,7 +199,7 @@ class NodeScheduler(PeriodicScheduler):
     # The timer
 
     def _arm(self) -> None:
-        """Let the timer ring for the earliest item, or rest."""
+        """Set the timer to the earliest item, or stop it."""
         if self._disposed:
             return
         if not self._heap:
@@ -208,10 +208,10 @@ class NodeScheduler(PeriodicScheduler):
             return
         due = self._heap[0][0]
         if self._armed_for is not None and self._armed_for <= due:
-            return  # it rings early at worst, and looks again
+            return  # at worst it fires early and is armed again
         self._armed_for = due
         self._timer.timer_period_ns = max(0, due - self._read())
-        self._timer.reset()  # which wakes an executor that waits
+        self._timer.reset()  # wakes a waiting executor
 
     # The clock
 
@@ -228,13 +228,13 @@ class NodeScheduler(PeriodicScheduler):
         return isinstance(clock, ROSClock) and bool(clock.ros_time_is_active)
 
     def _time_has_jumped(self, jump: TimeJump) -> None:
-        """Go on from where our time is, by the same clock or another one."""
+        """Continue this scheduler's time without a jump back, by the same clock or by another one."""
         with self._lock:
             if self._disposed:
                 return
             simulated = self._time_is_simulated()
             if simulated != self._simulated:
-                # Simulated time that has just ended is not to be read any more.
+                # If simulated time has ended, its clock already reads real time.
                 before = self._read() - (jump.delta.nanoseconds if self._simulated else 0)
                 self._node.destroy_timer(self._timer)
                 self._use_clock(simulated)
@@ -246,13 +246,13 @@ class NodeScheduler(PeriodicScheduler):
             elif self._node.get_clock().now() == _NOT_HEARD + jump.delta:
                 self._begin_simulation(jump.delta.nanoseconds)
             else:
-                return  # time just goes on, which the timer sees
+                return  # time goes on; the timer sees that
             self._armed_for = None
             self._arm()
 
     def _begin_simulation(self, delta: int) -> None:
-        """Follow the first simulated time that is heard: until then that clock has stood at 0."""
-        if self._offset:  # there was time before: it goes on from where it is
+        """Follow the first simulated time; until then that clock stood at 0."""
+        if self._offset:  # this time had begun before: it continues
             self._offset -= delta
             return
         self._heap = [(due + delta, order, item) for due, order, item in self._heap]
@@ -260,7 +260,7 @@ class NodeScheduler(PeriodicScheduler):
             item.due += delta
 
     def dispose(self) -> None:
-        """Forget everything, for ever: the node ends."""
+        """Drop all actions, now and later: the node ends."""
         with self._lock:
             self._disposed = True
             self._heap.clear()

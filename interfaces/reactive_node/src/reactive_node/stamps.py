@@ -1,18 +1,18 @@
-"""How old a message is, by the clock of its stamp: the time of day.
+"""Times of messages as ``datetime``.
 
-DDS source times and the stamps of the contract are of that clock, even while ROS time is simulated. It may be
-set, and differ between hosts; where safety depends on an age, only the age at arrival is taken from it.
+DDS source times and stamps count by the time of day, even while ROS time is simulated. That clock may be set,
+and may differ between hosts. Where safety depends on an age, take only the age at arrival from it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 from builtin_interfaces.msg import Time
 from reactivex import Observable
-from reactivex.operators._timestamp import Timestamp
 
 __all__ = [
     "Timestamp",
@@ -25,10 +25,19 @@ __all__ = [
     "to_nanoseconds",
 ]
 
+_T = TypeVar("_T")
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 _MICROSECOND = timedelta(microseconds=1)
 IN_STEP = timedelta(milliseconds=50)
 """By how much the clocks of two hosts may differ that NTP or PTP keeps in step (deploy/SAFETY.md, A3)."""
+
+
+@dataclass(slots=True)
+class Timestamp(Generic[_T]):
+    """A value and its time, with the attributes of the items that RxPY's ``timestamp`` operator emits."""
+
+    value: _T
+    timestamp: datetime
 
 
 def now() -> datetime:

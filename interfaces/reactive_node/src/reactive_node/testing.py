@@ -1,41 +1,106 @@
-"""Fixtures for tests of nodes: a DDS domain of their own, nodes in it, an executor that spins them."""
+"""A pytest plugin that drives recipes in virtual time, and nodes in a ROS domain of their own.
+
+Load it with ``pytest_plugins = ["reactive_node.testing"]`` in ``conftest.py``.
+"""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, Generic, TypeVar
 
 import pytest
 import rclpy
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from reactivex.testing import TestScheduler
+from reactivex import Observable
+from reactivex.notification import OnNext
+from reactivex.testing import Recorded, TestScheduler
 
 from reactive_node.domains import reserved_domain
 from reactive_node.node import ReactiveNode
 
+_T = TypeVar("_T")
+
+MakeNode = Callable[..., Any]
+"""The fixture ``make_node``: ``(name="node", kind=ReactiveNode, **options) -> node``."""
+SpinUntil = Callable[..., None]
+"""The fixture ``spin_until``: ``(condition, seconds=10.0) -> None``."""
+SpinFor = Callable[[float], None]
+"""The fixture ``spin_for``: ``(seconds) -> None``."""
+
+
+@dataclass(frozen=True)
+class Recording(Generic[_T]):
+    """What an observable has emitted, in virtual time."""
+
+    messages: list[Recorded[_T]]
+    """Items, error and completion; compare with RxPY's ``ReactiveTest.on_next(1, item)`` and so on."""
+
+    @property
+    def items(self) -> list[tuple[float, _T]]:
+        """The items, each with its time [s]; without error and completion."""
+        return [
+            (message.time, message.value.value)
+            for message in self.messages
+            if isinstance(message.value, OnNext)
+        ]
+
+
+class VirtualTime(TestScheduler):
+    """
+    RxPY's ``TestScheduler`` in seconds: time begins at 0 and passes only while it is told to.
+
+    A recipe under test is subscribed with :meth:`record`, its inputs are made with :meth:`hot`.
+    """
+
+    def hot(self, *items: tuple[float, Any]) -> Any:
+        """
+        Return a hot observable that emits each item at its time [s] and never ends.
+
+        Its ``subscriptions`` hold the times of subscribing and disposing. For an input that fails or
+        completes, use ``create_hot_observable``.
+        """
+        messages: Any = [Recorded(at, OnNext(item)) for at, item in items]  # type: ignore[arg-type]
+        return self.create_hot_observable(messages)
+
+    def record(self, observable: Observable[_T], *, until: float) -> Recording[_T]:
+        """Subscribe now, let time pass, dispose at ``until`` [s], inclusive; return what was emitted."""
+        observer = self.create_observer()
+        subscription = observable.subscribe(observer, scheduler=self)
+        self.advance_to(until)
+        subscription.dispose()
+        return Recording(observer.messages)
+
+
+@pytest.fixture
+def scheduler() -> VirtualTime:
+    """Virtual time [s]."""
+    return VirtualTime()
+
 
 @pytest.fixture
 def domain_id(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
-    """A free ROS_DOMAIN_ID, in the environment too."""
+    """A free ROS domain; the environment selects it and keeps its traffic on this machine."""
     with reserved_domain() as domain:
         monkeypatch.setenv("ROS_DOMAIN_ID", str(domain))
+        monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
         yield domain
 
 
 @pytest.fixture(scope="module")
 def module_domain_id() -> Iterator[int]:
-    """A free ROS_DOMAIN_ID for what the tests of a module share; the environment stays as it is."""
+    """A free ROS domain that the tests of a module share; the environment does not change."""
     with reserved_domain() as domain:
         yield domain
 
 
 @pytest.fixture
 def context(domain_id: int) -> Iterator[Context]:
-    """An initialized context that handles no signals, in a domain of its own."""
+    """An initialized context in the test's domain; it handles no signals."""
     context = Context()
     rclpy.init(args=[], context=context, domain_id=domain_id)
     yield context
@@ -51,8 +116,8 @@ def executor(context: Context) -> Iterator[SingleThreadedExecutor]:
 
 
 @pytest.fixture
-def make_node(context: Context, executor: SingleThreadedExecutor) -> Iterator[Callable[..., Any]]:
-    """Makes nodes that the test's executor spins, and ends them with the test."""
+def make_node(context: Context, executor: SingleThreadedExecutor) -> Iterator[MakeNode]:
+    """Makes nodes that the test's executor spins; they end with the test."""
     with ExitStack() as stack:
 
         def make(name: str = "node", kind: type[Node] = ReactiveNode, **options: Any) -> Node:
@@ -65,28 +130,21 @@ def make_node(context: Context, executor: SingleThreadedExecutor) -> Iterator[Ca
 
 
 @pytest.fixture
-def scheduler() -> TestScheduler:
-    """Virtual time [s]."""
-    return TestScheduler()
-
-
-@pytest.fixture
-def spin_until(executor: SingleThreadedExecutor) -> Callable[..., None]:
-    """Spins the test's executor until a condition is true; fails when that takes too long."""
+def spin_until(executor: SingleThreadedExecutor) -> SpinUntil:
+    """Spins the test's executor until a condition is true; fails after ``seconds``."""
 
     def spin(condition: Callable[[], object], seconds: float = 10.0) -> None:
-        clock = rclpy.clock.Clock(clock_type=rclpy.clock.ClockType.STEADY_TIME)
-        deadline = clock.now().nanoseconds + int(seconds * 1e9)
+        deadline = time.monotonic() + seconds
         while not condition():
-            assert clock.now().nanoseconds < deadline, f"not within {seconds} s"
+            assert time.monotonic() < deadline, f"the condition was not true within {seconds} s"
             executor.spin_once(timeout_sec=0.1)
 
     return spin
 
 
 @pytest.fixture
-def spin_for(executor: SingleThreadedExecutor) -> Callable[[float], None]:
-    """Spins for so many seconds: for what must not happen."""
+def spin_for(executor: SingleThreadedExecutor) -> SpinFor:
+    """Spins the test's executor for so many seconds, to show that something does not happen."""
 
     def spin(seconds: float) -> None:
         deadline = time.monotonic() + seconds

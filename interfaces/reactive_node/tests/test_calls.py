@@ -1,0 +1,111 @@
+"""Service calls as observables."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import reactivex as rx
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from reactivex.subject import Subject
+from std_srvs.srv import SetBool
+
+from reactive_node import ReactiveNode
+from reactive_node.testing import MakeNode, SpinFor, SpinUntil
+
+
+def answer(request: Any, response: Any) -> Any:
+    response.success = request.data
+    response.message = "answered"
+    return response
+
+
+def test_call_emits_response(node: ReactiveNode, peer: Node, spin_until: SpinUntil) -> None:
+    peer.create_service(SetBool, "switch", answer)
+    call = node.create_call(SetBool, "switch", timeout=10.0)
+    requests: Subject[SetBool.Request] = Subject()
+    responses: list[tuple[bool, str]] = []
+    requests.flat_map(call).subscribe(lambda response: responses.append((response.success, response.message)))
+
+    requests.on_next(SetBool.Request(data=True))
+    spin_until(lambda: responses == [(True, "answered")])
+    requests.on_next(SetBool.Request(data=False))
+    spin_until(lambda: responses == [(True, "answered"), (False, "answered")])
+
+
+def test_call_waits_for_server_without_blocking(
+    node: ReactiveNode, peer: Node, spin_until: SpinUntil
+) -> None:
+    ticks: list[int] = []
+    responses: list[Any] = []
+    node.create_call(SetBool, "switch")(SetBool.Request()).subscribe(responses.append)
+    rx.interval(0.01).subscribe(ticks.append, scheduler=node.scheduler)
+
+    spin_until(lambda: len(ticks) > 10)
+    assert responses == []
+    peer.create_service(SetBool, "switch", answer)
+
+    spin_until(lambda: responses)
+
+
+def test_call_finds_server_while_simulated_time_stands_still(
+    make_node: MakeNode, peer: Node, spin_until: SpinUntil, spin_for: SpinFor
+) -> None:
+    node = make_node("simulated", parameter_overrides=[Parameter("use_sim_time", value=True)])
+    responses: list[Any] = []
+    node.create_call(SetBool, "unpause", timeout=1.0)(SetBool.Request()).subscribe(responses.append)
+    spin_for(0.1)
+
+    peer.create_service(SetBool, "unpause", answer)
+    spin_until(lambda: responses)
+
+
+def test_call_without_response_ends_in_timeout_error(node: ReactiveNode, spin_until: SpinUntil) -> None:
+    errors: list[Exception] = []
+    call = node.create_call(SetBool, "nowhere", timeout=0.1)
+
+    call(SetBool.Request()).subscribe(on_error=errors.append)
+    spin_until(lambda: errors)
+
+    assert isinstance(errors[0], TimeoutError)
+    assert str(errors[0]) == "no response of nowhere within 0.1 s"
+
+
+def test_call_with_wrong_request_type_is_error(node: ReactiveNode, peer: Node, spin_until: SpinUntil) -> None:
+    peer.create_service(SetBool, "switch", answer)
+    errors: list[Exception] = []
+
+    node.create_call(SetBool, "switch")("no request").subscribe(on_error=errors.append)
+    spin_until(lambda: errors)
+
+    assert isinstance(errors[0], TypeError)
+
+
+def test_abandoned_call_emits_nothing(
+    node: ReactiveNode, peer: Node, spin_until: SpinUntil, spin_for: SpinFor
+) -> None:
+    served: list[bool] = []
+
+    def serve(request: Any, response: Any) -> Any:
+        served.append(True)
+        call.dispose()
+        return response
+
+    peer.create_service(SetBool, "switch", serve)
+    responses: list[Any] = []
+    call = node.create_call(SetBool, "switch")(SetBool.Request()).subscribe(responses.append)
+    spin_until(lambda: served)
+    spin_for(0.05)
+
+    assert responses == []
+
+
+def test_call_completes_with_node(node: ReactiveNode) -> None:
+    completed: list[bool] = []
+    node.create_call(SetBool, "nowhere")(SetBool.Request()).subscribe(
+        on_completed=lambda: completed.append(True)
+    )
+
+    node.destroy_node()
+
+    assert completed == [True]

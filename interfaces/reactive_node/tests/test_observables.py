@@ -1,0 +1,355 @@
+"""Topics as observables (thesis chapter 4)."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from datetime import UTC, datetime, timedelta
+from typing import Any
+
+import pytest
+import reactivex as rx
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from reactivex.abc import DisposableBase
+from std_msgs.msg import String
+
+from reactive_node import ReactiveNode, Timestamp
+from reactive_node.testing import SpinFor, SpinUntil
+
+LATCHED = QoSProfile(depth=3, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+class Talker:
+    """Publishes strings on a topic."""
+
+    def __init__(self, peer: Node, spin_until: SpinUntil, qos: QoSProfile | int = 10) -> None:
+        self.publisher: Publisher = peer.create_publisher(String, "topic", qos)
+        self.spin_until = spin_until
+
+    def say(self, *texts: str) -> None:
+        for text in texts:
+            self.publisher.publish(String(data=text))
+
+    def say_when_heard(self, *texts: str) -> None:
+        self.spin_until(lambda: self.publisher.get_subscription_count() == 1)
+        self.say(*texts)
+
+
+@pytest.fixture
+def talker(peer: Node, spin_until: SpinUntil) -> Talker:
+    return Talker(peer, spin_until)
+
+
+@pytest.fixture
+def latched_talker(peer: Node, spin_until: SpinUntil) -> Talker:
+    return Talker(peer, spin_until, LATCHED)
+
+
+def texts_into(received: list[str]) -> Callable[[Any], None]:
+    return lambda message: received.append(message.data)
+
+
+# The listings of the thesis
+
+
+def test_listings_4_1_and_4_2_node_subscribes(peer: Node, talker: Talker, spin_until: SpinUntil) -> None:
+    received: list[str] = []
+    peer.create_subscription(String, "topic", texts_into(received), 10)
+
+    talker.say_when_heard("hello")
+
+    spin_until(lambda: received == ["hello"])
+
+
+def test_listing_4_3_reactive_node_replaces_node(
+    node: ReactiveNode, talker: Talker, spin_until: SpinUntil
+) -> None:
+    received: list[str] = []
+    assert isinstance(node, Node)
+    node.create_subscription(String, "topic", texts_into(received), 10)
+
+    talker.say_when_heard("hello")
+
+    spin_until(lambda: received == ["hello"])
+
+
+def test_listing_4_4_observable_is_created_without_callback(
+    node: ReactiveNode,
+) -> None:
+    assert isinstance(node.create_observable(String, "topic"), rx.Observable)
+
+
+def test_listing_4_5_three_callbacks_receive_messages_and_end(
+    node: ReactiveNode, talker: Talker, spin_until: SpinUntil
+) -> None:
+    received: list[str] = []
+    errors: list[Exception] = []
+    completed: list[bool] = []
+
+    observable = node.create_observable(String, "topic")
+    observable.subscribe(texts_into(received), errors.append, lambda: completed.append(True))
+    talker.say_when_heard("one", "two")
+    spin_until(lambda: received == ["one", "two"])
+    node.destroy_node()
+
+    assert (errors, completed) == ([], [True])
+
+
+# Cold and shared
+
+
+def test_no_reader_exists_before_first_observer(
+    node: ReactiveNode, talker: Talker, spin_until: SpinUntil, spin_for: SpinFor
+) -> None:
+    observable = node.create_observable(String, "topic")
+    spin_for(0.2)
+    assert talker.publisher.get_subscription_count() == 0
+    assert not [sub for sub in node.subscriptions if sub.topic_name == "/topic"]
+
+    observable.subscribe()
+    spin_until(lambda: talker.publisher.get_subscription_count() == 1)
+
+
+def test_observers_share_one_reader_until_last_one_leaves(
+    node: ReactiveNode, talker: Talker, spin_until: SpinUntil, spin_for: SpinFor
+) -> None:
+    received: dict[int, list[str]] = {0: [], 1: [], 2: []}
+    observable = node.create_observable(String, "topic")
+    subscriptions = [observable.subscribe(texts_into(received[n])) for n in received]
+
+    talker.say_when_heard("all")
+    spin_until(lambda: all(received.values()))
+    spin_for(0.05)
+    assert talker.publisher.get_subscription_count() == 1
+    subscriptions[0].dispose()
+    talker.say("two of us")
+    spin_until(lambda: len(received[2]) == 2)
+    subscriptions[1].dispose()
+    subscriptions[2].dispose()
+    spin_until(lambda: talker.publisher.get_subscription_count() == 0)
+
+    assert received == {0: ["all"], 1: ["all", "two of us"], 2: ["all", "two of us"]}
+
+
+def test_new_subscription_creates_new_reader(
+    node: ReactiveNode, talker: Talker, spin_until: SpinUntil
+) -> None:
+    observable = node.create_observable(String, "topic")
+    received: list[str] = []
+    for text in ("first", "second"):
+        subscription = observable.subscribe(texts_into(received))
+        talker.say_when_heard(text)
+        spin_until(lambda text=text: received[-1:] == [text])
+        subscription.dispose()
+        subscription.dispose()
+        spin_until(lambda: talker.publisher.get_subscription_count() == 0)
+
+    assert received == ["first", "second"]
+
+
+def test_late_observer_of_latched_topic_gets_retained_samples(
+    node: ReactiveNode, latched_talker: Talker, spin_until: SpinUntil, spin_for: SpinFor
+) -> None:
+    shared, own = (node.create_observable(String, "topic", LATCHED) for _ in range(2))
+    first: list[str] = []
+    late: list[str] = []
+    late_with_own: list[str] = []
+    latched_talker.say("0", "1", "2", "3")
+    shared.subscribe(texts_into(first))
+    spin_until(lambda: first == ["1", "2", "3"])
+    latched_talker.say("4")
+    spin_until(lambda: first[-1] == "4")
+
+    shared.subscribe(texts_into(late))
+    own.subscribe(texts_into(late_with_own))
+    assert late == []  # the executor delivers them, like all messages
+    spin_until(lambda: len(late) == 3 and len(late_with_own) == 3)
+    latched_talker.say("5")
+    spin_until(lambda: late[-1] == "5" and late_with_own[-1] == "5")
+    spin_for(0.05)
+
+    assert late == late_with_own == ["2", "3", "4", "5"]
+    assert first == ["1", "2", "3", "4", "5"]
+
+
+def test_retained_samples_end_with_their_publisher(
+    node: ReactiveNode, peer: Node, latched_talker: Talker, spin_until: SpinUntil, spin_for: SpinFor
+) -> None:
+    observable = node.create_observable(String, "topic", LATCHED)
+    first: list[str] = []
+    late: list[str] = []
+    observable.subscribe(texts_into(first))
+    latched_talker.say("0")
+    spin_until(lambda: first == ["0"])
+
+    peer.destroy_publisher(latched_talker.publisher)
+    spin_until(lambda: node.count_publishers("topic") == 0)
+    observable.subscribe(texts_into(late))
+    spin_for(0.1)
+
+    assert late == []
+
+
+def test_new_reader_forgets_samples_of_previous_one(
+    node: ReactiveNode, latched_talker: Talker, spin_until: SpinUntil
+) -> None:
+    deep = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    observable = node.create_observable(String, "topic", deep)
+    latched_talker.say("0", "1")
+    for _ in range(2):
+        first: list[str] = []
+        late: list[str] = []
+        subscriptions = [observable.subscribe(texts_into(first))]
+        spin_until(lambda first=first: first == ["0", "1"])
+        subscriptions.append(observable.subscribe(texts_into(late)))
+        spin_until(lambda late=late: late == ["0", "1"])
+        for subscription in subscriptions:
+            subscription.dispose()
+
+
+def test_late_observer_of_volatile_topic_gets_new_samples_only(
+    node: ReactiveNode, talker: Talker, spin_until: SpinUntil
+) -> None:
+    observable = node.create_observable(String, "topic")
+    first: list[str] = []
+    late: list[str] = []
+    observable.subscribe(texts_into(first))
+    talker.say_when_heard("0")
+    spin_until(lambda: first == ["0"])
+
+    observable.subscribe(texts_into(late))
+    talker.say("1")
+    spin_until(lambda: late)
+
+    assert (first, late) == (["0", "1"], ["1"])
+
+
+def test_observer_that_leaves_early_gets_no_retained_samples(
+    node: ReactiveNode, latched_talker: Talker, spin_until: SpinUntil, spin_for: SpinFor
+) -> None:
+    observable = node.create_observable(String, "topic", LATCHED)
+    first: list[str] = []
+    late: list[str] = []
+    observable.subscribe(texts_into(first))
+    latched_talker.say("0")
+    spin_until(lambda: first)
+
+    observable.subscribe(texts_into(late)).dispose()
+    spin_for(0.05)
+
+    assert late == []
+
+
+def test_timestamped_items_carry_source_time(
+    node: ReactiveNode, talker: Talker, spin_until: SpinUntil
+) -> None:
+    received: list[Timestamp[String]] = []
+    node.create_observable(String, "topic", timestamped=True).subscribe(received.append)
+
+    before = datetime.now(UTC)
+    talker.say_when_heard("hello")
+    after = datetime.now(UTC)
+    spin_until(lambda: received)
+
+    assert received[0].value == String(data="hello")
+    assert before - timedelta(microseconds=1) <= received[0].timestamp <= after
+
+
+def test_observable_of_ended_node_completes_at_once(node: ReactiveNode) -> None:
+    observable = node.create_observable(String, "topic")
+    node.destroy_node()
+    node.destroy_node()
+    completed: list[bool] = []
+
+    observable.subscribe(on_completed=lambda: completed.append(True))
+
+    assert completed == [True]
+
+
+def test_invalid_message_type_is_error_of_observable(node: ReactiveNode) -> None:
+    errors: list[Exception] = []
+
+    node.create_observable(int, "topic").subscribe(on_error=errors.append)
+
+    assert len(errors) == 1
+
+
+# Disposing anywhere
+
+
+def test_disposing_in_callback_stops_messages(
+    node: ReactiveNode, talker: Talker, spin_until: SpinUntil, spin_for: SpinFor
+) -> None:
+    received: list[str] = []
+    subscription: DisposableBase
+
+    def take(message: String) -> None:
+        received.append(message.data)
+        subscription.dispose()
+
+    subscription = node.create_observable(String, "topic").subscribe(take)
+    talker.say_when_heard("0", "1", "2")
+    spin_until(lambda: talker.publisher.get_subscription_count() == 0)
+    spin_for(0.05)
+
+    assert received == ["0"]
+
+
+def test_thousand_disposals_on_other_threads_under_traffic_are_safe(
+    node: ReactiveNode, latched_talker: Talker, spin_until: SpinUntil
+) -> None:
+    observable = node.create_observable(String, "topic", LATCHED)
+    kept = observable.subscribe()
+    node.create_timer(0.0005, lambda: latched_talker.say("noise"))
+    done = threading.Event()
+    errors: list[BaseException] = []
+
+    def churn() -> None:
+        try:
+            for round_ in range(500):
+                subscription = observable.subscribe(lambda _: None)
+                if round_ % 5 == 0:
+                    kept_for_a_while = node.create_observable(String, "topic").subscribe(lambda _: None)
+                    kept_for_a_while.dispose()
+                subscription.dispose()
+        except BaseException as error:
+            errors.append(error)
+        finally:
+            done.set()
+
+    threads = [threading.Thread(target=churn) for _ in range(2)]
+    for thread in threads:
+        thread.start()
+    spin_until(lambda: not any(thread.is_alive() for thread in threads), seconds=30)
+    kept.dispose()
+
+    assert errors == []
+    assert not [sub for sub in node.subscriptions if sub.topic_name == "/topic"]
+
+
+# Errors
+
+
+def test_error_in_observer_is_raised_by_spin(
+    node: ReactiveNode, talker: Talker, spin_until: SpinUntil
+) -> None:
+    def fail(message: String) -> None:
+        raise ValueError(message.data)
+
+    node.create_observable(String, "topic").subscribe(fail)
+
+    talker.say_when_heard("planted")
+    with pytest.raises(ValueError, match="planted"):
+        spin_until(lambda: False)
+
+
+def test_unobserved_error_in_operator_is_raised_by_spin(
+    node: ReactiveNode, talker: Talker, spin_until: SpinUntil
+) -> None:
+    node.create_observable(String, "topic").map(lambda message: 1 / 0).subscribe()
+
+    talker.say_when_heard("boom")
+    with pytest.raises(ZeroDivisionError):
+        spin_until(lambda: False)

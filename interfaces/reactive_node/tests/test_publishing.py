@@ -1,0 +1,88 @@
+"""Observables as topics."""
+
+from __future__ import annotations
+
+import threading
+from typing import Any
+
+import pytest
+import reactivex as rx
+from rclpy.node import Node
+from reactivex.subject import Subject
+from std_msgs.msg import Float64, String
+
+from reactive_node import ReactiveNode
+from reactive_node.testing import SpinUntil
+
+
+def test_observable_is_published(node: ReactiveNode, peer: Node, spin_until: SpinUntil) -> None:
+    numbers: Subject[float] = Subject()
+    received: list[float] = []
+    peer.create_subscription(Float64, "numbers", lambda message: received.append(message.data), 10)
+    node.publish_observable(numbers.map(lambda number: Float64(data=number)), Float64, "numbers")
+
+    spin_until(lambda: node.count_subscribers("numbers") == 1)
+    spin_until(lambda: peer.count_publishers("numbers") == 1)
+    spin_until(lambda: any(p.get_subscription_count() for p in node.publishers if p.topic_name == "/numbers"))
+    numbers.on_next(1.5)
+    spin_until(lambda: received == [1.5])
+
+
+def test_publisher_lives_from_wiring_until_disposal(
+    node: ReactiveNode, peer: Node, spin_until: SpinUntil
+) -> None:
+    sink = node.publish_observable(rx.never(), Float64, "numbers")
+    spin_until(lambda: peer.count_publishers("numbers") == 1)
+
+    sink.dispose()
+    sink.dispose()
+    spin_until(lambda: peer.count_publishers("numbers") == 0)
+
+
+def test_recipe_runs_on_scheduler_of_node(node: ReactiveNode, spin_until: SpinUntil) -> None:
+    threads: list[int] = []
+
+    def message(number: int) -> Float64:
+        threads.append(threading.get_ident())
+        return Float64(data=float(number))
+
+    node.publish_observable(rx.interval(0.001).map(message), Float64, "numbers")
+    spin_until(lambda: len(threads) >= 3)
+
+    assert set(threads) == {threading.get_ident()}
+
+
+@pytest.mark.parametrize(
+    "recipe",
+    [
+        rx.throw(ValueError("planted")),
+        rx.timer(0.01).map(lambda _: int("planted")),
+        rx.timer(0.01).flat_map(lambda _: rx.of(1).map(lambda _: int("planted"))),
+        rx.timer(0.01).map(lambda _: rx.throw(ValueError("planted"))).switch_latest(),
+    ],
+)
+def test_error_in_recipe_is_raised_by_spin(
+    node: ReactiveNode, spin_until: SpinUntil, recipe: rx.Observable[Any]
+) -> None:
+    node.publish_observable(recipe, Float64, "numbers")
+
+    with pytest.raises(ValueError, match="planted"):
+        spin_until(lambda: False)
+
+
+def test_message_of_wrong_type_is_raised_by_spin(node: ReactiveNode, spin_until: SpinUntil) -> None:
+    node.publish_observable(rx.timer(0.01).map(lambda _: String(data="no number")), Float64, "numbers")
+
+    with pytest.raises(TypeError):
+        spin_until(lambda: False)
+
+
+def test_end_of_node_ends_publishing(node: ReactiveNode) -> None:
+    numbers: Subject[Float64] = Subject()
+    node.publish_observable(numbers, Float64, "numbers")
+    assert numbers.observers
+
+    node.destroy_node()
+
+    assert not numbers.observers
+    numbers.on_next(Float64(data=1.0))

@@ -1,0 +1,105 @@
+"""The README's Python blocks run as they stand."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import rclpy
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from std_msgs.msg import Bool, Float64, String
+
+from reactive_node.testing import MakeNode, SpinUntil
+
+README = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
+BLOCKS = re.findall(r"^```python\n(.*?)^```$", README, re.DOTALL | re.MULTILINE)
+NAME = re.compile(r"# (\w+\.py)\n")
+"""The first line of a block that is a file."""
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> Path:
+    """A directory with the README's files."""
+    for block in BLOCKS:
+        if name := NAME.match(block):
+            (tmp_path / name[1]).write_text(block)
+    return tmp_path
+
+
+@pytest.fixture
+def listings(domain_id: int) -> Iterator[dict[str, Any]]:
+    """The names that the README's listings define."""
+    names: dict[str, Any] = {}
+    try:
+        for block in BLOCKS:
+            if not NAME.match(block):
+                exec(block, names)
+        yield names
+    finally:
+        rclpy.try_shutdown()
+
+
+def test_listings_print_data_and_completion(
+    listings: dict[str, Any], capsys: pytest.CaptureFixture[str]
+) -> None:
+    talker = Node("talker")
+    publisher = talker.create_publisher(String, "topic", 10)
+    printed: set[str] = set()
+    deadline = time.monotonic() + 10.0
+
+    with SingleThreadedExecutor() as executor:
+        for node in (talker, listings["node"], listings["reactive"]):
+            executor.add_node(node)
+        while len(printed) < 2 and time.monotonic() < deadline:
+            executor.spin_once(timeout_sec=0.1)
+            if publisher.get_subscription_count() == 2:
+                publisher.publish(String(data="hello"))
+            printed.update(capsys.readouterr().out.splitlines())
+        listings["reactive"].destroy_node()
+
+    assert printed == {"Data: hello", "Reactive data: hello"}
+    assert capsys.readouterr().out == "Completed\n"
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=lambda number: number.name)
+def test_program_publishes_alarm_until_signal(
+    files: Path, make_node: MakeNode, spin_until: SpinUntil, number: signal.Signals
+) -> None:
+    peer = make_node("peer", kind=Node)
+    voltage = peer.create_publisher(Float64, "voltage", 10)
+    alarms: list[bool] = []
+    peer.create_subscription(Bool, "battery_low", lambda message: alarms.append(message.data), 10)
+    program = subprocess.Popen(
+        [sys.executable, files / "battery_alarm.py"], stderr=subprocess.PIPE, text=True
+    )
+    try:
+        spin_until(lambda: voltage.get_subscription_count() == 1)
+        voltage.publish(Float64(data=10.5))
+        spin_until(lambda: alarms == [True])
+
+        program.send_signal(number)
+        _, errors = program.communicate(timeout=10)
+    finally:
+        program.kill()
+        program.wait()
+
+    assert (program.returncode, errors) == (0, "")
+
+
+def test_virtual_time_test_passes(files: Path) -> None:
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", f"--rootdir={files}", files]
+    environment = os.environ | {"PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}
+
+    run = subprocess.run(command, cwd=files, env=environment, capture_output=True, text=True)
+
+    assert run.returncode == 0, run.stdout
+    assert run.stdout.splitlines()[-1].startswith("2 passed")
