@@ -33,6 +33,12 @@ def _file(name: str) -> str | None:
     return next(filter(os.path.isfile, paths), None)
 
 
+def shipped_packages() -> list[str]:
+    """Names of the message packages of this distribution, sorted."""
+    names = [entry.name for entry in os.scandir(_SHIPPED) if entry.is_dir()]
+    return sorted(name for name in names if any(interface_names(name, kind) for kind in ("msg", "srv")))
+
+
 def interface_names(package: str, kind: str) -> list[str]:
     """Names of all messages (kind ``msg``) or services (``srv``) that a package defines, sorted."""
     directories = filter(

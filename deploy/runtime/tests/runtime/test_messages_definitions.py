@@ -50,16 +50,6 @@ def test_hash_and_constants_are_those_of_rosbags(name: str) -> None:
         assert STORE.hash_rihs01(name) == message_class(name)._TYPE_HASH
 
 
-@pytest.mark.parametrize("package", PACKAGES)
-def test_the_committed_stubs_of_a_package_are_up_to_date(package: str, tmp_path: Path) -> None:
-    stubs.write_stubs(package, tmp_path)
-    written = {path.relative_to(tmp_path): path.read_text() for path in tmp_path.rglob("*.pyi")}
-    assert written == {
-        path.relative_to(SOURCE): path.read_text() for path in (SOURCE / package).rglob("*.pyi")
-    }
-    assert written
-
-
 _numbers = itertools.count()
 Define = Callable[..., str]
 
