@@ -5,10 +5,6 @@ from __future__ import annotations
 import weakref
 from typing import Any
 
-from rclpy import _imports
-
-_imports.offer(__name__)
-
 
 class CallbackGroup:
     """

@@ -6,11 +6,11 @@ import itertools
 import threading
 from typing import TYPE_CHECKING, Any
 
-from rclpy import _imports
 from rclpy._dds import Writer
 from rclpy._endpoint import ServiceEndpoint
 from rclpy._service_side import ServiceSide
 from rclpy._service_wire import RequestId, server_is_matched, unwrap, wrap
+from rclpy._type_variables import SrvType, SrvTypeRequest, SrvTypeResponse  # noqa: F401 (public programs import them from here)
 from rclpy.callback_groups import CallbackGroup
 from rclpy.exceptions import RCLError
 from rclpy.qos import QoSProfile
@@ -19,8 +19,6 @@ from service_msgs.msg import ServiceEventInfo
 
 if TYPE_CHECKING:
     from rclpy.context import Context
-
-_imports.offer(__name__)
 
 
 class Client(ServiceSide):

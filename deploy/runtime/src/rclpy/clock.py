@@ -12,7 +12,6 @@ from enum import IntEnum
 from types import TracebackType
 from typing import TYPE_CHECKING, NamedTuple, Protocol, TypeAlias
 
-from rclpy import _imports
 from rclpy._handle import Handle
 from rclpy.clock_type import ClockType
 from rclpy.constants import S_TO_NS
@@ -22,8 +21,6 @@ from rclpy.time import Time, TimeHandle
 
 if TYPE_CHECKING:
     from rclpy.context import Context
-
-_imports.offer(__name__)
 
 __all__ = [
     "Clock",

@@ -11,7 +11,7 @@ from contextlib import AbstractContextManager, suppress
 from types import TracebackType
 from typing import TYPE_CHECKING
 
-from rclpy import _imports, logging
+from rclpy import logging
 from rclpy._arguments import RosArguments, parse
 from rclpy._dds import domain
 from rclpy._handle import Handle
@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from rclpy._graph import Graph
     from rclpy.executors import Executor
     from rclpy.node import Node
-
-_imports.offer(__name__)
 
 g_logging_ref_count = 0
 _logging_lock = threading.Lock()

@@ -5,10 +5,7 @@ from __future__ import annotations
 from typing import Protocol
 
 import builtin_interfaces.msg
-from rclpy import _imports
 from rclpy.constants import S_TO_NS
-
-_imports.offer(__name__)
 
 _MIN = -(2**63)
 _MAX = 2**63 - 1

@@ -10,13 +10,12 @@ from enum import IntEnum
 from types import TracebackType
 from typing import Any
 
-from rclpy import _imports, logging
+from rclpy import logging
 from rclpy._dds import Reader, Writer, status
 from rclpy.callback_groups import CallbackGroup
+from rclpy.exceptions import UnsupportedEventTypeError  # noqa: F401 (public programs import it from here)
 from rclpy.qos import QoSPolicyKind, qos_policy_name_from_kind
 from rclpy.waitable import NumberOfEntities, Waitable
-
-_imports.offer(__name__)
 
 
 class QoSPublisherEventType(IntEnum):

@@ -4,12 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rclpy import _imports
-
 if TYPE_CHECKING:
     from rclpy.parameter import AllowableParameterValue
-
-_imports.offer(__name__)
 
 
 class InvalidHandle(RuntimeError):

@@ -15,16 +15,17 @@ import time
 import weakref
 from collections import deque
 from collections.abc import Callable, Coroutine
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager
 from types import CoroutineType, TracebackType
 from typing import TYPE_CHECKING, Any, Protocol
 
-from rclpy import _imports, signals
-from rclpy._dds import INFINITY, GuardCondition, WaitSet
+from rclpy import _dds, signals
+from rclpy._dds import INFINITY, WaitSet
 from rclpy.callback_groups import CallbackGroup
+from rclpy.client import Client  # noqa: F401 (public programs import it from here)
 from rclpy.constants import S_TO_NS
-from rclpy.exceptions import NotInitializedException
+from rclpy.exceptions import InvalidHandle, NotInitializedException  # noqa: F401 (public programs import InvalidHandle from here)
+from rclpy.guard_condition import GuardCondition  # noqa: F401 (public programs import it from here)
 from rclpy.task import Future, Task
 from rclpy.utilities import get_default_context
 
@@ -32,8 +33,6 @@ if TYPE_CHECKING:
     from rclpy.context import Context
     from rclpy.node import Node
     from rclpy.timer import Timer
-
-_imports.offer(__name__)
 
 # As long as all that was ready is run within this time, readers may have more messages at once, in turns;
 # then the timers get theirs. So a flood costs few waits, and a slow callback delays nobody but by itself.
@@ -126,11 +125,11 @@ class Executor(AbstractContextManager["Executor"]):
         self._closed = False
         self._idle = threading.Condition()
 
-        self._guard = GuardCondition()
+        self._guard = _dds.GuardCondition()
         self._waitset = WaitSet()
         self._waitset.attach(self._guard.handle, _WAKE)
         # What ends with the executor, also where nobody shuts it down.
-        self._dds: list[WaitSet | GuardCondition] = [self._waitset, self._guard]
+        self._dds: list[WaitSet | _dds.GuardCondition] = [self._waitset, self._guard]
         self._close_dds = weakref.finalize(self, _close, self._dds)
         self._close_dds.atexit = False  # DDS ends by itself then
         self._spinning_thread: int | None = None
@@ -503,7 +502,7 @@ class Executor(AbstractContextManager["Executor"]):
         self.shutdown()
 
 
-def _close(entities: list[WaitSet | GuardCondition]) -> None:
+def _close(entities: list[WaitSet | _dds.GuardCondition]) -> None:
     for entity in entities:
         entity.close()
 
@@ -588,6 +587,8 @@ class MultiThreadedExecutor(_ReadyMadeExecutor):
         """
         if num_threads is not None and num_threads < 1:
             raise ValueError("a MultiThreadedExecutor needs at least one thread")
+        from concurrent.futures import ThreadPoolExecutor  # here: it takes long to import
+
         super().__init__(context=context)
         self._threads = num_threads or max(2, os.cpu_count() or 2)
         self._pool_threads = pool_threads = set[int]()

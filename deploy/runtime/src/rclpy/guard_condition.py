@@ -6,15 +6,12 @@ import threading
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from rclpy import _imports
 from rclpy._handle import Handle
 from rclpy.callback_groups import CallbackGroup
 from rclpy.exceptions import InvalidHandle
 
 if TYPE_CHECKING:
     from rclpy.context import Context
-
-_imports.offer(__name__)
 
 
 class GuardCondition:

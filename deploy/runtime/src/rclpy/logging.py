@@ -5,12 +5,9 @@ from __future__ import annotations
 import os
 from typing import TYPE_CHECKING
 
-from rclpy import _imports
 from rclpy.impl import _logging_levels, _logging_output, rcutils_logger
 from rclpy.impl.logging_severity import LoggingSeverity
 from rclpy.impl.rcutils_logger import RcutilsLogger
-
-_imports.offer(__name__)
 
 __all__ = [
     "LoggingSeverity",

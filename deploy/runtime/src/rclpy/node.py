@@ -5,10 +5,10 @@ from __future__ import annotations
 import weakref
 from collections.abc import Callable, Iterator
 from functools import partial
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 from rcl_interfaces.msg import Log, ParameterEvent
-from rclpy import _best_available, _imports, _names
+from rclpy import _best_available, _names
 from rclpy._arguments import parse
 from rclpy._endpoint import PublisherEndpoint, ServiceEndpoint, SubscriptionEndpoint
 from rclpy._node_graph import NodeGraph
@@ -51,12 +51,6 @@ from rclpy.validate_node_name import validate_node_name
 from rclpy.validate_topic_name import validate_topic_name
 from rclpy.waitable import Waitable
 
-if TYPE_CHECKING:
-    from rclpy.context import Context
-    from rclpy.executors import Executor
-
-_imports.offer(__name__)
-
 __all__ = [
     "HIDDEN_NODE_PREFIX",
     "PARAMETER_SEPARATOR_STRING",
@@ -65,6 +59,27 @@ __all__ = [
     "qos_profile_parameter_events",
     "qos_profile_services_default",
 ]
+
+# Public programs import these from here, where ROS 2 has them, too: see tests/conformance/test_imports.py.
+from typing import Dict, List, Optional, Union  # noqa: F401, UP035
+
+from rcl_interfaces.msg import (  # noqa: F401
+    FloatingPointRange,
+    IntegerRange,
+    ParameterDescriptor,
+    ParameterType,
+    ParameterValue,
+    SetParametersResult,
+)
+from rclpy._type_variables import MsgType, SrvType, SrvTypeRequest, SrvTypeResponse  # noqa: F401
+from rclpy.callback_groups import ReentrantCallbackGroup  # noqa: F401
+from rclpy.context import Context
+from rclpy.exceptions import (  # noqa: F401
+    InvalidHandle,
+    NodeNameNonExistentError,
+    ParameterNotDeclaredException,
+)
+from rclpy.executors import Executor
 
 HIDDEN_NODE_PREFIX = "_"
 

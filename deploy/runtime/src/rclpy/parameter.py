@@ -8,9 +8,6 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 from rcl_interfaces.msg import Parameter as ParameterMsg
 from rcl_interfaces.msg import ParameterType, ParameterValue
-from rclpy import _imports
-
-_imports.offer(__name__)
 
 if TYPE_CHECKING:
     AllowableParameterValue: TypeAlias = (

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
-from rclpy import _imports
 from rclpy._dds import Writer
 from rclpy._endpoint import Owner, PublisherEndpoint
+from rclpy._type_variables import MsgType  # noqa: F401 (public programs import it from here)
 from rclpy.callback_groups import CallbackGroup
 from rclpy.duration import Duration
 from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.exceptions import RCLError
 from rclpy.qos import QoSProfile
-
-_imports.offer(__name__)
 
 
 class Publisher(Owner):

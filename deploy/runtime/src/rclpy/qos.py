@@ -11,10 +11,7 @@ from collections.abc import Callable, Iterable
 from enum import Enum, IntEnum
 from typing import Any, NoReturn, TypeVar
 
-from rclpy import _imports
 from rclpy.duration import Duration
-
-_imports.offer(__name__)
 
 
 class QoSPolicyKind(IntEnum):

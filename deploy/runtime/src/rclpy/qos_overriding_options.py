@@ -10,7 +10,6 @@ from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, TypeAlias
 
 from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
-from rclpy import _imports
 from rclpy.duration import Duration
 from rclpy.exceptions import ParameterAlreadyDeclaredException
 from rclpy.qos import (
@@ -27,8 +26,6 @@ if TYPE_CHECKING:
     from rclpy.node import Node
     from rclpy.publisher import Publisher
     from rclpy.subscription import Subscription
-
-_imports.offer(__name__)
 
 QosCallbackResult: TypeAlias = SetParametersResult
 QosCallbackType: TypeAlias = Callable[[QoSProfile], QosCallbackResult]

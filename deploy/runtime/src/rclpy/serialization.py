@@ -4,11 +4,8 @@ from __future__ import annotations
 
 from typing import Any, TypeVar
 
-from rclpy import _imports
 from rclpy.exceptions import RMWError
 from rclpy.type_support import check_is_valid_msg_type
-
-_imports.offer(__name__)
 
 _Message = TypeVar("_Message")
 

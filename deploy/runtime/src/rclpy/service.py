@@ -9,17 +9,16 @@ from collections.abc import Callable, Coroutine
 from contextlib import suppress
 from typing import Any
 
-from rclpy import _imports
 from rclpy._dds import Reader
 from rclpy._endpoint import ServiceEndpoint
 from rclpy._service_side import ServiceSide
 from rclpy._service_wire import RequestId, client_is_matched, unwrap, wrap
+from rclpy._type_variables import SrvType, SrvTypeRequest, SrvTypeResponse  # noqa: F401 (public programs import them from here)
 from rclpy.callback_groups import CallbackGroup
 from rclpy.exceptions import InvalidHandle
 from rclpy.qos import QoSProfile
+from rclpy.service_introspection import ServiceIntrospectionState  # noqa: F401 (public programs import it from here)
 from service_msgs.msg import ServiceEventInfo
-
-_imports.offer(__name__)
 
 # A client may be heard before discovery has told us of its reader: so long a reply waits for it [s].
 _PATIENCE = 0.1

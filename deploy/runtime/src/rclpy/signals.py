@@ -16,15 +16,12 @@ from enum import IntEnum
 from types import FrameType
 from typing import TYPE_CHECKING, Any
 
-from rclpy import _imports
 from rclpy._listeners import Listeners
 from rclpy.guard_condition import GuardCondition
 
 if TYPE_CHECKING:
     from rclpy.context import Context
     from rclpy.executors import Executor
-
-_imports.offer(__name__)
 
 
 class SignalHandlerOptions(IntEnum):

@@ -7,15 +7,13 @@ from collections.abc import Callable
 from enum import Enum
 from typing import Any
 
-from rclpy import _imports
 from rclpy._bad_input import BadInput
 from rclpy._dds import Reader
 from rclpy._endpoint import Owner, SubscriptionEndpoint
+from rclpy._type_variables import MsgType  # noqa: F401 (public programs import it from here)
 from rclpy.callback_groups import CallbackGroup
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.qos import QoSProfile
-
-_imports.offer(__name__)
 
 
 class Subscription(Owner):

@@ -5,12 +5,9 @@ from __future__ import annotations
 from typing import Protocol, overload
 
 import builtin_interfaces.msg
-from rclpy import _imports
 from rclpy.clock_type import ClockType
 from rclpy.constants import S_TO_NS
 from rclpy.duration import Duration
-
-_imports.offer(__name__)
 
 _MAX = 2**63 - 1
 

@@ -6,7 +6,6 @@ import threading
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from rclpy import _imports
 from rclpy._dds import INFINITY
 from rclpy._handle import Handle
 from rclpy.callback_groups import CallbackGroup
@@ -18,8 +17,6 @@ from rclpy.utilities import get_default_context
 
 if TYPE_CHECKING:
     from rclpy.context import Context
-
-_imports.offer(__name__)
 
 TimerCallbackType = Callable[[], Any]
 

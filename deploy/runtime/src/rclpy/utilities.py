@@ -5,11 +5,9 @@ from __future__ import annotations
 import threading
 from collections.abc import Sequence
 
-from rclpy import _arguments, _imports
+from rclpy import _arguments
 from rclpy.constants import S_TO_NS
 from rclpy.context import Context
-
-_imports.offer(__name__)
 
 g_default_context: Context | None = None
 g_context_lock = threading.Lock()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, cast
 
-from rclpy import _imports
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.exceptions import NotInitializedException
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
@@ -14,8 +13,6 @@ from rclpy.task import Future
 if TYPE_CHECKING:
     from rclpy.node import Node
     from rclpy.subscription import Subscription
-
-_imports.offer(__name__)
 
 
 def wait_for_message(
