@@ -1,4 +1,4 @@
-"""Parameter values without quotes, typed as `rcl_yaml_param_parser` types them: it accepts more than YAML."""
+"""Types parameter values without quotes as `rcl_yaml_param_parser` does, which accepts more than YAML."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ _FLOAT = re.compile(
 
 
 def plain_scalar(text: str) -> bool | int | float | str:
-    """Type a scalar without quotes as C's strtoll and strtod do: an integer beyond 64 bits is a double."""
+    """Type a scalar without quotes as C's strtoll and strtod do. An integer beyond 64 bits is a double."""
     if text in _TRUE:
         return True
     if text in _FALSE:
         return False
-    # No 64 bit integer is longer than that, and Python refuses to convert thousands of digits.
+    # A 64 bit integer is never longer, and Python refuses to convert thousands of digits.
     if len(text) <= 66 and (number := _INTEGER.fullmatch(text)):
         integer = int(text, 16 if number["hexadecimal"] else 8 if number["octal"] else 10)
         if -(2**63) <= integer < 2**63:
             return integer
     if _FLOAT.fullmatch(text):
         value = float(re.sub(r"\.(?=[in])", "", text.lower()))
-        # A number too large for a double is none.
+        # A number too large for a double is text.
         if math.isfinite(value) or not text[-1].isdigit():
             return value
     return text

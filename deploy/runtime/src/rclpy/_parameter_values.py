@@ -1,4 +1,4 @@
-"""Parameter values on the command line: the value of `-p name:=value`."""
+"""Parses parameter values of the command line: the value in `-p name:=value`."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 from rclpy._parameter_scalars import plain_scalar
 
-# What makes a text more than a plain scalar, or may: only a YAML parser knows.
+# A text with any of these may be more than a plain scalar: a YAML parser decides.
 _NOT_PLAIN = re.compile(r"""[\[\]{}'"!&*|>#%@`:,?\\\s]|^-$|^---|^\.\.\.""")
 
 
@@ -15,9 +15,9 @@ def parse_value(text: str) -> Any:
     """
     Convert the value of `-p name:=value`.
 
-    :raises ValueError: if it is empty, no valid YAML, or neither a scalar nor a list of scalars of one type.
+    :raises ValueError: if it is empty, invalid YAML, or neither a scalar nor a list of scalars of one type.
     """
-    # Plain scalars, the usual case, need no YAML parser, which takes time to import.
+    # The usual case, a plain scalar, needs no YAML parser, which takes time to import.
     if not _NOT_PLAIN.search(text):
         return plain_scalar(text)
     from rclpy._parameter_files import parse_yaml_value
