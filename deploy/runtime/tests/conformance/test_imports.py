@@ -6,7 +6,7 @@ import importlib
 
 import pytest
 
-# Public programs import these. Most are at home elsewhere: rclpy's modules import them for their own use.
+# Public programs import these. Most are defined elsewhere: rclpy's modules import them for their own use.
 NAMES = {
     "rclpy.client": "Future SrvType SrvTypeRequest SrvTypeResponse",
     "rclpy.clock": "ClockType Duration JumpHandlePreCallbackType Time",
@@ -41,7 +41,7 @@ def test_names_that_programs_import_are_there(module: str) -> None:
     assert [name for name in NAMES[module].split() if not hasattr(here, name)] == []
 
 
-def test_imported_name_is_the_same_as_at_home() -> None:
+def test_imported_name_is_the_original() -> None:
     from rcl_interfaces.msg import Parameter, ParameterDescriptor
     from rclpy import callback_groups, executors, guard_condition, node, parameter
 

@@ -1,4 +1,4 @@
-"""The distribution: its wheel and source distribution, and what an environment has that installs it."""
+"""The runtime as a distribution: wheel, source distribution and installation."""
 
 from __future__ import annotations
 
