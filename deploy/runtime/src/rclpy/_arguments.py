@@ -16,7 +16,7 @@ from rclpy._parameter_values import parse_value
 from rclpy.exceptions import RCLInvalidROSArgsError, UnknownROSArgsError
 from rclpy.expand_topic_name import expand_topic_name
 from rclpy.impl.logging_severity import LoggingSeverity
-from rclpy.logging import get_logger
+from rclpy.impl.rcutils_logger import RcutilsLogger
 from rclpy.parameter import Parameter
 
 if TYPE_CHECKING:
@@ -178,7 +178,7 @@ class _Parser:
                 # Before `--ros-args` existed, remap rules were plain arguments. ROS 2 still accepts them.
                 if rule := _as_rule(argument):
                     self._remaps.append(rule)
-                    get_logger("rcl").warning(
+                    RcutilsLogger("rcl").warning(
                         f"Found remap rule '{argument}'. This syntax is deprecated. "
                         f"Use '--ros-args --remap {argument}' instead."
                     )

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from types import CodeType, FrameType
 from typing import Any
 
+from rclpy.clock_type import ClockType
 from rclpy.impl import _logging_levels, _logging_output
 from rclpy.impl.logging_severity import LoggingSeverity
 
@@ -49,11 +50,8 @@ class _Filters:
         self._skipped = False
         self._logged = False
         clock = options.get("throttle_time_source_type")
-        if options.get("throttle_duration_sec") and clock is not None:
-            from rclpy.clock import Clock
-
-            if not isinstance(clock, Clock):
-                raise ValueError(f'Received throttle_time_source_type of "{clock}" is not a clock instance')
+        if options.get("throttle_duration_sec") and clock is not None and not _is_clock(clock):
+            raise ValueError(f'Received throttle_time_source_type of "{clock}" is not a clock instance')
 
     def check_unchanged(self, severity: LoggingSeverity, name: str, options: dict[str, Any]) -> None:
         """
@@ -88,6 +86,11 @@ class _Filters:
                 return False
             self._logged = True
         return True
+
+
+def _is_clock(value: Any) -> bool:
+    # Not isinstance(value, Clock): the module of clocks imports that of contexts, and that one logging.
+    return isinstance(getattr(value, "clock_type", None), ClockType) and hasattr(value, "now")
 
 
 def _requested(options: dict[str, Any]) -> set[str]:
