@@ -49,6 +49,7 @@ bench: setup
 check: setup
 	@$(PY) -m ruff check .
 	@$(PY) -m ruff format --check --quiet .
+	@PYTHONPATH=deploy/runtime/src $(PY) -m rosidl_runtime_embedded.stubs --output deploy/runtime/build/stubs
 	@$(PY) -m mypy
 	@$(PY) -m mypy --config-file deploy/runtime/pyproject.toml
 	@.venv/bin/shellcheck deploy/commands/setup.sh .ci/run

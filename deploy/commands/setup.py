@@ -84,7 +84,7 @@ def fingerprint_of(distribution: Path) -> str:
     made = ("__pycache__", "egg-info")
     sources = (path for path in (distribution / "src").rglob("*") if path.is_file())
     kept = (path for path in sources if not any(part.endswith(made) for part in path.parts))
-    return _digest([distribution / "pyproject.toml", *sorted(kept)])
+    return _digest([distribution / "pyproject.toml", *distribution.glob("hatch_build.py"), *sorted(kept)])
 
 
 def _digest(files: Iterable[Path], *words: str) -> str:

@@ -1,6 +1,6 @@
 """rclpy, the ROS 2 client library for Python, on Eclipse Cyclone DDS and without a ROS installation.
 
-Names, signatures and behaviour are those of ROS 2 Jazzy; what is not supported raises NotImplementedError.
+Names, signatures and behaviour are those of ROS 2 Jazzy. Unsupported methods raise NotImplementedError.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ _executor: Executor | None = None
 
 
 def __getattr__(name: str) -> ModuleType:
-    """Import a submodule, such as ``rclpy.executors``, when it is first asked for."""
+    """Import a submodule, such as ``rclpy.executors``, on its first use."""
     if importlib.util.find_spec(f"{__name__}.{name}") is None:
         raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
     return importlib.import_module(f"{__name__}.{name}")
@@ -63,14 +63,14 @@ def init(
     signal_handler_options: SignalHandlerOptions | None = None,
 ) -> None:
     """
-    Begin.
+    Initialize a context: it joins the DDS domain.
 
-    :param args: command line arguments, ``sys.argv`` if ``None``; those after ``--ros-args`` count.
-    :param context: what to initialize; the default context if ``None``.
-    :param domain_id: DDS domain, by default the one that ``ROS_DOMAIN_ID`` names.
-    :param signal_handler_options: which signals shut down; by default SIGINT and SIGTERM, for the default
-        context.
-    :raises RuntimeError: if the context is initialized already.
+    :param args: command line arguments, ``sys.argv`` if ``None``; ROS arguments follow ``--ros-args``.
+    :param context: context to initialize; the default context if ``None``.
+    :param domain_id: DDS domain; by default the value of ``ROS_DOMAIN_ID``.
+    :param signal_handler_options: signals that shut down; by default SIGINT and SIGTERM for the default
+        context, none for others.
+    :raises RuntimeError: if the context is already initialized.
     """
     default = get_default_context()
     context = default if context is None else context
@@ -82,7 +82,7 @@ def init(
 
 
 def get_global_executor() -> Executor:
-    """Return the executor of :func:`spin` and its like, where none is given."""
+    """Return the executor that :func:`spin` and similar functions use by default."""
     global _executor
     if _executor is None:
         from rclpy.executors import SingleThreadedExecutor
@@ -94,7 +94,7 @@ def get_global_executor() -> Executor:
             global _executor
             ended, _executor = _executor, None
             if ended is not None:
-                # Without waiting: what a callback on another thread waits for may be held by who shuts down.
+                # Do not wait: a callback on another thread may wait for the thread that shuts down.
                 ended.shutdown(timeout_sec=0)
 
         get_default_context().on_shutdown(end)
@@ -103,11 +103,11 @@ def get_global_executor() -> Executor:
 
 def shutdown(*, context: Context | None = None, uninstall_handlers: bool | None = None) -> None:
     """
-    End: whoever spins returns.
+    Shut down a context: spinning ends.
 
-    :param context: what to shut down; the default context if ``None``.
-    :param uninstall_handlers: whether to handle signals no longer; by default so for the default context.
-    :raises RuntimeError: if the context does not run.
+    :param context: context to shut down; the default context if ``None``.
+    :param uninstall_handlers: whether to stop handling signals; by default, only for the default context.
+    :raises RuntimeError: if the context is not initialized or already shut down.
     """
     _shutdown(context=context)
     if uninstall_handlers is None:
@@ -158,7 +158,7 @@ def _with_executor(node: Node, executor: Executor | None, work: Callable[[Execut
 
 
 def spin_once(node: Node, *, executor: Executor | None = None, timeout_sec: float | None = None) -> None:
-    """Run one callback of ``node``, waiting at most ``timeout_sec`` for it (``None``: for ever)."""
+    """Run one callback of ``node``; wait for it at most ``timeout_sec`` (``None``: for ever)."""
     _with_executor(node, executor, lambda chosen: chosen.spin_once(timeout_sec))
 
 
@@ -175,7 +175,7 @@ def spin(node: Node, executor: Executor | None = None) -> None:
 def spin_until_future_complete(
     node: Node, future: Future, executor: Executor | None = None, timeout_sec: float | None = None
 ) -> None:
-    """Run the callbacks of ``node`` until ``future`` is done, but no longer than ``timeout_sec``."""
+    """Run the callbacks of ``node`` until ``future`` is done, or for ``timeout_sec``."""
     chosen = get_global_executor() if executor is None else executor
     was_added = chosen.add_node(node)
     try:

@@ -1,8 +1,8 @@
 """
-The command line of a ROS 2 process: what stands between `--ros-args` and `--`.
+Parses the ROS arguments of a command line: those between `--ros-args` and `--`.
 
-The grammar is that of docs.ros.org, "Passing ROS arguments to nodes via the command-line". For the values of
-`-p` see `_parameter_values`, for the files of `--params-file` `_parameter_files`.
+Source of the grammar: docs.ros.org, "Passing ROS arguments to nodes via the command-line".
+`_parameter_values` parses the values of `-p`, `_parameter_files` the files of `--params-file`.
 """
 
 from __future__ import annotations
@@ -10,13 +10,17 @@ from __future__ import annotations
 import re
 import sys
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
-from rclpy._parameter_values import NodeParameters, parse_value
+from rclpy._parameter_values import parse_value
 from rclpy.exceptions import RCLInvalidROSArgsError, UnknownROSArgsError
 from rclpy.expand_topic_name import expand_topic_name
 from rclpy.impl.logging_severity import LoggingSeverity
-from rclpy.logging import get_logger
+from rclpy.impl.rcutils_logger import RcutilsLogger
 from rclpy.parameter import Parameter
+
+if TYPE_CHECKING:
+    from rclpy._parameter_files import ParametersOfNodes
 
 _TOKEN = "[A-Za-z_][A-Za-z0-9_]*"
 _NAME = rf"(?:~/|/)?{_TOKEN}(?:/{_TOKEN})*"
@@ -26,7 +30,7 @@ _MOVE_NODE = re.compile(rf"{_NODE_PREFIX}__ns:=(?P<to>/(?:{_TOKEN}(?:/{_TOKEN})*
 _NO_NODE = "(?!__(?:node|name|ns):)"
 _KIND = "(?P<kind>rostopic://|rosservice://)?"
 _REMAP = re.compile(rf"{_NODE_PREFIX}{_KIND}{_NO_NODE}(?P<from>{_NAME}):=(?P<to>{_NAME})")
-# Character by character: of tokens in repetition, those that do not match would take for ever to be refused.
+# Matched by character: with repeated tokens, rejecting a name could take exponential time.
 _PARAMETER_NAME_PART = r"[A-Za-z_/](?:[A-Za-z_/]|(?<!/)[0-9])*"
 _PARAMETER_NAME = rf"{_PARAMETER_NAME_PART}(?:\.{_PARAMETER_NAME_PART})*"
 _PARAMETER = re.compile(rf"{_NODE_PREFIX}(?P<name>{_PARAMETER_NAME}):=(?P<value>.+)", re.DOTALL)
@@ -43,21 +47,21 @@ class RemapRule:
     kind: str | None = None
 
     def applies_to(self, node_name: str) -> bool:
-        """Tell whether the rule is meant for the node with that name."""
+        """Return whether the rule applies to the node with that name."""
         return self.node is None or self.node == node_name
 
 
 @dataclass(frozen=True, slots=True)
 class RosArguments:
     """
-    What a command line says to the nodes of a process.
+    The ROS arguments of a process, which apply to its nodes.
 
-    `log_level` is the default level, `log_levels` that of loggers by name; `None` and absent ones are not
-    given. `remaining` is the command line without its ROS arguments.
+    `log_level` is the default level (`None`: not given), `log_levels` maps names of loggers to their levels.
+    `remaining` is the command line without its ROS arguments.
     """
 
     remaps: tuple[RemapRule, ...] = ()
-    parameters: tuple[NodeParameters, ...] = ()
+    parameters: tuple[ParametersOfNodes, ...] = ()
     log_level: LoggingSeverity | None = None
     log_levels: dict[str, LoggingSeverity] = field(default_factory=dict)
     stdout_logs: bool = True
@@ -67,18 +71,18 @@ class RosArguments:
 
     def before(self, fallback: RosArguments) -> RosArguments:
         """
-        Return the arguments of a node that has some of its own and obeys those of its process (`fallback`).
+        Return these arguments of one node, completed by those of its process (`fallback`).
 
-        The node's own remaps are tried first, its own parameters win; all else is the process' business.
+        Remaps and parameters of the node win. All other arguments are those of the process.
         """
         return replace(
             fallback, remaps=self.remaps + fallback.remaps, parameters=fallback.parameters + self.parameters
         )
 
     def node_name(self, name: str, namespace: str) -> tuple[str, str]:
-        """Return the name and namespace that a node constructed with these gets."""
+        """Return name and namespace of a node after remapping."""
         name = self._replacement("__node", name) or name
-        # Prefixes of further rules mean the new name.
+        # The prefixes of further rules refer to the new name.
         return name, self._replacement("__ns", name) or namespace
 
     def remap_topic(self, fqn: str, node_name: str, node_namespace: str) -> str:
@@ -115,17 +119,17 @@ class RosArguments:
 
 def parse(argv: list[str] | None) -> RosArguments:
     """
-    Parse a command line, `sys.argv` if it is `None`.
+    Parse a command line, by default `sys.argv`.
 
     :raises RCLInvalidROSArgsError: if a ROS argument has an invalid value; the message is one line.
-    :raises UnknownROSArgsError: if a ROS argument is not known.
-    :raises NotImplementedError: if a ROS argument asks for what this runtime cannot do.
+    :raises UnknownROSArgsError: if a ROS argument is unknown.
+    :raises NotImplementedError: if this runtime does not support a ROS argument.
     """
     return _Parser(sys.argv if argv is None else argv).parse()
 
 
 def remove_ros_args(argv: list[str] | None) -> list[str]:
-    """Return a command line (`sys.argv` if it is `None`) without its ROS arguments, which are not checked."""
+    """Return a command line (by default `sys.argv`) without its ROS arguments; do not check those."""
     remaining = []
     ros = False
     for argument in sys.argv if argv is None else argv:
@@ -144,7 +148,7 @@ class _Parser:
     def __init__(self, argv: list[str]) -> None:
         self._argv = argv
         self._remaps: list[RemapRule] = []
-        self._parameters: NodeParameters = {}
+        self._parameters: ParametersOfNodes = {}
         self._log_level: LoggingSeverity | None = None
         self._log_levels: dict[str, LoggingSeverity] = {}
         self._switches = {"stdout": True, "rosout": True, "external-lib": True}
@@ -171,10 +175,10 @@ class _Parser:
             if argument == "--ros-args":
                 ros = True
             elif not ros:
-                # Before `--ros-args` existed, rules stood among the other arguments; ROS 2 still takes them.
+                # Before `--ros-args` existed, remap rules were plain arguments. ROS 2 still accepts them.
                 if rule := _as_rule(argument):
                     self._remaps.append(rule)
-                    get_logger("rcl").warning(
+                    RcutilsLogger("rcl").warning(
                         f"Found remap rule '{argument}'. This syntax is deprecated. "
                         f"Use '--ros-args --remap {argument}' instead."
                     )
@@ -224,7 +228,7 @@ class _Parser:
         self._parameters.setdefault(rule["node"] or _ALL_NODES, {})[name] = parameter
 
     def _parameter_file(self, flag: str, value: str) -> None:
-        # Here, since a YAML parser takes time to import.
+        # Imported on use: a YAML parser takes time to import.
         from rclpy._parameter_files import ParameterFileError, read_parameter_file
 
         try:
@@ -240,7 +244,7 @@ class _Parser:
             severity = LoggingSeverity[level.upper()]
         except KeyError:
             names = ", ".join(severity.name.lower() for severity in LoggingSeverity)
-            raise _invalid(flag, value, f"'{level}' is no severity ({names})") from None
+            raise _invalid(flag, value, f"'{level}' is not a severity ({names})") from None
         if not separator:
             self._log_level = severity
         elif logger:
@@ -252,11 +256,11 @@ class _Parser:
         self._enclave = value
 
     def _unsupported(self, flag: str, value: str) -> None:
-        raise NotImplementedError(f"{flag}: this runtime writes no log files of its own")
+        raise NotImplementedError(f"{flag}: not supported: this runtime writes no log files")
 
 
 def _as_rule(argument: str) -> RemapRule | None:
-    """Parse a remap rule; `None` if the argument is none."""
+    """Parse a remap rule; `None` if the argument is not one."""
     if match := _RENAME_NODE.fullmatch(argument):
         return RemapRule("__node", match["to"], match["node"])
     if match := _MOVE_NODE.fullmatch(argument):
@@ -267,9 +271,9 @@ def _as_rule(argument: str) -> RemapRule | None:
 
 
 def _matches(pattern: str, fqn: str) -> bool:
-    """Tell whether a node name of a parameter file, perhaps with wildcards, means the node `fqn`."""
+    """Return whether a node name of a parameter file, with or without wildcards, matches the node `fqn`."""
     absolute = pattern if pattern.startswith("/") else f"/{pattern}"
-    # `/*` is one token, `/**` any number of them.
+    # `/*` matches one token, `/**` any number of tokens.
     expression = re.escape(absolute).replace(r"/\*\*", r"(/\w+)*").replace(r"/\*", r"/\w+")
     return re.fullmatch(expression, fqn) is not None
 

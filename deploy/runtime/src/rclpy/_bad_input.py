@@ -1,4 +1,4 @@
-"""Samples that are no message of their type: dropped, counted, and reported once for each writer."""
+"""Malformed samples are dropped, counted, and logged once for each writer."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from rclpy._dds import Sample
 if TYPE_CHECKING:
     from rclpy.impl.rcutils_logger import RcutilsLogger
 
-# Writers come and go; a flood of short-lived ones must not fill the memory.
+# Bounds the memory: short-lived writers can come without end.
 _REMEMBERED_WRITERS = 1000
 
 
 class BadInput:
-    """What one reader has dropped."""
+    """The malformed samples of one reader."""
 
     def __init__(self, logger: RcutilsLogger, name: str) -> None:
         self._logger = logger
@@ -23,7 +23,7 @@ class BadInput:
         self.count = 0
 
     def drop(self, sample: Sample, reason: Exception) -> None:
-        """Count a malformed sample; log the first one of its writer."""
+        """Count a malformed sample; log the first of each writer."""
         self.count += 1
         if sample.publication_handle in self._writers:
             return
@@ -31,6 +31,6 @@ class BadInput:
             self._writers.clear()
         self._writers.add(sample.publication_handle)
         self._logger.warning(
-            f"dropped {len(sample.data)} octets on {self._name}: {reason}"
-            " (more of this writer is dropped silently)"
+            f"dropped a malformed message of {len(sample.data)} octets on {self._name}: {reason}"
+            " (others of this writer are dropped silently)"
         )

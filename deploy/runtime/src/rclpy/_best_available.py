@@ -1,6 +1,6 @@
-"""Policies that are "best available": chosen when an entity is made, from the endpoints that are known then.
+"""Resolves "best available" QoS policies when an entity is created, from the endpoints that are known then.
 
-Source of the choices: rmw_dds_common of Jazzy. They hold for the entity's life, whoever comes later.
+Source: rmw_dds_common of Jazzy. Endpoints that come later do not change the choice.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ _POLICIES = ("reliability", "durability", "liveliness", "deadline", "liveliness_
 
 
 def has_open_policy(profile: QoSProfile) -> bool:
-    """Whether a policy of the profile is to be chosen."""
+    """Whether a policy of the profile is "best available"."""
     return any(_is_open(profile, policy) for policy in _POLICIES)
 
 
 def for_subscription(profile: QoSProfile, publishers: list[QoSProfile]) -> QoSProfile:
-    """What to request, so that all publishers match: the most that every one of them offers."""
+    """Request the strictest policies that all publishers offer: so all of them match."""
     reliable = all(offered.reliability == ReliabilityPolicy.RELIABLE for offered in publishers)
     latched = all(offered.durability == DurabilityPolicy.TRANSIENT_LOCAL for offered in publishers)
     manual = all(offered.liveliness == LivelinessPolicy.MANUAL_BY_TOPIC for offered in publishers)
@@ -42,7 +42,7 @@ def for_subscription(profile: QoSProfile, publishers: list[QoSProfile]) -> QoSPr
 
 
 def for_publisher(profile: QoSProfile, subscriptions: list[QoSProfile]) -> QoSProfile:
-    """What to offer, so that all subscriptions match: the most that any of them requests, or more."""
+    """Offer at least the strictest policy that a subscription requests: so all of them match."""
     manual = any(requested.liveliness == LivelinessPolicy.MANUAL_BY_TOPIC for requested in subscriptions)
     leases = (requested.liveliness_lease_duration for requested in subscriptions)
     return _closed(
@@ -56,7 +56,7 @@ def for_publisher(profile: QoSProfile, subscriptions: list[QoSProfile]) -> QoSPr
 
 
 def for_service(profile: QoSProfile) -> QoSProfile:
-    """What a service and its clients use: the default of services."""
+    """Use the default policies of services, as all services and clients do."""
     default = qos_profile_services_default
     return _closed(profile, **{policy: getattr(default, policy) for policy in _POLICIES})
 
@@ -66,7 +66,7 @@ def _is_open(profile: QoSProfile, policy: str) -> bool:
 
 
 def _closed(profile: QoSProfile, **best: Any) -> QoSProfile:
-    """The profile with the best for what is open in it."""
+    """A copy of the profile whose "best available" policies have the given values."""
     if not has_open_policy(profile):
         return profile
     closed = profile._copy()

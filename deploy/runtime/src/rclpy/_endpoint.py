@@ -1,4 +1,4 @@
-"""What publishers, subscriptions, services and clients stand on: DDS entities that belong to a node."""
+"""DDS entities that belong to a node: the base of publishers, subscriptions, services and clients."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ class SubscriptionEndpoint:
 @dataclass(frozen=True)
 class ServiceEndpoint:
     """
-    Where a service or client writes and reads, its node, and the service's fully qualified name.
+    The DDS writer and reader of a service or client, its node, and the service's fully qualified name.
 
-    Its identifier is what its writer and reader announce.
+    Writer and reader announce the identifier in USER_DATA.
     """
 
     node: Node
@@ -47,7 +47,7 @@ class ServiceEndpoint:
 
 
 class Owner:
-    """Who uses DDS entities of a node until it is destroyed."""
+    """Base of publishers and subscriptions: uses DDS entities of a node until it is destroyed."""
 
     def __init__(self, node: Node, name: str, *entities: Writer | Reader) -> None:
         self._node = node
@@ -62,7 +62,7 @@ class Owner:
             raise InvalidHandle(f"cannot use a {kind} of {self._name} that was destroyed")
 
     def destroy(self) -> None:
-        """End it; whoever created it should use the node's method for that."""
+        """Destroy it. The node's ``destroy_…`` method also removes it from the node."""
         if not self._destroyed:
             self._destroyed = True
             for handler in self.event_handlers:

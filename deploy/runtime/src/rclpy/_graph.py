@@ -1,7 +1,7 @@
-"""The ROS graph: which nodes exist and what they publish, subscribe to, serve and call.
+"""The ROS graph: the nodes that exist, with their publishers, subscriptions, services and clients.
 
-DDS knows endpoints; which node they belong to travels on the topic ``ros_discovery_info``, where every
-process keeps its latest ``rmw_dds_common/msg/ParticipantEntitiesInfo`` (facts/wire_samples.json).
+DDS discovers endpoints. The topic ``ros_discovery_info`` tells which node they belong to: every process
+publishes its latest ``rmw_dds_common/msg/ParticipantEntitiesInfo`` there (facts/wire_samples.json).
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ NamesAndTypes = list[tuple[str, list[str]]]
 
 
 class NodeEntities:
-    """One node of some process: its name and the GUIDs of its readers and writers."""
+    """A node of any process: its name and the GUIDs of its readers and writers."""
 
     __slots__ = ("name", "namespace", "readers", "writers")
 
@@ -59,7 +59,7 @@ class NodeEntities:
 
 
 class _OwnNode(NodeEntities):
-    """A node of this process: its endpoints, too, and what to do when it is gone undestroyed."""
+    """A node of this process, with its endpoints and a callback for its garbage collection."""
 
     __slots__ = ("dropped", "endpoints")
 
@@ -70,9 +70,9 @@ class _OwnNode(NodeEntities):
 
 
 def encode(gid: bytes, nodes: list[NodeEntities]) -> bytes:
-    """CDR of a ParticipantEntitiesInfo: a participant's GUID and its nodes.
+    """Encode a participant's GUID and its nodes as a ParticipantEntitiesInfo in CDR.
 
-    Written here and not by the message class, whose arrays would cost every process the import of NumPy.
+    The message class is not used, because its arrays would make every process import NumPy.
     """
     data = bytearray(b"\x00\x01\x00\x00" + gid + struct.pack("<I", len(nodes)))
 
@@ -89,7 +89,7 @@ def encode(gid: bytes, nodes: list[NodeEntities]) -> bytes:
 
 
 def decode(data: bytes) -> tuple[bytes, list[NodeEntities]]:
-    """A participant's GUID and its nodes from CDR. Raises ValueError if it is malformed."""
+    """Decode a participant's GUID and its nodes from CDR. Raises ValueError if it is malformed."""
     position = 20
 
     def number() -> int:
@@ -109,7 +109,7 @@ def decode(data: bytes) -> tuple[bytes, list[NodeEntities]]:
         return data[position - count : position]
 
     if data[:2] != b"\x00\x01" or len(data) < position:
-        raise ValueError("no ParticipantEntitiesInfo")
+        raise ValueError("not a ParticipantEntitiesInfo")
     try:
         nodes = []
         for _ in range(number()):
@@ -123,13 +123,13 @@ def decode(data: bytes) -> tuple[bytes, list[NodeEntities]]:
     return data[4:20], nodes
 
 
-# Of more peers than these it is asked which of them are still alive.
+# With more peers than these, dead ones are removed.
 _MANY_PEERS = 100
-_REST = 0.1  # s between two looks at what peers announce, where nobody waits for it
+_PAUSE = 0.1  # [s], before announcements are read that no caller waits for
 
 
 class Graph:
-    """A process' view of the graph, and what it tells the others about its own nodes."""
+    """The graph as this process sees it; announces the nodes of this process to others."""
 
     def __init__(self, domain_id: int, enclave: str) -> None:
         self._lock = threading.RLock()
@@ -137,15 +137,15 @@ class Graph:
         hash_ = f"typehash={_TYPE_HASH};"
         self._writer = self.participant.create_writer(_TOPIC, _TYPE, _WRITER_QOS, hash_)
         self._reader = self.participant.create_reader(_TOPIC, _TYPE, _READER_QOS, hash_)
-        self._own: dict[weakref.ref[Node], _OwnNode] = {}  # a node that nobody else keeps shall go
+        self._own: dict[weakref.ref[Node], _OwnNode] = {}  # weak: they do not keep a node alive
         self._dropped: deque[weakref.ref[Node]] = deque()
         self._drops = GuardCondition()
         self._deferred = 0
-        self._announced: dict[bytes, Sample] = {}  # by a participant's GUID, until somebody asks
+        self._announced: dict[bytes, Sample] = {}  # by a participant's GUID; decoded on the first query
         self._bad_input = BadInput(get_logger("rclpy"), _TOPIC)
         self._peers: dict[bytes, list[NodeEntities]] = {}
         self._many_peers = _MANY_PEERS
-        self._discovery: Discovery | None = None  # made when somebody asks about the graph
+        self._discovery: Discovery | None = None  # made on the first query
         self._service_ids = 0
         self._waiting: set[GuardCondition] = set()
         self._waitset = WaitSet()
@@ -158,9 +158,9 @@ class Graph:
     def close(self) -> None:
         """Leave the domain."""
         self._closing.set()
-        with self._lock:  # in which the listening thread does what it does
+        with self._lock:  # held by the listening thread while it works
             for own in self._own.values():
-                for endpoint in own.endpoints:  # DDS ends them, too, but who writes on would not know
+                for endpoint in own.endpoints:  # so that later writes raise: DDS would close them silently
                     endpoint.close()
             self._own.clear()
             self._writer.close()
@@ -168,14 +168,14 @@ class Graph:
             self._drops.close()
             self.participant.close()
         if threading.current_thread() is not self._listener:
-            # Its end is at hand, unless a signal interrupted who holds the lock: that cannot wait for itself.
-            self._listener.join(_REST)
+            # With a timeout: if a signal interrupted the holder of the lock, the thread cannot end yet.
+            self._listener.join(_PAUSE)
 
-    # What this process tells
+    # Announcing the nodes of this process
 
     @contextmanager
     def one_announcement(self) -> Iterator[None]:
-        """Announce all changes within the ``with`` as one."""
+        """Announce all changes within the ``with`` at once, at its end."""
         with self._lock:
             self._deferred += 1
         try:
@@ -192,16 +192,16 @@ class Graph:
 
     def add_node(self, node: Node, dropped: Callable[[], None]) -> None:
         """
-        Announce a node of this process, until it is removed or the garbage collector takes it.
+        Announce a node of this process until it is removed or garbage-collected.
 
-        :param dropped: is called in the latter case, when its endpoints have ended; on a thread of the graph.
+        :param dropped: called on the graph's thread after a garbage collection and the closing of endpoints.
         """
         with self._lock:
             self._own[weakref.ref(node, self._drop)] = _OwnNode(node, dropped)
         self._announce()
 
     def remove_node(self, node: Node) -> None:
-        """Announce that a node is no more, and end what endpoints it still has."""
+        """Announce that a node is gone, and close its remaining endpoints."""
         self._remove(weakref.ref(node))
 
     def _remove(self, node: weakref.ref[Node]) -> _OwnNode | None:
@@ -214,10 +214,9 @@ class Graph:
 
     def _drop(self, node: weakref.ref[Node]) -> None:
         """
-        Leave word for the listening thread that a node is gone.
+        Tell the listening thread that a node was garbage-collected.
 
-        The garbage collector calls this on any thread, whatever that is doing and whatever locks it holds: so
-        this may wait for none.
+        The garbage collector calls this on any thread, which may hold any lock: this must not wait for one.
         """
         self._dropped.append(node)
         self._drops.trigger()
@@ -236,7 +235,7 @@ class Graph:
     def create_writer(
         self, node: Node, topic: str, msg_type: Any, profile: QoSProfile, extra: str = ""
     ) -> Writer:
-        """A writer of ``msg_type`` that belongs to ``node``; ``extra`` goes to USER_DATA before the hash."""
+        """Create a writer of ``node``; ``extra`` precedes the type hash in USER_DATA."""
         if _best_available.has_open_policy(profile):
             readers = [reader.profile for reader in self._discovered().readers() if reader.topic == topic]
             profile = _best_available.for_publisher(profile, readers)
@@ -254,7 +253,7 @@ class Graph:
     def create_reader(
         self, node: Node, topic: str, msg_type: Any, profile: QoSProfile, extra: str = ""
     ) -> Reader:
-        """A reader of ``msg_type`` that belongs to ``node``; ``extra`` goes to USER_DATA before the hash."""
+        """Create a reader of ``node``; ``extra`` precedes the type hash in USER_DATA."""
         if _best_available.has_open_policy(profile):
             writers = [writer.profile for writer in self._discovered().writers() if writer.topic == topic]
             profile = _best_available.for_subscription(profile, writers)
@@ -270,7 +269,7 @@ class Graph:
         return reader
 
     def destroy(self, node: Node, *endpoints: Writer | Reader) -> None:
-        """End readers and writers of ``node``."""
+        """Close readers and writers of ``node``."""
         gone = {endpoint.gid for endpoint in endpoints}
 
         def remove(own: _OwnNode) -> None:
@@ -283,22 +282,22 @@ class Graph:
             endpoint.close()
 
     def next_service_id(self) -> bytes:
-        """An identifier for the two endpoints of a service or client, unique in the domain."""
+        """Return an identifier for a service or client that is unique in the domain."""
         with self._lock:
             self._service_ids += 1
             return self.participant.gid[:12] + struct.pack(">I", self._service_ids)
 
-    # What the others tell
+    # Listening to the other processes
 
     def _listen(self) -> None:
-        """Take what peers announce as it comes: where nobody spins or asks, it would pile up.
+        """Take the announcements of peers, which would pile up if no executor spins and no query is made.
 
-        So there is a thread of its own for it, as in ROS 2.
+        This needs a separate thread, as in ROS 2.
         """
         while True:
             self._waitset.wait(INFINITY)
-            if not self._waiting:  # peers announce themselves often while they start: all of it at once, then
-                self._closing.wait(_REST)
+            if not self._waiting:  # starting peers announce themselves often: handle several announcements
+                self._closing.wait(_PAUSE)
             with self._lock:
                 if self._waitset.closed:
                     return
@@ -308,10 +307,10 @@ class Graph:
                     self._discovery.forget_gone()
                 for guard in self._waiting:
                     guard.trigger()
-            self._remove_dropped()  # without the lock: who hears of it may wait for others
+            self._remove_dropped()  # without the lock: the callbacks may wait for other threads
 
     def _take(self) -> None:
-        """Note what peers have announced."""
+        """Keep the latest announcement of each peer."""
         with self._lock:
             while (sample := self._reader.take()) is not None:
                 self._announced[sample.data[4:20]] = sample
@@ -320,7 +319,7 @@ class Graph:
                 self._many_peers = max(_MANY_PEERS, 2 * len(self._peers))
 
     def _forget_dead_peers(self) -> None:
-        """Read what was announced, and keep that of participants that exist."""
+        """Decode the announcements; keep those of participants that exist."""
         while self._announced:
             sample = self._announced.popitem()[1]
             try:
@@ -344,11 +343,11 @@ class Graph:
         self, condition: Callable[[], bool], timeout: float | None, alive: Callable[[], bool]
     ) -> bool:
         """
-        Wait until ``condition`` is true, looking anew whenever the graph changes.
+        Wait until ``condition`` is true; check it whenever the graph changes.
 
-        :param timeout: seconds; ``None`` or negative for ever.
-        :param alive: asked at least ten times a second; the wait ends when it says no.
-        :return: whether the condition came true.
+        :param timeout: [s]; ``None`` or negative: for ever.
+        :param alive: called at least ten times a second; the wait ends when it returns False.
+        :return: whether the condition became true.
         """
         deadline = None if timeout is None or timeout < 0 else time.monotonic() + timeout
         waitset, guard = WaitSet(), GuardCondition()
@@ -372,7 +371,7 @@ class Graph:
             guard.close()
 
     def _nodes(self) -> Iterator[tuple[bytes, NodeEntities]]:
-        """Every node that is known, with its participant's GUID."""
+        """Every known node, with its participant's GUID."""
         with self._lock:
             self._take()
             self._forget_dead_peers()
@@ -383,7 +382,7 @@ class Graph:
                     yield gid, node
 
     def node_names(self) -> list[tuple[str, str, str]]:
-        """Name, namespace and enclave of every node."""
+        """Return name, namespace and enclave of every node."""
         enclaves = self._discovered().participants()
         return [
             (node.name, node.namespace, user_data_value(enclaves.get(gid, ""), "enclave") or "/")
@@ -391,7 +390,7 @@ class Graph:
         ]
 
     def _with_owners(self, endpoints: list[Endpoint]) -> list[tuple[Endpoint, str, str]]:
-        """Each with name and namespace of its node, as ROS 2 names what it does not know."""
+        """Each endpoint with name and namespace of its node, or ROS 2's names for an unknown node."""
         nodes: dict[bytes, list[NodeEntities]] = {}
         for gid, node in self._nodes():
             nodes.setdefault(gid, []).append(node)
@@ -401,11 +400,11 @@ class Graph:
         return self._discovered().writers() + self._discovered().readers()
 
     def topic_names_and_types(self, no_demangle: bool) -> NamesAndTypes:
-        """Every topic that has a reader or writer, with its types."""
+        """Return every topic that has a reader or writer, with its types."""
         return _collect_topics(self._writers_and_readers(), no_demangle)
 
     def service_names_and_types(self) -> NamesAndTypes:
-        """Every service that has a server or client, with its types."""
+        """Return every service that has a server or client, with its types."""
         return _collect_services(self._writers_and_readers())
 
     def _of_node(self, name: str, namespace: str, kind: str, endpoints: list[Endpoint]) -> list[Endpoint]:
@@ -420,44 +419,44 @@ class Graph:
         return [endpoint for endpoint in endpoints if endpoint.gid in gids]
 
     def publishers_of_node(self, name: str, namespace: str, no_demangle: bool) -> NamesAndTypes:
-        """The topics that a node publishes."""
+        """Return the topics that a node publishes."""
         writers = self._of_node(name, namespace, "writers", self._discovered().writers())
         return _collect_topics(writers, no_demangle)
 
     def subscriptions_of_node(self, name: str, namespace: str, no_demangle: bool) -> NamesAndTypes:
-        """The topics that a node subscribes to."""
+        """Return the topics that a node subscribes to."""
         readers = self._of_node(name, namespace, "readers", self._discovered().readers())
         return _collect_topics(readers, no_demangle)
 
     def services_of_node(self, name: str, namespace: str) -> NamesAndTypes:
-        """The services that a node serves: it reads their requests."""
+        """Return the services that a node serves: it reads their requests."""
         readers = self._of_node(name, namespace, "readers", self._discovered().readers())
         return _collect_services([reader for reader in readers if reader.topic.startswith("rq/")])
 
     def clients_of_node(self, name: str, namespace: str) -> NamesAndTypes:
-        """The services that a node calls: it reads their replies."""
+        """Return the services that a node calls: it reads their replies."""
         readers = self._of_node(name, namespace, "readers", self._discovered().readers())
         return _collect_services([reader for reader in readers if reader.topic.startswith("rr/")])
 
     def writers_of(self, dds_topic: str) -> list[tuple[Endpoint, str, str]]:
-        """The writers on a topic, each with its node's name and namespace."""
+        """Return the writers on a topic, each with its node's name and namespace."""
         return self._with_owners([w for w in self._discovered().writers() if w.topic == dds_topic])
 
     def readers_of(self, dds_topic: str) -> list[tuple[Endpoint, str, str]]:
-        """The readers on a topic, each with its node's name and namespace."""
+        """Return the readers on a topic, each with its node's name and namespace."""
         return self._with_owners([r for r in self._discovered().readers() if r.topic == dds_topic])
 
     def count_writers(self, dds_topic: str) -> int:
-        """How many writers a topic has."""
+        """Return the number of writers on a topic."""
         return sum(writer.topic == dds_topic for writer in self._discovered().writers())
 
     def count_readers(self, dds_topic: str) -> int:
-        """How many readers a topic has."""
+        """Return the number of readers on a topic."""
         return sum(reader.topic == dds_topic for reader in self._discovered().readers())
 
 
 def _owner(endpoint: Endpoint, nodes: list[NodeEntities]) -> tuple[str, str]:
-    """Name and namespace of that node of the endpoint's participant which has it."""
+    """Name and namespace of the endpoint's node, which is one of its participant's nodes."""
     for node in nodes:
         if endpoint.gid in node.readers or endpoint.gid in node.writers:
             return node.name, node.namespace

@@ -1,4 +1,4 @@
-"""Handles: what stands for an entity in code that was written for rclpy's C layer."""
+"""Handles: they represent entities in code that was written for rclpy's C layer."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from types import TracebackType
 
 class Handle:
     """
-    An entity, or what stands for it, as the subject of a ``with``.
+    An entity, or its representative, as the subject of a ``with``.
 
-    In rclpy the ``with`` keeps the entity from being destroyed meanwhile. Here nothing breaks when it is, so
-    the ``with`` does nothing.
+    In rclpy, the ``with`` delays the destruction of the entity. Here the destruction of an entity in use is
+    safe, so the ``with`` does nothing.
     """
 
     def __enter__(self) -> None:
-        """Begin to use it."""
+        """Do nothing."""
 
     def __exit__(
         self,
@@ -22,4 +22,4 @@ class Handle:
         exc_val: BaseException | None,
         exc_tb: TracebackType | None,
     ) -> None:
-        """Use it no longer."""
+        """Do nothing."""

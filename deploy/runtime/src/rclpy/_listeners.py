@@ -1,4 +1,4 @@
-"""Who is told of something."""
+"""A weak set of objects to notify, which may change while it is iterated."""
 
 from __future__ import annotations
 
@@ -11,21 +11,21 @@ Listener = TypeVar("Listener")
 
 class Listeners(Generic[Listener]):
     """
-    A set of objects that are told of something as long as others keep them alive.
+    A set of objects that does not keep them alive.
 
-    It may change while it is iterated, on other threads or in a signal's handler, where a ``WeakSet`` fails
-    and a lock may be held already: who is there is noted in one step, when the iteration begins.
+    Other threads and signal handlers may change it during an iteration: a ``WeakSet`` would fail, and a lock
+    may already be held by the interrupted thread. An iteration copies the references first, in one step.
     """
 
     def __init__(self) -> None:
         self._listeners: WeakValueDictionary[int, Listener] = WeakValueDictionary()
 
     def add(self, listener: Listener) -> None:
-        """Tell this one, too."""
+        """Add an object."""
         self._listeners[id(listener)] = listener
 
     def discard(self, listener: Listener) -> None:
-        """Tell this one no longer, if it was told."""
+        """Remove an object if it is in the set."""
         self._listeners.pop(id(listener), None)
 
     def __iter__(self) -> Iterator[Listener]:

@@ -1,4 +1,4 @@
-"""What a node can ask about the graph: the part of `Node` that looks at others."""
+"""The part of `Node` that queries the graph."""
 
 from __future__ import annotations
 
@@ -17,90 +17,90 @@ if TYPE_CHECKING:
 
 class NodeGraph(NodeNames):
     """
-    Names, types and endpoints in the node's domain, as far as discovery has found them by now.
+    Names, types and endpoints in the node's domain that discovery has found so far.
 
-    Everything here raises InvalidHandle when the node was destroyed, and RCLError after the shutdown.
+    Every query raises InvalidHandle if the node was destroyed, and RCLError after the shutdown.
     """
 
     _rclpy_graph: Graph
 
-    def _rclpy_asked(self) -> Graph:
-        """The graph, for a node that may ask."""
+    def _rclpy_usable_graph(self) -> Graph:
+        """The graph. Raises InvalidHandle or RCLError if the node cannot be used."""
         self._rclpy_check_usable()
         return self._rclpy_graph
 
     def get_node_names(self) -> list[str]:
         """Return the names of all nodes, without namespaces."""
-        return [name for name, _, _ in self._rclpy_asked().node_names()]
+        return [name for name, _, _ in self._rclpy_usable_graph().node_names()]
 
     def get_fully_qualified_node_names(self) -> list[str]:
         """Return the names of all nodes, with their namespaces."""
-        return _full_names(self._rclpy_asked())
+        return _full_names(self._rclpy_usable_graph())
 
     def get_node_names_and_namespaces(self) -> list[tuple[str, str]]:
         """Return name and namespace of every node."""
-        return [(name, namespace) for name, namespace, _ in self._rclpy_asked().node_names()]
+        return [(name, namespace) for name, namespace, _ in self._rclpy_usable_graph().node_names()]
 
     def get_node_names_and_namespaces_with_enclaves(self) -> list[tuple[str, str, str]]:
         """Return name, namespace and enclave of every node."""
-        return self._rclpy_asked().node_names()
+        return self._rclpy_usable_graph().node_names()
 
     def get_topic_names_and_types(self, no_demangle: bool = False) -> NamesAndTypes:
-        """Return every topic with its types; with ``no_demangle`` by its DDS names, ROS or not."""
-        return self._rclpy_asked().topic_names_and_types(no_demangle)
+        """Return every topic with its types; with ``no_demangle``, every DDS topic by its DDS names."""
+        return self._rclpy_usable_graph().topic_names_and_types(no_demangle)
 
     def get_service_names_and_types(self) -> NamesAndTypes:
         """Return every service with its types."""
-        return self._rclpy_asked().service_names_and_types()
+        return self._rclpy_usable_graph().service_names_and_types()
 
     def get_publisher_names_and_types_by_node(
         self, node_name: str, node_namespace: str, no_demangle: bool = False
     ) -> NamesAndTypes:
-        """Return the topics that a node publishes. Raises NodeNameNonExistentError if it is not known."""
-        return self._rclpy_asked().publishers_of_node(node_name, node_namespace, no_demangle)
+        """Return the topics that a node publishes. Raises NodeNameNonExistentError if it is unknown."""
+        return self._rclpy_usable_graph().publishers_of_node(node_name, node_namespace, no_demangle)
 
     def get_subscriber_names_and_types_by_node(
         self, node_name: str, node_namespace: str, no_demangle: bool = False
     ) -> NamesAndTypes:
-        """Return the topics that a node subscribes to. Raises NodeNameNonExistentError if it is not known."""
-        return self._rclpy_asked().subscriptions_of_node(node_name, node_namespace, no_demangle)
+        """Return the topics that a node subscribes to. Raises NodeNameNonExistentError if it is unknown."""
+        return self._rclpy_usable_graph().subscriptions_of_node(node_name, node_namespace, no_demangle)
 
     def get_service_names_and_types_by_node(self, node_name: str, node_namespace: str) -> NamesAndTypes:
-        """Return the services that a node serves. Raises NodeNameNonExistentError if it is not known."""
-        return self._rclpy_asked().services_of_node(node_name, node_namespace)
+        """Return the services that a node serves. Raises NodeNameNonExistentError if it is unknown."""
+        return self._rclpy_usable_graph().services_of_node(node_name, node_namespace)
 
     def get_client_names_and_types_by_node(self, node_name: str, node_namespace: str) -> NamesAndTypes:
-        """Return the services that a node calls. Raises NodeNameNonExistentError if it is not known."""
-        return self._rclpy_asked().clients_of_node(node_name, node_namespace)
+        """Return the services that a node calls. Raises NodeNameNonExistentError if it is unknown."""
+        return self._rclpy_usable_graph().clients_of_node(node_name, node_namespace)
 
     def count_publishers(self, topic_name: str) -> int:
-        """Return how many publishers a topic has; its name is not remapped."""
-        return self._rclpy_asked().count_writers(self._rclpy_counted_topic(topic_name))
+        """Return the number of publishers on a topic; its name is not remapped."""
+        return self._rclpy_usable_graph().count_writers(self._rclpy_counted_topic(topic_name))
 
     def count_subscribers(self, topic_name: str) -> int:
-        """Return how many subscriptions a topic has; its name is not remapped."""
-        return self._rclpy_asked().count_readers(self._rclpy_counted_topic(topic_name))
+        """Return the number of subscriptions to a topic; its name is not remapped."""
+        return self._rclpy_usable_graph().count_readers(self._rclpy_counted_topic(topic_name))
 
     def count_services(self, service_name: str) -> int:
-        """Return how many servers a service has; its name is not remapped."""
-        return self._rclpy_asked().count_readers(self._rclpy_counted_requests(service_name))
+        """Return the number of servers of a service; its name is not remapped."""
+        return self._rclpy_usable_graph().count_readers(self._rclpy_counted_requests(service_name))
 
     def count_clients(self, service_name: str) -> int:
-        """Return how many clients a service has; its name is not remapped."""
-        return self._rclpy_asked().count_writers(self._rclpy_counted_requests(service_name))
+        """Return the number of clients of a service; its name is not remapped."""
+        return self._rclpy_usable_graph().count_writers(self._rclpy_counted_requests(service_name))
 
     def get_publishers_info_by_topic(
         self, topic_name: str, no_mangle: bool = False
     ) -> list[TopicEndpointInfo]:
-        """Return who publishes a topic, and how; with ``no_mangle`` the topic's name is a DDS name."""
-        found = self._rclpy_asked().writers_of(self._rclpy_dds_topic(topic_name, no_mangle))
+        """Return the publishers on a topic; with ``no_mangle``, the topic's name is a DDS name."""
+        found = self._rclpy_usable_graph().writers_of(self._rclpy_dds_topic(topic_name, no_mangle))
         return [_info(*one, TopicEndpointTypeEnum.PUBLISHER) for one in found]
 
     def get_subscriptions_info_by_topic(
         self, topic_name: str, no_mangle: bool = False
     ) -> list[TopicEndpointInfo]:
-        """Return who subscribes to a topic, and how; with ``no_mangle`` the topic's name is a DDS name."""
-        found = self._rclpy_asked().readers_of(self._rclpy_dds_topic(topic_name, no_mangle))
+        """Return the subscriptions to a topic; with ``no_mangle``, the topic's name is a DDS name."""
+        found = self._rclpy_usable_graph().readers_of(self._rclpy_dds_topic(topic_name, no_mangle))
         return [_info(*one, TopicEndpointTypeEnum.SUBSCRIPTION) for one in found]
 
     def _rclpy_dds_topic(self, name: str, no_mangle: bool = False) -> str:
@@ -113,9 +113,9 @@ class NodeGraph(NodeNames):
         return _names.request_to_dds(self._rclpy_expanded(name, is_service=True))
 
     def wait_for_node(self, fully_qualified_node_name: str, timeout: float) -> bool:
-        """Wait until a node is there; ``False`` if that takes longer than ``timeout`` seconds."""
+        """Wait until a node exists; return ``False`` after ``timeout`` seconds."""
         name = "/" + fully_qualified_node_name.lstrip("/")
-        graph = self._rclpy_asked()
+        graph = self._rclpy_usable_graph()
         return graph.wait_for(lambda: name in _full_names(graph), timeout, self.context.ok)
 
 

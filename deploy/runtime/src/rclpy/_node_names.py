@@ -1,4 +1,4 @@
-"""Who a node is, and what names mean in its mouth: the part of `Node` that concerns names."""
+"""The part of `Node` that concerns names: its own, and the resolution of topic and service names."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ if TYPE_CHECKING:
 
 class NodeNames:
     """
-    The node's own name, and those that it gives to topics and services.
+    The node's name, and the expanded and remapped names of its topics and services.
 
-    Users subclass `Node`, and take any private name that rclpy's does not have for their own: what only the
-    embedded runtime has, here and in the other parts of `Node`, begins with ``_rclpy_``.
+    Subclasses by users may use any private name that rclpy's `Node` does not have. To avoid collisions, the
+    private names that only this runtime has begin with ``_rclpy_``, in all parts of `Node`.
     """
 
     _context: Context
@@ -31,12 +31,12 @@ class NodeNames:
 
     @property
     def context(self) -> Context:
-        """The context it belongs to."""
+        """The context of the node."""
         return self._context
 
     @property
     def handle(self) -> Handle:
-        """What stands for the node. Raises InvalidHandle when it was destroyed."""
+        """A handle for the node. Raises InvalidHandle if the node was destroyed."""
         self._rclpy_check_exists()
         return Handle()
 
@@ -46,9 +46,9 @@ class NodeNames:
 
     def _rclpy_check_usable(self) -> None:
         """
-        Check that it can be used in its domain.
+        Check that the node can be used in its domain.
 
-        :raises InvalidHandle: if it was destroyed.
+        :raises InvalidHandle: if the node was destroyed.
         :raises RCLError: if the context was shut down.
         """
         self._rclpy_check_exists()
@@ -56,15 +56,15 @@ class NodeNames:
             raise RCLError(f"cannot use node {self._rclpy_fully_qualified_name}: the context was shut down")
 
     def get_name(self) -> str:
-        """Return its name."""
+        """Return the node's name."""
         return self._rclpy_name
 
     def get_namespace(self) -> str:
-        """Return its namespace."""
+        """Return the node's namespace."""
         return self._rclpy_namespace
 
     def get_fully_qualified_name(self) -> str:
-        """Return its namespace and name."""
+        """Return the node's namespace and name."""
         return self._rclpy_fully_qualified_name
 
     def resolve_topic_name(self, topic: str, *, only_expand: bool = False) -> str:
@@ -94,15 +94,15 @@ class NodeNames:
         """
         Return the fully qualified name of a topic or service.
 
-        :raises ValueError: if the name as it stands is invalid.
-        :raises InvalidTopicNameException, InvalidServiceNameException: if it is once expanded.
+        :raises ValueError: if the given name is invalid.
+        :raises InvalidTopicNameException, InvalidServiceNameException: if the expanded name is invalid.
         """
         expanded = expand_topic_name(name, self._rclpy_name, self._rclpy_namespace)
         validate_full_topic_name(expanded, is_service=is_service)
         return expanded
 
     def _rclpy_remapped(self, name: str, *, is_service: bool = False) -> str:
-        """Return the fully qualified name, remapped. Raises what :meth:`_rclpy_expanded` does."""
+        """Return the fully qualified, remapped name; errors as in :meth:`_rclpy_expanded`."""
         remap = self._rclpy_arguments.remap_service if is_service else self._rclpy_arguments.remap_topic
         return remap(
             self._rclpy_expanded(name, is_service=is_service), self._rclpy_name, self._rclpy_namespace

@@ -1,4 +1,4 @@
-"""The parameters of a node: the part of `Node` that declares, sets and describes them."""
+"""The part of `Node` that declares, sets and describes parameters."""
 
 from __future__ import annotations
 
@@ -33,26 +33,26 @@ if TYPE_CHECKING:
     from rclpy.clock import Clock
 
 _DEPTH_RECURSIVE = 0
-"""`rcl_interfaces/srv/ListParameters`: list names however deep they are."""
+"""`rcl_interfaces/srv/ListParameters`: list names of any depth."""
 
 
 class NodeParameters(NodeNames):
     """
-    Parameters by name, each with a descriptor, and the callbacks that have a say in them.
+    Parameters by name, each with a descriptor, and the callbacks that check and observe changes.
 
-    A node inherits from this class, calls `_rclpy_init_parameters` when its clock exists and publishes what
-    it is handed in `_rclpy_publish_parameter_event`.
+    A node inherits from this class, calls `_rclpy_init_parameters` when its clock exists, and implements
+    `_rclpy_publish_parameter_event`.
     """
 
     PARAM_REL_TOL = 1e-6
-    """How close a double must be to a bound or step of its range, relative to its value."""
+    """Relative tolerance with which a double must meet a bound or step of its range."""
 
     def _rclpy_init_parameters(self, overrides: dict[str, Parameter], *, allow_undeclared: bool) -> None:
         """
-        Begin without parameters.
+        Initialize the node without parameters.
 
-        :param overrides: values that take the place of those given at declaration.
-        :param allow_undeclared: whether undeclared parameters may be set, and read as not set.
+        :param overrides: values that replace those given at declaration.
+        :param allow_undeclared: whether undeclared parameters can be set, and read as not set.
         """
         self._parameters: dict[str, Parameter] = {}
         self._descriptors: dict[str, ParameterDescriptor] = {}
@@ -71,7 +71,7 @@ class NodeParameters(NodeNames):
         )
 
     def _rclpy_publish_parameter_event(self, event: ParameterEvent) -> None:
-        """Tell the world what has changed: the node publishes on `/parameter_events`."""
+        """Publish a change on `/parameter_events`."""
         raise NotImplementedError
 
     def get_clock(self) -> Clock:
@@ -91,10 +91,10 @@ class NodeParameters(NodeNames):
         Declare a parameter and set it to its override, else to `value`.
 
         :param value: the default, or a `Parameter.Type` to leave the parameter uninitialized.
-        :param descriptor: its name and type are ignored: the name is `name`, the type that of the value.
-        :param ignore_override: whether to set `value` although there is an override.
-        :returns: the parameter as it is now.
-        :raises ParameterAlreadyDeclaredException: if it was declared before.
+        :param descriptor: its name and type are ignored: they follow from `name` and the value.
+        :param ignore_override: whether to set `value` even if there is an override.
+        :returns: the declared parameter.
+        :raises ParameterAlreadyDeclaredException: if it is already declared.
         :raises InvalidParameterException: if the name is invalid.
         :raises InvalidParameterTypeException: if the override is not of the declared type.
         :raises InvalidParameterValueException: if the descriptor or a callback rejects the value.
@@ -113,9 +113,9 @@ class NodeParameters(NodeNames):
         """
         Declare several parameters; see `declare_parameter`.
 
-        :param namespace: is put before all names, with a dot between, unless it is empty.
-        :param parameters: name, optionally a value or type, optionally a descriptor of each.
-        :raises TypeError: if one of the tuples is not of that form.
+        :param namespace: prefix of all names, separated by a dot, unless it is empty.
+        :param parameters: tuples of name, optionally value or type, and optionally descriptor.
+        :raises TypeError: if a tuple does not have this form.
         """
         declared: list[tuple[Parameter, ParameterDescriptor]] = []
         for index, declaration in enumerate(parameters):
@@ -147,7 +147,7 @@ class NodeParameters(NodeNames):
 
     def undeclare_parameter(self, name: str) -> None:
         """
-        Forget a parameter; no callback is called and no event published.
+        Remove a parameter, without callbacks and without an event.
 
         :raises ParameterNotDeclaredException: if it is not declared.
         :raises ParameterImmutableException: if it is read-only.
@@ -162,21 +162,21 @@ class NodeParameters(NodeNames):
     # Reading
 
     def has_parameter(self, name: str) -> bool:
-        """Tell whether a parameter is declared."""
+        """Return whether a parameter is declared."""
         return name in self._parameters
 
     def get_parameter_types(self, names: list[str]) -> list[Parameter.Type]:
         """
         Return the types of parameters; see `get_parameter_type`.
 
-        :raises TypeError: if a name is no string.
+        :raises TypeError: if a name is not a string.
         """
         _check_names(names)
         return [self.get_parameter_type(name) for name in names]
 
     def get_parameter_type(self, name: str) -> Parameter.Type:
         """
-        Return the number of a parameter's type, as rclpy does; NOT_SET for one that need not be declared.
+        Return the number of a parameter's type, as rclpy does; NOT_SET if it need not be declared and is not.
 
         :raises ParameterNotDeclaredException: if it is not declared and must be.
         """
@@ -190,17 +190,17 @@ class NodeParameters(NodeNames):
         """
         Return parameters; see `get_parameter`.
 
-        :raises TypeError: if a name is no string.
+        :raises TypeError: if a name is not a string.
         """
         _check_names(names)
         return [self.get_parameter(name) for name in names]
 
     def get_parameter(self, name: str) -> Parameter:
         """
-        Return a parameter; one that is not set, for a name that need not be declared.
+        Return a parameter. If it need not be declared and is not, its type is NOT_SET.
 
         :raises ParameterNotDeclaredException: if it is not declared and must be.
-        :raises ParameterUninitializedException: if it was declared by its type only and never set.
+        :raises ParameterUninitializedException: if it was declared with a type only and never set.
         """
         parameter = self._parameters.get(name)
         if parameter is None:
@@ -212,7 +212,7 @@ class NodeParameters(NodeNames):
         return parameter
 
     def get_parameter_or(self, name: str, alternative_value: Parameter | None = None) -> Parameter:
-        """Return a parameter, or the alternative (by default one that is not set) if it has no value."""
+        """Return a parameter; if it has no value, the alternative (by default one of type NOT_SET)."""
         parameter = self._parameters.get(name)
         if parameter is None or parameter.type_ is Parameter.Type.NOT_SET:
             return Parameter(name, Parameter.Type.NOT_SET) if alternative_value is None else alternative_value
@@ -220,9 +220,9 @@ class NodeParameters(NodeNames):
 
     def get_parameters_by_prefix(self, prefix: str) -> dict[str, Parameter]:
         """
-        Return the parameters below `prefix` by the rest of their names; all of them if it is empty.
+        Return the parameters below `prefix`, by their names without it; all if `prefix` is empty.
 
-        rclpy returns `Parameter`s too, though its annotation speaks of values.
+        rclpy also returns `Parameter`s, although its annotation says values.
         """
         start = f"{prefix}{PARAMETER_SEPARATOR_STRING}" if prefix else ""
         return {
@@ -233,9 +233,9 @@ class NodeParameters(NodeNames):
 
     def list_parameters(self, prefixes: list[str], depth: int) -> ListParametersResult:
         """
-        List the names of parameters, and the prefixes that they have.
+        List the names of parameters, and their prefixes.
 
-        :param prefixes: list those below (or with exactly) these names; all if there are none.
+        :param prefixes: list parameters with or below these names; all parameters if the list is empty.
         :param depth: list names with fewer dots than this below the prefix; 0: all.
         :raises TypeError: if an argument is of the wrong type.
         :raises ValueError: if `depth` is negative.
@@ -257,20 +257,20 @@ class NodeParameters(NodeNames):
 
     def set_parameters(self, parameter_list: list[Parameter]) -> list[SetParametersResult]:
         """
-        Set parameters one after the other; setting one to NOT_SET undeclares it.
+        Set parameters one by one; setting a parameter to NOT_SET undeclares it.
 
         :returns: for each, whether it was set, and the reason if not.
-        :raises ParameterNotDeclaredException: at the first one that is not declared and must be; those before
-            it stay set.
+        :raises ParameterNotDeclaredException: for the first parameter that is not declared and must be; the
+            ones before it stay set.
         """
         return [self._set_parameters_atomically([parameter]) for parameter in parameter_list]
 
     def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
         """
-        Set all these parameters, or none of them; setting one to NOT_SET undeclares it.
+        Set all parameters or none; setting a parameter to NOT_SET undeclares it.
 
         :returns: whether they were set, and the reason if not.
-        :raises ParameterNotDeclaredException: if one of them is not declared and must be.
+        :raises ParameterNotDeclaredException: if a parameter is not declared and must be.
         """
         return self._set_parameters_atomically(parameter_list)
 
@@ -302,9 +302,9 @@ class NodeParameters(NodeNames):
         keep_unset: bool = False,
     ) -> SetParametersResult:
         """
-        Check and ask, then set, publish and tell.
+        Check the values, ask the callbacks, set the parameters, publish the event, notify the callbacks.
 
-        :param descriptors: new descriptors of all parameters; those there are apply if `None`.
+        :param descriptors: new descriptors of all parameters; `None`: their current ones.
         :param keep_unset: whether to store parameters that are not set, instead of undeclaring them.
         """
         for parameter in parameters:
@@ -331,14 +331,14 @@ class NodeParameters(NodeNames):
             self._rclpy_store(parameter, descriptors[parameter.name] if descriptors else None)
         event.stamp = self.get_clock().now().to_msg()
         self._rclpy_publish_parameter_event(event)
-        for tell in list(self._post_set_parameters_callbacks):
-            tell(parameters)
+        for notify in list(self._post_set_parameters_callbacks):
+            notify(parameters)
         return SetParametersResult(successful=True)
 
     def _rclpy_objection(
         self, parameter: Parameter, descriptor: ParameterDescriptor | None, *, new: bool
     ) -> str:
-        """Say why a parameter cannot be set so; '' if it can. A new descriptor's read-only is for later."""
+        """Return why a parameter cannot be set; '' if it can. A `new` descriptor may be read-only."""
         if descriptor is None:
             return ""
         if descriptor.read_only and not new:
@@ -349,7 +349,7 @@ class NodeParameters(NodeNames):
         return objection(parameter, descriptor, self.PARAM_REL_TOL)
 
     def _rclpy_store(self, parameter: Parameter, descriptor: ParameterDescriptor | None) -> None:
-        """Set a parameter that passed all checks; without any descriptor it is dynamically typed."""
+        """Set a parameter that passed all checks; without a descriptor, it is dynamically typed."""
         if descriptor is None:
             descriptor = self._descriptors.get(parameter.name) or ParameterDescriptor(dynamic_typing=True)
         descriptor.name = parameter.name
@@ -361,40 +361,40 @@ class NodeParameters(NodeNames):
     # Callbacks
 
     def add_pre_set_parameters_callback(self, callback: Callable[[list[Parameter]], list[Parameter]]) -> None:
-        """Let `callback` replace the parameters to be set before they are checked; the last one is first."""
+        """Let `callback` replace the parameters before they are checked; the last added is called first."""
         self._pre_set_parameters_callbacks.insert(0, callback)
 
     def add_on_set_parameters_callback(
         self, callback: Callable[[list[Parameter]], SetParametersResult]
     ) -> None:
-        """Let `callback` decide about parameters to be declared or set; the last one is asked first."""
+        """Let `callback` accept or reject new values of parameters; the last added is called first."""
         self._on_set_parameters_callbacks.insert(0, callback)
 
     def add_post_set_parameters_callback(self, callback: Callable[[list[Parameter]], None]) -> None:
-        """Tell `callback` of parameters that were declared or set; the last one is told first."""
+        """Call `callback` after parameters were declared or set; the last added is called first."""
         self._post_set_parameters_callbacks.insert(0, callback)
 
     def remove_pre_set_parameters_callback(
         self, callback: Callable[[list[Parameter]], list[Parameter]]
     ) -> None:
-        """Undo `add_pre_set_parameters_callback`; ValueError if there is nothing to undo."""
+        """Undo `add_pre_set_parameters_callback`; ValueError if it was not added."""
         self._pre_set_parameters_callbacks.remove(callback)
 
     def remove_on_set_parameters_callback(
         self, callback: Callable[[list[Parameter]], SetParametersResult]
     ) -> None:
-        """Undo `add_on_set_parameters_callback`; ValueError if there is nothing to undo."""
+        """Undo `add_on_set_parameters_callback`; ValueError if it was not added."""
         self._on_set_parameters_callbacks.remove(callback)
 
     def remove_post_set_parameters_callback(self, callback: Callable[[list[Parameter]], None]) -> None:
-        """Undo `add_post_set_parameters_callback`; ValueError if there is nothing to undo."""
+        """Undo `add_post_set_parameters_callback`; ValueError if it was not added."""
         self._post_set_parameters_callbacks.remove(callback)
 
     # Describing
 
     def describe_parameter(self, name: str) -> ParameterDescriptor:
         """
-        Return the descriptor of a parameter; an empty one for a name that need not be declared.
+        Return the descriptor of a parameter; an empty one if it need not be declared and is not.
 
         :raises ParameterNotDeclaredException: if it is not declared and must be.
         """
@@ -416,9 +416,9 @@ class NodeParameters(NodeNames):
         alternative_value: ParameterValue | None = None,
     ) -> ParameterValue:
         """
-        Give a parameter a new descriptor, and the alternative value if the descriptor rejects its value.
+        Replace the descriptor of a parameter; set the alternative value if it rejects the current value.
 
-        :returns: the value that the parameter has now.
+        :returns: the new value of the parameter.
         :raises ParameterNotDeclaredException: if it is not declared and must be.
         :raises ParameterImmutableException: if it is read-only.
         :raises InvalidParameterValueException: if the descriptor rejects both values.
@@ -441,7 +441,7 @@ class NodeParameters(NodeNames):
 
 
 def _unpack(index: int, declaration: tuple[Any, ...]) -> tuple[str, Any, ParameterDescriptor]:
-    """Return name, value and a descriptor of its own from a declaration."""
+    """Return name, value and a copy of the descriptor of a declaration."""
     if not 1 <= len(declaration) <= 3:
         raise TypeError(
             f"Invalid parameter tuple length at index {index} in parameters list: {declaration}; "
@@ -456,12 +456,12 @@ def _unpack(index: int, declaration: tuple[Any, ...]) -> tuple[str, Any, Paramet
         raise TypeError(
             f"Third element {descriptor} at index {index} in parameters list is not a ParameterDescriptor."
         )
-    # The caller may use his descriptor for other parameters too.
+    # The caller may use the descriptor for other parameters, too.
     return name, value, copy.copy(descriptor)
 
 
 def _default_value(name: str, value: Any, descriptor: ParameterDescriptor) -> Any:
-    """Return the value in a declaration, `None` if it is a type; put its type into the descriptor."""
+    """Return the value of a declaration, `None` if it is a type; set the descriptor's type."""
     if isinstance(value, Parameter.Type):
         if value is Parameter.Type.NOT_SET:
             raise ValueError(f"Cannot declare parameter {{{name}}} as statically typed of type NOT_SET")
@@ -501,7 +501,7 @@ def _check_names(names: list[str]) -> None:
 
 
 def _is_listed(name: str, prefixes: list[str], depth: int) -> bool:
-    """Tell whether `list_parameters` lists a name."""
+    """Return whether `list_parameters` lists a name."""
 
     def is_shallow(rest: str) -> bool:
         return depth == _DEPTH_RECURSIVE or rest.count(PARAMETER_SEPARATOR_STRING) < depth

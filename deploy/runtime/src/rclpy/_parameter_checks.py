@@ -1,4 +1,4 @@
-"""What a descriptor allows a parameter's value to be."""
+"""Checks the value of a parameter against its descriptor."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from rclpy.parameter import Parameter
 
 def objection(parameter: Parameter, descriptor: ParameterDescriptor, rel_tol: float) -> str:
     """
-    Say why the descriptor's type or range does not allow the parameter's value; '' if it does.
+    Return why the descriptor's type or range forbids the parameter's value; '' if it allows it.
 
-    :param rel_tol: how close a double must be to a bound or step, relative to its value.
+    :param rel_tol: relative tolerance with which a double must meet a bound or step.
     """
     if parameter.type_ is Parameter.Type.NOT_SET:
         return ""
@@ -31,7 +31,7 @@ def _integer_objection(parameter: Parameter, allowed: IntegerRange) -> str:
     value = parameter.value
     if not low <= value <= high:
         return f"Parameter {parameter.name} out of range. Min: {low}, Max: {high}, value: {value}"
-    # The upper bound is valid even where no step meets it.
+    # The upper bound is valid even if no step meets it.
     if allowed.step and value != high and (value - low) % allowed.step:
         return (
             f"The parameter value for {parameter.name} is not a valid step. "
@@ -45,7 +45,7 @@ def _double_objection(parameter: Parameter, allowed: FloatingPointRange, rel_tol
     value = parameter.value
     if math.isclose(value, low, rel_tol=rel_tol) or math.isclose(value, high, rel_tol=rel_tol):
         return ""
-    # Also true of NaN, which is in no range.
+    # Also true for NaN, which is in no range.
     if not low < value < high:
         return f"Parameter {parameter.name} out of range Min: {low}, Max: {high}, value: {value}"
     if allowed.step:

@@ -1,19 +1,22 @@
 """
-Parameter files, and values in YAML: what `rcl_yaml_param_parser` reads.
+Reads parameter files, and values in YAML, as `rcl_yaml_param_parser` does.
 
-A file maps names of nodes, which may be nested in namespaces and contain the wildcards `*` and `**`, to
-`ros__parameters`, a tree of parameters.
+A file maps names of nodes to `ros__parameters`, a tree of parameters. Names may be nested in namespaces and
+contain the wildcards `*` and `**`.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, TypeAlias
 
 import yaml
 
 from rclpy import validate_node_name
-from rclpy._parameter_values import NodeParameters, plain_scalar
+from rclpy._parameter_scalars import plain_scalar
 from rclpy.parameter import PARAMETER_SEPARATOR_STRING, Parameter
+
+ParametersOfNodes: TypeAlias = dict[str, dict[str, Parameter]]
+"""Node name or pattern -> parameter name -> parameter, in the order of the file."""
 
 _PARAMETERS_KEY = "ros__parameters"
 _STRING_TAG = "tag:yaml.org,2002:str"
@@ -24,14 +27,14 @@ _KINDS = {bool: "bool", int: "integer", float: "double", str: "string"}
 
 
 class ParameterFileError(ValueError):
-    """Raised for a parameter file that cannot be used; the message is one line with file, key and reason."""
+    """Raised for an invalid parameter file; the message is one line with file, key and reason."""
 
 
-def read_parameter_file(path: str) -> NodeParameters:
+def read_parameter_file(path: str) -> ParametersOfNodes:
     """
     Read a parameter file.
 
-    :raises ParameterFileError: if it cannot be read or used.
+    :raises ParameterFileError: if the file cannot be read or is invalid.
     """
     try:
         with open(path, encoding="utf-8") as file:
@@ -45,14 +48,14 @@ def read_parameter_file(path: str) -> NodeParameters:
     except RecursionError:
         raise ParameterFileError(f"{path}: {_TOO_DEEP}") from None
 
-    nodes: NodeParameters = {}
+    nodes: ParametersOfNodes = {}
     try:
         if document is not None:
             _read_nodes(document, "", nodes)
-    except _Mistake as mistake:
-        key = f"{mistake.key}: " if mistake.key else ""
-        told = " ".join(f"{key}{mistake.reason}".split())  # a key may have several lines
-        raise ParameterFileError(f"{path}: line {mistake.line}: {told}") from None
+    except _InvalidKey as error:
+        key = f"{error.key}: " if error.key else ""
+        text = " ".join(f"{key}{error.reason}".split())  # a key may have several lines
+        raise ParameterFileError(f"{path}: line {error.line}: {text}") from None
     return nodes
 
 
@@ -60,7 +63,7 @@ def parse_yaml_value(text: str) -> Any:
     """
     Convert a scalar or a list of scalars.
 
-    :raises ValueError: if the text is something else, or no YAML.
+    :raises ValueError: if the text is not YAML, or something else in YAML.
     """
     try:
         return _value(yaml.compose(text, Loader=_Loader))
@@ -71,7 +74,7 @@ def parse_yaml_value(text: str) -> Any:
 
 
 class _Loader(yaml.SafeLoader):
-    """Composes nodes; leaves scalars without a tag of YAML's own choice, and refuses aliases as ROS does."""
+    """Composes nodes, leaves plain scalars untagged, and rejects aliases, as ROS 2 does."""
 
     def resolve(self, kind: type[yaml.Node], value: Any, implicit: Any) -> str:
         if kind is yaml.ScalarNode:
@@ -86,8 +89,8 @@ class _Loader(yaml.SafeLoader):
         return super().compose_node(parent, index)
 
 
-class _Mistake(Exception):
-    """A mistake at a key of a file."""
+class _InvalidKey(Exception):
+    """An error at a key of a file."""
 
     def __init__(self, node: yaml.Node, key: str, reason: str) -> None:
         self.line = node.start_mark.line + 1
@@ -95,7 +98,7 @@ class _Mistake(Exception):
         self.reason = reason
 
 
-def _read_nodes(mapping: yaml.Node, namespace: str, nodes: NodeParameters) -> None:
+def _read_nodes(mapping: yaml.Node, namespace: str, nodes: ParametersOfNodes) -> None:
     """Collect the parameters of the nodes in `namespace`."""
     for key_node, value_node in _items(mapping, namespace, "names of nodes"):
         name = key_node.value
@@ -103,7 +106,7 @@ def _read_nodes(mapping: yaml.Node, namespace: str, nodes: NodeParameters) -> No
             _read_nodes(value_node, _join(namespace, name), nodes)
             continue
         if not namespace:
-            raise _Mistake(key_node, name, "there is no node name above it")
+            raise _InvalidKey(key_node, name, "there is no node name above it")
         _check_node_name(key_node, namespace)
         if not _is_empty(value_node):
             _read_parameters(value_node, namespace, "", nodes.setdefault(namespace, {}))
@@ -119,17 +122,17 @@ def _read_parameters(mapping: yaml.Node, node: str, prefix: str, parameters: dic
         try:
             parameters[name] = Parameter(name, value=_value(value_node))
         except ValueError as error:
-            raise _Mistake(value_node, f"{node}: {name}", str(error)) from None
+            raise _InvalidKey(value_node, f"{node}: {name}", str(error)) from None
 
 
 def _items(mapping: yaml.Node, key: str, content: str) -> list[tuple[yaml.ScalarNode, yaml.Node]]:
     """Return the items of a mapping with scalar keys."""
     if not isinstance(mapping, yaml.MappingNode):
-        raise _Mistake(mapping, key, f"expected a mapping of {content}, found {_describe(mapping)}")
+        raise _InvalidKey(mapping, key, f"expected a mapping of {content}, found {_describe(mapping)}")
     items: list[tuple[yaml.ScalarNode, yaml.Node]] = mapping.value
     for key_node, _ in items:
         if not isinstance(key_node, yaml.ScalarNode) or not key_node.value:
-            raise _Mistake(key_node, key, "a key must be a name")
+            raise _InvalidKey(key_node, key, "a key must be a name")
     return items
 
 
@@ -144,26 +147,28 @@ def _is_empty(node: yaml.Node) -> bool:
 
 
 def _join(namespace: str, name: str) -> str:
-    """Append a key to the node name that the keys above it make."""
+    """Append a key to the node name that the enclosing keys make."""
     return f"{namespace.rstrip('/')}/{name.lstrip('/')}" if namespace else name
 
 
 def _check_node_name(key_node: yaml.Node, name: str) -> None:
     for token in name.removeprefix("/").split("/"):
         if token not in ("*", "**") and (problem := validate_node_name._problem(token)):
-            raise _Mistake(key_node, name, problem[0])
+            raise _InvalidKey(key_node, name, problem[0])
 
 
 def _value(node: yaml.Node | None) -> Any:
     """
-    Convert a scalar or a list of scalars; an empty list has no type, so it is no value: `None`, as in ROS.
+    Convert a scalar or a list of scalars. An empty list has no type: it is `None`, as in ROS 2.
 
-    :raises ValueError: if it is neither, or empty, or a list of mixed types.
+    :raises ValueError: for other nodes, an empty scalar, or a list of mixed types.
     """
     if isinstance(node, yaml.ScalarNode) and not _is_empty(node):
         return _scalar(node)
     if not isinstance(node, yaml.SequenceNode):
-        raise ValueError("a mapping is no value" if isinstance(node, yaml.MappingNode) else "it has no value")
+        raise ValueError(
+            "a mapping is not a value" if isinstance(node, yaml.MappingNode) else "it has no value"
+        )
     values = []
     for item in node.value:
         if not isinstance(item, yaml.ScalarNode) or _is_empty(item):
@@ -176,13 +181,13 @@ def _value(node: yaml.Node | None) -> Any:
 
 
 def _scalar(node: yaml.ScalarNode) -> bool | int | float | str:
-    """Type a scalar by its text, unless quotes or `!!str` make it a string; ROS heeds no other tag."""
+    """Type a scalar by its text, unless quotes or `!!str` make it a string. ROS 2 ignores other tags."""
     text = str(node.value)
     return text if node.tag == _STRING_TAG or node.style in _QUOTES else plain_scalar(text)
 
 
 def _reason(error: yaml.YAMLError) -> str:
-    """Say in one line what is wrong with a YAML text, and where."""
+    """Return place and problem of a YAML error in one line."""
     mark = getattr(error, "problem_mark", None)
     problem = getattr(error, "problem", None) or str(error)
     place = f"line {mark.line + 1}: " if mark else ""

@@ -1,4 +1,4 @@
-"""What code finds here that was written for rclpy's C extension: its exceptions, and the signals' options."""
+"""The exceptions and enumerations of rclpy's C extension, for code that imports them from it."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> NoReturn:
-    """:raises NotImplementedError: for everything else of the extension."""
+    """:raises NotImplementedError: for all other names of the extension."""
     if name.startswith("__"):
         raise AttributeError(name)
     raise NotImplementedError(f"rclpy._rclpy_pybind11.{name}: this runtime has no C extension")

@@ -1,4 +1,4 @@
-"""What services and clients have in common: names, and the events by which others watch their calls."""
+"""The common base of services and clients: names and introspection events."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class _Introspection:
 
 
 class ServiceSide(Owner):
-    """A service or a client of one."""
+    """A service, or a client of a service."""
 
     def __init__(
         self,
@@ -59,13 +59,13 @@ class ServiceSide(Owner):
         introspection_state: ServiceIntrospectionState,
     ) -> None:
         """
-        Tell on ``<service>/_service_event`` what happens to calls, from now on.
+        Publish the events of future calls on ``<service>/_service_event``.
 
-        Clock and QoS stay as they are until it was OFF in between, as in rclpy.
+        A new clock or QoS takes effect only if the state was OFF before, as in rclpy.
 
-        :param clock: by which the events are stamped.
+        :param clock: stamps the events.
         :param service_event_qos_profile: the QoS of the topic.
-        :param introspection_state: how much to tell.
+        :param introspection_state: the content of the events; OFF publishes none.
         :raises InvalidHandle: if the service or client was destroyed.
         """
         self._check_usable()
@@ -84,8 +84,10 @@ class ServiceSide(Owner):
         if introspection is not None:
             introspection.publisher.destroy()
 
-    def _tell(self, event_type: int, client_gid: bytes, sequence_number: int, **message: Any) -> None:
-        """Tell of an event, if that is wanted; ``message`` is the ``request`` or the ``response``."""
+    def _publish_event(
+        self, event_type: int, client_gid: bytes, sequence_number: int, **message: Any
+    ) -> None:
+        """Publish an event unless introspection is off; ``message`` is the ``request`` or ``response``."""
         introspection = self._introspection
         if introspection is None:
             return
@@ -97,10 +99,10 @@ class ServiceSide(Owner):
         if introspection.state == ServiceIntrospectionState.CONTENTS:
             for name, value in message.items():
                 setattr(event, name, [value])
-        with suppress(InvalidHandle):  # another thread may have switched it off meanwhile
+        with suppress(InvalidHandle):  # another thread may just have switched it off
             introspection.publisher.publish(event)
 
     def destroy(self) -> None:
-        """End it; whoever created it should use the node's method for that."""
+        """Destroy it. The node's ``destroy_…`` method also removes it from the node."""
         self._end_introspection()
         super().destroy()

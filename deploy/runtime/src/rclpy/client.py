@@ -6,11 +6,11 @@ import itertools
 import threading
 from typing import TYPE_CHECKING, Any
 
-from rclpy import _imports
 from rclpy._dds import Writer
 from rclpy._endpoint import ServiceEndpoint
 from rclpy._service_side import ServiceSide
 from rclpy._service_wire import RequestId, server_is_matched, unwrap, wrap
+from rclpy._type_variables import SrvType, SrvTypeRequest, SrvTypeResponse  # noqa: F401 (re-export)
 from rclpy.callback_groups import CallbackGroup
 from rclpy.exceptions import RCLError
 from rclpy.qos import QoSProfile
@@ -20,11 +20,9 @@ from service_msgs.msg import ServiceEventInfo
 if TYPE_CHECKING:
     from rclpy.context import Context
 
-_imports.offer(__name__)
-
 
 class Client(ServiceSide):
-    """Calls one service; :meth:`rclpy.node.Node.create_client` makes them."""
+    """Calls a service. Created by :meth:`rclpy.node.Node.create_client`."""
 
     def __init__(
         self,
@@ -45,15 +43,15 @@ class Client(ServiceSide):
 
     @property
     def handle(self) -> Writer:
-        """The DDS writer of the requests. Raises InvalidHandle when the client was destroyed."""
+        """The DDS writer of the requests. Raises InvalidHandle if the client was destroyed."""
         self._check_usable()
         return self._requests
 
     def call(self, request: Any, timeout_sec: float | None = None) -> Any:
         """
-        Call and wait for the reply, at most ``timeout_sec``; ``None`` if it did not come.
+        Call the service and wait for the reply, at most ``timeout_sec``; return ``None`` without a reply.
 
-        Another thread must spin the node meanwhile: do not call this in a callback.
+        Another thread must spin the node, so do not call this in a callback.
 
         :raises TypeError: if ``request`` is not of the service's request type.
         """
@@ -68,7 +66,7 @@ class Client(ServiceSide):
 
     def call_async(self, request: Any) -> Future:
         """
-        Call; the future gets the reply. Cancel it, or remove the pending request, to wait no longer.
+        Call the service; the future gets the reply. To stop waiting, cancel it or remove the request.
 
         :raises TypeError: if ``request`` is not of the service's request type.
         """
@@ -80,57 +78,59 @@ class Client(ServiceSide):
         with self._lock:
             number = next(self._sequence_numbers)
             self._pending_requests[number] = future
-        # Not as a done callback: it would need the executor to run it.
+        # Not a done callback, which only runs on an executor.
         future._call_when_complete(lambda: self.remove_pending_request(future))
         self.handle.write(wrap(RequestId(self._requests.instance_handle, number), data))
-        self._tell(ServiceEventInfo.REQUEST_SENT, self._identifier, number, request=request)
+        self._publish_event(ServiceEventInfo.REQUEST_SENT, self._identifier, number, request=request)
         return future
 
     def get_pending_request(self, sequence_number: int) -> Future:
-        """The future of a request that has no reply yet. Raises KeyError if there is none."""
+        """Return the future of a request without a reply. Raises KeyError if there is none."""
         with self._lock:
             return self._pending_requests[sequence_number]
 
     def remove_pending_request(self, future: Future) -> None:
-        """Wait for the reply to this request no longer: its future will not be completed."""
+        """Stop waiting for the reply to a request: its future will not be completed."""
         with self._lock:
             for number, pending in list(self._pending_requests.items()):
                 if pending is future:
                     del self._pending_requests[number]
 
     def service_is_ready(self) -> bool:
-        """Whether a server would hear a call now, and we its reply. Raises RCLError after the shutdown."""
+        """Whether a server is matched in both directions. Raises RCLError after the shutdown."""
         if not self.context.ok():
             raise RCLError(f"cannot look for a server of {self._name}: the context was shut down")
         return server_is_matched(self.handle, self._replies)
 
     def wait_for_service(self, timeout_sec: float | None = None) -> bool:
         """
-        Wait for a server, at most ``timeout_sec`` (``None``: for ever). ``False`` if none came.
+        Wait for a server, at most ``timeout_sec`` (``None``: for ever); return whether there is one.
 
-        :raises RCLError: if the context is or gets shut down: whoever asks in a loop must not do so for ever.
+        :raises RCLError: if the context is shut down, so that a loop around this call ends.
         """
         timeout = None if timeout_sec is None else max(0.0, timeout_sec)
         graph = self._node._rclpy_graph
         return graph.wait_for(self.service_is_ready, timeout, self.context.ok) or self.service_is_ready()
 
-    # What the executor asks of everything it waits for.
+    # The interface that executors use for every entity.
 
     def _take(self) -> tuple[Future, Any] | None:
         while not self._destroyed and (sample := self._replies.take()) is not None:
             try:
                 request_id, data = unwrap(sample.data)
                 if request_id.client != self._requests.instance_handle:
-                    continue  # all clients of a service share one topic: this is another one's reply
+                    continue  # all clients of a service share a topic: this reply is for another client
                 response = self.srv_type.Response._deserialize(data)
             except ValueError as error:
                 self._bad_input.drop(sample, error)
                 continue
             number = request_id.sequence_number
-            self._tell(ServiceEventInfo.RESPONSE_RECEIVED, self._identifier, number, response=response)
+            self._publish_event(
+                ServiceEventInfo.RESPONSE_RECEIVED, self._identifier, number, response=response
+            )
             with self._lock:
                 future = self._pending_requests.get(number)
-            if future is not None:  # else nobody waits for it any more
+            if future is not None:  # else the request was removed
                 return future, response
         return None
 

@@ -1,4 +1,4 @@
-"""Clocks: system time, steady time, and ROS time, which a simulator may drive.
+"""Clocks: system time, steady time, and ROS time, which may be simulated.
 
 Source: the ROS 2 design article "Clock and Time".
 """
@@ -12,7 +12,6 @@ from enum import IntEnum
 from types import TracebackType
 from typing import TYPE_CHECKING, NamedTuple, Protocol, TypeAlias
 
-from rclpy import _imports
 from rclpy._handle import Handle
 from rclpy.clock_type import ClockType
 from rclpy.constants import S_TO_NS
@@ -22,8 +21,6 @@ from rclpy.time import Time, TimeHandle
 
 if TYPE_CHECKING:
     from rclpy.context import Context
-
-_imports.offer(__name__)
 
 __all__ = [
     "Clock",
@@ -41,7 +38,7 @@ JumpHandlePreCallbackType: TypeAlias = Callable[[], None]
 
 
 class ClockChange(IntEnum):
-    """What a time jump says about where ROS time comes from."""
+    """Whether a time jump changes the source of ROS time."""
 
     ROS_TIME_NO_CHANGE = 1
     ROS_TIME_ACTIVATED = 2
@@ -54,7 +51,7 @@ class TimeJumpDictionary(dict[str, int]):
 
 
 class JumpThreshold:
-    """Which time jumps a callback wants to hear of."""
+    """Selects the time jumps that a callback is called for."""
 
     def __init__(
         self,
@@ -64,12 +61,12 @@ class JumpThreshold:
         on_clock_change: bool = True,
     ) -> None:
         """
-        Choose the jumps that count.
+        Select jumps by size and cause.
 
-        :param min_forward: the shortest jump forward that counts, ``None`` for none; positive.
-        :param min_backward: the shortest jump backward that counts, ``None`` for none; negative.
-        :param on_clock_change: whether a change of the source of time counts.
-        :raises ValueError: if a threshold has the wrong sign, or nothing would count.
+        :param min_forward: the shortest jump forward to report, ``None``: none; positive.
+        :param min_backward: the shortest jump backward to report, ``None``: none; negative.
+        :param on_clock_change: whether to report a change of the source of time.
+        :raises ValueError: if a threshold has the wrong sign, or no jump is selected.
         """
         if min_forward is not None and min_forward.nanoseconds <= 0:
             raise ValueError("min_forward must be a positive non-zero duration")
@@ -83,7 +80,7 @@ class JumpThreshold:
 
 
 class TimeJump:
-    """A time jump that has happened."""
+    """A time jump that occurred."""
 
     def __init__(self, clock_change: ClockChange, delta: Duration) -> None:
         self._clock_change = clock_change
@@ -101,7 +98,7 @@ class TimeJump:
 
 
 class JumpHandle:
-    """A registered pair of jump callbacks; ``unregister`` or a ``with`` ends it."""
+    """A registered pair of jump callbacks; ``unregister`` or the end of a ``with`` removes it."""
 
     def __init__(
         self,
@@ -129,7 +126,7 @@ class JumpHandle:
         )
 
     def unregister(self) -> None:
-        """Hear of no more jumps."""
+        """Remove the callbacks."""
         if self._clock is not None:
             self._clock.handle.remove_clock_callback(self)
             self._clock = None
@@ -144,7 +141,7 @@ class JumpHandle:
 
 
 class ClockHandle(Protocol):
-    """What a clock reads, and who hears of its jumps."""
+    """The source of a clock's time, and the callbacks for its jumps."""
 
     def get_now(self) -> TimeHandle: ...
 
@@ -162,26 +159,26 @@ class ClockHandle(Protocol):
 
 
 class _Listener(NamedTuple):
-    """Who hears of which jumps: shortest ones forward and backward [ns], 0 for none."""
+    """Jump callbacks with their thresholds forward and backward [ns], 0: none."""
 
     jump_handle: JumpHandle
     on_clock_change: bool
     min_forward: int
     min_backward: int
 
-    def hears(self, change: ClockChange, delta: int) -> bool:
+    def is_affected_by(self, change: ClockChange, delta: int) -> bool:
         if change in (ClockChange.ROS_TIME_ACTIVATED, ClockChange.ROS_TIME_DEACTIVATED):
             return self.on_clock_change
         return (0 < self.min_forward <= delta) or (0 > self.min_backward >= delta)
 
 
 class _ClockSource(Handle):
-    """The one implementation of ClockHandle: reads the machine, or the time a simulator has set."""
+    """The implementation of ClockHandle: reads the machine's clock, or returns the simulated time."""
 
     def __init__(self, clock_type: ClockType) -> None:
         self._type = clock_type
         self._read = time.monotonic_ns if clock_type == ClockType.STEADY_TIME else time.time_ns
-        self._override: int | None = None  # simulated time [ns] while ROS time is driven from outside
+        self._override: int | None = None  # simulated time [ns]; None: not simulated
         self._latest = 0
         self._listeners: list[_Listener] = []
         self._lock = threading.Lock()
@@ -227,23 +224,23 @@ class _ClockSource(Handle):
                 handle.pre_callback()
         self._override = override
         jump = TimeJumpDictionary(clock_change=change, delta=delta)
-        # Anew: who came meanwhile may have read the time from before.
+        # Query again: a callback added meanwhile may have read the old time.
         for handle in self._affected(change, delta):
             if handle.post_callback is not None:
                 handle.post_callback(jump)
 
     def _affected(self, change: ClockChange, delta: int) -> list[JumpHandle]:
-        return [one.jump_handle for one in self._listeners if one.hears(change, delta)]
+        return [one.jump_handle for one in self._listeners if one.is_affected_by(change, delta)]
 
 
 class Clock:
-    """A source of time. ``Clock()`` is the system's; ``clock_type`` chooses another."""
+    """A source of time: system time, unless ``clock_type`` chooses another."""
 
     _source: _ClockSource
     _clock_type: ClockType
 
     def __new__(cls, *, clock_type: ClockType = ClockType.SYSTEM_TIME) -> Clock:
-        """Create a clock; ROS time makes a :class:`ROSClock`. Raises TypeError for no clock type."""
+        """Create a clock, a :class:`ROSClock` for ROS time. Raises TypeError for another type of argument."""
         if not isinstance(clock_type, ClockType):
             raise TypeError("Clock type must be a ClockType enum")
         self = super().__new__(ROSClock if clock_type == ClockType.ROS_TIME else cls)
@@ -253,7 +250,7 @@ class Clock:
 
     @property
     def clock_type(self) -> ClockType:
-        """Which time this clock tells."""
+        """The type of time of this clock."""
         return self._clock_type
 
     @property
@@ -265,7 +262,7 @@ class Clock:
         return f"Clock(clock_type={self._clock_type.name})"
 
     def now(self) -> Time:
-        """The time now."""
+        """Return the current time."""
         return self._source.get_now()
 
     def create_jump_callback(
@@ -278,9 +275,9 @@ class Clock:
         """
         Call back before and after time jumps.
 
-        The caller keeps the handle; ``post_callback`` is told the jump.
+        The caller must keep the handle alive. ``post_callback`` gets the jump.
 
-        :raises ValueError: if neither callback is given, or one cannot be called.
+        :raises ValueError: if neither callback is given, or one is not callable.
         """
         if post_callback is not None and not callable(post_callback):
             raise ValueError("post_callback must be callable if given")
@@ -299,9 +296,10 @@ class Clock:
 
     def sleep_until(self, until: Time, context: Context | None = None) -> bool:
         """
-        Sleep until this clock says ``until``.
+        Sleep until the time ``until`` of this clock.
 
-        :return: whether the time came; ``False`` if the context ended, or the source of ROS time changed.
+        :return: whether the time was reached; ``False`` if the context was shut down or the source of ROS
+            time changed.
         :raises ValueError: if ``until`` is of another clock type.
         :raises NotInitializedException: if the context is not initialized.
         """
@@ -341,7 +339,7 @@ class Clock:
 
 
 class ROSClock(Clock):
-    """ROS time: the system's, unless a simulator drives it (``use_sim_time``)."""
+    """ROS time: system time, or simulated time (``use_sim_time``)."""
 
     def __new__(cls) -> ROSClock:
         clock = super().__new__(cls, clock_type=ClockType.ROS_TIME)
@@ -350,7 +348,7 @@ class ROSClock(Clock):
 
     @property
     def ros_time_is_active(self) -> bool:
-        """Whether a simulator drives this clock."""
+        """Whether the time is simulated."""
         return self._source.get_ros_time_override_is_enabled()
 
     def _set_ros_time_is_active(self, enabled: bool) -> None:
@@ -360,7 +358,7 @@ class ROSClock(Clock):
         """
         Set the simulated time.
 
-        :raises TypeError: if ``time`` is no :class:`~rclpy.time.Time`.
+        :raises TypeError: if ``time`` is not a :class:`~rclpy.time.Time`.
         """
         if not isinstance(time, Time):
             raise TypeError("Time must be specified as rclpy.time.Time")

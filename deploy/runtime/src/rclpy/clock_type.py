@@ -1,4 +1,4 @@
-"""The sources of time a clock, and every time it hands out, can belong to."""
+"""The types of clocks and times."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from enum import IntEnum
 
 class ClockType(IntEnum):
     """
-    Source of a time; the values are those of `rcl_clock_type_t`.
+    Type of a clock or time; the values are those of `rcl_clock_type_t`.
 
-    `ROS_TIME` is simulated time while `use_sim_time` is on and system time otherwise, `SYSTEM_TIME` the wall
-    clock since 1970, `STEADY_TIME` monotonic since an arbitrary origin.
+    `ROS_TIME` is simulated time while `use_sim_time` is set, otherwise system time. `SYSTEM_TIME` is wall
+    time since 1970. `STEADY_TIME` is monotonic, with an arbitrary origin.
     """
 
     UNINITIALIZED = 0

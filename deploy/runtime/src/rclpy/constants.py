@@ -1,4 +1,4 @@
-"""Numbers that more than one module of rclpy needs."""
+"""Constants of several modules of rclpy."""
 
 from __future__ import annotations
 

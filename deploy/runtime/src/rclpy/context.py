@@ -1,4 +1,4 @@
-"""A context: one life of rclpy from ``init`` to ``shutdown``, and the process' place in a DDS domain."""
+"""Contexts: each is a life of rclpy, from ``init`` to ``shutdown``, in a DDS domain."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from contextlib import AbstractContextManager, suppress
 from types import TracebackType
 from typing import TYPE_CHECKING
 
-from rclpy import _imports, logging
+from rclpy import logging
 from rclpy._arguments import RosArguments, parse
 from rclpy._dds import domain
 from rclpy._handle import Handle
@@ -23,43 +23,41 @@ if TYPE_CHECKING:
     from rclpy.executors import Executor
     from rclpy.node import Node
 
-_imports.offer(__name__)
-
 g_logging_ref_count = 0
 _logging_lock = threading.Lock()
-_in_a_domain: set[Context] = set()
+_joined: set[Context] = set()
 
 
-@atexit.register  # as soon as rclpy is imported: what users register runs before, and may still publish
+@atexit.register  # registered on import: exit handlers of users run earlier and may still publish
 def _leave_domains() -> None:
-    for context in list(_in_a_domain):
+    for context in list(_joined):
         context._leave_domain()
 
 
 class ContextHandle(Handle):
-    """What stands for a context."""
+    """A handle for a context."""
 
     def __init__(self, context: Context) -> None:
         self._context = context
 
     def ok(self) -> bool:
-        """Whether the context runs."""
+        """Whether the context is initialized and not shut down."""
         return self._context.ok()
 
     def get_domain_id(self) -> int:
-        """The DDS domain."""
+        """Return the DDS domain."""
         return self._context.get_domain_id()
 
     def shutdown(self) -> None:
-        """End the context. Raises RCLError if it does not run."""
+        """Shut down the context. Raises RCLError if it is not initialized or already shut down."""
         self._context.shutdown()
 
 
 class Context(AbstractContextManager["Context"]):
     """
-    Holds what nodes share: arguments, domain, and whether rclpy runs.
+    The shared state of nodes: arguments, DDS domain, and whether rclpy is shut down.
 
-    Usable in a ``with``, which initializes it and shuts it down at its end.
+    A ``with`` initializes the context and shuts it down at its end.
     """
 
     def __init__(self) -> None:
@@ -70,7 +68,7 @@ class Context(AbstractContextManager["Context"]):
         self._logging = False
         self._domain_id = 0
         self._arguments = RosArguments()
-        self._callbacks: list[Callable[[], Callable[[], None] | None]] = []  # as references to them
+        self._callbacks: list[Callable[[], Callable[[], None] | None]] = []  # references to them
         self._nodes: weakref.WeakSet[Node] = weakref.WeakSet()
         self._executors: Listeners[Executor] = Listeners()
         self._events: Listeners[threading.Event] = Listeners()
@@ -78,7 +76,7 @@ class Context(AbstractContextManager["Context"]):
 
     @property
     def handle(self) -> ContextHandle:
-        """What stands for the context. Raises NotInitializedException before ``init``."""
+        """A handle for the context. Raises NotInitializedException before ``init``."""
         self._check_initialized()
         return ContextHandle(self)
 
@@ -94,12 +92,12 @@ class Context(AbstractContextManager["Context"]):
         domain_id: int | None = None,
     ) -> None:
         """
-        Begin.
+        Initialize the context.
 
-        :param args: command line arguments, ``sys.argv`` if ``None``; those after ``--ros-args`` count.
-        :param initialize_logging: whether its arguments configure logging, if no other context has done so.
-        :param domain_id: DDS domain, by default the one that ``ROS_DOMAIN_ID`` names.
-        :raises RuntimeError: if the context was initialized already, or an argument cannot be understood.
+        :param args: command line arguments, ``sys.argv`` if ``None``; ROS arguments follow ``--ros-args``.
+        :param initialize_logging: whether the arguments configure logging, unless another context did.
+        :param domain_id: DDS domain; by default the value of ``ROS_DOMAIN_ID``.
+        :raises RuntimeError: if the context is already initialized, or an argument is invalid.
         """
         with self._lock:
             if self._initialized:
@@ -108,7 +106,7 @@ class Context(AbstractContextManager["Context"]):
                 raise RuntimeError(f"domain id ({domain_id}) should not be lower than zero.")
             self._arguments = parse(args)
             self._domain_id = domain.domain_id_from_environment() if domain_id is None else domain_id
-            domain.configuration()  # a mistake in the environment is best told at once
+            domain.configuration()  # reports errors in the environment now, not with the first node
             self._initialized = self._valid = True
             if initialize_logging:
                 self._initialize_logging()
@@ -116,51 +114,51 @@ class Context(AbstractContextManager["Context"]):
     def _initialize_logging(self) -> None:
         global g_logging_ref_count
         with _logging_lock:
-            if not g_logging_ref_count:  # it is the whole process': who came first has said how he wants it
+            if not g_logging_ref_count:  # logging belongs to the process: the first context configures it
                 logging._apply_arguments(self._arguments)
             g_logging_ref_count += 1
         self._logging = True
 
     def ok(self) -> bool:
-        """Whether the context runs: after ``init``, before ``shutdown``."""
+        """Whether the context is initialized and not shut down."""
         return self._valid
 
     def get_domain_id(self) -> int:
-        """The DDS domain. Raises NotInitializedException before ``init``."""
+        """Return the DDS domain. Raises NotInitializedException before ``init``."""
         self._check_initialized()
         return self._domain_id
 
     def on_shutdown(self, callback: Callable[[], None]) -> None:
-        """Call ``callback`` at shutdown, at once after it; a bound method does not keep its object alive."""
+        """Call ``callback`` at shutdown, or now after it. A bound method does not keep its object alive."""
         if not callable(callback):
             raise TypeError("callback should be callable, got {}", type(callback))
         with self._lock:
             if self._initialized and not self._valid:
                 callback()
-            elif inspect.ismethod(callback):  # of Python: a builtin's cannot be referred to weakly
+            elif inspect.ismethod(callback):  # only methods written in Python have weak references
                 self._callbacks.append(weakref.WeakMethod(callback, self._forget_callback))
             else:
                 self._callbacks.append(lambda: callback)
 
     def _forget_callback(self, reference: Callable[[], Callable[[], None] | None]) -> None:
-        with suppress(ValueError):  # the shutdown has taken them all
+        with suppress(ValueError):  # the shutdown takes all callbacks
             self._callbacks.remove(reference)
 
     def shutdown(self) -> None:
         """
-        End: everybody who waits is woken, and nothing can be waited for any more.
+        Shut down: all waiting calls end, and new ones are not possible.
 
-        :raises RCLError: if the context does not run.
+        :raises RCLError: if the context is not initialized or already shut down.
         """
         if not self._end():
             raise RCLError("Context must be initialized before it can be shutdown")
 
     def try_shutdown(self) -> None:
-        """End, unless that has happened already."""
+        """Shut down unless the context is not initialized or already shut down."""
         self._end()
 
     def destroy(self) -> None:
-        """End, and leave the DDS domain although nodes may still exist."""
+        """Shut down, and leave the DDS domain even if nodes still exist."""
         self._end()
         self._leave_domain()
 
@@ -186,7 +184,7 @@ class Context(AbstractContextManager["Context"]):
         return True
 
     def __enter__(self) -> Context:
-        """Initialize with the command line's arguments; :meth:`init` takes others, without a ``with``."""
+        """Initialize with the arguments of the command line. To use others, call :meth:`init` instead."""
         self.init()
         return self
 
@@ -198,7 +196,7 @@ class Context(AbstractContextManager["Context"]):
     ) -> None:
         self.try_shutdown()
 
-    # For nodes and executors.
+    # Used by nodes and executors
 
     def _wake_on_shutdown(self, event: threading.Event) -> None:
         self._events.add(event)
@@ -206,7 +204,7 @@ class Context(AbstractContextManager["Context"]):
             event.set()
 
     def _join_domain(self, node: Node) -> Graph:
-        """Note a node, and let the first one take the process into the DDS domain."""
+        """Register a node; the first one makes the process join the DDS domain."""
         from rclpy._graph import Graph
 
         with self._lock:
@@ -214,7 +212,7 @@ class Context(AbstractContextManager["Context"]):
                 raise NotInitializedException("cannot create node")
             if self._graph is None:
                 self._graph = Graph(self._domain_id, self._arguments.enclave)
-                _in_a_domain.add(self)
+                _joined.add(self)
             self._nodes.add(node)
             return self._graph
 
@@ -224,14 +222,14 @@ class Context(AbstractContextManager["Context"]):
             self._leave_if_unused()
 
     def _leave_if_unused(self) -> None:
-        """Leave the DDS domain if the context was shut down and there are no nodes."""
+        """Leave the DDS domain if the context was shut down and has no nodes."""
         with self._lock:
-            if not self._valid and not list(self._nodes):  # its length counts those that are just going
+            if not self._valid and not list(self._nodes):  # a WeakSet's length includes dying nodes
                 self._leave_domain()
 
     def _leave_domain(self) -> None:
         with self._lock:
             graph, self._graph = self._graph, None
             if graph is not None:
-                _in_a_domain.discard(self)
+                _joined.discard(self)
                 graph.close()

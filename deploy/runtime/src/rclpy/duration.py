@@ -1,37 +1,34 @@
-"""A span of time in whole nanoseconds."""
+"""Durations in whole nanoseconds."""
 
 from __future__ import annotations
 
 from typing import Protocol
 
 import builtin_interfaces.msg
-from rclpy import _imports
 from rclpy.constants import S_TO_NS
-
-_imports.offer(__name__)
 
 _MIN = -(2**63)
 _MAX = 2**63 - 1
 
 
 class DurationType(Protocol):
-    """What `Duration.get_c_duration` returns: anything with its nanoseconds."""
+    """The result of `Duration.get_c_duration`: an object with the nanoseconds."""
 
     @property
     def nanoseconds(self) -> int: ...
 
 
 class Duration:
-    """A span of time between two points, possibly negative, with a resolution of one nanosecond."""
+    """A duration, possibly negative, with a resolution of one nanosecond."""
 
     __slots__ = ("__weakref__", "_nanoseconds")
 
-    # Equality without a hash, as rclpy's Duration.
+    # Not hashable, as rclpy's Duration.
     __hash__ = None  # type: ignore[assignment]
 
     def __init__(self, *, seconds: int | float = 0, nanoseconds: int = 0):
         """
-        Create a duration of `seconds` (its fraction counts) plus `nanoseconds` (its fraction is discarded).
+        Create a duration from the sum of `seconds` and `nanoseconds`, without fractions of a nanosecond.
 
         :raises OverflowError: if the sum does not fit into 64 bits.
         """
@@ -42,7 +39,7 @@ class Duration:
 
     @property
     def nanoseconds(self) -> int:
-        """The whole duration [ns]."""
+        """The duration [ns]."""
         return self._nanoseconds
 
     def __repr__(self) -> str:
@@ -67,7 +64,7 @@ class Duration:
         return self._nanoseconds >= other._nanoseconds if isinstance(other, Duration) else NotImplemented
 
     def to_msg(self) -> builtin_interfaces.msg.Duration:
-        """Convert to a message; its nanoseconds are never negative, so -0.1 s is -1 s + 900,000,000 ns."""
+        """Convert to a message. Its nanoseconds are never negative: -0.1 s is -1 s + 900,000,000 ns."""
         seconds, nanoseconds = divmod(self._nanoseconds, S_TO_NS)
         return builtin_interfaces.msg.Duration(sec=seconds, nanosec=nanoseconds)
 
@@ -83,9 +80,9 @@ class Duration:
         return cls(seconds=msg.sec, nanoseconds=msg.nanosec)
 
     def get_c_duration(self) -> DurationType:
-        """Return what rclpy hands to C: here the duration itself."""
+        """Return the duration itself; in rclpy, a structure of C."""
         return self
 
 
 Infinite = Duration(nanoseconds=_MAX)
-"""The duration that never ends (`RMW_DURATION_INFINITE`)."""
+"""Infinite duration (`RMW_DURATION_INFINITE`)."""

@@ -1,4 +1,4 @@
-"""QoS events: deadlines missed, liveliness lost and found, incompatible QoS, messages lost, matches."""
+"""QoS events: missed deadlines, changes of liveliness, incompatible QoS, lost messages, matches."""
 
 from __future__ import annotations
 
@@ -10,13 +10,12 @@ from enum import IntEnum
 from types import TracebackType
 from typing import Any
 
-from rclpy import _imports, logging
+from rclpy import logging
 from rclpy._dds import Reader, Writer, status
 from rclpy.callback_groups import CallbackGroup
+from rclpy.exceptions import UnsupportedEventTypeError  # noqa: F401 (re-export)
 from rclpy.qos import QoSPolicyKind, qos_policy_name_from_kind
 from rclpy.waitable import NumberOfEntities, Waitable
-
-_imports.offer(__name__)
 
 
 class QoSPublisherEventType(IntEnum):
@@ -42,35 +41,35 @@ class QoSSubscriptionEventType(IntEnum):
 
 @dataclass
 class _Count:
-    """A count since creation, and its change since it was last reported."""
+    """A count since creation, and its change since the last report."""
 
     total_count: int
     total_count_change: int
 
 
 class QoSRequestedDeadlineMissedInfo(_Count):
-    """How often a subscription waited in vain for a message within its deadline."""
+    """Number of deadlines in which a subscription got no message."""
 
 
 class QoSOfferedDeadlineMissedInfo(_Count):
-    """How often a publisher did not publish within its deadline."""
+    """Number of deadlines in which a publisher published no message."""
 
 
 class QoSLivelinessLostInfo(_Count):
-    """How often a publisher failed to show that it lives."""
+    """Number of times that a publisher did not assert its liveliness in time."""
 
 
 class QoSMessageLostInfo(_Count):
-    """How many messages were lost on the way to a subscription."""
+    """Number of messages that a subscription lost."""
 
 
 class IncompatibleTypeInfo(_Count):
-    """How many endpoints have another type under the same topic name."""
+    """Number of endpoints with another type on the same topic."""
 
 
 @dataclass
 class QoSLivelinessChangedInfo:
-    """How many matched publishers live, and how many do not."""
+    """Numbers of matched publishers that are alive and that are not."""
 
     alive_count: int
     not_alive_count: int
@@ -84,11 +83,11 @@ class _Incompatible(_Count):
 
 
 class QoSOfferedIncompatibleQoSInfo(_Incompatible):
-    """How many subscriptions request what a publisher does not offer, and the policy that differed last."""
+    """Number of subscriptions that request more than a publisher offers, and the last policy concerned."""
 
 
 class QoSRequestedIncompatibleQoSInfo(_Incompatible):
-    """How many publishers do not offer what a subscription requests, and the policy that differed last."""
+    """Number of publishers that offer less than a subscription requests, and the last policy concerned."""
 
 
 @dataclass
@@ -98,11 +97,11 @@ class _Matched(_Count):
 
 
 class QoSPublisherMatchedInfo(_Matched):
-    """How many subscriptions are matched, and ever were."""
+    """Numbers of subscriptions that are matched now and that ever were."""
 
 
 class QoSSubscriptionMatchedInfo(_Matched):
-    """How many publishers are matched, and ever were."""
+    """Numbers of publishers that are matched now and that ever were."""
 
 
 _POLICY_KINDS = {
@@ -114,10 +113,10 @@ _POLICY_KINDS = {
     21: QoSPolicyKind.LIFESPAN,
 }
 
-# Cyclone DDS never says that types differ; rmw_cyclonedds takes a callback for it all the same.
-_NEVER = ""
+# Cyclone DDS has no status for different types. rmw_cyclonedds accepts a callback, and so does this runtime.
+_NO_STATUS = ""
 
-# The DDS status that tells of an event, and what the callback gets.
+# The DDS status of each event, and the type of the callback's argument.
 _PUBLISHER_EVENTS: dict[int, tuple[str, Callable[..., Any]]] = {
     QoSPublisherEventType.RCL_PUBLISHER_OFFERED_DEADLINE_MISSED: (
         "offered_deadline_missed",
@@ -128,7 +127,7 @@ _PUBLISHER_EVENTS: dict[int, tuple[str, Callable[..., Any]]] = {
         "offered_incompatible_qos",
         QoSOfferedIncompatibleQoSInfo,
     ),
-    QoSPublisherEventType.RCL_PUBLISHER_INCOMPATIBLE_TYPE: (_NEVER, IncompatibleTypeInfo),
+    QoSPublisherEventType.RCL_PUBLISHER_INCOMPATIBLE_TYPE: (_NO_STATUS, IncompatibleTypeInfo),
     QoSPublisherEventType.RCL_PUBLISHER_MATCHED: ("publication_matched", QoSPublisherMatchedInfo),
 }
 _SUBSCRIPTION_EVENTS: dict[int, tuple[str, Callable[..., Any]]] = {
@@ -145,13 +144,13 @@ _SUBSCRIPTION_EVENTS: dict[int, tuple[str, Callable[..., Any]]] = {
         QoSRequestedIncompatibleQoSInfo,
     ),
     QoSSubscriptionEventType.RCL_SUBSCRIPTION_MESSAGE_LOST: ("sample_lost", QoSMessageLostInfo),
-    QoSSubscriptionEventType.RCL_SUBSCRIPTION_INCOMPATIBLE_TYPE: (_NEVER, IncompatibleTypeInfo),
+    QoSSubscriptionEventType.RCL_SUBSCRIPTION_INCOMPATIBLE_TYPE: (_NO_STATUS, IncompatibleTypeInfo),
     QoSSubscriptionEventType.RCL_SUBSCRIPTION_MATCHED: ("subscription_matched", QoSSubscriptionMatchedInfo),
 }
 
 
 def _info(make: Callable[..., Any], found: Any) -> Any:
-    """What a callback gets, from the C structure of a DDS status."""
+    """Convert the C structure of a DDS status to the callback's argument."""
     values = {name: getattr(found, name) for name, _ in found._fields_ if not name.startswith("last_")}
     if hasattr(found, "last_policy_id"):
         values["last_policy_kind"] = _POLICY_KINDS.get(found.last_policy_id, QoSPolicyKind.INVALID)
@@ -159,7 +158,7 @@ def _info(make: Callable[..., Any], found: Any) -> Any:
 
 
 class EventHandler(Waitable):
-    """Calls back when one kind of event happens to a publisher or subscription."""
+    """Calls back for one type of event of a publisher or subscription."""
 
     def __init__(
         self,
@@ -169,7 +168,7 @@ class EventHandler(Waitable):
         event_type: IntEnum,
         parent_impl: Writer | Reader,
     ) -> None:
-        """Create a handler; publishers and subscriptions make theirs from their event callbacks."""
+        """Create a handler. Publishers and subscriptions create theirs from their event callbacks."""
         super().__init__(callback_group)
         events = _PUBLISHER_EVENTS if isinstance(event_type, QoSPublisherEventType) else _SUBSCRIPTION_EVENTS
         self.callback = callback
@@ -179,31 +178,31 @@ class EventHandler(Waitable):
         self._destroyed = False
 
     def destroy(self) -> None:
-        """Call back no more."""
+        """Stop calling back."""
         self._destroyed = True
 
     def __enter__(self) -> None:
-        """Begin to use it: nothing breaks when it is destroyed meanwhile, as with handles."""
+        """Do nothing, as handles."""
 
     def __exit__(
         self, t: type[BaseException] | None, v: BaseException | None, tb: TracebackType | None
     ) -> None:
-        """Use it no longer."""
+        """Do nothing."""
 
     def get_num_entities(self) -> NumberOfEntities:
-        """One event."""
+        """Return one event."""
         return NumberOfEntities(num_events=1)
 
     def take_data(self) -> Any:
-        """What happened since it was last asked for, ``None`` if nothing did."""
-        if self._destroyed or self._status == _NEVER:
+        """Return the changes since the last call, ``None`` without any."""
+        if self._destroyed or self._status == _NO_STATUS:
             return None
         found = status.changed(self._parent.handle, self._status)
         return None if found is None else _info(self._make_info, found)
 
 
 class QoSEventHandler(EventHandler):
-    """The name that :class:`EventHandler` had before ROS 2 Iron."""
+    """The name of :class:`EventHandler` before ROS 2 Iron."""
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         warnings.warn("QoSEventHandler is deprecated: use EventHandler instead", stacklevel=2)
@@ -220,7 +219,7 @@ def _handlers(
         for event, callback in callbacks.items()
         if callback is not None
     ]
-    status.watch(parent.handle, [handler._status for handler in handlers if handler._status != _NEVER])
+    status.watch(parent.handle, [handler._status for handler in handlers if handler._status != _NO_STATUS])
     return handlers
 
 
@@ -233,7 +232,7 @@ def _warn_of_incompatible_qos(logger_name: str, text: str) -> Callable[[Any], No
 
 
 class SubscriptionEventCallbacks:
-    """What to call when something happens to a subscription."""
+    """The event callbacks of a subscription."""
 
     def __init__(
         self,
@@ -258,7 +257,7 @@ class SubscriptionEventCallbacks:
     def create_event_handlers(
         self, callback_group: CallbackGroup, subscription: Reader, topic_name: str
     ) -> list[EventHandler]:
-        """The handlers of one subscription."""
+        """Create the handlers of a subscription."""
         incompatible_qos = self.incompatible_qos
         if incompatible_qos is None and self.use_default_callbacks:
             text = (
@@ -282,7 +281,7 @@ class SubscriptionEventCallbacks:
 
 
 class PublisherEventCallbacks:
-    """What to call when something happens to a publisher."""
+    """The event callbacks of a publisher."""
 
     def __init__(
         self,
@@ -305,7 +304,7 @@ class PublisherEventCallbacks:
     def create_event_handlers(
         self, callback_group: CallbackGroup, publisher: Writer, topic_name: str
     ) -> list[EventHandler]:
-        """The handlers of one publisher."""
+        """Create the handlers of a publisher."""
         incompatible_qos = self.incompatible_qos
         if incompatible_qos is None and self.use_default_callbacks:
             text = (
@@ -328,7 +327,7 @@ class PublisherEventCallbacks:
 
 
 class EndpointEvents:
-    """All events of one publisher or subscription, as the executor waits for them: on one DDS entity."""
+    """All events of a publisher or subscription: an executor waits for them on one DDS entity."""
 
     def __init__(self, handlers: list[EventHandler], parent: Writer | Reader) -> None:
         self._handlers = handlers
@@ -336,10 +335,8 @@ class EndpointEvents:
         self.callback_group = handlers[0].callback_group
 
     def _take(self) -> list[tuple[EventHandler, Any]] | None:
-        happened = [
-            (handler, data) for handler in self._handlers if (data := handler.take_data()) is not None
-        ]
-        return happened or None
+        events = [(handler, data) for handler in self._handlers if (data := handler.take_data()) is not None]
+        return events or None
 
     def _execute(self, taken: list[tuple[EventHandler, Any]]) -> Any:
         results = [handler.callback(data) for handler, data in taken]

@@ -1,15 +1,11 @@
-"""What can go wrong in rclpy, by name."""
+"""The exceptions of rclpy."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rclpy import _imports
-
 if TYPE_CHECKING:
     from rclpy.parameter import AllowableParameterValue
-
-_imports.offer(__name__)
 
 
 class InvalidHandle(RuntimeError):
@@ -21,23 +17,23 @@ class RCUtilsError(RuntimeError):
 
 
 class RMWError(RuntimeError):
-    """Raised when the middleware refuses a request."""
+    """Raised when the middleware rejects a request."""
 
 
 class RCLError(RuntimeError):
-    """Raised when the core library refuses a request."""
+    """Raised when the core library rejects a request."""
 
 
 class RCLInvalidROSArgsError(RCLError):
-    """Raised when an argument between `--ros-args` and `--` cannot be understood."""
+    """Raised when an argument between `--ros-args` and `--` is invalid."""
 
 
 class UnknownROSArgsError(RuntimeError):
-    """Raised when a flag between `--ros-args` and `--` is not known."""
+    """Raised when a flag between `--ros-args` and `--` is unknown."""
 
 
 class NodeNameNonExistentError(RCLError):
-    """Raised when the graph is asked for a node it does not know."""
+    """Raised when a query names a node that is not in the graph."""
 
 
 class UnsupportedEventTypeError(RCLError):
@@ -53,14 +49,14 @@ class NotInitializedException(Exception):
 
 
 class NoTypeSupportImportedException(Exception):
-    """Raised when a class is used as a message type but is none."""
+    """Raised when a class is used as a message type but is not one."""
 
     def __init__(self) -> None:
         super().__init__("no type_support imported")
 
 
 class NameValidationException(Exception):
-    """Raised when a topic, service, node or namespace name is invalid; the message points at the place."""
+    """Raised when a topic, service, node or namespace name is invalid; the message marks the place."""
 
     def __init__(self, name_type: str, name: str, error_msg: str, invalid_index: int) -> None:
         super().__init__(f"Invalid {name_type}: {error_msg}:\n  '{name}'\n   {' ' * invalid_index}^")
@@ -102,7 +98,7 @@ class ParameterException(Exception):
 
 
 class ParameterNotDeclaredException(ParameterException):
-    """Raised when an undeclared parameter is used by a node that does not allow it."""
+    """Raised when a parameter is not declared and the node does not allow undeclared parameters."""
 
     def __init__(self, parameters: str | list[str]) -> None:
         super().__init__("Invalid access to undeclared parameter(s)", parameters)
@@ -116,14 +112,14 @@ class ParameterAlreadyDeclaredException(ParameterException):
 
 
 class InvalidParameterException(ParameterException):
-    """Raised when a parameter to be declared has an invalid name."""
+    """Raised when a parameter is declared with an invalid name."""
 
     def __init__(self, parameter_name: str):
         super().__init__("Invalid parameter name", parameter_name)
 
 
 class InvalidParameterTypeException(ParameterException):
-    """Raised when the value of a parameter has not the type it was declared with."""
+    """Raised when the value of a parameter does not have its declared type."""
 
     from rclpy.parameter import Parameter
 
@@ -136,21 +132,21 @@ class InvalidParameterTypeException(ParameterException):
 
 
 class InvalidParameterValueException(ParameterException):
-    """Raised when the value of a parameter is rejected by its descriptor or by a callback."""
+    """Raised when the descriptor or a callback rejects the value of a parameter."""
 
     def __init__(self, parameter: str, value: AllowableParameterValue, reason: str) -> None:
         super().__init__(f"Invalid parameter value ({value}) for parameter. Reason: {reason}", parameter)
 
 
 class ParameterImmutableException(ParameterException):
-    """Raised when a read-only parameter would change."""
+    """Raised when a read-only parameter is changed."""
 
     def __init__(self, parameter_name: str):
         super().__init__("Attempted to modify read-only parameter", parameter_name)
 
 
 class ParameterUninitializedException(ParameterException):
-    """Raised when a parameter that was declared with a type only is read before it was set."""
+    """Raised when a parameter that was declared with a type only is read before it is set."""
 
     def __init__(self, parameter_name: str):
         super().__init__(f"The parameter '{parameter_name}' is not initialized", parameter_name)

@@ -1,9 +1,9 @@
-"""Executors: they wait for what happens to nodes and run the callbacks.
+"""Executors: they wait for events of nodes and run the callbacks.
 
-An executor waits in a DDS wait set, with the interpreter lock released, on one condition per reader and on
-one guard condition by which everything else wakes it: timers that changed, tasks, guard conditions, entities
-that came or went. So nothing polls, and a change from any thread is seen at once. The wait set belongs to the
-spinning thread alone: other threads only leave word and wake it.
+An executor waits in a DDS wait set, with the interpreter lock released. The wait set has a condition for each
+reader, and a guard condition for all other changes: timers, tasks, guard conditions, created and destroyed
+entities. So no executor polls, and a change from any thread takes effect at once. Only the spinning thread
+uses the wait set; other threads set a flag and trigger the guard condition.
 """
 
 from __future__ import annotations
@@ -15,16 +15,17 @@ import time
 import weakref
 from collections import deque
 from collections.abc import Callable, Coroutine
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager
 from types import CoroutineType, TracebackType
 from typing import TYPE_CHECKING, Any, Protocol
 
-from rclpy import _imports, signals
-from rclpy._dds import INFINITY, GuardCondition, WaitSet
+from rclpy import _dds, signals
+from rclpy._dds import INFINITY, WaitSet
 from rclpy.callback_groups import CallbackGroup
+from rclpy.client import Client  # noqa: F401 (re-export)
 from rclpy.constants import S_TO_NS
-from rclpy.exceptions import NotInitializedException
+from rclpy.exceptions import InvalidHandle, NotInitializedException  # noqa: F401 (re-export)
+from rclpy.guard_condition import GuardCondition  # noqa: F401 (re-export)
 from rclpy.task import Future, Task
 from rclpy.utilities import get_default_context
 
@@ -33,29 +34,25 @@ if TYPE_CHECKING:
     from rclpy.node import Node
     from rclpy.timer import Timer
 
-_imports.offer(__name__)
-
-# As long as all that was ready is run within this time, readers may have more messages at once, in turns;
-# then the timers get theirs. So a flood costs few waits, and a slow callback delays nobody but by itself.
-_TURNS = 200_000  # ns
+# For this long after a wait [ns], ready readers take further messages in turn. Then timers are checked again.
+# So a flood of messages needs few waits, and a slow callback delays the others only by its own duration.
+_BURST = 200_000
 _WAKE = 0  # the wait set's token of the guard condition
 
 
 class TimeoutException(Exception):
-    """Signal that nothing became ready in time."""
+    """Raised when no callback became ready in time."""
 
 
 class ShutdownException(Exception):
-    """Signal that the executor was shut down."""
+    """Raised when the executor was shut down."""
 
 
 class ExternalShutdownException(Exception):
     """Context has been shutdown."""
 
     def __init__(self, *args: object) -> None:
-        super().__init__(
-            *(args or ("the context was shut down from outside: by a signal or another thread",))
-        )
+        super().__init__(*(args or ("the context was shut down by a signal or another thread",)))
 
 
 class ConditionReachedException(Exception):
@@ -63,21 +60,21 @@ class ConditionReachedException(Exception):
 
 
 class TimeoutObject:
-    """A timeout that many calls share."""
+    """A timeout for several calls together."""
 
     def __init__(self, timeout: float) -> None:
         self._deadline = _deadline(timeout)
 
     @property
     def timeout(self) -> float:
-        """Seconds that remain, never negative; -1 for no end."""
+        """Remaining time [s], never negative; -1: no timeout."""
         if self._deadline is None:
             return -1.0
         return _remaining(self._deadline) / S_TO_NS
 
 
 def _deadline(timeout: float | TimeoutObject | None) -> int | None:
-    """When a timeout [s] is over, by the steady clock [ns]; ``None`` for never."""
+    """Convert a timeout [s] to a deadline of the steady clock [ns]; ``None``: no deadline."""
     if isinstance(timeout, TimeoutObject):
         return timeout._deadline
     if timeout is None or timeout < 0:
@@ -86,12 +83,12 @@ def _deadline(timeout: float | TimeoutObject | None) -> int | None:
 
 
 def _remaining(deadline: int | None) -> int:
-    """Nanoseconds until a deadline of :func:`_deadline`, never negative."""
+    """Return the time until a deadline [ns], never negative."""
     return INFINITY if deadline is None else max(0, deadline - time.monotonic_ns())
 
 
 class _Entity(Protocol):
-    """What an executor waits for and runs: a subscription, timer, service, client, guard or event."""
+    """An entity with a callback: subscription, timer, service, client, guard condition or events."""
 
     @property
     def callback_group(self) -> CallbackGroup | None: ...
@@ -102,7 +99,7 @@ class _Entity(Protocol):
 
 
 async def await_or_execute(callback: Callable[..., Any] | Coroutine[Any, Any, Any], *args: Any) -> Any:
-    """Call ``callback``; await what it returns if it is a coroutine function."""
+    """Call ``callback``; if it is a coroutine function, await its result."""
     if inspect.iscoroutinefunction(callback):
         return await callback(*args)
     assert callable(callback)
@@ -110,10 +107,10 @@ async def await_or_execute(callback: Callable[..., Any] | Coroutine[Any, Any, An
 
 
 class Executor(AbstractContextManager["Executor"]):
-    """Waits for work of its nodes. What runs it, and on which thread, is up to the subclasses."""
+    """Waits for ready callbacks of its nodes. Subclasses decide how and on which thread they run."""
 
     def __init__(self, *, context: Context | None = None) -> None:
-        """Create an executor of ``context``'s nodes. Raises NotInitializedException if it does not run."""
+        """Create an executor. Raises NotInitializedException if the context does not run."""
         super().__init__()
         self._context = get_default_context() if context is None else context
         if not self._context._valid:
@@ -122,46 +119,46 @@ class Executor(AbstractContextManager["Executor"]):
         self._nodes_lock = threading.RLock()
         self._tasks: deque[Task] = deque()
         self._is_shutdown = False
-        self._is_global = False  # rclpy.spin()'s: unless a signal ends the context, spinning just returns
+        self._is_global = False  # the default of rclpy.spin(), which returns silently after rclpy.shutdown()
         self._closed = False
         self._idle = threading.Condition()
 
-        self._guard = GuardCondition()
+        self._guard = _dds.GuardCondition()
         self._waitset = WaitSet()
         self._waitset.attach(self._guard.handle, _WAKE)
-        # What ends with the executor, also where nobody shuts it down.
-        self._dds: list[WaitSet | GuardCondition] = [self._waitset, self._guard]
+        # Closed with the executor, also if it is garbage-collected without a shutdown.
+        self._dds: list[WaitSet | _dds.GuardCondition] = [self._waitset, self._guard]
         self._close_dds = weakref.finalize(self, _close, self._dds)
-        self._close_dds.atexit = False  # DDS ends by itself then
+        self._close_dds.atexit = False  # at exit, DDS closes everything itself
         self._spinning_thread: int | None = None
-        self._callback_thread: int | None = None  # the spinning thread, while it runs a callback itself
-        # The rest is the spinning thread's own, but for the two flags by which others leave word.
+        self._callback_thread: int | None = None  # the spinning thread, while it runs a callback
+        # Only the spinning thread uses the rest, except these two flags.
         self._entities_changed = True
         self._groups_changed = False
-        self._only_nodes: list[Node] | None = None  # to wait for, in place of those that were added
-        self._seen: list[tuple[Node, int]] = []  # the nodes, and the version of their entities, waited for
+        self._only_nodes: list[Node] | None = None  # if given, wait for these instead of the added ones
+        self._seen: list[tuple[Node, int]] = []  # nodes in the wait set, with the version of their entities
         self._timers: list[Timer] = []
         self._guards: list[Any] = []
         self._attached: dict[int, tuple[_Entity, int]] = {}  # token -> entity, DDS handle
-        self._blocked: dict[int, tuple[_Entity, int]] = {}  # the same, while their callback group is busy
+        self._blocked: dict[int, tuple[_Entity, int]] = {}  # likewise, while the callback group is busy
         self._tokens: dict[int, int] = {}  # DDS handle -> token
         self._last_token = _WAKE
-        # An entity or task, and whether it is a reader, which may have more than one message.
+        # Entities or tasks, and whether each is a reader, which may have several messages.
         self._ready: deque[tuple[Any, bool]] = deque()
-        self._again: deque[tuple[Any, bool]] = deque()  # the readers that had one
-        self._turns_end = 0
+        self._repeatable: deque[tuple[Any, bool]] = deque()  # readers that had a message in this burst
+        self._burst_end = 0
         self._context._executors.add(self)
         signals._watch(self)
 
     @property
     def context(self) -> Context:
-        """The context whose nodes it runs."""
+        """The context of the executor."""
         return self._context
 
     # Nodes
 
     def add_node(self, node: Node) -> bool:
-        """Run ``node``'s callbacks from now on. ``False`` if that is so already."""
+        """Add a node, whose callbacks this executor runs. Return ``False`` if it was added before."""
         with self._nodes_lock:
             if node in self._nodes:
                 return False
@@ -173,7 +170,7 @@ class Executor(AbstractContextManager["Executor"]):
         return True
 
     def remove_node(self, node: Node) -> None:
-        """Run ``node``'s callbacks no longer."""
+        """Remove a node: this executor stops running its callbacks."""
         with self._nodes_lock:
             if node not in self._nodes:
                 return
@@ -181,7 +178,7 @@ class Executor(AbstractContextManager["Executor"]):
         self._entities_have_changed()
 
     def get_nodes(self) -> list[Node]:
-        """The nodes whose callbacks run here."""
+        """Return the nodes of this executor."""
         with self._nodes_lock:
             return list(self._nodes)
 
@@ -194,7 +191,7 @@ class Executor(AbstractContextManager["Executor"]):
     def create_task(
         self, callback: Callable[..., Any] | Coroutine[Any, Any, Any], *args: Any, **kwargs: Any
     ) -> Task:
-        """Run a function or coroutine on this executor; the returned future gets its result."""
+        """Run a function or coroutine on this executor; return its task, a future of the result."""
         task = Task(callback, args, kwargs, executor=self)
         self._schedule(task)
         return task
@@ -216,30 +213,30 @@ class Executor(AbstractContextManager["Executor"]):
     # Spinning
 
     def wake(self) -> None:
-        """Let the spinning thread look anew; from any thread."""
+        """Make the spinning thread check for work again; may be called from any thread."""
         if not self._is_shutdown:
             self._guard.trigger()
 
     def _wake_if_waiting(self) -> None:
-        """Wake, unless this is said in a callback on the spinning thread, which looks anew anyway."""
+        """Wake the spinning thread, unless it is running the caller and will check again anyway."""
         if threading.get_ident() != self._callback_thread:
             self.wake()
 
     def spin(self) -> None:
-        """Run callbacks until the context, or this executor, is shut down."""
+        """Run callbacks until the context or this executor is shut down."""
         while self._context._valid and not self._is_shutdown:
             self.spin_once()
 
     def spin_once(self, timeout_sec: float | None = None) -> None:
         """
-        Run one callback, waiting at most ``timeout_sec`` for it (``None`` or negative: for ever).
+        Run one callback; wait for it at most ``timeout_sec`` (``None`` or negative: for ever).
 
-        An executor of your own defines this, and gets its work from :meth:`wait_for_ready_callbacks`.
+        Custom executors implement this with :meth:`wait_for_ready_callbacks`.
         """
         raise NotImplementedError
 
     def spin_until_future_complete(self, future: Future, timeout_sec: float | None = None) -> None:
-        """Run callbacks until ``future`` is done or cancelled, but no longer than ``timeout_sec``."""
+        """Run callbacks until ``future`` is done or cancelled, at most for ``timeout_sec``."""
         future._call_when_complete(self.wake)
         timeout = None if timeout_sec is None or timeout_sec < 0 else TimeoutObject(timeout_sec)
         while self._context._valid and not self._is_shutdown and not future._is_over():
@@ -251,9 +248,9 @@ class Executor(AbstractContextManager["Executor"]):
         self, future: Future, timeout_sec: float | TimeoutObject | None = None
     ) -> None:
         """
-        Run one callback, unless ``future`` is or gets done before one is ready.
+        Run one callback, unless ``future`` is done before one is ready.
 
-        An executor of your own defines this, if somebody is to wait for futures with it.
+        Custom executors that support :meth:`spin_until_future_complete` implement this.
         """
         raise NotImplementedError
 
@@ -264,11 +261,11 @@ class Executor(AbstractContextManager["Executor"]):
         condition: Callable[[], bool] = lambda: False,
     ) -> tuple[Task, Any, Node | None]:
         """
-        Wait for a callback and return it as a task, with its entity and node.
+        Wait for a ready callback and return it as a task, with its entity and node.
 
-        :param nodes: the nodes whose callbacks to wait for; those of this executor if ``None``.
+        :param nodes: wait for callbacks of these nodes; ``None``: those of this executor.
         :raises TimeoutException, ShutdownException, ExternalShutdownException, ConditionReachedException:
-            if there is none.
+            if the wait ends without one.
         """
         if nodes is not None:
             self._wait_only_for(list(nodes))
@@ -280,7 +277,7 @@ class Executor(AbstractContextManager["Executor"]):
         candidates = self.get_nodes() if nodes is None else nodes
         node = next((node for node in candidates if entity in node._rclpy_entities()), None)
         task = Task(self._run, (entity, taken), executor=self)
-        # Whoever waits here on another thread than the task's may have to wait for more from then on.
+        # When the task ends, its callback group may allow other callbacks, for which another thread may wait.
         task._call_when_complete(self.wake)
         return task, entity, node
 
@@ -289,11 +286,11 @@ class Executor(AbstractContextManager["Executor"]):
         self._entities_changed = True
 
     def can_execute(self, entity: Any) -> bool:
-        """Whether ``entity``'s callback group would let it run now."""
+        """Return whether the callback group of ``entity`` allows it to run now."""
         return entity.callback_group is None or bool(entity.callback_group.can_execute(entity))
 
     def _next(self, deadline: int | None, condition: Callable[[], bool] | None) -> tuple[Any, Any]:
-        """Wait for work: an entity and what was taken from it; for a task, the task and ``None``."""
+        """Wait for work: return an entity and the data taken from it, or a task and ``None``."""
         self._check(condition)
         waited = False
         while True:
@@ -312,29 +309,29 @@ class Executor(AbstractContextManager["Executor"]):
                 try:
                     taken = entity._take()
                 except BaseException:
-                    self._ended(entity)
+                    self._end_execution(entity)
                     raise
                 if taken is None:
                     if group is not None:
                         group.ending_execution(entity)
                     continue
                 if is_reader:
-                    self._again.append((entity, True))
+                    self._repeatable.append((entity, True))
                 return entity, taken
-            if self._again:
-                if time.monotonic_ns() < self._turns_end:
-                    self._ready, self._again = self._again, self._ready
+            if self._repeatable:
+                if time.monotonic_ns() < self._burst_end:
+                    self._ready, self._repeatable = self._repeatable, self._ready
                     continue
-                self._again.clear()
+                self._repeatable.clear()
             if waited and deadline is not None and time.monotonic_ns() >= deadline:
                 raise TimeoutException
-            # Without a word from anybody there is no new reason to end.
+            # Every new reason to end wakes the executor.
             if self._collect(deadline) or not self._ready:
                 self._check(condition)
             waited = True
 
     def _check(self, condition: Callable[[], bool] | None) -> None:
-        """Raise the reason for which no more work is to be waited for, if there is one."""
+        """Raise the exception that ends the wait for work, if there is a reason to end it."""
         if not self._context._valid:
             in_order = self._is_global and not self._context._ended_by_signal
             raise ShutdownException if in_order else ExternalShutdownException
@@ -345,9 +342,9 @@ class Executor(AbstractContextManager["Executor"]):
 
     def _collect(self, deadline: int | None) -> bool:
         """
-        Wait until something is ready, ``deadline`` is over or somebody wakes us; note what is ready.
+        Wait for ready entities until the deadline has passed or :meth:`wake` is called; collect them.
 
-        :return: whether somebody woke us.
+        :return: whether :meth:`wake` was called.
         """
         timeout = _remaining(deadline)
         while self._tasks:
@@ -368,9 +365,9 @@ class Executor(AbstractContextManager["Executor"]):
                 next_timer, timeout = timer, remaining
         tokens = self._waitset.wait(timeout)
         if not tokens and next_timer is not None:
-            self._ready.append((next_timer, False))  # its time has come
+            self._ready.append((next_timer, False))  # the wait lasted until the timer was due
         if tokens:
-            self._turns_end = time.monotonic_ns() + _TURNS
+            self._burst_end = time.monotonic_ns() + _BURST
         woken = False
         for token in tokens:
             if token == _WAKE:
@@ -380,11 +377,11 @@ class Executor(AbstractContextManager["Executor"]):
                 self._ready.append((self._attached[token][0], True))
         return woken
 
-    # What is waited for
+    # The contents of the wait set
 
     def _update_entities(self) -> None:
-        """Bring the wait set up to the entities that the nodes have now."""
-        self._entities_changed = False  # first: what changes from now on is seen in the next round
+        """Update the wait set to the current entities of the nodes."""
+        self._entities_changed = False  # first: later changes are handled in the next round
         nodes = self.get_nodes() if self._only_nodes is None else self._only_nodes
         seen = [(node, node._rclpy_entities_version) for node in nodes]
         if seen == self._seen:
@@ -409,24 +406,24 @@ class Executor(AbstractContextManager["Executor"]):
                 if self._waitset.attach(handle, self._last_token):
                     self._tokens[handle] = self._last_token
                     self._attached[self._last_token] = (entity, handle)
-        self._again.clear()
-        if self._ready:  # what others run from now on is not run here
-            here = {*self._timers, *self._guards, *wanted.values()}
-            self._ready = deque(one for one in self._ready if one[0].__class__ is Task or one[0] in here)
+        self._repeatable.clear()
+        if self._ready:  # drop entities of nodes that were removed or destroyed
+            present = {*self._timers, *self._guards, *wanted.values()}
+            self._ready = deque(one for one in self._ready if one[0].__class__ is Task or one[0] in present)
 
     def _block(self, entity: _Entity) -> None:
-        """Do not wait for an entity whose callback group is busy: its data would end every wait at once."""
+        """Stop waiting for an entity whose callback group is busy: its data would end every wait at once."""
         for token, (attached, handle) in list(self._attached.items()):
             if attached is entity:
                 del self._attached[token]
                 self._waitset.detach(handle)
                 self._blocked[token] = (entity, handle)
-        # Set or left alone: a thread that ends what is in the way meanwhile sets it, too.
+        # Never set to False here: another thread may just have freed the group and set it.
         if self.can_execute(entity):
             self._groups_changed = True
 
     def _unblock(self) -> None:
-        """Wait again for those whose callback group is free again."""
+        """Wait again for entities whose callback group is free again."""
         self._groups_changed = False
         for token, (entity, handle) in list(self._blocked.items()):
             if self.can_execute(entity):
@@ -437,7 +434,7 @@ class Executor(AbstractContextManager["Executor"]):
     # Running
 
     def _run(self, entity: Any, taken: Any) -> None:
-        """Run what :meth:`_next` returned; raises what its callback raises."""
+        """Run the result of :meth:`_next`; exceptions of the callback propagate."""
         if entity.__class__ is Task:
             self._run_task(entity)
             _raise_exception_of(entity)
@@ -445,17 +442,17 @@ class Executor(AbstractContextManager["Executor"]):
         try:
             result = entity._execute(taken)
         except BaseException:
-            self._ended(entity)
+            self._end_execution(entity)
             raise
         if result.__class__ is CoroutineType:
             task = Task(result, executor=self)
-            task._call_when_complete(lambda: self._ended(entity))
+            task._call_when_complete(lambda: self._end_execution(entity))
             self._run_task(task)
             _raise_exception_of(task)
         else:
-            self._ended(entity)
+            self._end_execution(entity)
 
-    def _ended(self, entity: _Entity) -> None:
+    def _end_execution(self, entity: _Entity) -> None:
         if entity.callback_group is not None:
             entity.callback_group.ending_execution(entity)
             if self._blocked:
@@ -467,14 +464,14 @@ class Executor(AbstractContextManager["Executor"]):
 
     def shutdown(self, timeout_sec: float | None = None) -> bool:
         """
-        Stop, and wait for callbacks that run on other threads.
+        Stop, and wait until callbacks on other threads have ended.
 
-        :return: whether they ended within ``timeout_sec`` (``None``: however long it takes).
+        :return: whether they ended within ``timeout_sec`` (``None``: no limit).
         """
         if not self._is_shutdown:
             self._is_shutdown = True
             self._guard.trigger()
-        # A callback, or a signal handler, on the spinning thread cannot wait for itself to end.
+        # A callback or signal handler on the spinning thread cannot wait for its own end.
         if threading.get_ident() != self._spinning_thread:
             with self._idle:
                 if not self._idle.wait_for(self._is_idle, timeout_sec):
@@ -503,7 +500,7 @@ class Executor(AbstractContextManager["Executor"]):
         self.shutdown()
 
 
-def _close(entities: list[WaitSet | GuardCondition]) -> None:
+def _close(entities: list[WaitSet | _dds.GuardCondition]) -> None:
     for entity in entities:
         entity.close()
 
@@ -513,25 +510,25 @@ def _raise_exception_of(task: Task) -> None:
         task.result()
 
 
-class _ReadyMadeExecutor(Executor):
-    """An executor of this module: as little as possible stands between its waiting and a callback."""
+class _BuiltInExecutor(Executor):
+    """Base of this module's executors, with a minimum of code between waiting and callback."""
 
-    _ENDS: tuple[type[Exception], ...] = (TimeoutException, ShutdownException, ConditionReachedException)
-    """what ends its spinning without an error"""
+    _SPIN_ENDS: tuple[type[Exception], ...] = (TimeoutException, ShutdownException, ConditionReachedException)
+    """These end the spinning without an error."""
 
     def spin_once(self, timeout_sec: float | None = None) -> None:
-        """Run one callback, waiting at most ``timeout_sec`` for it (``None`` or negative: for ever)."""
+        """Run one callback; wait for it at most ``timeout_sec`` (``None`` or negative: for ever)."""
         self._spin(_deadline(timeout_sec), None, once=True)
 
     def spin_once_until_future_complete(
         self, future: Future, timeout_sec: float | TimeoutObject | None = None
     ) -> None:
-        """Run one callback, unless ``future`` is or gets done before one is ready."""
+        """Run one callback, unless ``future`` is done before one is ready."""
         future._call_when_complete(self.wake)
         self._spin(_deadline(timeout_sec), future._is_over, once=True)
 
     def spin_until_future_complete(self, future: Future, timeout_sec: float | None = None) -> None:
-        """Run callbacks until ``future`` is done or cancelled, but no longer than ``timeout_sec``."""
+        """Run callbacks until ``future`` is done or cancelled, at most for ``timeout_sec``."""
         future._call_when_complete(self.wake)
         if self._context._valid:
             self._spin(_deadline(timeout_sec), future._is_over)
@@ -539,17 +536,17 @@ class _ReadyMadeExecutor(Executor):
     def _spin(
         self, deadline: int | None, condition: Callable[[], bool] | None, *, once: bool = False
     ) -> None:
-        """Run callbacks, or one, unless the time is over or the condition true before one is ready."""
+        """Run callbacks, or ``once`` one, until the deadline has passed or the condition is true."""
         thread, outer = threading.get_ident(), self._spinning_thread
         if outer is not None and outer != thread:
-            raise ValueError("another thread spins this executor: it can only be spun by one at a time")
-        self._spinning_thread = thread  # it may be that already, if it spins in a callback
+            raise ValueError("another thread already spins this executor")
+        self._spinning_thread = thread  # it may already be, if a callback spins
         try:
             while True:
                 self._callback_thread = None
                 try:
                     entity, taken = self._next(deadline, condition)
-                except self._ENDS:
+                except self._SPIN_ENDS:
                     return
                 self._callback_thread = thread
                 self._dispatch(entity, taken)
@@ -557,28 +554,31 @@ class _ReadyMadeExecutor(Executor):
                     return
                 if deadline is not None and time.monotonic_ns() >= deadline:
                     return
-                del entity, taken  # the next may be long in coming: nothing lives on for that
+                del entity, taken  # the next wait may be long: keep no object alive
         finally:
             self._spinning_thread = self._callback_thread = outer
-            if self._is_shutdown:  # somebody may be waiting for this; who comes later finds it done
+            if self._is_shutdown:  # shutdown() may be waiting for this
                 with self._idle:
                     self._idle.notify_all()
 
     def _dispatch(self, entity: Any, taken: Any) -> None:
-        """Have run, here or elsewhere, what :meth:`_next` returned."""
+        """Run the result of :meth:`_next`, on this or another thread."""
         raise NotImplementedError
 
 
-class SingleThreadedExecutor(_ReadyMadeExecutor):
+class SingleThreadedExecutor(_BuiltInExecutor):
     """Runs all callbacks on the thread that spins."""
 
     _dispatch = Executor._run
 
 
-class MultiThreadedExecutor(_ReadyMadeExecutor):
-    """Runs callbacks on a pool of threads, as far as their callback groups let them run in parallel."""
+class MultiThreadedExecutor(_BuiltInExecutor):
+    """Runs callbacks on a pool of threads, in parallel if their callback groups allow it."""
 
-    _ENDS = (*_ReadyMadeExecutor._ENDS, ExternalShutdownException)  # unlike on one thread, as in rclpy
+    _SPIN_ENDS = (
+        *_BuiltInExecutor._SPIN_ENDS,
+        ExternalShutdownException,
+    )  # as in rclpy
 
     def __init__(self, num_threads: int | None = None, *, context: Context | None = None) -> None:
         """
@@ -588,28 +588,32 @@ class MultiThreadedExecutor(_ReadyMadeExecutor):
         """
         if num_threads is not None and num_threads < 1:
             raise ValueError("a MultiThreadedExecutor needs at least one thread")
+        from concurrent.futures import ThreadPoolExecutor  # here: it takes long to import
+
         super().__init__(context=context)
         self._threads = num_threads or max(2, os.cpu_count() or 2)
         self._pool_threads = pool_threads = set[int]()
         self._pool = ThreadPoolExecutor(
             self._threads,
             "rclpy-executor",
-            lambda: pool_threads.add(threading.get_ident()),  # the threads shall not keep the executor alive
+            lambda: pool_threads.add(
+                threading.get_ident()
+            ),  # without self: the threads must not keep the executor alive
         )
         self._errors: deque[BaseException] = deque()
-        self._in_pool = 0  # callbacks under way there
-        self._wakes = WaitSet()  # for nothing but being woken
-        self._wakes.attach(self._guard.handle, _WAKE)
-        self._dds.append(self._wakes)
+        self._in_pool = 0  # running or queued callbacks
+        self._wake_set = WaitSet()  # contains the guard condition only
+        self._wake_set.attach(self._guard.handle, _WAKE)
+        self._dds.append(self._wake_set)
 
     def _next(self, deadline: int | None, condition: Callable[[], bool] | None) -> tuple[Any, Any]:
-        """Wait for a free thread, then for work: what is taken earlier grows old, and more and more of it."""
+        """Wait for a free thread first: samples taken earlier would pile up in the pool and get old."""
         while self._in_pool >= self._threads:
             self._check(condition)
             timeout = _remaining(deadline)
             if not timeout:
                 raise TimeoutException
-            if self._wakes.wait(timeout):
+            if self._wake_set.wait(timeout):
                 self._guard.take()
         return super()._next(deadline, condition)
 
@@ -627,7 +631,7 @@ class MultiThreadedExecutor(_ReadyMadeExecutor):
             self._in_pool += 1
         try:
             self._pool.submit(self._run_in_pool, entity, taken)
-        except RuntimeError:  # shut down meanwhile, by a signal's handler on this thread
+        except RuntimeError:  # a signal handler on this thread has shut the pool down
             self._run_in_pool(entity, taken)
 
     def _run_in_pool(self, entity: Any, taken: Any) -> None:
@@ -639,17 +643,17 @@ class MultiThreadedExecutor(_ReadyMadeExecutor):
             with self._idle:
                 self._in_pool -= 1
                 self._idle.notify_all()
-                # The spinning thread may be waiting for a thread, this entity's callback group, or an error.
-                # Under the lock: whoever waits in shutdown() ends afterwards what this wakes by.
+                # The spinning thread may wait for a free thread, this entity's callback group, or an error.
+                # Under the lock, because shutdown() waits for it and then closes the guard condition.
                 self.wake()
 
     def _is_idle(self) -> bool:
         return super()._is_idle() and not self._in_pool
 
     def shutdown(self, timeout_sec: float | None = None) -> bool:
-        """Stop, and wait for callbacks that run, unless one of them asks: see :meth:`Executor.shutdown`."""
+        """Stop, and wait until callbacks have ended, unless one calls this: see :meth:`Executor.shutdown`."""
         if threading.get_ident() in self._pool_threads:
-            timeout_sec = 0  # a callback cannot wait for itself to end
+            timeout_sec = 0  # a callback cannot wait for its own end
         return super().shutdown(timeout_sec)
 
     def _close(self) -> None:

@@ -1,4 +1,4 @@
-"""From a name as a user writes it to the fully qualified name."""
+"""Expands names of topics and services to fully qualified names."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ __all__ = ["expand_topic_name"]
 
 def expand_topic_name(topic_name: str, node_name: str, node_namespace: str) -> str:
     """
-    Expand `topic_name` as the node `node_name` in `node_namespace` means it.
+    Expand `topic_name` for the node `node_name` in `node_namespace`.
 
-    `chatter` is relative to the namespace, `~/chatter` private to the node, `/chatter` absolute; `{node}`,
+    `chatter` is relative to the namespace, `~/chatter` private to the node, `/chatter` absolute. `{node}`,
     `{ns}` and `{namespace}` are replaced. The result may still be invalid: see `validate_full_topic_name`.
 
-    :raises ValueError: if one of the arguments is invalid or a substitution is unknown.
+    :raises ValueError: if an argument is invalid or a substitution unknown.
     """
     _raise_if("topic name", topic_name, validate_topic_name._problem(topic_name))
     _raise_if("node name", node_name, validate_node_name._problem(node_name))

@@ -1,4 +1,4 @@
-"""Guard conditions: what an application triggers itself."""
+"""Guard conditions: events that an application triggers itself."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import threading
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from rclpy import _imports
 from rclpy._handle import Handle
 from rclpy.callback_groups import CallbackGroup
 from rclpy.exceptions import InvalidHandle
@@ -14,11 +13,9 @@ from rclpy.exceptions import InvalidHandle
 if TYPE_CHECKING:
     from rclpy.context import Context
 
-_imports.offer(__name__)
-
 
 class GuardCondition:
-    """Runs its callback on the executor after each :meth:`trigger`; several triggers may become one."""
+    """Runs its callback on the executor after :meth:`trigger`; several triggers may cause one call."""
 
     def __init__(
         self,
@@ -26,7 +23,7 @@ class GuardCondition:
         callback_group: CallbackGroup | None,
         context: Context | None = None,
     ) -> None:
-        """Create one; :meth:`rclpy.node.Node.create_guard_condition` is the usual way."""
+        """Create a guard condition; usually, :meth:`rclpy.node.Node.create_guard_condition` does."""
         self.callback = callback
         self.callback_group = callback_group
         self._context = context
@@ -37,7 +34,7 @@ class GuardCondition:
 
     @property
     def handle(self) -> Handle:
-        """What stands for the guard condition. Raises InvalidHandle when it was destroyed."""
+        """A handle for the guard condition. Raises InvalidHandle if it was destroyed."""
         self._check_usable()
         return self._handle
 
@@ -46,19 +43,19 @@ class GuardCondition:
             raise InvalidHandle("cannot use a guard condition that was destroyed")
 
     def trigger(self) -> None:
-        """Let the callback run; from any thread."""
+        """Make the callback run; may be called from any thread."""
         self._check_usable()
         self._triggered.set()
         self._on_change()
 
     def destroy(self) -> None:
-        """End it; whoever created it should use :meth:`rclpy.node.Node.destroy_guard_condition`."""
+        """Destroy it. :meth:`rclpy.node.Node.destroy_guard_condition` also removes it from the node."""
         self._destroyed = True
 
-    # What the executor asks of everything it waits for.
+    # The interface that executors use for every entity.
 
     def _is_ready(self) -> bool:
-        """Whether it was triggered and its callback has not run yet."""
+        """Whether it is triggered and its callback has not started."""
         return self._triggered.is_set() and not self._destroyed
 
     def _take(self) -> tuple[()] | None:

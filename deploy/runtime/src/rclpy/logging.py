@@ -1,16 +1,13 @@
-"""Loggers, and the levels below which they are silent."""
+"""Loggers and their levels."""
 
 from __future__ import annotations
 
 import os
 from typing import TYPE_CHECKING
 
-from rclpy import _imports
 from rclpy.impl import _logging_levels, _logging_output, rcutils_logger
 from rclpy.impl.logging_severity import LoggingSeverity
 from rclpy.impl.rcutils_logger import RcutilsLogger
-
-_imports.offer(__name__)
 
 __all__ = [
     "LoggingSeverity",
@@ -47,55 +44,55 @@ def get_logger(name: str) -> RcutilsLogger:
 
 def initialize() -> None:
     """
-    Configure logging from the environment, if that has not happened yet.
+    Configure logging from the environment, unless it is already configured.
 
-    :raises RuntimeError: if an environment variable has a value that is not valid.
+    :raises RuntimeError: if an environment variable has an invalid value.
     """
     _logging_output.initialize()
 
 
 def shutdown() -> None:
-    """Forget the configuration of logging: the levels, and what was read from the environment."""
+    """Reset logging: the levels, and the configuration from the environment."""
     _logging_output.shutdown()
     _logging_levels.clear()
 
 
 def clear_config() -> None:
-    """Configure logging from the environment again, and forget all levels."""
+    """Reset all levels, and configure logging from the environment again."""
     shutdown()
     initialize()
 
 
 def set_logger_level(name: str, level: int | LoggingSeverity, detailed_error: bool = False) -> None:
     """
-    Set the level of the logger `name`; '' names the default of all loggers.
+    Set the level of the logger `name`; '' sets the default of all loggers.
 
-    :param detailed_error: has no effect here: the only error names its reason.
-    :raises ValueError: if `level` is no severity.
+    :param detailed_error: has no effect: the only error always names its reason.
+    :raises ValueError: if `level` is not a severity.
     """
     _logging_levels.set_level(name, LoggingSeverity(level))
 
 
 def get_logger_effective_level(name: str) -> LoggingSeverity:
-    """Return the level that applies to the logger `name`: its own, or that of an ancestor."""
+    """Return the effective level of the logger `name`: its own, or that of an ancestor."""
     return LoggingSeverity(_logging_levels.effective_level(name))
 
 
 def get_logger_level(name: str) -> LoggingSeverity:
-    """Return the level that was set for exactly the logger `name`, UNSET if none was."""
+    """Return the level that was set for the logger `name` itself, or UNSET."""
     return LoggingSeverity(_logging_levels.get_level(name))
 
 
 def get_logging_severity_from_string(log_severity: str) -> LoggingSeverity:
     """
-    Return the severity with that name, whatever its case.
+    Return the severity with that name, in upper or lower case.
 
     :raises RuntimeError: if there is none.
     """
     try:
         return LoggingSeverity[log_severity.upper()]
     except KeyError:
-        raise RuntimeError(f"Failed to get severity name: '{log_severity}' is none") from None
+        raise RuntimeError(f"Failed to get severity name: '{log_severity}' is not a severity") from None
 
 
 def get_logging_directory() -> Path:
@@ -110,7 +107,7 @@ def _apply_arguments(arguments: RosArguments) -> None:
     """
     Configure logging from the environment and the command line of a process.
 
-    :raises RuntimeError: if an environment variable has a value that is not valid.
+    :raises RuntimeError: if an environment variable has an invalid value.
     """
     initialize()
     _logging_output.enable_console(arguments.stdout_logs)

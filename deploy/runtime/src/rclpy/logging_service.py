@@ -1,4 +1,4 @@
-"""The services through which others read and set the levels of a process' loggers."""
+"""The services to get and set the levels of a process' loggers."""
 
 from __future__ import annotations
 

@@ -1,14 +1,14 @@
-"""Nodes: what takes part in the ROS graph."""
+"""Nodes: the participants of the ROS graph."""
 
 from __future__ import annotations
 
 import weakref
 from collections.abc import Callable, Iterator
 from functools import partial
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 from rcl_interfaces.msg import Log, ParameterEvent
-from rclpy import _best_available, _imports, _names
+from rclpy import _best_available, _names
 from rclpy._arguments import parse
 from rclpy._endpoint import PublisherEndpoint, ServiceEndpoint, SubscriptionEndpoint
 from rclpy._node_graph import NodeGraph
@@ -51,12 +51,6 @@ from rclpy.validate_node_name import validate_node_name
 from rclpy.validate_topic_name import validate_topic_name
 from rclpy.waitable import Waitable
 
-if TYPE_CHECKING:
-    from rclpy.context import Context
-    from rclpy.executors import Executor
-
-_imports.offer(__name__)
-
 __all__ = [
     "HIDDEN_NODE_PREFIX",
     "PARAMETER_SEPARATOR_STRING",
@@ -66,9 +60,30 @@ __all__ = [
     "qos_profile_services_default",
 ]
 
+# Re-exports: programs written for ROS 2 import these names from here (tests/conformance/test_imports.py).
+from typing import Dict, List, Optional, Union  # noqa: F401, UP035
+
+from rcl_interfaces.msg import (  # noqa: F401
+    FloatingPointRange,
+    IntegerRange,
+    ParameterDescriptor,
+    ParameterType,
+    ParameterValue,
+    SetParametersResult,
+)
+from rclpy._type_variables import MsgType, SrvType, SrvTypeRequest, SrvTypeResponse  # noqa: F401
+from rclpy.callback_groups import ReentrantCallbackGroup  # noqa: F401
+from rclpy.context import Context
+from rclpy.exceptions import (  # noqa: F401
+    InvalidHandle,
+    NodeNameNonExistentError,
+    ParameterNotDeclaredException,
+)
+from rclpy.executors import Executor
+
 HIDDEN_NODE_PREFIX = "_"
 
-# rmw/qos_profiles.h's counterpart in rcl: rcl_qos_profile_rosout_default.
+# Source: rcl_qos_profile_rosout_default.
 _ROSOUT_QOS = QoSProfile(
     depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL, lifespan=Duration(seconds=10)
 )
@@ -77,7 +92,7 @@ _Entity = TypeVar("_Entity")
 
 
 class Node(NodeParameters, NodeGraph):
-    """A named participant in the ROS graph, with its publishers, subscriptions, services and timers."""
+    """A named participant of the ROS graph, with its publishers, subscriptions, services and timers."""
 
     def __init__(
         self,
@@ -98,16 +113,16 @@ class Node(NodeParameters, NodeGraph):
         Create a node.
 
         :param node_name: its name, unless remapped (``__node``).
-        :param context: what it belongs to; the default context if ``None``.
-        :param cli_args: ROS arguments for this node only; those of the process count as well.
+        :param context: its context; the default context if ``None``.
+        :param cli_args: ROS arguments for this node only, in addition to those of the process.
         :param namespace: its namespace, unless remapped (``__ns``).
-        :param use_global_arguments: whether the arguments of the process count.
+        :param use_global_arguments: whether the arguments of the process apply to it.
         :param enable_rosout: whether its log messages are published on ``/rosout``.
-        :param start_parameter_services: whether others can get and set its parameters.
-        :param parameter_overrides: values that win over those of parameter files and arguments.
-        :param allow_undeclared_parameters: whether parameters need not be declared.
+        :param start_parameter_services: whether other nodes can get and set its parameters.
+        :param parameter_overrides: values that override those of parameter files and arguments.
+        :param allow_undeclared_parameters: whether undeclared parameters are allowed.
         :param automatically_declare_parameters_from_overrides: whether overrides declare parameters.
-        :param enable_logger_service: whether others can get and set its logger levels.
+        :param enable_logger_service: whether other nodes can get and set its logger levels.
         :raises NotInitializedException: if the context is not initialized.
         :raises InvalidNodeNameException, InvalidNamespaceException: if a name is invalid.
         """
@@ -133,7 +148,7 @@ class Node(NodeParameters, NodeGraph):
         self._guards: list[GuardCondition] = []
         self._rclpy_rates: dict[Rate, Timer] = {}
         self._rclpy_events: dict[Publisher | Subscription, EndpointEvents] = {}
-        self._rclpy_used_types: set[Any] = set()  # of messages and services, for who asks what they look like
+        self._rclpy_used_types: set[Any] = set()  # for the service get_type_description
         self._rclpy_entities_version = 0
         self._default_callback_group = MutuallyExclusiveCallbackGroup()
 
@@ -142,7 +157,7 @@ class Node(NodeParameters, NodeGraph):
         self._rclpy_init_parameters(overrides, allow_undeclared=allow_undeclared_parameters)
 
         self._rclpy_rosout_publisher: Publisher | None = None
-        self._rclpy_log_listener = _weakly(self._rclpy_publish_log)
+        self._rclpy_log_listener = _weak_call(self._rclpy_publish_log)
         self._rclpy_graph = self._context._join_domain(self)
         with self._rclpy_graph.one_announcement():
             self._rclpy_graph.add_node(
@@ -167,29 +182,29 @@ class Node(NodeParameters, NodeGraph):
                     self._logger_service = LoggingService(self)
                 self._type_description_service = TypeDescriptionService(self)
             except BaseException:
-                Node.destroy_node(self)  # a subclass' own does not expect to be called yet
+                Node.destroy_node(self)  # not an override: the subclass is not initialized yet
                 raise
 
-    # Who it is
+    # Properties
 
     @property
     def default_callback_group(self) -> CallbackGroup:
-        """The group of everything that is created without one: its callbacks run one at a time."""
+        """The callback group of entities without another one: their callbacks run one at a time."""
         return self._default_callback_group
 
     def get_clock(self) -> Clock:
-        """Return its clock, which tells ROS time."""
+        """Return the node's clock, of type ROS time."""
         return self._clock
 
     def get_logger(self) -> RcutilsLogger:
-        """Return its logger."""
+        """Return the node's logger."""
         return self._logger
 
-    # Who runs it
+    # Execution
 
     @property
     def executor(self) -> Executor | None:
-        """The executor that it was added to last, as long as there is that: by ``rclpy.spin_once()``, too."""
+        """The existing executor to which the node was added last, also by ``rclpy.spin_once()``."""
         return None if self._rclpy_executor is None else self._rclpy_executor()
 
     @executor.setter
@@ -215,7 +230,7 @@ class Node(NodeParameters, NodeGraph):
             executor._entities_have_changed()
 
     def _rclpy_waitables(self) -> list[Any]:
-        """What an executor waits for in DDS."""
+        """The entities that an executor waits for in DDS."""
         return [
             *list(self._subscriptions),
             *list(self._services),
@@ -224,44 +239,44 @@ class Node(NodeParameters, NodeGraph):
         ]
 
     def _rclpy_entities(self) -> list[Any]:
-        """Everything that runs a callback."""
+        """All entities with a callback."""
         return [*self._rclpy_waitables(), *list(self._timers), *list(self._guards)]
 
-    # What it has
+    # Entities
 
     @property
     def publishers(self) -> Iterator[Publisher]:
-        """Its publishers."""
+        """The node's publishers."""
         yield from list(self._publishers)
 
     @property
     def subscriptions(self) -> Iterator[Subscription]:
-        """Its subscriptions."""
+        """The node's subscriptions."""
         yield from list(self._subscriptions)
 
     @property
     def clients(self) -> Iterator[Client]:
-        """Its clients."""
+        """The node's clients."""
         yield from list(self._clients)
 
     @property
     def services(self) -> Iterator[Service]:
-        """Its services."""
+        """The node's services."""
         yield from list(self._services)
 
     @property
     def timers(self) -> Iterator[Timer]:
-        """Its timers."""
+        """The node's timers."""
         yield from list(self._timers)
 
     @property
     def guards(self) -> Iterator[GuardCondition]:
-        """Its guard conditions."""
+        """The node's guard conditions."""
         yield from list(self._guards)
 
     @property
     def waitables(self) -> Iterator[Waitable]:
-        """The QoS event handlers of its publishers and subscriptions."""
+        """The QoS event handlers of the node's publishers and subscriptions."""
         for publisher in self.publishers:
             yield from publisher.event_handlers
         for subscription in self.subscriptions:
@@ -291,9 +306,9 @@ class Node(NodeParameters, NodeGraph):
         """
         Create a publisher.
 
-        :param qos_profile: the QoS it offers, or just the depth of its history.
+        :param qos_profile: the offered QoS, or only the depth of the history.
         :param callback_group: the group of its event callbacks.
-        :param qos_overriding_options: which policies parameters may override.
+        :param qos_overriding_options: the policies that parameters may override.
         :raises InvalidTopicNameException: if the topic's name is invalid.
         """
         profile, name = self._rclpy_endpoint_options(
@@ -319,7 +334,7 @@ class Node(NodeParameters, NodeGraph):
         return publisher
 
     def _rclpy_create_own_publisher(self, msg_type: Any, topic: str, qos_profile: QoSProfile) -> Publisher:
-        """A publisher that is not the user's: it is not listed, and nobody hears of its events."""
+        """Create an internal publisher: it is not listed, and its events are not reported."""
         silent = PublisherEventCallbacks(use_default_callbacks=False)
         publisher = self.create_publisher(msg_type, topic, qos_profile, event_callbacks=silent)
         self._publishers.remove(publisher)
@@ -340,11 +355,11 @@ class Node(NodeParameters, NodeGraph):
         """
         Create a subscription.
 
-        :param callback: is called with each message, and with its info if it takes two arguments.
-        :param qos_profile: the QoS it requests, or just the depth of its history.
+        :param callback: called with each message, and with its info if it takes two arguments.
+        :param qos_profile: the requested QoS, or only the depth of the history.
         :param callback_group: the group of its callback and event callbacks.
-        :param qos_overriding_options: which policies parameters may override.
-        :param raw: whether to call back with serialized messages (``bytes``).
+        :param qos_overriding_options: the policies that parameters may override.
+        :param raw: whether the callback gets serialized messages (``bytes``).
         :raises InvalidTopicNameException: if the topic's name is invalid.
         """
         profile, name = self._rclpy_endpoint_options(
@@ -381,7 +396,7 @@ class Node(NodeParameters, NodeGraph):
         qos_profile: QoSProfile | int,
         overriding: QoSOverridingOptions | None,
     ) -> tuple[QoSProfile, str]:
-        """The profile, with its overrides, and the fully qualified name of a new endpoint's topic."""
+        """Return the profile, with overrides, and the fully qualified topic name of a new endpoint."""
         self._rclpy_check_usable()
         check_is_valid_msg_type(msg_type)
         self._rclpy_used_types.add(msg_type)
@@ -412,7 +427,7 @@ class Node(NodeParameters, NodeGraph):
         Create a service.
 
         :param callback: gets a request and an empty response, and returns the response.
-        :raises InvalidServiceNameException: if its name is invalid.
+        :raises InvalidServiceNameException: if the service's name is invalid.
         """
         group = callback_group or self._default_callback_group
         endpoint = self._rclpy_service_endpoint(srv_type, srv_name, qos_profile, is_server=True)
@@ -477,8 +492,8 @@ class Node(NodeParameters, NodeGraph):
         Create a timer.
 
         :param timer_period_sec: period [s].
-        :param clock: the clock it runs by; the node's if ``None``.
-        :param autostart: whether it runs at once, or waits for :meth:`rclpy.timer.Timer.reset`.
+        :param clock: its clock; the node's if ``None``.
+        :param autostart: whether it starts now, or with :meth:`rclpy.timer.Timer.reset`.
         """
         self._rclpy_check_usable()
         group = callback_group or self._default_callback_group
@@ -509,14 +524,14 @@ class Node(NodeParameters, NodeGraph):
 
     def create_rate(self, frequency: float, clock: Clock | None = None) -> Rate:
         """
-        Create a rate, by which a thread that does not spin the node can sleep.
+        Create a rate: a thread that does not spin the node can sleep until its next tick.
 
-        :param frequency: how often a second; more than 0.
-        :raises ValueError: if the frequency is not more than 0.
+        :param frequency: ticks per second; positive.
+        :raises ValueError: if the frequency is not positive.
         """
         if frequency <= 0:
             raise ValueError("frequency must be > 0")
-        # A group of its own: no callback of the node may keep the rate from waking its sleepers.
+        # A separate group: callbacks of the node must not delay the rate.
         group = MutuallyExclusiveCallbackGroup()
         timer = self.create_timer(1.0 / frequency, lambda: None, group, clock)
         rate = Rate(timer, context=self._context)
@@ -540,31 +555,31 @@ class Node(NodeParameters, NodeGraph):
         return True
 
     def destroy_publisher(self, publisher: Publisher) -> bool:
-        """End a publisher; ``False`` if it is none of this node's."""
+        """Destroy a publisher; return ``False`` if the node does not have it."""
         return self._rclpy_destroy(self._publishers, publisher)
 
     def destroy_subscription(self, subscription: Subscription) -> bool:
-        """End a subscription; ``False`` if it is none of this node's."""
+        """Destroy a subscription; return ``False`` if the node does not have it."""
         return self._rclpy_destroy(self._subscriptions, subscription)
 
     def destroy_client(self, client: Client) -> bool:
-        """End a client; ``False`` if it is none of this node's."""
+        """Destroy a client; return ``False`` if the node does not have it."""
         return self._rclpy_destroy(self._clients, client)
 
     def destroy_service(self, service: Service) -> bool:
-        """End a service; ``False`` if it is none of this node's."""
+        """Destroy a service; return ``False`` if the node does not have it."""
         return self._rclpy_destroy(self._services, service)
 
     def destroy_timer(self, timer: Timer) -> bool:
-        """End a timer; ``False`` if it is none of this node's."""
+        """Destroy a timer; return ``False`` if the node does not have it."""
         return self._rclpy_destroy(self._timers, timer)
 
     def destroy_guard_condition(self, guard: GuardCondition) -> bool:
-        """End a guard condition; ``False`` if it is none of this node's."""
+        """Destroy a guard condition; return ``False`` if the node does not have it."""
         return self._rclpy_destroy(self._guards, guard)
 
     def destroy_rate(self, rate: Rate) -> bool:
-        """End a rate and wake who sleeps by it; ``False`` if it is none of this node's."""
+        """Destroy a rate and wake its sleepers; return ``False`` if the node does not have it."""
         timer = self._rclpy_rates.pop(rate, None)
         if timer is None:
             return False
@@ -572,7 +587,7 @@ class Node(NodeParameters, NodeGraph):
         return self.destroy_timer(timer)
 
     def destroy_node(self) -> None:
-        """End the node and everything it has. Nothing of it may be used afterwards."""
+        """Destroy the node and all its entities. None of them may be used afterwards."""
         if self._rclpy_destroyed:
             return
         executor = self.executor
@@ -599,7 +614,7 @@ class Node(NodeParameters, NodeGraph):
             self._rclpy_graph.remove_node(self)
         self._context._forget(self)
 
-    # What it tells the world of itself
+    # Internal publishers
 
     def _rclpy_publish_parameter_event(self, event: ParameterEvent) -> None:
         self._parameter_event_publisher.publish(event)
@@ -616,8 +631,8 @@ class Node(NodeParameters, NodeGraph):
         publisher.publish(message)
 
 
-def _weakly(method: Callable[[Any], None]) -> Callable[[Any], None]:
-    """What calls a bound method as long as its object is there, which this does not keep alive."""
+def _weak_call(method: Callable[[Any], None]) -> Callable[[Any], None]:
+    """Return a function that calls a bound method while its object exists, without keeping it alive."""
     reference = weakref.WeakMethod(method)
 
     def call(argument: Any) -> None:
@@ -628,6 +643,6 @@ def _weakly(method: Callable[[Any], None]) -> Callable[[Any], None]:
 
 
 def _forget_dropped(context: Context, log_listener: Callable[[Any], None]) -> None:
-    """Forget a node that is gone though nobody destroyed it."""
+    """Clean up after a node that was garbage-collected without ``destroy_node``."""
     _logging_output.remove_rosout_publisher(log_listener)
     context._leave_if_unused()

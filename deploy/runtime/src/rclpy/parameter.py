@@ -1,4 +1,4 @@
-"""A named, typed value of a node, and its forms in messages, on the command line and in files."""
+"""Parameters: named, typed values of a node, and their conversion from and to messages and YAML."""
 
 from __future__ import annotations
 
@@ -8,9 +8,6 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 from rcl_interfaces.msg import Parameter as ParameterMsg
 from rcl_interfaces.msg import ParameterType, ParameterValue
-from rclpy import _imports
-
-_imports.offer(__name__)
 
 if TYPE_CHECKING:
     AllowableParameterValue: TypeAlias = (
@@ -32,7 +29,7 @@ if TYPE_CHECKING:
         | tuple[str, ...]
         | None
     )
-else:  # arrays take no subscript when this runs
+else:  # array.array is not subscriptable at run time
     AllowableParameterValue = Any
 
 PARAMETER_SEPARATOR_STRING = "."
@@ -60,9 +57,9 @@ class Parameter:
         @classmethod
         def from_parameter_value(cls, parameter_value: Any) -> Parameter.Type:
             """
-            Return the type of a value; an empty list counts as a byte array.
+            Return the type of a value; that of an empty list is a byte array.
 
-            :raises TypeError: if no parameter can have that value.
+            :raises TypeError: if no parameter can have this value.
             """
             if parameter_value is None:
                 return cls.NOT_SET
@@ -77,7 +74,7 @@ class Parameter:
             raise TypeError(f"The given value is not a list of one of the allowed types '{parameter_value}'.")
 
         def check(self, parameter_value: Any) -> bool:
-            """Tell whether the value is of this type."""
+            """Return whether the value is of this type."""
             if self is Parameter.Type.NOT_SET:
                 return parameter_value is None
             python_type = _PYTHON_TYPES[self]
@@ -99,10 +96,10 @@ class Parameter:
 
     def __init__(self, name: str, type_: Parameter.Type | None = None, value: Any = None) -> None:
         """
-        Create a parameter; without `type_` it is that of the value.
+        Create a parameter; by default, its type is that of the value.
 
-        :raises TypeError: if `type_` is no type, or missing and not to be had from the value.
-        :raises ValueError: if the value is not of the type.
+        :raises TypeError: if `type_` is not a type, or if it is missing and no type fits the value.
+        :raises ValueError: if the value does not have the type.
         """
         if type_ is None:
             type_ = Parameter.Type.from_parameter_value(value)
@@ -116,7 +113,7 @@ class Parameter:
 
     @property
     def name(self) -> str:
-        """The name, with dots between its namespaces."""
+        """The name, with dots between namespaces."""
         return self._name
 
     @property
@@ -141,7 +138,7 @@ class Parameter:
         return ParameterMsg(name=self._name, value=self.get_parameter_value())
 
 
-# In the order in which a value's type is guessed: a bool is an int too, and an empty list is all bytes.
+# The order matters for the type of a value: a bool is also an int, and an empty list is a list of bytes.
 _SCALARS: dict[type, Parameter.Type] = {
     bool: Parameter.Type.BOOL,
     int: Parameter.Type.INTEGER,
@@ -159,15 +156,15 @@ _PYTHON_TYPES = {type_: python for table in (_SCALARS, _ELEMENTS) for python, ty
 
 
 def _field(type_: Any) -> str:
-    """Name the field of a ParameterValue message that holds values of this type."""
+    """Return the name of the field of a ParameterValue for values of this type."""
     return f"{Parameter.Type(type_).name.lower()}_value"
 
 
 def get_parameter_value(string_value: str) -> ParameterValue:
     """
-    Convert a text that a user typed: to the type that YAML sees in it, else to a string.
+    Convert a text to a value of the type that it has in YAML, or else to a string.
 
-    A list of mixed types, a mapping and an empty text are strings too.
+    A list of mixed types, a mapping and an empty text become strings.
     """
     import yaml
 
@@ -178,13 +175,13 @@ def get_parameter_value(string_value: str) -> ParameterValue:
 
 
 def _from_yaml(value: Any, text: str) -> ParameterValue:
-    """Convert what YAML made of a text; where no parameter can have that value, the text itself."""
+    """Convert the YAML value of a text, or the text itself if no parameter can have this value."""
     try:
         type_ = Parameter.Type.from_parameter_value(value)
     except TypeError:
         type_ = Parameter.Type.NOT_SET
     if value == []:
-        # Seems to be an array of bytes, which YAML cannot write.
+        # Not an array of bytes, which YAML cannot express.
         type_ = Parameter.Type.BOOL_ARRAY
     if type_ is Parameter.Type.NOT_SET:
         type_, value = Parameter.Type.STRING, text
@@ -193,9 +190,9 @@ def _from_yaml(value: Any, text: str) -> ParameterValue:
 
 def parameter_value_to_python(parameter_value: ParameterValue) -> Any:
     """
-    Return the value in a message, arrays as lists, `None` if it is not set.
+    Return the value in a message: arrays as lists, `None` if it is not set.
 
-    :raises RuntimeError: if the message's type is not known.
+    :raises RuntimeError: if the type in the message is unknown.
     """
     try:
         type_ = Parameter.Type(parameter_value.type)
@@ -216,10 +213,10 @@ def parameter_dict_from_yaml_file(
     """
     Read the parameters of nodes from a YAML file, by name.
 
-    :param use_wildcard: take those of `/**` too; those of a node come after them and win.
-    :param target_nodes: the nodes to read, as they stand in the file; all of them if there are none.
-    :param namespace: is put before the names.
-    :raises RuntimeError: if the file is no parameter file or lacks a node.
+    :param use_wildcard: whether to include those of `/**`; those of nodes override them.
+    :param target_nodes: names of nodes as in the file; all nodes if the list is empty.
+    :param namespace: prefix of the names.
+    :raises RuntimeError: if the file is not a parameter file or lacks a node.
     """
     import yaml
 
@@ -253,6 +250,6 @@ def _flatten(namespace: str, parameters: dict[str, Any]) -> dict[str, ParameterM
         if isinstance(value, dict):
             messages.update(_flatten(name + PARAMETER_SEPARATOR_STRING, value))
         else:
-            # As rclpy does: what counts is how a value looks, whether it stands in quotes or not.
+            # As in rclpy, the text of the value decides its type, even if the value is in quotes.
             messages[name] = ParameterMsg(name=name, value=get_parameter_value(str(value)))
     return messages

@@ -1,4 +1,4 @@
-"""Access to the parameters of other nodes."""
+"""A client for the parameters of another node."""
 
 from __future__ import annotations
 
@@ -16,7 +16,6 @@ from rcl_interfaces.srv import (
     SetParameters,
     SetParametersAtomically,
 )
-from rclpy import _imports
 from rclpy.parameter import Parameter, parameter_dict_from_yaml_file
 from rclpy.qos import QoSProfile, qos_profile_parameter_events, qos_profile_services_default
 
@@ -29,14 +28,12 @@ if TYPE_CHECKING:
     from rclpy.subscription import Subscription
     from rclpy.task import Future
 
-_imports.offer(__name__)
-
 
 class AsyncParameterClient:
     """
-    Calls the parameter services of another node; all calls return futures of the services' responses.
+    Calls the parameter services of another node. All calls return futures of the responses.
 
-    The `callback` of a call, if given, is a done callback of its future.
+    If a `callback` is given, it becomes a done callback of the future.
     """
 
     def __init__(
@@ -76,19 +73,19 @@ class AsyncParameterClient:
         ]
 
     def services_are_ready(self) -> bool:
-        """Tell whether all services are there."""
+        """Return whether all services are available."""
         return all(client.service_is_ready() for client in self._clients())
 
     def wait_for_services(self, timeout_sec: float | None = None) -> bool:
         """
-        Wait for all services, at most `timeout_sec` seconds; `None`: as long as it takes.
+        Wait for all services, at most `timeout_sec` seconds; `None`: for ever.
 
-        :returns: whether they are there.
+        :returns: whether they are available.
         """
         deadline = None if timeout_sec is None else time.monotonic() + timeout_sec
         for client in self._clients():
-            rest = None if deadline is None else deadline - time.monotonic()
-            if not client.wait_for_service(timeout_sec=rest):
+            remaining = None if deadline is None else deadline - time.monotonic()
+            if not client.wait_for_service(timeout_sec=remaining):
                 return False
         return self.services_are_ready()
 
@@ -98,12 +95,12 @@ class AsyncParameterClient:
         depth: int | None = None,
         callback: Callable[[Future], Any] | None = None,
     ) -> Future:
-        """Ask for the names below `prefixes` (all, if none), `depth` levels deep (all, if none)."""
+        """Request the names below `prefixes`, `depth` levels deep; by default all."""
         request = ListParameters.Request(prefixes=prefixes or [], depth=depth or 0)
         return _call(self._list_parameter_client, request, callback)
 
     def get_parameters(self, names: list[str], callback: Callable[[Future], Any] | None = None) -> Future:
-        """Ask for values."""
+        """Request values."""
         return _call(self._get_parameter_client, GetParameters.Request(names=names), callback)
 
     def set_parameters(
@@ -118,13 +115,13 @@ class AsyncParameterClient:
     def describe_parameters(
         self, names: list[str], callback: Callable[[Future], Any] | None = None
     ) -> Future:
-        """Ask for descriptors."""
+        """Request descriptors."""
         return _call(self._describe_parameters_client, DescribeParameters.Request(names=names), callback)
 
     def get_parameter_types(
         self, names: list[str], callback: Callable[[Future], Any] | None = None
     ) -> Future:
-        """Ask for types."""
+        """Request types."""
         return _call(self._get_parameter_types_client, GetParameterTypes.Request(names=names), callback)
 
     def set_parameters_atomically(
@@ -132,12 +129,12 @@ class AsyncParameterClient:
         parameters: Sequence[Parameter | ParameterMsg],
         callback: Callable[[Future], Any] | None = None,
     ) -> Future:
-        """Set all parameters, or none."""
+        """Set all parameters or none."""
         request = SetParametersAtomically.Request(parameters=_messages(parameters))
         return _call(self._set_parameters_atomically_client, request, callback)
 
     def delete_parameters(self, names: list[str], callback: Callable[[Future], Any] | None = None) -> Future:
-        """Undeclare parameters; only dynamically typed ones can be."""
+        """Undeclare parameters, which must be dynamically typed."""
         return self.set_parameters([Parameter(name) for name in names], callback)
 
     def load_parameter_file(
@@ -149,7 +146,7 @@ class AsyncParameterClient:
         """
         Set the parameters in a YAML file one by one; see `parameter_dict_from_yaml_file`.
 
-        :raises RuntimeError: if it is no parameter file.
+        :raises RuntimeError: if it is not a parameter file.
         """
         parameters = parameter_dict_from_yaml_file(parameter_file, use_wildcard)
         return self.set_parameters(list(parameters.values()), callback)
@@ -161,9 +158,9 @@ class AsyncParameterClient:
         callback: Callable[[Future], Any] | None = None,
     ) -> Future:
         """
-        Set all parameters in a YAML file, or none; see `parameter_dict_from_yaml_file`.
+        Set all parameters in a YAML file or none; see `parameter_dict_from_yaml_file`.
 
-        :raises RuntimeError: if it is no parameter file.
+        :raises RuntimeError: if it is not a parameter file.
         """
         parameters = parameter_dict_from_yaml_file(parameter_file, use_wildcard)
         return self.set_parameters_atomically(list(parameters.values()), callback)
@@ -178,7 +175,7 @@ class AsyncParameterClient:
         qos_overriding_options: QoSOverridingOptions | None = None,
         raw: bool = False,
     ) -> Subscription:
-        """Subscribe to `/parameter_events`, which tell of the parameters of all nodes."""
+        """Subscribe to `/parameter_events`, the changes of parameters of all nodes."""
         return self.node.create_subscription(
             ParameterEvent,
             "/parameter_events",

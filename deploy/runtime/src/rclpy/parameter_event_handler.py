@@ -1,4 +1,4 @@
-"""Callbacks for changes of parameters, of any node."""
+"""Callbacks for changes of the parameters of any node."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 from rcl_interfaces.msg import Parameter as ParameterMsg
 from rcl_interfaces.msg import ParameterEvent
-from rclpy import _imports
 from rclpy.qos import QoSProfile, qos_profile_parameter_events
 
 if TYPE_CHECKING:
@@ -17,8 +16,6 @@ if TYPE_CHECKING:
     from rclpy.event_handler import SubscriptionEventCallbacks
     from rclpy.node import Node
     from rclpy.qos_overriding_options import QoSOverridingOptions
-
-_imports.offer(__name__)
 
 
 class ParameterCallbackHandle:
@@ -41,10 +38,10 @@ class ParameterEventCallbackHandle:
 
 class ParameterEventHandler:
     """
-    Subscribes to `/parameter_events` and calls the callbacks that an event concerns, the last added first.
+    Subscribes to `/parameter_events` and calls the matching callbacks, the last added first.
 
-    Callbacks for parameters get the parameter's message, as in rclpy. They may add and remove callbacks,
-    which counts from the next event on.
+    Callbacks for parameters get the parameter's message, as in rclpy. They may add and remove callbacks, with
+    effect from the next event.
     """
 
     class Callbacks:
@@ -56,7 +53,7 @@ class ParameterEventHandler:
             self.mutex = RLock()
 
         def event_callback(self, event: ParameterEvent) -> None:
-            """Call all callbacks that an event concerns."""
+            """Call all callbacks that match an event."""
             with self.mutex:
                 by_parameter = [(key, list(handles)) for key, handles in self.parameter_callbacks.items()]
                 for_events = list(self.event_callbacks)
@@ -74,7 +71,7 @@ class ParameterEventHandler:
         def add_parameter_callback(
             self, parameter_name: str, node_name: str, callback: Callable[[ParameterMsg], None]
         ) -> ParameterCallbackHandle:
-            """Add a callback for one parameter of the node with that fully qualified name."""
+            """Add a callback for a parameter of the node with this fully qualified name."""
             handle = ParameterCallbackHandle(parameter_name, node_name, callback)
             with self.mutex:
                 self.parameter_callbacks.setdefault((parameter_name, node_name), []).insert(0, handle)
@@ -84,7 +81,7 @@ class ParameterEventHandler:
             """
             Undo `add_parameter_callback`.
 
-            :raises RuntimeError: if there is nothing to undo.
+            :raises RuntimeError: if it was not added.
             """
             key = (handle.parameter_name, handle.node_name)
             with self.mutex:
@@ -108,7 +105,7 @@ class ParameterEventHandler:
             """
             Undo `add_parameter_event_callback`.
 
-            :raises RuntimeError: if there is nothing to undo.
+            :raises RuntimeError: if it was not added.
             """
             with self.mutex:
                 if handle not in self.event_callbacks:
@@ -147,7 +144,7 @@ class ParameterEventHandler:
     def get_parameter_from_event(
         event: ParameterEvent, parameter_name: str, node_name: str
     ) -> ParameterMsg | None:
-        """Return the parameter if the event tells of its new value, else `None`."""
+        """Return the parameter if the event contains its new value, else `None`."""
         if event.node != node_name:
             return None
         parameters = ParameterEventHandler.get_parameters_from_event(event)
@@ -155,7 +152,7 @@ class ParameterEventHandler:
 
     @staticmethod
     def get_parameters_from_event(event: ParameterEvent) -> Iterable[ParameterMsg]:
-        """Yield all parameters with new values."""
+        """Yield all parameters of an event with new values."""
         yield from chain(event.new_parameters, event.changed_parameters)
 
     def add_parameter_callback(
@@ -172,7 +169,7 @@ class ParameterEventHandler:
         """
         Undo `add_parameter_callback`.
 
-        :raises RuntimeError: if there is nothing to undo.
+        :raises RuntimeError: if it was not added.
         """
         self._callbacks.remove_parameter_callback(handle)
 
@@ -186,7 +183,7 @@ class ParameterEventHandler:
         """
         Undo `add_parameter_event_callback`.
 
-        :raises RuntimeError: if there is nothing to undo.
+        :raises RuntimeError: if it was not added.
         """
         self._callbacks.remove_parameter_event_callback(handle)
 

@@ -1,4 +1,4 @@
-"""The services through which others read and set the parameters of a node (`ros2 param`)."""
+"""The services to get and set the parameters of a node (`ros2 param`)."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ if TYPE_CHECKING:
 
 
 class ParameterService:
-    """The six parameter services of a node, which it keeps alive, not the other way round."""
+    """The six parameter services of a node. They do not keep the node alive."""
 
     def __init__(self, node: Node) -> None:
-        """Create the services `<node>/describe_parameters` and so on."""
+        """Create the services, such as `<node>/describe_parameters`."""
         self._node_weak_ref = weakref.ref(node)
         services: dict[str, tuple[Any, Any]] = {
             "describe_parameters": (DescribeParameters, self._describe_parameters),
@@ -47,7 +47,7 @@ class ParameterService:
         try:
             response.descriptors = self._get_node().describe_parameters(list(request.names))
         except ParameterNotDeclaredException:
-            # All or nothing: with some missing, the others could not be told apart.
+            # No partial result: descriptors could not be assigned to names.
             response.descriptors = []
         return response
 
@@ -68,7 +68,7 @@ class ParameterService:
             types: list[Any] = list(self._get_node().get_parameter_types(list(request.names)))
         except ParameterNotDeclaredException:
             types = []
-        # An undeclared parameter has an enumeration's member as its type, all others a number.
+        # The type of an undeclared parameter is a member of an enumeration, that of others a number.
         response.types = [getattr(type_, "value", type_) for type_ in types]
         return response
 
@@ -94,11 +94,11 @@ class ParameterService:
         return response
 
     def _set(self, messages: Any) -> SetParametersResult:
-        """Set all parameters of these messages, or none."""
+        """Set all parameters of these messages or none."""
         try:
             parameters = [Parameter.from_parameter_msg(message) for message in messages]
         except ValueError as error:
-            # A type that is none.
+            # The number of the type is unknown.
             return SetParametersResult(successful=False, reason=str(error))
         try:
             return self._get_node().set_parameters_atomically(parameters)

@@ -1,23 +1,21 @@
-"""Publishers."""
+"""Publishers of topics."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from rclpy import _imports
 from rclpy._dds import Writer
 from rclpy._endpoint import Owner, PublisherEndpoint
+from rclpy._type_variables import MsgType  # noqa: F401 (re-export)
 from rclpy.callback_groups import CallbackGroup
 from rclpy.duration import Duration
 from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.exceptions import RCLError
 from rclpy.qos import QoSProfile
 
-_imports.offer(__name__)
-
 
 class Publisher(Owner):
-    """Publishes messages of one type on one topic; :meth:`rclpy.node.Node.create_publisher` makes them."""
+    """Publishes messages of a type on a topic. Created by :meth:`rclpy.node.Node.create_publisher`."""
 
     def __init__(
         self,
@@ -41,7 +39,7 @@ class Publisher(Owner):
 
     @property
     def handle(self) -> Writer:
-        """The DDS writer. Raises InvalidHandle when the publisher was destroyed."""
+        """The DDS writer. Raises InvalidHandle if the publisher was destroyed."""
         self._check_usable()
         return self._writer
 
@@ -52,14 +50,14 @@ class Publisher(Owner):
 
     def publish(self, msg: Any) -> None:
         """
-        Send a message, or one that is serialized already (``bytes``).
+        Publish a message, or a serialized message (``bytes``).
 
         :raises TypeError: if ``msg`` is not of the publisher's type, or a field has a wrong type.
-        :raises ValueError: if a field has a value that its type cannot have.
+        :raises ValueError: if a field has a value that its type cannot represent.
         :raises RCLError: if the context was shut down.
         :raises InvalidHandle: if the publisher was destroyed.
         """
-        if self._destroyed:  # asked here first: this is where every message passes
+        if self._destroyed:  # checked inline: this is the path of every message
             self._check_usable()
         if not self._context._valid:
             raise RCLError(f"cannot publish on {self._name}: the context was shut down")
@@ -72,14 +70,14 @@ class Publisher(Owner):
             raise TypeError(f"Expected {expected} on {self._name}, got {type(msg).__name__}: {msg!r}")
 
     def get_subscription_count(self) -> int:
-        """How many subscriptions receive what is published here."""
+        """Return the number of matched subscriptions."""
         return self.handle.matched()
 
     def assert_liveliness(self) -> None:
-        """Say that this publisher lives, where liveliness is MANUAL_BY_TOPIC."""
+        """Assert that this publisher is alive, for liveliness MANUAL_BY_TOPIC."""
         self.handle.assert_liveliness()
 
     def wait_for_all_acked(self, timeout: Duration = Duration(seconds=-1)) -> bool:  # noqa: B008
-        """Wait until all reliable subscriptions have everything, at most ``timeout`` (negative: for ever)."""
+        """Wait until reliable subscriptions have acknowledged all; ``timeout`` negative: for ever."""
         nanoseconds = timeout.nanoseconds
         return self.handle.wait_for_acks(nanoseconds if nanoseconds >= 0 else 2**63 - 1)

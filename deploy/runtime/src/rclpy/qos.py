@@ -1,7 +1,7 @@
 """
-Quality of service: what publishers offer and subscriptions request.
+Quality of service: the policies that publishers offer and subscriptions request.
 
-The presets are those of `rmw/qos_profiles.h`, the policies' numbers those of `rmw/types.h`.
+Source of the presets: `rmw/qos_profiles.h`; of the policies' numbers: `rmw/types.h`.
 """
 
 from __future__ import annotations
@@ -11,14 +11,11 @@ from collections.abc import Callable, Iterable
 from enum import Enum, IntEnum
 from typing import Any, NoReturn, TypeVar
 
-from rclpy import _imports
 from rclpy.duration import Duration
-
-_imports.offer(__name__)
 
 
 class QoSPolicyKind(IntEnum):
-    """The policies of a profile, as QoS events and QoS overrides name them."""
+    """The policies of a profile, in QoS events and QoS overrides."""
 
     INVALID = 1 << 0
     DURABILITY = 1 << 1
@@ -38,14 +35,14 @@ def qos_policy_name_from_kind(policy_kind: QoSPolicyKind | int) -> str:
 
 
 class InvalidQoSProfileException(Exception):
-    """Raised when a profile is built from settings that make no sense together."""
+    """Raised when a profile is created from contradictory settings."""
 
     def __init__(self, *args: Any) -> None:
         super().__init__("Invalid QoSProfile", *args)
 
 
 class QoSPolicyEnum(IntEnum):
-    """Base of the policies' enumerations: their members by short, lower-case names."""
+    """Base of the policies' enumerations, with access to members by lower-case names."""
 
     @classmethod
     def short_keys(cls) -> list[str]:
@@ -55,7 +52,7 @@ class QoSPolicyEnum(IntEnum):
     @classmethod
     def get_from_short_key(cls, name: str) -> int:
         """
-        Return the number of the member with that name, whatever its case.
+        Return the number of the member with that name, in upper or lower case.
 
         :raises KeyError: if there is none.
         """
@@ -71,7 +68,7 @@ _Policy = TypeVar("_Policy", bound=type[QoSPolicyEnum])
 
 
 class _DeprecatedAlias:
-    """The name that a member had before ROS 2 Foxy: works, and warns."""
+    """The name of a member before ROS 2 Foxy: it works, with a warning."""
 
     def __init__(self, deprecated: str, replacement: str) -> None:
         self._deprecated = deprecated
@@ -86,7 +83,7 @@ class _DeprecatedAlias:
 
 
 def _deprecated_aliases(prefix: str, names: Iterable[str]) -> Callable[[_Policy], _Policy]:
-    """Give a policy the deprecated names `<prefix>_<name>` for its members `names`."""
+    """Add the deprecated names `<prefix>_<name>` of the members `names` to a policy."""
 
     def decorate(policy: _Policy) -> _Policy:
         for name in names:
@@ -98,7 +95,7 @@ def _deprecated_aliases(prefix: str, names: Iterable[str]) -> Callable[[_Policy]
 
 @_deprecated_aliases("RMW_QOS_POLICY_HISTORY", ("SYSTEM_DEFAULT", "KEEP_LAST", "KEEP_ALL", "UNKNOWN"))
 class HistoryPolicy(QoSPolicyEnum):
-    """How many samples are kept: the last `depth`, or all that resources allow."""
+    """The number of samples to keep: the last `depth`, or all within the resource limits."""
 
     SYSTEM_DEFAULT = 0
     KEEP_LAST = 1
@@ -121,7 +118,7 @@ class ReliabilityPolicy(QoSPolicyEnum):
     "RMW_QOS_POLICY_DURABILITY", ("SYSTEM_DEFAULT", "TRANSIENT_LOCAL", "VOLATILE", "UNKNOWN")
 )
 class DurabilityPolicy(QoSPolicyEnum):
-    """Whether a late subscription gets the samples that its publishers still keep."""
+    """Whether a late subscription gets the samples that publishers keep."""
 
     SYSTEM_DEFAULT = 0
     TRANSIENT_LOCAL = 1
@@ -130,11 +127,11 @@ class DurabilityPolicy(QoSPolicyEnum):
     BEST_AVAILABLE = 4
 
 
-# The alias for UNKNOWN is called DURABILITY in rclpy too.
+# rclpy also calls the alias of UNKNOWN DURABILITY.
 @_deprecated_aliases("RMW_QOS_POLICY_DURABILITY", ("UNKNOWN",))
 @_deprecated_aliases("RMW_QOS_POLICY_LIVELINESS", ("SYSTEM_DEFAULT", "AUTOMATIC", "MANUAL_BY_TOPIC"))
 class LivelinessPolicy(QoSPolicyEnum):
-    """How a publisher shows that it is alive: by its process, or by each topic itself."""
+    """Whether the process or each topic separately asserts that a publisher is alive."""
 
     SYSTEM_DEFAULT = 0
     AUTOMATIC = 1
@@ -152,10 +149,10 @@ QoSLivelinessPolicy = LivelinessPolicy
 _UNSPECIFIED = Duration()
 
 DeadlineBestAvailable = Duration(nanoseconds=2**63 - 2)
-"""Deadline that matches most endpoints and is as strict as that allows."""
+"""The strictest deadline that matches most endpoints."""
 
 LivelinessLeaseDurationeBestAvailable = Duration(nanoseconds=2**63 - 2)
-"""Lease duration that matches most endpoints and is as strict as that allows (rclpy spells it so)."""
+"""The strictest lease duration that matches most endpoints. The spelling is that of rclpy."""
 
 
 class QoSProfile:
@@ -173,12 +170,12 @@ class QoSProfile:
         "_avoid_ros_namespace_conventions",
     )
 
-    # Equality without a hash, as rclpy's profile, which can be changed.
+    # Not hashable, because it is mutable, as in rclpy.
     __hash__ = None  # type: ignore[assignment]
 
     def __init__(self, **kwargs: Any) -> None:
         """
-        Create a profile from the policies given by name; the others are those of `qos_profile_default`.
+        Create a profile from policies by name; other policies are those of `qos_profile_default`.
 
         :raises InvalidQoSProfileException: without `history` and `depth`, or for KEEP_LAST without `depth`.
         """
@@ -201,7 +198,7 @@ class QoSProfile:
 
     @property
     def history(self) -> HistoryPolicy:
-        """How many samples are kept."""
+        """The samples to keep."""
         return self._history
 
     @history.setter
@@ -221,7 +218,7 @@ class QoSProfile:
 
     @property
     def durability(self) -> DurabilityPolicy:
-        """Whether late subscriptions get samples that were sent before."""
+        """Whether a late subscription gets the samples that publishers keep."""
         return self._durability
 
     @durability.setter
@@ -247,7 +244,7 @@ class QoSProfile:
 
     @property
     def lifespan(self) -> Duration:
-        """The age at which a sample is dropped undelivered."""
+        """The age at which an undelivered sample is dropped."""
         return self._lifespan
 
     @lifespan.setter
@@ -267,7 +264,7 @@ class QoSProfile:
 
     @property
     def liveliness(self) -> LivelinessPolicy:
-        """How a publisher shows that it is alive."""
+        """Whether the process or the topic asserts that a publisher is alive."""
         return self._liveliness
 
     @liveliness.setter
@@ -277,7 +274,7 @@ class QoSProfile:
 
     @property
     def liveliness_lease_duration(self) -> Duration:
-        """The time without a sign of life after which a publisher counts as dead."""
+        """The time without an assertion after which a publisher is not alive."""
         return self._liveliness_lease_duration
 
     @liveliness_lease_duration.setter
@@ -287,7 +284,7 @@ class QoSProfile:
 
     @property
     def avoid_ros_namespace_conventions(self) -> bool:
-        """Whether the DDS topic is named as the ROS topic, without the prefix `rt`."""
+        """Whether the DDS topic has the name of the ROS topic, without the prefix `rt`."""
         return self._avoid_ros_namespace_conventions
 
     @avoid_ros_namespace_conventions.setter
@@ -297,9 +294,9 @@ class QoSProfile:
 
     def get_c_qos_profile(self) -> NoReturn:
         """
-        Would convert the profile for the C layer.
+        Not supported: there is no C layer.
 
-        :raises NotImplementedError: always; this runtime has no C layer.
+        :raises NotImplementedError: always.
         """
         raise NotImplementedError("QoSProfile.get_c_qos_profile: this runtime has no rmw_qos_profile_t")
 
@@ -313,7 +310,7 @@ class QoSProfile:
         return f"{type(self).__name__}({policies})"
 
     def _copy(self) -> QoSProfile:
-        """Return a profile of its own with the same policies."""
+        """Return a copy."""
         return QoSProfile(**{slot[1:]: getattr(self, slot) for slot in self.__slots__})
 
 
@@ -324,10 +321,10 @@ qos_profile_unknown = QoSProfile(
     durability=DurabilityPolicy.UNKNOWN,
     liveliness=LivelinessPolicy.UNKNOWN,
 )
-"""What is known of a profile before anything is known."""
+"""No policy is known."""
 
 qos_profile_default = QoSProfile(depth=10)
-"""Reliable, volatile, the last ten."""
+"""Reliable, volatile, last 10."""
 
 qos_profile_system_default = QoSProfile(
     history=HistoryPolicy.SYSTEM_DEFAULT,
@@ -338,13 +335,13 @@ qos_profile_system_default = QoSProfile(
 """Leaves the choice to the middleware."""
 
 qos_profile_sensor_data = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
-"""Fresh data before complete data: best effort, the last five."""
+"""Prefers fresh to complete data: best effort, last 5."""
 
 qos_profile_services_default = QoSProfile(depth=10)
 """For requests and replies."""
 
 qos_profile_parameters = QoSProfile(depth=1000)
-"""For the parameter services: deep enough that no request is lost."""
+"""For the parameter services, with a depth that avoids lost requests."""
 
 qos_profile_parameter_events = QoSProfile(depth=1000)
 """For `/parameter_events`."""
@@ -357,7 +354,7 @@ qos_profile_best_available = QoSProfile(
     liveliness=LivelinessPolicy.BEST_AVAILABLE,
     liveliness_lease_duration=LivelinessLeaseDurationeBestAvailable,
 )
-"""Matches most endpoints known when the entity is created, at the highest level of service they allow."""
+"""The strictest policies that match most endpoints known at the creation of the entity."""
 
 qos_profile_action_status_default = QoSProfile(
     depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
@@ -386,7 +383,7 @@ class QoSPresetProfiles(Enum):
     @classmethod
     def get_from_short_key(cls, name: str) -> QoSProfile:
         """
-        Return the preset with that name, whatever its case.
+        Return the preset with that name, in upper or lower case.
 
         :raises KeyError: if there is none.
         """
@@ -394,7 +391,7 @@ class QoSPresetProfiles(Enum):
 
 
 class QoSCompatibility(IntEnum):
-    """Whether a publisher and a subscription can talk; WARNING: it depends on what is not known."""
+    """Whether a publisher and a subscription match. WARNING: it depends on unknown policies."""
 
     OK = 0
     WARNING = 1
@@ -405,7 +402,7 @@ def qos_check_compatible(
     publisher_qos: QoSProfile, subscription_qos: QoSProfile
 ) -> tuple[QoSCompatibility, str]:
     """
-    Tell whether endpoints with these profiles would match, and why not (as `rmw_dds_common` decides it).
+    Return whether endpoints with these profiles match, and why not. Source: `rmw_dds_common`.
 
     The reasons end with semicolons. "System default" and "unknown" lead to warnings.
     """
@@ -417,7 +414,7 @@ def qos_check_compatible(
 
 
 def _incompatibilities(publisher: QoSProfile, subscription: QoSProfile) -> list[str]:
-    """List what the subscription requests and the publisher certainly does not offer."""
+    """List the requests of the subscription that the publisher certainly does not offer."""
     errors = []
     if (publisher.reliability, subscription.reliability) == (
         ReliabilityPolicy.BEST_EFFORT,
@@ -448,7 +445,7 @@ def _incompatibilities(publisher: QoSProfile, subscription: QoSProfile) -> list[
 
 
 def _doubts(publisher: QoSProfile, subscription: QoSProfile) -> list[str]:
-    """List the policies whose compatibility hangs on a value that is not known."""
+    """List the policies whose compatibility depends on an unknown value."""
     doubts = []
     for policy, weakest, strictest in (
         ("reliability", ReliabilityPolicy.BEST_EFFORT, ReliabilityPolicy.RELIABLE),

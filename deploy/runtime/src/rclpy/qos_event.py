@@ -1,4 +1,4 @@
-"""The name that :mod:`rclpy.event_handler` had before ROS 2 Iron."""
+"""The name of :mod:`rclpy.event_handler` before ROS 2 Iron."""
 
 import warnings
 

@@ -1,5 +1,5 @@
 """
-QoS by configuration: publishers and subscriptions whose policies are read-only parameters of their node.
+QoS policies of publishers and subscriptions as read-only parameters of their node.
 
 The parameters are named `qos_overrides.<topic>.<publisher|subscription>[_<id>].<policy>`.
 """
@@ -10,7 +10,6 @@ from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, TypeAlias
 
 from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
-from rclpy import _imports
 from rclpy.duration import Duration
 from rclpy.exceptions import ParameterAlreadyDeclaredException
 from rclpy.qos import (
@@ -28,8 +27,6 @@ if TYPE_CHECKING:
     from rclpy.publisher import Publisher
     from rclpy.subscription import Subscription
 
-_imports.offer(__name__)
-
 QosCallbackResult: TypeAlias = SetParametersResult
 QosCallbackType: TypeAlias = Callable[[QoSProfile], QosCallbackResult]
 
@@ -46,7 +43,7 @@ class InvalidQosOverridesError(Exception):
 
 
 class QoSOverridingOptions:
-    """Says which policies of an entity may be overridden by parameters."""
+    """Selects the policies of a publisher or subscription that parameters may override."""
 
     def __init__(
         self,
@@ -56,10 +53,10 @@ class QoSOverridingOptions:
         entity_id: str | None = None,
     ) -> None:
         """
-        Choose the policies.
+        Select the policies.
 
-        :param callback: is asked whether the profile is valid with all overrides.
-        :param entity_id: tells the entity from others of its kind on the same topic.
+        :param callback: returns whether the profile is valid with all overrides.
+        :param entity_id: distinguishes the entity from others of its kind on the same topic.
         """
         self._policy_kinds = policy_kinds
         self._callback = callback
@@ -67,24 +64,24 @@ class QoSOverridingOptions:
 
     @property
     def policy_kinds(self) -> Iterable[QoSPolicyKind]:
-        """The policies that have a parameter."""
+        """The selected policies."""
         return self._policy_kinds
 
     @property
     def callback(self) -> QosCallbackType | None:
-        """Who is asked whether the profile is valid."""
+        """Returns whether the profile is valid with all overrides."""
         return self._callback
 
     @property
     def entity_id(self) -> str | None:
-        """What tells the entity from others on the same topic."""
+        """Distinguishes the entity from others of its kind on the same topic."""
         return self._entity_id
 
     @classmethod
     def with_default_policies(
         cls, *, callback: QosCallbackType | None = None, entity_id: str | None = None
     ) -> QoSOverridingOptions:
-        """Choose history, depth and reliability."""
+        """Select history, depth and reliability."""
         return cls(
             policy_kinds=(QoSPolicyKind.HISTORY, QoSPolicyKind.DEPTH, QoSPolicyKind.RELIABILITY),
             callback=callback,
@@ -100,12 +97,12 @@ def _declare_qos_parameters(
     options: QoSOverridingOptions,
 ) -> None:
     """
-    Declare the parameters of an entity and put their values into `qos`.
+    Declare the parameters of an entity and set their values in `qos`.
 
     :param topic_name: the fully qualified name of the topic.
     :raises TypeError: if `entity_type` is neither a publisher nor a subscription.
     :raises ValueError: if a policy of `qos` is unknown.
-    :raises RuntimeError: if an override is no value of its policy.
+    :raises RuntimeError: if an override is not a value of its policy.
     :raises InvalidQosOverridesError: if the callback rejects the profile.
     """
     entity = _entity_name(entity_type)
@@ -142,7 +139,7 @@ def _entity_name(entity_type: type[Publisher] | type[Subscription]) -> str:
 
 
 def _get_qos_policy_parameter(qos: QoSProfile, policy: QoSPolicyKind) -> str | int | bool:
-    """Return a policy's value as its parameter has it: enumerations by name, durations in nanoseconds."""
+    """Convert a policy to the value of its parameter: an enumeration to its name, a duration to [ns]."""
     value = getattr(qos, policy.name.lower())
     if isinstance(value, QoSPolicyEnum):
         if value.short_key == "unknown":
@@ -157,7 +154,7 @@ def _get_qos_policy_parameter(qos: QoSProfile, policy: QoSPolicyKind) -> str | i
 def _from_parameter(
     kind: QoSPolicyKind, value: str | int | bool
 ) -> QoSPolicyEnum | Duration | int | bool | str:
-    """Undo `_get_qos_policy_parameter`."""
+    """Convert the value of a parameter to the policy: the inverse of `_get_qos_policy_parameter`."""
     if kind in _ENUMS:
         try:
             return _ENUMS[kind][str(value).upper()]

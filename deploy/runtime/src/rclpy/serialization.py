@@ -1,24 +1,21 @@
-"""Messages as bytes, in the form they have on the network (CDR)."""
+"""Serializes messages as on the network (CDR)."""
 
 from __future__ import annotations
 
 from typing import Any, TypeVar
 
-from rclpy import _imports
 from rclpy.exceptions import RMWError
 from rclpy.type_support import check_is_valid_msg_type
-
-_imports.offer(__name__)
 
 _Message = TypeVar("_Message")
 
 
 def serialize_message(message: Any) -> bytes:
     """
-    Return a message as CDR with its four bytes of header.
+    Serialize a message as CDR, with a header of four bytes.
 
-    :raises AttributeError: if it is no message.
-    :raises TypeError, ValueError: if a field has a value that it cannot have.
+    :raises AttributeError: if it is not a message.
+    :raises TypeError, ValueError: if a field has an invalid value.
     """
     message_type: Any = type(message)
     check_is_valid_msg_type(message_type)
@@ -28,11 +25,11 @@ def serialize_message(message: Any) -> bytes:
 
 def deserialize_message(serialized_message: bytes, message_type: type[_Message]) -> _Message:
     """
-    Return the message that `serialize_message` turned into these bytes.
+    Deserialize a message from the bytes of `serialize_message`.
 
-    :raises AttributeError: if `message_type` is no type of messages or services.
-    :raises RuntimeError: if it is a type of services.
-    :raises RMWError: if the bytes are no message of that type.
+    :raises AttributeError: if `message_type` is not a message or service type.
+    :raises RuntimeError: if it is a service type.
+    :raises RMWError: if the bytes are not a message of this type.
     """
     type_: Any = message_type
     check_is_valid_msg_type(type_)

@@ -9,24 +9,23 @@ from collections.abc import Callable, Coroutine
 from contextlib import suppress
 from typing import Any
 
-from rclpy import _imports
 from rclpy._dds import Reader
 from rclpy._endpoint import ServiceEndpoint
 from rclpy._service_side import ServiceSide
 from rclpy._service_wire import RequestId, client_is_matched, unwrap, wrap
+from rclpy._type_variables import SrvType, SrvTypeRequest, SrvTypeResponse  # noqa: F401 (re-export)
 from rclpy.callback_groups import CallbackGroup
 from rclpy.exceptions import InvalidHandle
 from rclpy.qos import QoSProfile
+from rclpy.service_introspection import ServiceIntrospectionState  # noqa: F401 (re-export)
 from service_msgs.msg import ServiceEventInfo
 
-_imports.offer(__name__)
-
-# A client may be heard before discovery has told us of its reader: so long a reply waits for it [s].
-_PATIENCE = 0.1
+# [s] A request may arrive before discovery has found the client's reader. The reply waits for it this long.
+_MATCH_TIMEOUT = 0.1
 
 
 class Service(ServiceSide):
-    """Answers requests by its callback; :meth:`rclpy.node.Node.create_service` makes them."""
+    """Answers requests with a callback. Created by :meth:`rclpy.node.Node.create_service`."""
 
     def __init__(
         self,
@@ -45,13 +44,13 @@ class Service(ServiceSide):
 
     @property
     def handle(self) -> Reader:
-        """The DDS reader of the requests. Raises InvalidHandle when the service was destroyed."""
+        """The DDS reader of the requests. Raises InvalidHandle if the service was destroyed."""
         self._check_usable()
         return self._requests
 
     def send_response(self, response: Any, header: RequestId) -> None:
         """
-        Answer the request that ``header`` names.
+        Answer the request that ``header`` identifies.
 
         :raises TypeError: if ``response`` is not of the service's response type.
         """
@@ -60,32 +59,32 @@ class Service(ServiceSide):
             raise TypeError(f"{self._name} must answer with {expected}, not {response!r}")
         data = wrap(header, self.srv_type.Response._serialize(response))
         self._wait_for_client(header.publication_handle)
-        # A service that another thread has destroyed meanwhile answers no more.
+        # Another thread may just have destroyed the service.
         with suppress(InvalidHandle):
             self._replies.write(data)
-        self._tell_of(ServiceEventInfo.RESPONSE_SENT, header, response=response)
+        self._publish_request_event(ServiceEventInfo.RESPONSE_SENT, header, response=response)
 
-    def _tell_of(self, event_type: int, request_id: RequestId, **message: Any) -> None:
-        # A server does not know the client's GID: it takes the request's for it, as rmw_cyclonedds does.
+    def _publish_request_event(self, event_type: int, request_id: RequestId, **message: Any) -> None:
+        # A server does not know the client's GID. Like rmw_cyclonedds, it uses the identity of the request.
         client = struct.pack("<QQ", request_id.client, request_id.publication_handle)
-        self._tell(event_type, client, request_id.sequence_number, **message)
+        self._publish_event(event_type, client, request_id.sequence_number, **message)
 
     def _wait_for_client(self, publication_handle: int) -> None:
         with self._lock:
             if publication_handle in self._known_clients:
                 return
-        deadline = time.monotonic() + _PATIENCE
+        deadline = time.monotonic() + _MATCH_TIMEOUT
         matched = client_is_matched(self._requests, self._replies, publication_handle)
         while matched is False and time.monotonic() < deadline:
             time.sleep(0.001)
             matched = client_is_matched(self._requests, self._replies, publication_handle)
         if matched:
             with self._lock:
-                if len(self._known_clients) >= 1000:  # most of them have gone long since
+                if len(self._known_clients) >= 1000:  # bounds the memory: most of them are gone
                     self._known_clients.clear()
                 self._known_clients.add(publication_handle)
 
-    # What the executor asks of everything it waits for.
+    # The interface that executors use for every entity.
 
     def _take(self) -> tuple[Any, RequestId] | None:
         while not self._destroyed and (sample := self._requests.take()) is not None:
@@ -96,7 +95,7 @@ class Service(ServiceSide):
                 self._bad_input.drop(sample, error)
                 continue
             request_id = request_id._replace(publication_handle=sample.publication_handle)
-            self._tell_of(ServiceEventInfo.REQUEST_RECEIVED, request_id, request=request)
+            self._publish_request_event(ServiceEventInfo.REQUEST_RECEIVED, request_id, request=request)
             return request, request_id
         return None
 

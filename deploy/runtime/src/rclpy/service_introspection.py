@@ -1,4 +1,4 @@
-"""How much of its calls a service or client tells on ``<service>/_service_event``."""
+"""The content of the events that services and clients publish on ``<service>/_service_event``."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from enum import IntEnum
 
 
 class ServiceIntrospectionState(IntEnum):
-    """What others can see of each call."""
+    """The content of the event of each call."""
 
     OFF = 0
-    """Nothing."""
+    """No event is published."""
     METADATA = 1
-    """When which client's call reached which stage."""
+    """Stage and time of the call, and its client."""
     CONTENTS = 2
-    """Requests and responses, too."""
+    """Also the request or response."""

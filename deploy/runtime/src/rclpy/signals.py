@@ -1,8 +1,8 @@
-"""What Ctrl-C and SIGTERM do: they shut every context down, and whoever spins returns.
+"""Handles SIGINT (Ctrl-C) and SIGTERM: they shut down the contexts, and spinning ends.
 
-A thread that waits in DDS cannot notice a signal. So the C-level handler of Python writes to a pipe
-(``signal.set_wakeup_fd``), and a thread that reads it wakes the executors; then Python runs the handler.
-Where the main thread never comes to that, in the event loop of a GUI for instance, that thread shuts down.
+A thread that waits in DDS does not notice a signal. So Python's C handler writes to a pipe
+(``signal.set_wakeup_fd``), and a thread that reads it wakes the executors; then Python can run the handler.
+If the main thread does not run it, for example in the event loop of a GUI, the reading thread shuts down.
 """
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ from enum import IntEnum
 from types import FrameType
 from typing import TYPE_CHECKING, Any
 
-from rclpy import _imports
 from rclpy._listeners import Listeners
 from rclpy.guard_condition import GuardCondition
 
@@ -24,11 +23,9 @@ if TYPE_CHECKING:
     from rclpy.context import Context
     from rclpy.executors import Executor
 
-_imports.offer(__name__)
-
 
 class SignalHandlerOptions(IntEnum):
-    """Which signals rclpy handles."""
+    """The signals that rclpy handles."""
 
     NO = 0
     SIGINT = 1
@@ -39,10 +36,10 @@ class SignalHandlerOptions(IntEnum):
 _executors: Listeners[Executor] = Listeners()
 _contexts: Listeners[Context] = Listeners()
 _guards: Listeners[GuardCondition] = Listeners()
-_previous: dict[int, Any] = {}  # the handlers that were there before ours
+_previous: dict[int, Any] = {}  # the handlers before ours
 _options = SignalHandlerOptions.NO
 _wakeup_fd = -1
-_TURN = 0.2  # [s] that the main thread has to run a handler
+_HANDLER_TIME = 0.2  # [s], for the main thread to run the handler
 
 
 class SignalHandlerGuardCondition(GuardCondition):
@@ -53,14 +50,14 @@ class SignalHandlerGuardCondition(GuardCondition):
         _guards.add(self)
 
     def destroy(self) -> None:
-        """Hear of no more signals."""
+        """Destroy it: signals no longer trigger it."""
         _guards.discard(self)
         super().destroy()
 
 
 def _handle(signum: int, frame: FrameType | None) -> None:
     if not _options and signal.getsignal(signum) is _handle:
-        _restore(signum)  # uninstalled on another thread, which could not
+        _restore(signum)  # another thread uninstalled the handlers, and could not restore them
         signal.raise_signal(signum)
         return
     _shut_down(_contexts)
@@ -77,7 +74,7 @@ def _shut_down(contexts: Iterable[Context]) -> None:
 
 
 def _restore(signum: int) -> None:
-    """Put the handler back that was there before ours, unless ours is no longer there."""
+    """Restore the previous handler, unless ours was replaced."""
     previous = _previous.pop(signum, None)
     if signal.getsignal(signum) is _handle:
         signal.signal(signum, signal.SIG_DFL if previous is None else previous)
@@ -89,21 +86,21 @@ def _wake_executors(fd: int) -> None:
         for executor in _executors:
             executor.wake()
         if contexts and any(signal.getsignal(number) is _handle for number in numbers):
-            time.sleep(_TURN)
-            # Not those that have begun since: whoever began them has heard of the signal.
+            time.sleep(_HANDLER_TIME)
+            # Not newer contexts: the program initialized them after the signal.
             left = [context for context in contexts if context._valid]
             if left and _options:
                 _shut_down(left)
 
 
 def _listen() -> None:
-    """Let the C-level handler wake the executors, unless it has a wake-up fd of somebody else already."""
+    """Install the pipe, unless the program has installed its own wake-up file descriptor."""
     global _wakeup_fd
     if threading.current_thread() is not threading.main_thread():
         return
-    there = signal.set_wakeup_fd(-1)
-    if there not in (-1, _wakeup_fd):
-        signal.set_wakeup_fd(there)
+    current = signal.set_wakeup_fd(-1)
+    if current not in (-1, _wakeup_fd):
+        signal.set_wakeup_fd(current)
         return
     if _wakeup_fd < 0:
         reading, _wakeup_fd = os.pipe()
@@ -113,7 +110,7 @@ def _listen() -> None:
 
 
 def _watch(executor: Executor) -> None:
-    """Let every signal end this executor's waiting, so that its handler runs."""
+    """Make every signal wake this executor, so that Python runs the handler."""
     _executors.add(executor)
     _listen()
 
@@ -123,17 +120,17 @@ def _shut_down_by_signal(context: Context) -> None:
 
 
 def get_current_signal_handlers_options() -> SignalHandlerOptions:
-    """Return which signals rclpy handles now."""
+    """Return the signals that rclpy handles now."""
     return _options
 
 
 def install_signal_handlers(options: SignalHandlerOptions = SignalHandlerOptions.ALL) -> None:
-    """Handle the signals that ``options`` name, besides those handled already. Only the main thread can."""
+    """Handle these signals, in addition to those already handled. Has an effect only in the main thread."""
     global _options
     if threading.current_thread() is not threading.main_thread():
         return
     if not _options:
-        uninstall_signal_handlers()  # in case that it was called on another thread
+        uninstall_signal_handlers()  # completes a call on another thread
     for number, option in (
         (signal.SIGINT, SignalHandlerOptions.SIGINT),
         (signal.SIGTERM, SignalHandlerOptions.SIGTERM),
@@ -146,9 +143,10 @@ def install_signal_handlers(options: SignalHandlerOptions = SignalHandlerOptions
 
 def uninstall_signal_handlers() -> None:
     """
-    Handle signals no more: put the handlers back that were there before.
+    Stop handling signals: restore the previous handlers.
 
-    Only the main thread can. After a call on another one the next signal does it, and is handled by them.
+    Only the main thread can do so. After a call on another thread, the next signal restores them, and they
+    handle it.
     """
     global _options
     _options = SignalHandlerOptions.NO

@@ -1,4 +1,4 @@
-"""Subscriptions."""
+"""Subscriptions to topics."""
 
 from __future__ import annotations
 
@@ -7,22 +7,20 @@ from collections.abc import Callable
 from enum import Enum
 from typing import Any
 
-from rclpy import _imports
 from rclpy._bad_input import BadInput
 from rclpy._dds import Reader
 from rclpy._endpoint import Owner, SubscriptionEndpoint
+from rclpy._type_variables import MsgType  # noqa: F401 (re-export)
 from rclpy.callback_groups import CallbackGroup
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.qos import QoSProfile
 
-_imports.offer(__name__)
-
 
 class Subscription(Owner):
-    """Calls back with each message of a topic; :meth:`rclpy.node.Node.create_subscription` makes them."""
+    """Calls back with each message of a topic. Created by :meth:`rclpy.node.Node.create_subscription`."""
 
     class CallbackType(Enum):
-        """What the callback is called with."""
+        """The arguments of the callback."""
 
         MessageOnly = 0
         WithMessageInfo = 1
@@ -53,7 +51,7 @@ class Subscription(Owner):
 
     @property
     def handle(self) -> Reader:
-        """The DDS reader. Raises InvalidHandle when the subscription was destroyed."""
+        """The DDS reader. Raises InvalidHandle if the subscription was destroyed."""
         self._check_usable()
         return self._reader
 
@@ -64,7 +62,7 @@ class Subscription(Owner):
 
     @property
     def callback(self) -> Callable[..., Any]:
-        """What is called with each message, and with its info as a second argument if it takes two."""
+        """Called with each message, and with its info if it takes two arguments."""
         return self._callback
 
     @callback.setter
@@ -73,13 +71,13 @@ class Subscription(Owner):
         self._callback_type = _callback_type(value)
 
     def get_publisher_count(self) -> int:
-        """How many publishers this subscription receives from."""
+        """Return the number of matched publishers."""
         return self.handle.matched()
 
-    # What the executor asks of everything it waits for.
+    # The interface that executors use for every entity.
 
     def _take(self) -> tuple[Any, ...] | None:
-        """The arguments of the next call of the callback; malformed messages are dropped and reported."""
+        """Return the arguments for the callback; drop and count malformed messages."""
         while not self._destroyed and (sample := self._reader.take()) is not None:
             try:
                 message = sample.data if self.raw else self._deserialize(sample.data)
@@ -96,10 +94,10 @@ class Subscription(Owner):
 
 
 def _callback_type(callback: Callable[..., Any]) -> Subscription.CallbackType:
-    """How a callback wants to be called. Raises RuntimeError if neither one nor two arguments fit."""
+    """Return the arguments that a callback takes. Raises RuntimeError if neither one nor two fit."""
     try:
         signature = inspect.signature(callback)
-    except (ValueError, TypeError):  # a builtin, such as list.append, does not say
+    except (ValueError, TypeError):  # a builtin without a signature, such as list.append
         return Subscription.CallbackType.MessageOnly
     for arguments, kind in (
         ((object(),), Subscription.CallbackType.MessageOnly),

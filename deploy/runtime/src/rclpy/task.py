@@ -1,4 +1,4 @@
-"""Results that come later, and the functions and coroutines that an executor runs to get them."""
+"""Futures, and tasks: functions and coroutines that an executor runs."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ if TYPE_CHECKING:
 
 class Future:
     """
-    A result that comes later, or an exception in its place; may be awaited in a coroutine callback.
+    A future result or exception. Coroutine callbacks can await it.
 
     All methods may be called from any thread.
     """
 
     def __init__(self, *, executor: Executor | None = None) -> None:
-        """Create a future whose done callbacks run on `executor`, or at once on the completing thread."""
+        """Create a future. Its done callbacks run on `executor`, or without one on the completing thread."""
         self._done = False
         self._cancelled = False
         self._result: Any = None
         self._exception: BaseException | None = None
         self._exception_fetched = False
         self._callbacks: list[Callable[[Any], Any]] = []
-        # What must know at once, whatever executor there is: a task that awaits this future.
+        # Called on the completing thread, for example by tasks that await this future.
         self._waiters: list[Callable[[], None]] = []
         self._lock = threading.Lock()
         self._executor: Callable[[], Executor | None] = _no_executor
@@ -41,14 +41,14 @@ class Future:
 
     def __await__(self) -> Generator[None, None, Any]:
         while not self._is_over():
-            # Told aside: asyncio, whose tasks may await this too, takes None for "again later".
+            # Not yielded: tasks of asyncio may also await this, and to them None means "call again".
             _running.awaited = self
             yield
         return self.result()
 
     def cancel(self) -> None:
         """
-        Cancel, unless done already: done callbacks run, and who awaits the future gets `None`.
+        Cancel the future unless it is done: done callbacks run, and awaiting it results in `None`.
 
         `done()` stays `False`, as in rclpy.
         """
@@ -58,22 +58,22 @@ class Future:
         self._complete()
 
     def cancelled(self) -> bool:
-        """Tell whether the future was cancelled."""
+        """Return whether the future was cancelled."""
         return self._cancelled
 
     def done(self) -> bool:
-        """Tell whether there is a result or an exception."""
+        """Return whether there is a result or an exception."""
         return self._done
 
     def _is_over(self) -> bool:
-        """Tell whether nobody needs to wait for it any more."""
+        """Return whether the future is done or cancelled."""
         return self._done or self._cancelled
 
     def result(self) -> Any:
         """
-        Return the result, `None` as long as there is none.
+        Return the result, or `None` before there is one.
 
-        :raises Exception: the exception that came in place of a result.
+        :raises Exception: the exception, if there is one instead of a result.
         """
         if self._exception is not None:
             self._exception_fetched = True
@@ -81,12 +81,12 @@ class Future:
         return self._result
 
     def exception(self) -> BaseException | None:
-        """Return the exception that came in place of a result, or `None`."""
+        """Return the exception, or `None` if there is none."""
         self._exception_fetched = True
         return self._exception
 
     def set_result(self, result: Any) -> None:
-        """Complete with `result`."""
+        """Complete the future with a result."""
         with self._lock:
             self._result = result
             self._done = True
@@ -94,7 +94,7 @@ class Future:
         self._complete()
 
     def set_exception(self, exception: BaseException) -> None:
-        """Complete with an exception, which `result` will raise."""
+        """Complete the future with an exception, which `result` raises."""
         with self._lock:
             self._exception = exception
             self._exception_fetched = False
@@ -104,9 +104,9 @@ class Future:
 
     def add_done_callback(self, callback: Callable[[Any], Any]) -> None:
         """
-        Call `callback` with this future when it is done or cancelled, at once if it is done already.
+        Call `callback` with this future when it is done or cancelled, or now if it is done.
 
-        The callback runs as a task of the future's executor, if it has one; it should not raise.
+        The callback runs as a task of the future's executor, if there is one. It should not raise.
         """
         with self._lock:
             if not self._done:
@@ -119,22 +119,22 @@ class Future:
             callback(self)
 
     def _set_executor(self, executor: Executor | None) -> None:
-        """Choose the executor for the done callbacks; it is not kept alive."""
+        """Set the executor of the done callbacks, without keeping it alive."""
         with self._lock:
             self._executor = _no_executor if executor is None else weakref.ref(executor)
 
     def _call_when_complete(self, waiter: Callable[[], None]) -> None:
-        """Call `waiter` once, on the completing thread: when done or cancelled, at once if that is so."""
+        """Call `waiter` once: on the completing thread, or now if the future is done or cancelled."""
         with self._lock:
             if not self._is_over():
-                # Who waits with a timeout comes again and again.
+                # A caller that waits with timeouts adds the same waiter repeatedly.
                 if waiter not in self._waiters:
                     self._waiters.append(waiter)
                 return
         waiter()
 
     def _complete(self) -> None:
-        """Tell everybody who waits; the lock must not be held."""
+        """Call the waiters and callbacks; the caller must not hold the lock."""
         with self._lock:
             waiters, self._waiters = self._waiters, []
             callbacks, self._callbacks = self._callbacks, []
@@ -148,7 +148,7 @@ class Future:
             try:
                 callback(self)
             except Exception as error:
-                # The other callbacks have a right to be called too.
+                # The other callbacks must run, too.
                 warnings.warn(f"Unhandled exception in done callback: {error}", stacklevel=2)
 
 
@@ -158,7 +158,7 @@ def _no_executor() -> None:
 
 class _Running(threading.local):
     awaited: Future | None = None
-    """what the coroutine that runs in this thread awaits now"""
+    """The future that this thread's running coroutine awaits."""
 
 
 _running = _Running()
@@ -166,7 +166,7 @@ _running = _Running()
 
 class Task(Future):
     """
-    A function or coroutine that an executor runs; the future of what it returns.
+    A function or coroutine that an executor runs, and the future of its result.
 
     Only executors create tasks: see `Executor.create_task`.
     """
@@ -178,24 +178,24 @@ class Task(Future):
         kwargs: dict[str, Any] | None = None,
         executor: Executor | None = None,
     ) -> None:
-        """Create a task that calls `handler` (or drives it, if it is a coroutine) with these arguments."""
+        """Create a task that calls `handler` with these arguments, or runs it if it is a coroutine."""
         super().__init__(executor=executor)
         self._handler: Any = handler
         self._args: Any = [] if args is None else args
         self._kwargs: dict[str, Any] = {} if kwargs is None else kwargs
         if inspect.iscoroutinefunction(handler):
             self._handler = handler(*self._args, **self._kwargs)
-        # The future this task waits for between two calls; None: nothing keeps it from running on.
+        # The future that this task awaits; None: the task can continue.
         self._awaited: Future | None = None
         self._executing = False
-        # Keeps two threads from running the task at once.
+        # Two threads must not run the task at the same time.
         self._task_lock = threading.Lock()
 
     def __call__(self) -> None:
         """
-        Run the function, or the coroutine to its next `await`, and store the outcome.
+        Run the function, or the coroutine until its next `await`, and store the result or exception.
 
-        Does nothing when the task is done, cancelled, or running on another thread.
+        Does nothing if the task is done, cancelled, or running on another thread.
         """
         if not self._task_lock.acquire(blocking=False):
             return
@@ -215,7 +215,7 @@ class Task(Future):
             self._task_lock.release()
 
     def executing(self) -> bool:
-        """Tell whether the task is running at this moment."""
+        """Return whether the task is running now."""
         return self._executing
 
     def _run(self) -> None:
@@ -226,7 +226,7 @@ class Task(Future):
         except Exception as error:
             self.set_exception(error)
         except BaseException:
-            # KeyboardInterrupt or SystemExit end the spin; spinning again must not run the task again.
+            # KeyboardInterrupt and SystemExit end spinning. Later spinning must not run the task again.
             self.cancel()
             raise
         else:
@@ -250,7 +250,7 @@ class Task(Future):
             self._awaited, _running.awaited = _running.awaited, None
 
     def _drop_handler(self) -> None:
-        """Let go of what the handler holds; a coroutine that was cancelled runs its `finally` clauses."""
+        """Release the handler and its arguments; a cancelled coroutine runs its `finally` clauses."""
         if inspect.iscoroutine(self._handler):
             self._handler.close()
         self._handler = None

@@ -1,22 +1,19 @@
-"""A point in time on one of the clocks."""
+"""Points in time of a clock."""
 
 from __future__ import annotations
 
 from typing import Protocol, overload
 
 import builtin_interfaces.msg
-from rclpy import _imports
 from rclpy.clock_type import ClockType
 from rclpy.constants import S_TO_NS
 from rclpy.duration import Duration
-
-_imports.offer(__name__)
 
 _MAX = 2**63 - 1
 
 
 class TimeHandle(Protocol):
-    """What rclpy's C layer keeps of a time."""
+    """A time in rclpy's C layer."""
 
     @property
     def nanoseconds(self) -> int: ...
@@ -27,14 +24,14 @@ class TimeHandle(Protocol):
 
 class Time:
     """
-    A point in time: nanoseconds since the epoch of a clock, and the type of that clock.
+    A point in time: nanoseconds since the epoch of a clock, and the type of the clock.
 
-    Only times of the same clock type compare and subtract.
+    Only times of the same clock type can be compared and subtracted.
     """
 
     __slots__ = ("__weakref__", "_clock_type", "_nanoseconds")
 
-    # Equality without a hash, as rclpy's Time.
+    # Not hashable, as rclpy's Time.
     __hash__ = None  # type: ignore[assignment]
 
     def __init__(
@@ -47,7 +44,7 @@ class Time:
         """
         Create the time `seconds` plus `nanoseconds` after the epoch of `clock_type`.
 
-        :raises TypeError: if `clock_type` is no clock type.
+        :raises TypeError: if `clock_type` is not a clock type.
         :raises ValueError: if `seconds` or `nanoseconds` are negative.
         :raises OverflowError: if the sum does not fit into 63 bits.
         """
@@ -65,7 +62,7 @@ class Time:
 
     @classmethod
     def _of(cls, nanoseconds: int, clock_type: ClockType) -> Time:
-        """Create a time from a clock's own reading, which needs no check."""
+        """Create a time from a clock's reading, without checks."""
         time = cls.__new__(cls)
         time._nanoseconds = nanoseconds
         time._clock_type = clock_type
@@ -73,16 +70,16 @@ class Time:
 
     @property
     def nanoseconds(self) -> int:
-        """Nanoseconds since the epoch of the clock."""
+        """The time since the epoch of the clock [ns]."""
         return self._nanoseconds
 
     def seconds_nanoseconds(self) -> tuple[int, int]:
-        """Return the whole seconds since the epoch, and the nanoseconds within the last one."""
+        """Return the whole seconds since the epoch, and the remaining nanoseconds."""
         return divmod(self._nanoseconds, S_TO_NS)
 
     @property
     def clock_type(self) -> ClockType:
-        """The type of the clock this time was read from."""
+        """The type of the clock."""
         return self._clock_type
 
     def __repr__(self) -> str:
@@ -141,7 +138,7 @@ class Time:
         return self._nanoseconds >= self._comparable(other) if isinstance(other, Time) else NotImplemented
 
     def to_msg(self) -> builtin_interfaces.msg.Time:
-        """Convert to a message, which does not say the clock type."""
+        """Convert to a message, which does not contain the clock type."""
         seconds, nanoseconds = divmod(self._nanoseconds, S_TO_NS)
         return builtin_interfaces.msg.Time(sec=seconds, nanosec=nanoseconds)
 

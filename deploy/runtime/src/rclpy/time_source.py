@@ -1,4 +1,4 @@
-"""Simulated time: clocks that follow `/clock` while the parameter `use_sim_time` of their node is true."""
+"""Simulated time: clocks follow `/clock` while the parameter `use_sim_time` of their node is true."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ USE_SIM_TIME_NAME = "use_sim_time"
 
 
 class TimeSource:
-    """Sets the clocks attached to it to the time that a simulator publishes."""
+    """Sets the attached clocks to the time that a simulator publishes."""
 
     def __init__(self, *, node: Node | None = None) -> None:
-        """Create a time source, and attach `node` if there is one."""
+        """Create a time source, and attach `node` if it is given."""
         self._clock_sub: Subscription | None = None
         self._node_weak_ref: weakref.ReferenceType[Node] | None = None
         self._associated_clocks: set[ROSClock] = set()
-        # Zero: no time was heard yet.
+        # Zero: no time was received.
         self._last_time_set = Time(clock_type=ClockType.ROS_TIME)
         self._ros_time_is_active = False
         if node is not None:
@@ -39,7 +39,7 @@ class TimeSource:
 
     @property
     def ros_time_is_active(self) -> bool:
-        """Whether the clocks follow `/clock`; may be set."""
+        """Whether the clocks follow `/clock`. Can be set."""
         return self._ros_time_is_active
 
     @ros_time_is_active.setter
@@ -56,9 +56,9 @@ class TimeSource:
 
     def attach_node(self, node: Node) -> None:
         """
-        Follow the parameter `use_sim_time` of `node`, which is declared if need be, through its subscription.
+        Follow the parameter `use_sim_time` of `node`; declare it if necessary.
 
-        :raises TypeError: if `node` is none.
+        :raises TypeError: if `node` is not a node.
         """
         from rclpy.node import Node
 
@@ -81,7 +81,7 @@ class TimeSource:
         node.add_post_set_parameters_callback(self._follow)
 
     def detach_node(self) -> None:
-        """Follow the node no longer."""
+        """Stop following the node's parameter."""
         node = self._get_node()
         self._unsubscribe()
         if node is not None:
@@ -91,9 +91,9 @@ class TimeSource:
 
     def attach_clock(self, clock: ROSClock) -> None:
         """
-        Set `clock` from now on.
+        Attach a clock.
 
-        :raises ValueError: if it is no clock of ROS time.
+        :raises ValueError: if it is not a clock of ROS time.
         """
         if not isinstance(clock, ROSClock):
             raise ValueError("Only clocks with type ROS_TIME can be attached.")
@@ -105,10 +105,10 @@ class TimeSource:
         """
         Set all clocks to the simulator's time.
 
-        :raises ValueError: if it is negative: no time.
+        :raises ValueError: if it is negative.
         """
         time = Time.from_msg(msg.clock)
-        # Clocks that are attached later start with it.
+        # The initial time of clocks that are attached later.
         self._last_time_set = time
         for clock in self._associated_clocks:
             clock.set_ros_time_override(time)
@@ -122,7 +122,7 @@ class TimeSource:
             CLOCK_TOPIC,
             self.clock_callback,
             QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT),
-            # Of its own, so that time goes on while a callback of the node sleeps.
+            # A separate group: time must go on while a callback of the node sleeps.
             callback_group=MutuallyExclusiveCallbackGroup(),
         )
 
@@ -133,7 +133,7 @@ class TimeSource:
         self._clock_sub = None
 
     def _check(self, parameters: list[Parameter]) -> SetParametersResult:
-        """Let `use_sim_time` be a bool only."""
+        """Reject values of `use_sim_time` that are not bool."""
         for parameter in parameters:
             if parameter.name == USE_SIM_TIME_NAME and parameter.type_ is not Parameter.Type.BOOL:
                 reason = f"{USE_SIM_TIME_NAME} parameter set to something besides a bool"
@@ -143,7 +143,7 @@ class TimeSource:
         return SetParametersResult(successful=True)
 
     def _follow(self, parameters: list[Parameter]) -> None:
-        """Do as `use_sim_time` says, once nobody has rejected it."""
+        """Apply `use_sim_time` after all callbacks have accepted it."""
         for parameter in parameters:
             if parameter.name == USE_SIM_TIME_NAME:
                 self.ros_time_is_active = parameter.value
@@ -154,7 +154,7 @@ class TimeSource:
 
 @cache
 def _valid_clock() -> type[rosgraph_msgs.msg.Clock]:
-    """The message of `/clock`; refuses what is no time where octets become messages, as all bad input is."""
+    """The message of `/clock`; its deserialization rejects negative times as malformed."""
     from rosgraph_msgs.msg import Clock
 
     class ValidClock(Clock):

@@ -1,4 +1,4 @@
-"""Timers, and rates that sleep by them."""
+"""Timers, and rates."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import threading
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from rclpy import _imports
 from rclpy._dds import INFINITY
 from rclpy._handle import Handle
 from rclpy.callback_groups import CallbackGroup
@@ -19,13 +18,11 @@ from rclpy.utilities import get_default_context
 if TYPE_CHECKING:
     from rclpy.context import Context
 
-_imports.offer(__name__)
-
 TimerCallbackType = Callable[[], Any]
 
 
 class Timer:
-    """Calls back once a period by its clock. The periods do not drift; missed ones are skipped."""
+    """Calls back in each period of its clock. The periods do not drift; missed periods are skipped."""
 
     def __init__(
         self,
@@ -38,10 +35,10 @@ class Timer:
         autostart: bool = True,
     ) -> None:
         """
-        Create a timer; :meth:`rclpy.node.Node.create_timer` is the usual way.
+        Create a timer; usually, :meth:`rclpy.node.Node.create_timer` does.
 
         :param timer_period_ns: period [ns], not negative.
-        :param autostart: whether it runs at once, or waits for :meth:`reset`.
+        :param autostart: whether it starts now, or with :meth:`reset`.
         """
         if timer_period_ns < 0:
             raise RCLError("failed to create timer: timer period must be non-negative")
@@ -56,7 +53,7 @@ class Timer:
         self._next_call = self._last_call + self._period
         self._canceled = not autostart
         self._destroyed = False
-        # Who waits for this timer hears through this that the wait has become another one.
+        # Called when the time until the next call changes.
         self._on_change: Callable[[], None] = lambda: None
         self._jump_handle = None
         if clock.clock_type == ClockType.ROS_TIME:
@@ -68,8 +65,8 @@ class Timer:
     def _time_has_jumped(self, jump: TimeJump) -> None:
         now = self._source.nanoseconds()
         if jump.clock_change in (ClockChange.ROS_TIME_ACTIVATED, ClockChange.ROS_TIME_DEACTIVATED):
-            # Another scale of time: what remained of the period still remains. Not so while no simulated time
-            # was heard yet: the first one will be a jump back, which starts a new period.
+            # The source of time changes: keep the rest of the period. Except before the first simulated time,
+            # which will be a jump back and start a new period.
             if self._source._latest:
                 self._next_call += jump.delta.nanoseconds
                 self._last_call += jump.delta.nanoseconds
@@ -80,7 +77,7 @@ class Timer:
 
     @property
     def handle(self) -> Handle:
-        """What stands for the timer. Raises InvalidHandle when it was destroyed."""
+        """A handle for the timer. Raises InvalidHandle if it was destroyed."""
         return self._usable()._handle
 
     def _usable(self) -> Timer:
@@ -90,12 +87,12 @@ class Timer:
 
     @property
     def clock(self) -> Clock:
-        """The clock it runs by."""
+        """The clock of the timer."""
         return self._clock
 
     @property
     def timer_period_ns(self) -> int:
-        """The period [ns]. A new one counts from the next call on."""
+        """The period [ns]. A change takes effect with the next call."""
         return self._usable()._period
 
     @timer_period_ns.setter
@@ -104,15 +101,15 @@ class Timer:
         self._on_change()
 
     def is_ready(self) -> bool:
-        """Whether it should be called now."""
+        """Whether the next call is due."""
         return not self._usable()._canceled and self._source.nanoseconds() >= self._next_call
 
     def is_canceled(self) -> bool:
-        """Whether it rests."""
+        """Whether it is canceled."""
         return self._usable()._canceled
 
     def cancel(self) -> None:
-        """Rest until :meth:`reset`."""
+        """Stop until :meth:`reset`."""
         self._usable()._canceled = True
 
     def reset(self) -> None:
@@ -122,29 +119,29 @@ class Timer:
         self._on_change()
 
     def time_since_last_call(self) -> int:
-        """Nanoseconds since the last call, or since the creation."""
+        """Return the time since the last call, or since the creation [ns]."""
         return self._source.nanoseconds() - self._usable()._last_call
 
     def time_until_next_call(self) -> int | None:
-        """Nanoseconds until the next call, negative if it is overdue, ``None`` if canceled."""
+        """Return the time until the next call [ns], negative if overdue, ``None`` if canceled."""
         return None if self._usable()._canceled else self._next_call - self._source.nanoseconds()
 
     def destroy(self) -> None:
-        """End it; whoever created it should use :meth:`rclpy.node.Node.destroy_timer`."""
+        """Destroy it. :meth:`rclpy.node.Node.destroy_timer` also removes it from the node."""
         self._destroyed = True
         if self._jump_handle is not None:
             self._jump_handle.unregister()
 
-    # What the executor asks of everything it waits for.
+    # The interface that executors use for every entity.
 
     def _remaining(self) -> int:
-        """Nanoseconds to wait for it; for ever while it rests, or while its time is a simulator's."""
+        """Return the time to wait [ns]: infinite if canceled, or not yet due in simulated time."""
         if self._canceled or self._destroyed:
             return INFINITY
         override = self._source._override
         if override is None:
             return self._next_call - self._source._read()
-        # Simulated time comes as a message: there is nothing to wait for until it is there.
+        # Simulated time advances by messages, which wake the executor.
         return INFINITY if self._next_call > override else 0
 
     def _take(self) -> tuple[()] | None:
@@ -165,16 +162,16 @@ class Timer:
 
 
 class Rate:
-    """Sleeps at a rate, in a thread other than the one that spins the node."""
+    """Sleeps at a rate, on a thread that does not spin the node."""
 
     def __init__(self, timer: Timer, *, context: Context) -> None:
-        """Create a rate on a timer; :meth:`rclpy.node.Node.create_rate` is the usual way."""
+        """Create a rate from a timer; usually, :meth:`rclpy.node.Node.create_rate` does."""
         self._timer = timer
         self._clock = timer.clock
         self._context = context
         self._ticks = threading.Condition()
         self._tick = 0
-        self._overrun = False  # whether the latest tick has let nobody go yet
+        self._overrun = False  # whether the latest tick has not ended a sleep
         self._is_destroyed = False
         timer.callback = self._wake
         context.on_shutdown(self._end)
@@ -191,15 +188,15 @@ class Rate:
             self._ticks.notify_all()
 
     def destroy(self) -> None:
-        """Wake whoever sleeps, for the last time."""
+        """Destroy the rate and wake its sleepers."""
         self._end()
 
     def sleep(self) -> None:
         """
-        Sleep until the next tick; not at all if one came while nobody slept.
+        Sleep until the next tick, or not at all if a tick came since the last sleep.
 
-        :raises ROSInterruptException: if the context is or gets shut down.
-        :raises RuntimeError: if the rate is destroyed; a sleep under way just ends then.
+        :raises ROSInterruptException: if the context is shut down, also during the sleep.
+        :raises RuntimeError: if the rate was destroyed before; its destruction during the sleep just ends it.
         """
         with self._ticks:
             if self._is_destroyed and self._context.ok():

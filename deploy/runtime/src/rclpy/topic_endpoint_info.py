@@ -1,4 +1,4 @@
-"""What is known of a publisher or subscription in the graph."""
+"""The properties of a publisher or subscription in the graph."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class TopicEndpointTypeEnum(IntEnum):
 
 
 class TopicEndpointInfo:
-    """An endpoint: whose it is, its type, its identity and its quality of service."""
+    """A publisher or subscription: its node, type, identity and quality of service."""
 
     __slots__ = (
         "_node_name",
@@ -30,11 +30,11 @@ class TopicEndpointInfo:
         "_qos_profile",
     )
 
-    # Equality without a hash, as rclpy's TopicEndpointInfo, which can be changed.
+    # Not hashable, because it is mutable, as in rclpy.
     __hash__ = None  # type: ignore[assignment]
 
     def __init__(self, **kwargs: Any) -> None:
-        """Create from the properties by name; what is not given is empty or unknown."""
+        """Create it from properties by name. Missing ones are empty or unknown."""
         assert all(f"_{key}" in self.__slots__ for key in kwargs), (
             f"Invalid arguments passed to constructor: {list(kwargs)}"
         )
@@ -48,7 +48,7 @@ class TopicEndpointInfo:
 
     @property
     def node_name(self) -> str:
-        """The name of the node the endpoint belongs to."""
+        """The name of its node."""
         return self._node_name
 
     @node_name.setter
@@ -58,7 +58,7 @@ class TopicEndpointInfo:
 
     @property
     def node_namespace(self) -> str:
-        """The namespace of that node."""
+        """The namespace of its node."""
         return self._node_namespace
 
     @node_namespace.setter
@@ -78,7 +78,7 @@ class TopicEndpointInfo:
 
     @property
     def topic_type_hash(self) -> TypeHash:
-        """The hash of the type's definition; a dictionary of its properties may be assigned too."""
+        """The hash of the type's definition. A dictionary of its properties can be assigned, too."""
         return self._topic_type_hash
 
     @topic_type_hash.setter
@@ -98,7 +98,7 @@ class TopicEndpointInfo:
 
     @property
     def endpoint_gid(self) -> list[int]:
-        """The bytes of the identity that the middleware gave it."""
+        """The bytes of its GID, the identity in the middleware."""
         return self._endpoint_gid
 
     @endpoint_gid.setter
@@ -108,7 +108,7 @@ class TopicEndpointInfo:
 
     @property
     def qos_profile(self) -> QoSProfile:
-        """Its quality of service; a dictionary of policies may be assigned too."""
+        """The quality of service. A dictionary of policies can be assigned, too."""
         return self._qos_profile
 
     @qos_profile.setter

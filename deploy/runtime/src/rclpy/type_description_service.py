@@ -1,4 +1,4 @@
-"""The service ``~/get_type_description``, by which others learn what a type looks like (REP 2016)."""
+"""The service ``~/get_type_description``, which returns the definition of a type (REP 2016)."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ _NOT_IN_USE = "Type not currently in use by this node"
 
 
 class TypeDescriptionService:
-    """Describes a node's types, unless its parameter ``start_type_description_service`` is false."""
+    """Describes the types of a node, unless its parameter ``start_type_description_service`` is false."""
 
     def __init__(self, node: Node) -> None:
-        """Declare the parameter, and create the service if it says so."""
+        """Declare the parameter, and create the service if it is true."""
         self._node = node
         self._service: Any = None
         from rcl_interfaces.msg import ParameterDescriptor
@@ -45,13 +45,13 @@ class TypeDescriptionService:
             )
 
     def destroy(self) -> None:
-        """End the service."""
+        """Destroy the service."""
         if self._service is not None:
             self._node.destroy_service(self._service)
             self._service = None
 
     def _describe(self, request: Any, response: Any) -> Any:
-        """Answer as rcl does: the hash says which type is meant, whatever the name, and it must be in use."""
+        """Answer as rcl does: the hash identifies the type, which must be in use; its name is ignored."""
         from rosidl_runtime_embedded.type_description import type_description, type_sources
 
         names = {used._TYPE_HASH: used._TYPE_NAME for used in list(self._node._rclpy_used_types)}

@@ -1,4 +1,4 @@
-"""The hash of a type's definition (REP 2011)."""
+"""Hashes of type definitions (REP 2011)."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ _SIZE = 32
 
 
 class TypeHash:
-    """A hash as endpoints announce it: RIHS version and 32 bytes; version -1: none is known."""
+    """A type hash: the RIHS version (-1: the hash is unknown) and 32 bytes."""
 
     _TYPE_HASH_SIZE = _SIZE
 
     __slots__ = ("_value", "_version")
 
-    # Equality without a hash, as rclpy's TypeHash, which can be changed.
+    # Not hashable, because it is mutable, as in rclpy.
     __hash__ = None  # type: ignore[assignment]
 
     def __init__(self, version: int = -1, value: bytes = bytes(_SIZE)) -> None:
@@ -31,7 +31,7 @@ class TypeHash:
 
     @property
     def value(self) -> bytes:
-        """The hash itself."""
+        """The bytes of the hash."""
         return self._value
 
     @value.setter
@@ -51,7 +51,7 @@ class TypeHash:
 
     @classmethod
     def _parse(cls, text: str) -> TypeHash:
-        """Undo `str`; anything that is no hash is the unknown one."""
+        """Parse the result of `str`; for other texts, return the unknown hash."""
         version, separator, value = text.removeprefix("RIHS").partition("_")
         if not (text.startswith("RIHS") and separator and version.isdecimal() and len(value) == 2 * _SIZE):
             return cls()

@@ -1,4 +1,4 @@
-"""Checks that a class is what a topic or service needs as its type."""
+"""Checks that a class is a message or service type."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ def check_for_type_support(msg_or_srv_type: Any) -> None:
     """
     Check that a class is a message or service type.
 
-    :raises AttributeError: if it is none.
+    :raises AttributeError: if it is neither.
     """
     if not hasattr(msg_or_srv_type, "_TYPE_NAME"):
-        raise AttributeError(f"{msg_or_srv_type!r} is no message or service type of ROS 2")
+        raise AttributeError(f"{msg_or_srv_type!r} is not a ROS 2 message or service type")
 
 
 def check_is_valid_msg_type(msg_type: Any) -> None:
     """
     Check that a class is a message type.
 
-    :raises AttributeError: if it is no type at all.
+    :raises AttributeError: if it is neither a message nor a service type.
     :raises RuntimeError: if it is a service type.
     """
     check_for_type_support(msg_type)
@@ -33,7 +33,7 @@ def check_is_valid_srv_type(srv_type: Any) -> None:
     """
     Check that a class is a service type.
 
-    :raises AttributeError: if it is no type at all.
+    :raises AttributeError: if it is neither a message nor a service type.
     :raises RuntimeError: if it is a message type.
     """
     check_for_type_support(srv_type)

@@ -1,15 +1,13 @@
-"""The default context, and small helpers."""
+"""The default context, and helper functions."""
 
 from __future__ import annotations
 
 import threading
 from collections.abc import Sequence
 
-from rclpy import _arguments, _imports
+from rclpy import _arguments
 from rclpy.constants import S_TO_NS
 from rclpy.context import Context
-
-_imports.offer(__name__)
 
 g_default_context: Context | None = None
 g_context_lock = threading.Lock()
@@ -17,9 +15,9 @@ g_context_lock = threading.Lock()
 
 def get_default_context(*, shutting_down: bool = False) -> Context:
     """
-    Return the context that is used where none is given, making it if need be.
+    Return the default context; create it if necessary.
 
-    :param shutting_down: hand it over for the last time; the next call makes a new one.
+    :param shutting_down: whether the caller shuts it down: the next call creates a new one.
     """
     global g_default_context
     with g_context_lock:
@@ -32,41 +30,41 @@ def get_default_context(*, shutting_down: bool = False) -> Context:
 
 
 def remove_ros_args(args: Sequence[str] | None = None) -> list[str]:
-    """Return ``args`` (``sys.argv`` if ``None``) without what is for ROS."""
+    """Return ``args`` (``sys.argv`` if ``None``) without ROS arguments."""
     return _arguments.remove_ros_args(None if args is None else list(args))
 
 
 def ok(*, context: Context | None = None) -> bool:
-    """Whether ``context`` (the default one if ``None``) runs."""
+    """Return whether ``context`` (by default the default one) is initialized and not shut down."""
     return (get_default_context() if context is None else context).ok()
 
 
 def shutdown(*, context: Context | None = None) -> None:
-    """Shut ``context`` (the default one if ``None``) down; raises RuntimeError if it does not run."""
+    """Shut down ``context`` (by default the default one). Raises RuntimeError if it does not run."""
     (get_default_context(shutting_down=True) if context is None else context).shutdown()
 
 
 def try_shutdown(*, context: Context | None = None) -> None:
     """
-    Shut ``context`` (the default one if ``None``) down, unless that has happened already.
+    Shut down ``context`` (by default the default one) unless it is already shut down.
 
-    There is a new default context afterwards, also where a signal has shut the old one down.
+    The next default context is a new one, also after a shutdown by a signal.
     """
     (get_default_context(shutting_down=True) if context is None else context).try_shutdown()
 
 
 def get_rmw_implementation_identifier() -> str:
-    """The middleware: always Cyclone DDS here."""
+    """Return the name of the middleware: always Cyclone DDS."""
     return "rmw_cyclonedds_cpp"
 
 
 def get_available_rmw_implementations() -> set[str]:
-    """The middlewares one can choose from."""
+    """Return the available middlewares."""
     return {get_rmw_implementation_identifier()}
 
 
 def timeout_sec_to_nsec(timeout_sec: float | None) -> int:
-    """A timeout in seconds (``None`` or negative: for ever) as nanoseconds (-1: for ever)."""
+    """Convert a timeout [s] (``None`` or negative: for ever) to nanoseconds (-1: for ever)."""
     if timeout_sec is None or timeout_sec < 0:
         return -1
     return int(float(timeout_sec) * S_TO_NS)

@@ -1,4 +1,4 @@
-"""The rule for names as they stand on the network: absolute and fully expanded."""
+"""Validates fully qualified names of topics and services."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Literal
 
 from rclpy.exceptions import InvalidServiceNameException, InvalidTopicNameException
 
-# DDS allows 255 characters, of which ROS keeps 8 for its prefixes and suffixes.
+# DDS allows 255 characters. ROS 2 reserves 8 for prefixes and suffixes.
 _MAX_LENGTH = 255 - 8
 
 
@@ -15,7 +15,7 @@ def validate_full_topic_name(name: str, *, is_service: bool = False) -> Literal[
     """
     Check that `name` is a valid fully qualified topic (or service) name.
 
-    :raises InvalidTopicNameException: if it is not; `InvalidServiceNameException` if `is_service`.
+    :raises InvalidTopicNameException: if it is not (`InvalidServiceNameException` if `is_service`).
     """
     if problem := _problem(name, "topic name", _MAX_LENGTH):
         error = InvalidServiceNameException if is_service else InvalidTopicNameException
@@ -24,7 +24,7 @@ def validate_full_topic_name(name: str, *, is_service: bool = False) -> Literal[
 
 
 def _problem(name: str, what: str, max_length: int) -> tuple[str, int] | None:
-    """Say what is wrong with the fully qualified `name` and at which index, or `None`."""
+    """Return problem and index of an invalid fully qualified `name`, `None` for a valid one."""
     if not name:
         return f"{what} must not be empty", 0
     if name[0] != "/":

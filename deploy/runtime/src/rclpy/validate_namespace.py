@@ -1,4 +1,4 @@
-"""The rule for namespaces."""
+"""Validates namespaces."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Literal
 from rclpy import validate_full_topic_name
 from rclpy.exceptions import InvalidNamespaceException
 
-# Two characters stay for a separator and the shortest node name.
+# Leaves two characters for a separator and the shortest node name.
 _MAX_LENGTH = validate_full_topic_name._MAX_LENGTH - 2
 
 
@@ -15,9 +15,9 @@ def validate_namespace(namespace: str) -> Literal[True]:
     """
     Check that `namespace` is valid: absolute, with or without tokens.
 
-    A node's constructor takes '' and relative namespaces too; they are made absolute before.
+    The constructor of `Node` also accepts '' and relative namespaces, and makes them absolute first.
 
-    :raises InvalidNamespaceException: if it is not valid; the message points at the place.
+    :raises InvalidNamespaceException: if it is invalid; the message marks the place.
     """
     if problem := _problem(namespace):
         raise InvalidNamespaceException(namespace, *problem)
@@ -25,7 +25,7 @@ def validate_namespace(namespace: str) -> Literal[True]:
 
 
 def _problem(namespace: str) -> tuple[str, int] | None:
-    """Say what is wrong with `namespace` and at which index, or `None`."""
+    """Return problem and index of an invalid `namespace`, `None` for a valid one."""
     if namespace == "/":
         return None
     if namespace.endswith("/"):

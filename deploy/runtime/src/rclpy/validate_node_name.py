@@ -1,4 +1,4 @@
-"""The rule for node names (ROS 2 design, "Topic and Service name mapping to DDS")."""
+"""Validates node names (ROS 2 design, "Topic and Service name mapping to DDS")."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ def validate_node_name(node_name: str) -> Literal[True]:
     """
     Check that `node_name` consists of letters, digits and underscores and does not start with a digit.
 
-    :raises InvalidNodeNameException: if it does not; the message points at the place.
+    :raises InvalidNodeNameException: if it does not; the message marks the place.
     """
     if problem := _problem(node_name):
         raise InvalidNodeNameException(node_name, *problem)
@@ -22,7 +22,7 @@ def validate_node_name(node_name: str) -> Literal[True]:
 
 
 def _problem(name: str) -> tuple[str, int] | None:
-    """Say what is wrong with `name` and at which index, or `None`."""
+    """Return problem and index of an invalid `name`, `None` for a valid one."""
     if not name:
         return "node name must not be empty", 0
     if stray := re.search(r"[^0-9A-Za-z_]", name):

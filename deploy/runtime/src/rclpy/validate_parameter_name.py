@@ -1,4 +1,4 @@
-"""The rule for parameter names."""
+"""Validates parameter names."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The rule for topic and service names as a user writes them: relative, private or with substitutions."""
+"""Validates topic and service names before expansion: relative, private or with substitutions."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ def validate_topic_name(name: str, *, is_service: bool = False) -> Literal[True]
     """
     Check that `name` is a valid topic (or service) name before expansion.
 
-    :raises InvalidTopicNameException: if it is not; `InvalidServiceNameException` if `is_service`.
+    :raises InvalidTopicNameException: if it is not (`InvalidServiceNameException` if `is_service`).
     """
     if problem := _problem(name):
         error = InvalidServiceNameException if is_service else InvalidTopicNameException
@@ -23,7 +23,7 @@ def validate_topic_name(name: str, *, is_service: bool = False) -> Literal[True]
 
 
 def _problem(name: str) -> tuple[str, int] | None:
-    """Say what is wrong with `name` and at which index, or `None`."""
+    """Return problem and index of an invalid `name`, `None` for a valid one."""
     if not name:
         return "topic name must not be empty string", 0
     if name[0] in "0123456789":
@@ -40,7 +40,7 @@ def _problem(name: str) -> tuple[str, int] | None:
 
 
 def _character_problem(name: str) -> tuple[str, int] | None:
-    """Find characters that are not allowed where they stand, and unbalanced braces."""
+    """Find characters in invalid places, and unbalanced braces."""
     opened: int | None = None
     for index, character in enumerate(name):
         if re.match(r"[0-9A-Za-z_]", character):

@@ -1,10 +1,9 @@
-"""One message of a topic, without a subscription of one's own."""
+"""Waits for a single message of a topic."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, cast
 
-from rclpy import _imports
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.exceptions import NotInitializedException
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
@@ -14,8 +13,6 @@ from rclpy.task import Future
 if TYPE_CHECKING:
     from rclpy.node import Node
     from rclpy.subscription import Subscription
-
-_imports.offer(__name__)
 
 
 def wait_for_message(
@@ -27,11 +24,11 @@ def wait_for_message(
     time_to_wait: float | int = -1,
 ) -> tuple[bool, Any]:
     """
-    Wait for the next message on `topic`, at most `time_to_wait` seconds; negative: as long as it takes.
+    Wait for the next message on `topic`, at most `time_to_wait` seconds; negative: for ever.
 
-    Nothing else of the node runs meanwhile, unless it spins on another thread.
+    No other callback of the node runs during the wait, unless another thread spins the node.
 
-    :returns: `True` and the message; `False` and `None` if none came in time or the context was shut down.
+    :returns: `True` and the message, or `False` and `None` after a timeout or the shutdown of the context.
     """
     message = Future()
     subscription = node.create_subscription(
@@ -39,22 +36,22 @@ def wait_for_message(
         topic,
         message.set_result,
         qos_profile,
-        # Of its own: the caller may be a callback of the node's default group.
+        # A separate group: the caller may be a callback of the node's default group.
         callback_group=ReentrantCallbackGroup(),
     )
     try:
         with SingleThreadedExecutor(context=node.context) as executor:
-            executor.add_node(cast("Node", _NodeWithOnly(subscription)))
+            executor.add_node(cast("Node", _NodeWithOneSubscription(subscription)))
             executor.spin_until_future_complete(message, None if time_to_wait < 0 else time_to_wait)
-    except (ExternalShutdownException, NotInitializedException):  # the latter: before there was the executor
-        pass
+    except (ExternalShutdownException, NotInitializedException):
+        pass  # shut down during or before the wait
     finally:
         node.destroy_subscription(subscription)
     return (True, message.result()) if message.done() else (False, None)
 
 
-class _NodeWithOnly:
-    """What an executor sees of a node, with one subscription to wait for."""
+class _NodeWithOneSubscription:
+    """Looks to an executor like a node with a single subscription."""
 
     timers = ()
     guards = ()

@@ -1,4 +1,4 @@
-"""The base class of things that rclpy's executors can wait for. Applications cannot add their own here."""
+"""The base class of rclpy's waitables. Custom waitables are not supported."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from rclpy.callback_groups import CallbackGroup
 
 
 class NumberOfEntities:
-    """How many entities of which kind a waitable brings into a wait set."""
+    """Numbers of entities that a waitable adds to a wait set."""
 
     def __init__(
         self,
@@ -37,7 +37,7 @@ class NumberOfEntities:
 
 
 class Waitable:
-    """Something an executor waits for. This runtime's wait sets are not rcl's: see ``Node.add_waitable``."""
+    """Base class of QoS event handlers; this runtime has no wait sets of rcl, so others cannot be added."""
 
     def __init__(self, callback_group: CallbackGroup) -> None:
         self.callback_group: CallbackGroup | None = callback_group

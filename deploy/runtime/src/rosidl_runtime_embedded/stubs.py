@@ -1,9 +1,9 @@
 """Type stubs of message packages, so that editors and mypy know the fields.
 
-``python -m rosidl_runtime_embedded.stubs <package>... --output <directory>`` writes
-``<directory>/<package>/msg/__init__.pyi`` and ``…/srv/__init__.pyi``. Those of the packages of this
-distribution are committed; for packages of one's own the directory belongs on ``MYPYPATH`` or among the
-editor's stub paths.
+``python -m rosidl_runtime_embedded.stubs [<package>...] --output <directory>`` writes
+``<directory>/<package>/msg/__init__.pyi`` and ``…/srv/__init__.pyi``, by default for all packages of this
+distribution: its build puts them into the wheel. For packages of your own, the directory belongs on
+``MYPYPATH`` or among the stub paths of your editor.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from .definition_files import interface_names, message_definition, service_definition, shipped_packages
 from .fields import ARRAY_CODES, python_value
-from .packages import interface_names, message_definition, service_definition
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -118,26 +118,29 @@ def _accepted(field: Field, package: str, kind: str) -> str:
     return f"Iterable[{element}]" if base in ARRAY_CODES else f"list[{element}]"
 
 
-def write_stubs(package: str, output: Path) -> None:
-    """Write the stubs of a package below a directory."""
-    for kind in ("msg", "srv"):
-        text = stub(package, kind)
-        if text:
-            path = output / package / kind / "__init__.pyi"
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_text(text, encoding="utf-8")
+def write_stubs(package: str, output: Path) -> bool:
+    """Write the stubs of a package below a directory. Returns False if the package has no interfaces."""
+    stubs = {kind: text for kind in ("msg", "srv") if (text := stub(package, kind))}
+    if not stubs:
+        return False
+    for kind, text in stubs.items():
+        directory = output / package / kind
+        directory.mkdir(parents=True, exist_ok=True)
+        (directory / "__init__.pyi").write_text(text, encoding="utf-8")
+    # Without it, mypy would prefer a package of the same name that has an __init__.py.
+    (output / package / "__init__.pyi").touch()
+    return True
 
 
 def main() -> None:
-    """Command line: packages and where to write."""
+    """Command line: packages and the directory to write below."""
     parser = argparse.ArgumentParser(description="Write type stubs of message packages.")
-    parser.add_argument("packages", nargs="+", metavar="package")
+    parser.add_argument("packages", nargs="*", metavar="package", help="default: all of this distribution")
     parser.add_argument("--output", type=Path, required=True, help="directory to write below")
     arguments = parser.parse_args()
-    for package in arguments.packages:
-        if not (stub(package, "msg") or stub(package, "srv")):
+    for package in arguments.packages or shipped_packages():
+        if not write_stubs(package, arguments.output):
             parser.error(f"there is no message package '{package}' in AMENT_PREFIX_PATH")
-        write_stubs(package, arguments.output)
 
 
 if __name__ == "__main__":

@@ -1,8 +1,9 @@
-"""Which part of rclpy 7.1.3's public API the embedded runtime has: the table of deploy/runtime/README.md.
+"""Compares the embedded runtime with the public API of rclpy 7.1.3: the table of deploy/runtime/README.md.
 
-``python -m deploy.runtime.tests.runtime.conformance`` prints it, from ``rclpy_api.json``, where the classes,
-functions and signatures of a real rclpy are recorded. A name is *supported* if calls that rclpy accepts are
-accepted here: parameters of the same names, kinds and order, with a default where rclpy has one.
+``python -m deploy.runtime.tests.runtime.conformance``, run from the root of the repository, prints it. The
+API is recorded in ``rclpy_api.json``: classes, functions and signatures. A name is *supported* if this
+runtime accepts the calls that rclpy accepts: its parameters have the same names, kinds and order, and the
+same ones have a default.
 """
 
 from __future__ import annotations
@@ -24,12 +25,12 @@ API = json.loads((Path(__file__).parents[1] / "facts" / "rclpy_api.json").read_t
 _OPENING, _CLOSING = "([{<", ")]}>"
 _ANY_POSITIONAL = Parameter("args", Parameter.VAR_POSITIONAL)
 _ANY_KEYWORD = Parameter("kwargs", Parameter.VAR_KEYWORD)
-_ENUM_METHODS = {"__init__"}  # of a class that is an enumeration: nobody calls it
+_ENUM_METHODS = {"__init__"}  # of an enumeration: never called
 
 
 @dataclass
 class Module:
-    """What a module of rclpy has, by what becomes of it here."""
+    """The public names of a module of rclpy, grouped by their support in this runtime."""
 
     name: str
     supported: list[str] = field(default_factory=list)
@@ -38,17 +39,17 @@ class Module:
 
 
 def modules() -> list[Module]:
-    """Compare every module of the facts with the one that is importable under its name."""
+    """Compare every recorded module with the module of this runtime."""
     return [_module(name, entries) for name, entries in API.items()]
 
 
 def surplus() -> list[str]:
-    """Name what public classes have here and not in rclpy: code that uses it would fail there."""
+    """Return the public members of classes that rclpy lacks: code that uses them would fail there."""
     recorded: dict[str, set[str]] = {}
     classes: list[type] = []
     for name, entries in API.items():
         for entry, facts in entries.items():
-            # What is a protocol or an object of C there does not tell all that it has.
+            # The record of a protocol or of a class of C is incomplete.
             if entry.startswith("class ") and not {"Protocol", "pybind11_object"} & {*facts["bases"]}:
                 cls = getattr(importlib.import_module(name), entry.split()[-1])
                 recorded[cls.__name__] = {*facts["methods"]}
@@ -61,7 +62,7 @@ def surplus() -> list[str]:
 
 
 def _public_members(cls: type) -> set[str]:
-    """The public methods and properties that a class of rclpy has, also from bases of rclpy."""
+    """The public methods and properties of a class, including those of its bases in rclpy."""
     return {
         name
         for base in cls.__mro__
@@ -104,7 +105,7 @@ def _module(name: str, entries: dict[str, Any]) -> Module:
 
 
 def _problems(module: Any, entry: str, recorded: Any) -> Iterator[tuple[str, str | None]]:
-    """Yield each name that stands behind an entry of the facts, and what is wrong with it."""
+    """Yield each name of a recorded entry, and its problem, ``None`` if it is supported."""
     name = entry.split()[-1]
     if not hasattr(module, name):
         yield name, " (no such name)"
@@ -125,7 +126,7 @@ def _method_problem(cls: Any, name: str, signature: str) -> str | None:
     try:
         found = inspect.getattr_static(cls, name)
     except AttributeError:
-        # What every instance has, though no class says so: set in __init__, or a dataclass's field.
+        # Attributes of instances only: set in __init__, or fields of a dataclass.
         if signature == "property" and name in _instance_attributes(cls):
             return None
         return " (no such name)"
@@ -147,7 +148,7 @@ def _instance_attributes(cls: Any) -> set[str]:
 
 def _callable_problem(found: Any, signature: str) -> str | None:
     if isinstance(found, type) and issubclass(found, Enum):
-        return None  # how it is called is Python's choice, and differs between its versions
+        return None  # its signature differs between versions of Python
     if _only_raises_not_implemented_error(found):
         return "NotImplementedError"
     try:
@@ -159,9 +160,9 @@ def _callable_problem(found: Any, signature: str) -> str | None:
 
 
 def _difference(ours: list[Parameter], theirs: list[Parameter]) -> str | None:
-    """Say which call that is right there would not be right here, if there is one."""
+    """Return why a call that rclpy accepts would fail here, ``None`` if none would."""
     if theirs[-2:] == [_ANY_POSITIONAL, _ANY_KEYWORD]:
-        return None  # only hands on to a private method
+        return None  # rclpy delegates to a private method
     takes_any = {parameter.kind for parameter in ours} & {Parameter.VAR_KEYWORD, Parameter.VAR_POSITIONAL}
     if len(takes_any) == 2:
         return None
@@ -206,7 +207,7 @@ def _only_raises_not_implemented_error(function: Any) -> bool:
 
 
 def _parse(signature: str) -> list[Parameter]:
-    """Read a recorded signature: its annotations and defaults are reprs, so it is no valid Python."""
+    """Parse a recorded signature. It is not valid Python: annotations and defaults are reprs."""
     parameters: list[Parameter] = []
     kind: Any = Parameter.POSITIONAL_OR_KEYWORD
     for text in _split(signature):

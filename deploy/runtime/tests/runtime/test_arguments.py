@@ -216,7 +216,7 @@ def test_a_parameter_may_be_named_after_a_topic() -> None:
         ("a/1:=1", "expected"),
         ("a.1:=1", "expected"),
         ("a." + "x" * 40 + "=1", "expected"),
-        ("x:={a: 1}", "a mapping is no value"),
+        ("x:={a: 1}", "a mapping is not a value"),
         ("x:=!!str", "it has no value"),
         ("x:=[1, a]", "must be of one type, found integer and string"),
         ("x:=[1, 2.0]", "must be of one type, found integer and double"),

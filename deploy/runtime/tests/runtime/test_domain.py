@@ -38,7 +38,7 @@ def test_a_peer_without_an_address_is_left_out(capsys: pytest.CaptureFixture[str
     configuration = domain.configuration({"ROS_STATIC_PEERS": "nowhere;10.0.0.7;robot1:7410"})
     assert configuration == domain.configuration({"ROS_STATIC_PEERS": "10.0.0.7;robot1:7410"})
     assert capsys.readouterr().err == (
-        "[WARN] ROS_STATIC_PEERS: going on without 'nowhere': Name or service not known\n"
+        "[WARN] ROS_STATIC_PEERS: 'nowhere' is ignored: Name or service not known\n"
     )
 
 

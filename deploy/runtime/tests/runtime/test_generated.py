@@ -1,4 +1,4 @@
-"""How generated code is run."""
+"""Running generated code."""
 
 from __future__ import annotations
 
@@ -14,5 +14,5 @@ except KeyboardInterrupt:
 """
 
 
-def test_a_program_that_has_caught_a_ctrl_c_within_generated_code_does_not_end_by_it() -> None:
+def test_program_continues_after_a_ctrl_c_caught_in_generated_code() -> None:
     assert subprocess.run([sys.executable, "-c", PROGRAM], timeout=30).returncode == 0

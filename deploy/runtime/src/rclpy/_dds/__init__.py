@@ -1,4 +1,4 @@
-"""The part of DDS that the runtime stands on: participants, readers, writers and waiting, on Cyclone DDS."""
+"""Participants, readers, writers and wait sets of DDS, implemented with Cyclone DDS."""
 
 from .entities import (
     GuardCondition,

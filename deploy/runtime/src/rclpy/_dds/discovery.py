@@ -1,4 +1,4 @@
-"""What DDS discovery has found in the domain: participants, writers and readers of all processes."""
+"""The results of DDS discovery: participants, writers and readers of all processes in the domain."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _BATCH = 64
 
 @dataclass(frozen=True)
 class Endpoint:
-    """A reader or writer somewhere in the domain, by its DDS names."""
+    """A reader or writer of any process in the domain, with its DDS names."""
 
     gid: bytes
     participant: bytes
@@ -42,9 +42,9 @@ class Endpoint:
 
 
 class _BuiltinReader:
-    """A reader of one of Cyclone's built-in topics, and all that exists of what it tells about.
+    """Reads one of Cyclone's built-in topics, and keeps the entities that exist.
 
-    Each thing is looked at once, when it is new: in a large domain to look at all of them is work.
+    Each entity is read once, when it is new: reading all of them repeatedly would be slow in a large domain.
     """
 
     def __init__(
@@ -73,7 +73,7 @@ class _BuiltinReader:
                     blocking.dds_return_loan(self.handle, samples, count)
 
     def alive(self) -> list[Any]:
-        """What exists now, each as it was converted from the C structure, but for what became None."""
+        """Return the existing entities, converted from the C structure, without those converted to None."""
         with self._lock:
             if blocking.dds_triggered(self.news):
                 for structure, info in self._samples("dds_read_mask", _NOT_READ):
@@ -84,14 +84,14 @@ class _BuiltinReader:
             return list(self._known.values())
 
     def forget_gone(self) -> None:
-        """Do not keep what exists no more."""
+        """Remove entities that no longer exist."""
         with self._lock:
             for _, info in self._samples("dds_take_mask", _NOT_ALIVE):
                 self._known.pop(info.instance_handle, None)
 
 
 class Discovery:
-    """The graph of DDS entities, as this participant has discovered it."""
+    """The DDS entities that a participant has discovered."""
 
     def __init__(self, participant: int) -> None:
         self._participants = _BuiltinReader(
@@ -102,7 +102,7 @@ class Discovery:
 
     @property
     def news(self) -> list[int]:
-        """The DDS conditions that are true while there is something new."""
+        """The DDS conditions that are true while there are unread changes."""
         return [self._participants.news, self._writers.news, self._readers.news]
 
     @property
@@ -111,27 +111,27 @@ class Discovery:
         return [self._participants.gone, self._writers.gone, self._readers.gone]
 
     def forget_gone(self) -> None:
-        """Give up what DDS keeps of entities that exist no more."""
+        """Remove entities that no longer exist, here and in DDS."""
         self._participants.forget_gone()
         self._writers.forget_gone()
         self._readers.forget_gone()
 
     def refresh(self) -> None:
-        """Read all the news, so that only further ones trigger the conditions."""
+        """Read all changes: only later ones trigger the conditions."""
         self.participants()
         self.writers()
         self.readers()
 
     def participants(self) -> dict[bytes, str]:
-        """The GUID of every participant and its USER_DATA."""
+        """Return the GUID and USER_DATA of every participant."""
         return dict(self._participants.alive())
 
     def writers(self) -> list[Endpoint]:
-        """Every writer."""
+        """Return every writer."""
         return self._writers.alive()
 
     def readers(self) -> list[Endpoint]:
-        """Every reader."""
+        """Return every reader."""
         return self._readers.alive()
 
 
@@ -141,7 +141,7 @@ def _participant(found: BuiltinParticipant) -> tuple[bytes, str]:
 
 def _endpoint(found: BuiltinEndpoint) -> Endpoint | None:
     if found.type_name.startswith(b"org::eclipse::cyclonedds::builtin::"):
-        return None  # one of our own readers above: Cyclone lists them, but announces them to nobody
+        return None  # a built-in reader of this process: Cyclone lists it but does not announce it
     return Endpoint(
         gid=bytes(found.key.bytes),
         participant=bytes(found.participant_key.bytes),

@@ -1,8 +1,7 @@
-"""How a process joins a DDS domain: the ROS 2 environment variables, in Cyclone DDS' terms.
+"""Joins DDS domains, with Cyclone DDS configured from the environment variables of ROS 2.
 
-Source: the variables of ROS 2 Jazzy ("Improved dynamic discovery") – ROS_AUTOMATIC_DISCOVERY_RANGE,
-ROS_STATIC_PEERS, ROS_LOCALHOST_ONLY (deprecated there, still obeyed), ROS_DOMAIN_ID – and Cyclone's
-CYCLONEDDS_URI, whose settings win.
+Source: ROS 2 Jazzy, "Improved dynamic discovery": ROS_AUTOMATIC_DISCOVERY_RANGE, ROS_STATIC_PEERS,
+ROS_LOCALHOST_ONLY (deprecated, still obeyed) and ROS_DOMAIN_ID. The settings of Cyclone's CYCLONEDDS_URI win.
 """
 
 from __future__ import annotations
@@ -25,12 +24,12 @@ _COMMENT = re.compile("<!--.*?-->", re.DOTALL)
 _NO_MULTICAST = "<General><AllowMulticast>false</AllowMulticast></General>"
 
 _lock = threading.Lock()
-_users: dict[int, int] = {}  # domain id -> participants of this process in it
+_users: dict[int, int] = {}  # domain id -> number of participants of this process
 _handles: dict[int, int] = {}
 
 
 def domain_id_from_environment(environment: Mapping[str, str] = os.environ) -> int:
-    """ROS_DOMAIN_ID, 0 if it is not set. Raises RCLError if it is no number from 0 to 232."""
+    """Return ROS_DOMAIN_ID, by default 0. Raises RCLError if it is not a number from 0 to 232."""
     text = environment.get("ROS_DOMAIN_ID", "").strip() or "0"
     if not text.isdecimal() or int(text) > 232:
         raise RCLError(f"ROS_DOMAIN_ID must be a whole number from 0 to 232, not '{text}'")
@@ -38,12 +37,12 @@ def domain_id_from_environment(environment: Mapping[str, str] = os.environ) -> i
 
 
 def configuration(environment: Mapping[str, str] = os.environ) -> str:
-    """Cyclone's configuration for the discovery range that the environment asks for. Raises RCLError.
+    """Return Cyclone's configuration for the discovery range in the environment. Raises RCLError.
 
-    In LOCALHOST the loopback interface is the only one. Multicast on it lets our own processes meet at once;
-    real Jazzy nodes do not multicast there but probe participant indices on localhost, so we take an index
-    and probe, too. Up to 100 processes fit (Jazzy's own limit of 33 would stop a fleet). Who names peers
-    besides is to meet them, on whatever interface leads there: then it is done as in Jazzy.
+    LOCALHOST uses the loopback interface only. With multicast on it, processes of this runtime discover each
+    other at once. Jazzy nodes do not use multicast there: they probe participant indices on localhost. So
+    this runtime takes an index and probes, too, for up to 100 processes; Jazzy's limit of 33 is too low for a
+    fleet. Static peers may need other interfaces, so with peers the configuration is that of Jazzy.
     """
     discovery_range = environment.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "").strip().upper() or "SUBNET"
     if discovery_range not in RANGES:
@@ -61,8 +60,8 @@ def configuration(environment: Mapping[str, str] = os.environ) -> str:
     general, discovery = "", ""
     if discovery_range == "LOCALHOST":
         if peers:
-            # Without the latter, Cyclone drops what comes by an interface that it does not use: what Jazzy
-            # sends to localhost.
+            # With extended packet information, Cyclone would drop packets from interfaces that it does not
+            # use, such as those that Jazzy nodes send to localhost.
             general = f"{_NO_MULTICAST}<Internal><ExtendedPacketInfo>false</ExtendedPacketInfo></Internal>"
         elif not _names_interfaces(uri):
             interface = '<NetworkInterface name="lo" multicast="true"/>'
@@ -85,48 +84,48 @@ def configuration(environment: Mapping[str, str] = os.environ) -> str:
 
 @cache
 def _has_address(peer: str, only_ipv4: bool) -> bool:
-    """Whether a peer's name can be looked up: Cyclone aborts the process if not. Warns then.
+    """Whether a peer's name can be resolved; print a warning if not.
 
-    Nobody else is to suffer from that: neither the other peers nor, when the network has failed, a restart.
+    Cyclone would abort the process. But the other peers, or a restart without a network, must still work.
     """
-    import socket  # here, as hardly anybody names peers, and every start would pay for it
+    import socket  # imported on use: peers are rare, and it would slow down every start
 
     family = socket.AF_INET if only_ipv4 else socket.AF_UNSPEC
     try:
         socket.getaddrinfo(peer.partition(":")[0] if peer.count(":") == 1 else peer, None, family)
     except (OSError, UnicodeError) as error:
         reason = getattr(error, "strerror", None) or error
-        print(f"[WARN] ROS_STATIC_PEERS: going on without '{peer}': {reason}", file=sys.stderr, flush=True)
+        print(f"[WARN] ROS_STATIC_PEERS: '{peer}' is ignored: {reason}", file=sys.stderr, flush=True)
         return False
     return True
 
 
 def _names_interfaces(uri: str) -> bool:
-    """Whether the settings of CYCLONEDDS_URI, there or in files, name network interfaces.
+    """Whether the settings of CYCLONEDDS_URI, inline or in files, name network interfaces.
 
-    Cyclone would add interfaces up and fail on one named twice: who names some means only these.
+    If so, only these must be used: Cyclone would add ours, and fail if one is named twice.
     """
     settings = [uri]
     for source in uri.split(","):
-        with suppress(OSError):  # Cyclone itself tells what it cannot read
+        with suppress(OSError):  # Cyclone reports unreadable files
             settings.append(Path(source.strip().removeprefix("file://")).read_text(errors="replace"))
-    # It does not care about the case of a name.
+    # Cyclone ignores case in names.
     return any("<networkinterface" in _COMMENT.sub("", text).lower() for text in settings)
 
 
 def enter(domain_id: int) -> None:
-    """Configure a domain before this process' first participant in it."""
+    """Configure a domain before the first participant of this process."""
     with _lock:
         if not _users.get(domain_id):
             handle = blocking.dds_create_domain(domain_id, configuration().encode())
-            # Somebody else in this process (an application with its own DDS code) made it first: theirs wins.
+            # If other code in this process has created the domain, its configuration applies.
             if handle != PRECONDITION_NOT_MET:
                 _handles[domain_id] = checked(handle, f"cannot configure DDS domain {domain_id}")
         _users[domain_id] = _users.get(domain_id, 0) + 1
 
 
 def leave(domain_id: int) -> None:
-    """Undo one ``enter``; the last one ends the domain and its threads."""
+    """Undo one ``enter``; the last call deletes the domain and ends its threads."""
     with _lock:
         _users[domain_id] -= 1
         if not _users[domain_id] and domain_id in _handles:

@@ -1,4 +1,4 @@
-"""DDS entities as Python objects: thin, explicit about their end, and quick where messages pass."""
+"""DDS entities as thin Python objects: explicitly closed, and optimized on the path of messages."""
 
 from __future__ import annotations
 
@@ -28,21 +28,21 @@ from .library import (
     quick,
 )
 
-# DDS sees every ROS type as "at least one octet, final, XCDR1": what the octets mean is the codec's business.
-# This way a malformed sample reaches the codec, which can say whose it is, and discovery announces no XTypes
-# information, as ROS 2's own does not. DDS_OP_ADR | DDS_OP_TYPE_1BY at offset 0, then DDS_OP_RTS.
+# To DDS, every ROS type is "at least one octet, final, XCDR1"; the codec interprets the octets. So a
+# malformed sample reaches the codec, which can name its writer. And discovery announces no XTypes
+# information, as in ROS 2. The operations are DDS_OP_ADR | DDS_OP_TYPE_1BY at offset 0, then DDS_OP_RTS.
 _OPAQUE = (ct.c_uint32 * 3)(0x01010000, 0, 0)
 
 
 class Sample(NamedTuple):
-    """A received message: CDR with its encapsulation header, time of writing [ns since 1970], its writer."""
+    """A received message: CDR with encapsulation header, source time [ns since 1970], and its writer."""
 
     data: bytes
     source_timestamp: int
     publication_handle: int
 
     def info(self) -> dict[str, Any]:
-        """What a callback with two arguments hears of it, as rclpy has it. The numbers DDS does not tell."""
+        """Return the second argument of subscription callbacks. DDS does not provide the sequence numbers."""
         return {
             "source_timestamp": self.source_timestamp,
             "received_timestamp": time.time_ns(),
@@ -75,7 +75,7 @@ def _guid(handle: int) -> bytes:
 
 
 class Participant:
-    """This process' membership in a DDS domain."""
+    """A participant of this process in a DDS domain."""
 
     def __init__(self, domain_id: int, user_data: str) -> None:
         self.domain_id = domain_id
@@ -92,7 +92,7 @@ class Participant:
         self.subscriber = checked(blocking.dds_create_subscriber(self.handle, None, None), "subscriber")
 
     def close(self) -> None:
-        """Leave the domain. Peers are told, so they need not wait for a lease to run out."""
+        """Leave the domain and notify peers, which need not wait for the end of a lease."""
         blocking.dds_delete(self.handle)
         domain.leave(self.domain_id)
 
@@ -102,7 +102,7 @@ class Participant:
         return checked(handle, f"cannot create topic {name} of type {type_name}")
 
     def create_writer(self, topic: str, type_name: str, profile: QoSProfile, user_data: str) -> Writer:
-        """A writer on the DDS topic ``topic`` (mangled: ``rt/...``) of DDS type ``type_name``."""
+        """Create a writer on the DDS topic ``topic`` (mangled: ``rt/...``) of DDS type ``type_name``."""
         handle = self._topic(topic, type_name)
         try:
             with qos.endpoint_qos(profile, user_data) as writer_qos:
@@ -112,7 +112,7 @@ class Participant:
             blocking.dds_delete(handle)
 
     def create_reader(self, topic: str, type_name: str, profile: QoSProfile, user_data: str) -> Reader:
-        """A reader on the DDS topic ``topic`` (mangled: ``rt/...``) of DDS type ``type_name``."""
+        """Create a reader on the DDS topic ``topic`` (mangled: ``rt/...``) of DDS type ``type_name``."""
         handle = self._topic(topic, type_name)
         try:
             with qos.endpoint_qos(profile, user_data) as reader_qos:
@@ -131,27 +131,27 @@ class Writer(Handle):
         self.gid = _guid(handle)
         sertype = Pointer()
         checked(quick.dds_get_entity_sertype(handle, ct.byref(sertype)), "cannot read a writer's type")
-        self._sertype = sertype.value  # None after the end: it is gone with the writer
+        self._sertype = sertype.value  # None once closed: DDS frees it with the writer
         instance = ct.c_uint64()
         checked(quick.dds_get_instance_handle(handle, ct.byref(instance)), "cannot read a writer's handle")
         self.instance_handle = instance.value
 
     def write(self, data: bytes) -> None:
         """
-        Send CDR with its encapsulation header. May block where reliability asks for it.
+        Write CDR with its encapsulation header. May block if the writer is reliable.
 
-        :raises InvalidHandle: if another thread ends the writer meanwhile.
+        :raises InvalidHandle: if another thread closes the writer during the call.
         """
-        if len(data) & 3:  # RTPS pads to four octets; Cyclone would with whatever stands in its memory
+        if len(data) & 3:  # RTPS pads to four octets; Cyclone would pad with uninitialized memory
             data += bytes(-len(data) & 3)
         size = len(data)
         vector = IoVector(data, size)
-        sertype = self._sertype  # from here to the end of the call the interpreter lets no other thread in
+        sertype = self._sertype  # until the end of the next call, no other thread runs Python code
         if sertype is None:
             raise InvalidHandle("cannot use a writer that was destroyed")
         serdata = quick.ddsi_serdata_from_ser_iov(sertype, SERDATA_KIND_DATA, 1, vector, size)
         if not serdata:
-            raise ValueError(f"DDS refuses these {size} octets: an encapsulation header and data are needed")
+            raise ValueError(f"invalid CDR of {size} octets: it needs an encapsulation header and data")
         result = blocking.dds_writecdr(self.handle, serdata)
         if result:
             if self._sertype is None:
@@ -159,68 +159,68 @@ class Writer(Handle):
             checked(result, "cannot write")
 
     def matched(self) -> int:
-        """How many readers are matched now."""
+        """Return the number of matched readers."""
         return max(0, int(quick.dds_get_matched_subscriptions(self.handle, None, 0)))
 
     def matched_user_data(self) -> list[str]:
-        """The USER_DATA of every matched reader."""
+        """Return the USER_DATA of every matched reader."""
         handles = _matched_handles(self.handle, "dds_get_matched_subscriptions")
         found = (_user_data(self.handle, "dds_get_matched_subscription_data", other) for other in handles)
         return [data for data in found if data is not None]
 
     def wait_for_acks(self, timeout: int) -> bool:
-        """Whether all matched reliable readers have acknowledged everything within ``timeout`` [ns]."""
+        """Wait at most ``timeout`` [ns] until all reliable readers have acknowledged all samples."""
         result = blocking.dds_wait_for_acks(self.handle, timeout)
         return result != TIMEOUT and checked(result, "cannot wait for acknowledgements") == 0
 
     def assert_liveliness(self) -> None:
-        """Say that the application behind this writer lives (liveliness MANUAL_BY_TOPIC)."""
+        """Assert that the application of this writer is alive (liveliness MANUAL_BY_TOPIC)."""
         checked(blocking.dds_assert_liveliness(self.handle), "cannot assert liveliness")
 
     def close(self) -> None:
-        """End the writer; what reliable readers still miss is lost."""
+        """Close the writer; unacknowledged samples are lost."""
         self._sertype = None
         blocking.dds_delete(self.handle)
 
 
 class Reader(Handle):
-    """A DDS reader of CDR. ``condition`` is what a wait set waits on."""
+    """A DDS reader of CDR. Wait sets attach its ``condition``."""
 
     def __init__(self, handle: int) -> None:
         self.handle = handle
         self.logger_name = ""  # of the node that it belongs to
         self.gid = _guid(handle)
         self.condition = checked(blocking.dds_create_readcondition(handle, ANY_STATE), "read condition")
-        # Where DDS puts what is taken: one for each thread that takes, made once, as that costs some time.
-        self._rooms: list[tuple[Pointer, int, SampleInfo, int]] = []
+        # DDS returns a sample in a buffer. Each taking thread uses one; they are reused, as creation is slow.
+        self._buffers: list[tuple[Pointer, int, SampleInfo, int]] = []
 
     def take(self) -> Sample | None:
-        """The next message, None if there is none. On any thread, whoever else takes."""
+        """Return the next message, ``None`` if there is none. Several threads may take."""
         try:
-            room = self._rooms.pop()
+            buffer = self._buffers.pop()
         except IndexError:
             serdata, info = Pointer(), SampleInfo()
-            room = serdata, ct.addressof(serdata), info, ct.addressof(info)
-        serdata, serdata_address, info, info_address = room
+            buffer = serdata, ct.addressof(serdata), info, ct.addressof(info)
+        serdata, serdata_address, info, info_address = buffer
         sample = None
         while quick.dds_takecdr(self.handle, serdata_address, 1, info_address, ANY_STATE) > 0:
             if info.valid_data:
                 size = quick.ddsi_serdata_size(serdata)
-                data = bytes(size)  # which nobody else knows yet: it may still be written to
+                data = bytes(size)  # no other reference exists yet, so it may be written to
                 quick.ddsi_serdata_to_ser(serdata, 0, size, data)
                 sample = Sample(data, info.source_timestamp, info.publication_handle)
             quick.ddsi_serdata_unref(serdata)
-            if sample is not None:  # else a writer came or went: news, but no message
+            if sample is not None:  # else the sample is a change of state without a message
                 break
-        self._rooms.append(room)
+        self._buffers.append(buffer)
         return sample
 
     def take_message(self, msg_type: Any, raw: bool) -> tuple[Any, dict[str, Any]] | None:
         """
-        The next message and what is known of it, None if there is none: for code that polls its subscription.
+        Return the next message and its info, ``None`` if there is none, for code that polls its subscription.
 
-        :param raw: whether it is to stay serialized.
-        :raises RCLError: if it is no message of ``msg_type``.
+        :param raw: whether to return the serialized message.
+        :raises RCLError: if it is not a message of ``msg_type``.
         """
         sample = self.take()
         if sample is None:
@@ -232,39 +232,39 @@ class Reader(Handle):
         return message, sample.info()
 
     def matched(self) -> int:
-        """How many writers are matched now."""
+        """Return the number of matched writers."""
         return max(0, int(quick.dds_get_matched_publications(self.handle, None, 0)))
 
     def matched_user_data(self) -> list[str]:
-        """The USER_DATA of every matched writer."""
+        """Return the USER_DATA of every matched writer."""
         handles = _matched_handles(self.handle, "dds_get_matched_publications")
         return [data for other in handles if (data := self.user_data_of(other)) is not None]
 
     def user_data_of(self, publication_handle: int) -> str | None:
-        """The USER_DATA of a matched writer, ``None`` if it is not matched any more."""
+        """Return the USER_DATA of a matched writer, ``None`` if it is no longer matched."""
         return _user_data(self.handle, "dds_get_matched_publication_data", publication_handle)
 
     def close(self) -> None:
-        """End the reader and its condition."""
+        """Close the reader and its condition."""
         blocking.dds_delete(self.handle)
 
 
 class GuardCondition:
-    """Something an application can trigger to end a wait, from any thread."""
+    """A condition that any thread can trigger to end a wait."""
 
     def __init__(self) -> None:
         self.handle = checked(blocking.dds_create_guardcondition(LIBRARY_HANDLE), "guard condition")
 
     def trigger(self) -> None:
-        """Wake whoever waits."""
+        """Trigger the condition: waits on it end."""
         blocking.dds_set_guardcondition(self.handle, True)
 
     def take(self) -> None:
-        """Reset it; a trigger from now on ends the next wait."""
+        """Reset the condition; a later trigger ends the next wait."""
         blocking.dds_take_guardcondition(self.handle, ct.byref(ct.c_bool()))
 
     def close(self) -> None:
-        """End it."""
+        """Close the condition."""
         blocking.dds_delete(self.handle)
 
 
@@ -274,34 +274,34 @@ class WaitSet:
     def __init__(self) -> None:
         self.handle = checked(blocking.dds_create_waitset(LIBRARY_HANDLE), "cannot create a wait set")
         self._attached = 0
-        self._make_room(0)
+        self._allocate(0)
         self.closed = False
 
-    def _make_room(self, capacity: int) -> None:
+    def _allocate(self, capacity: int) -> None:
         self._capacity = capacity
         tokens, timeout = (ct.c_ssize_t * capacity)(), Duration()
-        # Made once: a wait comes after each callback, and to convert them each time costs more than the call.
+        # Converted once: a wait follows every callback, and the conversion costs more than the call.
         address = Pointer(ct.addressof(tokens))
-        self._room = tokens, timeout, (Entity(self.handle), address, ct.c_size_t(capacity), timeout)
+        self._buffer = tokens, timeout, (Entity(self.handle), address, ct.c_size_t(capacity), timeout)
 
     def attach(self, handle: int, token: int) -> bool:
-        """Wait on ``handle`` from now on; ``wait`` reports it as ``token``. False if it is gone already."""
+        """Add a condition or entity, which ``wait`` reports as ``token``; False if it no longer exists."""
         if blocking.dds_waitset_attach(self.handle, handle, token) != 0:
             return False
         self._attached += 1
         if self._attached > self._capacity:
-            self._make_room(2 * self._attached + 8)
+            self._allocate(2 * self._attached + 8)
         return True
 
     def detach(self, handle: int) -> None:
-        """Wait on ``handle`` no longer. One that was deleted has left by itself."""
+        """Remove a condition or entity. DDS itself removes deleted ones."""
         blocking.dds_waitset_detach(self.handle, handle)
         self._attached -= 1
 
     def wait(self, timeout: int) -> list[int]:
-        """The tokens of what is triggered, after at most ``timeout`` [ns]; empty if nothing was."""
-        # Held here: DDS writes into the tokens, while another thread may attach more and make new room.
-        tokens, duration, arguments = self._room
+        """Wait at most ``timeout`` [ns]; return the tokens that are triggered."""
+        # Keeps the buffer alive: DDS writes into it, and another thread may attach more and replace it.
+        tokens, duration, arguments = self._buffer
         duration.value = timeout
         count = blocking.dds_waitset_wait(*arguments)
         if not count or self.closed:
@@ -309,6 +309,6 @@ class WaitSet:
         return tokens[: min(checked(count, "cannot wait"), len(tokens))]
 
     def close(self) -> None:
-        """End it, and every wait; what was attached lives on."""
+        """Close the wait set and end its waits; attached conditions and entities stay open."""
         self.closed = True
         blocking.dds_delete(self.handle)

@@ -1,12 +1,12 @@
-"""The C API of Eclipse Cyclone DDS, as far as this runtime needs it, through ctypes.
+"""The C functions of Eclipse Cyclone DDS that this runtime needs, through ctypes.
 
-The PyPI distribution ``cyclonedds`` carries the C library; its Python layer is not imported. That layer holds
-the interpreter lock while it writes, announces XTypes information that a ROS 2 node does not announce, and
-takes 130 ms to import. The C functions below are Cyclone's own interface for applications that bring their
-messages as CDR, the one that ``rmw_cyclonedds`` builds on, too.
+The PyPI distribution ``cyclonedds`` contains the C library. Its Python layer is not imported: it holds the
+interpreter lock while it writes, announces XTypes information that ROS 2 nodes do not announce, and takes
+130 ms to import. The C functions below are Cyclone's interface for applications with messages in CDR, which
+``rmw_cyclonedds`` uses, too.
 
-Two handles on one library: ``blocking`` releases the interpreter lock during a call and is for everything
-that may wait; ``quick`` keeps it, which is cheaper, and is for calls that never block.
+The library is loaded twice. Calls of ``blocking`` release the interpreter lock: for functions that may wait.
+Calls of ``quick`` keep it, which costs less: for functions that never block.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ INFINITY = 0x7FFFFFFFFFFFFFFF  # DDS_INFINITY [ns]
 LENGTH_UNLIMITED = -1
 ANY_STATE = 0x7F  # every sample, view and instance state
 SERDATA_KIND_DATA = 2
-LIBRARY_HANDLE = 0x7FFF0000 + 256  # DDS_CYCLONEDDS_HANDLE, owner of what belongs to no participant
+LIBRARY_HANDLE = 0x7FFF0000 + 256  # DDS_CYCLONEDDS_HANDLE, parent of entities without a participant
 PRECONDITION_NOT_MET = -4
 TIMEOUT = -10
 
@@ -44,7 +44,7 @@ class DDSError(RuntimeError):
 
 
 class TopicDescriptor(ct.Structure):
-    """dds_topic_descriptor_t: how DDS sees a type."""
+    """dds_topic_descriptor_t: the description of a type for DDS."""
 
     _fields_ = [
         ("size", ct.c_uint32),
@@ -65,7 +65,7 @@ class TopicDescriptor(ct.Structure):
 
 
 class SampleInfo(ct.Structure):
-    """dds_sample_info_t: what DDS knows of a sample besides its data."""
+    """dds_sample_info_t: the metadata of a sample."""
 
     _fields_ = [
         ("sample_state", ct.c_int),
@@ -96,13 +96,13 @@ class Guid(ct.Structure):
 
 
 class BuiltinParticipant(ct.Structure):
-    """dds_builtintopic_participant_t: a participant that discovery has found."""
+    """dds_builtintopic_participant_t: a discovered participant."""
 
     _fields_ = [("key", Guid), ("qos", Pointer)]
 
 
 class BuiltinEndpoint(ct.Structure):
-    """dds_builtintopic_endpoint_t: a reader or writer that discovery has found."""
+    """dds_builtintopic_endpoint_t: a discovered reader or writer."""
 
     _fields_ = [
         ("key", Guid),
@@ -119,13 +119,13 @@ def _path() -> str:
     if spec is None or not spec.submodule_search_locations:
         raise ImportError("Eclipse Cyclone DDS is not installed: pip install 'cyclonedds>=11.0.1,<12'")
     package = Path(spec.submodule_search_locations[0])
-    place = package.parent / "cyclonedds.libs"
-    for path in sorted(place.glob("libddsc*")):
+    libraries = package.parent / "cyclonedds.libs"
+    for path in sorted(libraries.glob("libddsc*")):
         return str(path)
-    raise ImportError(f"the C library of Cyclone DDS is not beside its package: no libddsc* in {place}")
+    raise ImportError(f"the C library of Cyclone DDS is missing: no libddsc* in {libraries}")
 
 
-# name: (result, arguments). Everything here may wait or take a lock that another thread holds for long.
+# name: (result, arguments). These may wait, or take a lock that another thread holds for long.
 _BLOCKING: dict[str, tuple[Any, list[Any]]] = {
     "dds_create_domain": (Entity, [ct.c_uint32, ct.c_char_p]),
     "dds_create_participant": (Entity, [ct.c_uint32, Pointer, Pointer]),
@@ -199,9 +199,9 @@ _QUICK: dict[str, tuple[Any, list[Any]]] = {
 
 
 def functions(library: ct.CDLL, signatures: dict[str, tuple[Any, list[Any]]]) -> SimpleNamespace:
-    """The C functions of these names, with their results and arguments, as plain attributes.
+    """Return a namespace of C functions, with declared results and arguments.
 
-    To a ctypes library they are none: it goes through its ``__getattr__`` each time.
+    Its plain attributes are faster than those of a ctypes library, which uses ``__getattr__``.
     """
     declared = SimpleNamespace()
     for name, (result, arguments) in signatures.items():
@@ -217,7 +217,7 @@ quick = functions(LOCK_KEEPING, _QUICK)
 
 
 def checked(code: int, what: str) -> int:
-    """Return ``code``, or raise DDSError saying ``what`` failed if it is negative."""
+    """Return ``code``. Raises DDSError with ``what`` if it is negative."""
     if code < 0:
         raise DDSError(code, what)
     return code

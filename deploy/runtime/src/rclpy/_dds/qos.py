@@ -1,4 +1,4 @@
-"""Between ROS QoS profiles and DDS QoS, with the choices of rmw_cyclonedds_cpp (facts/discovery.txt)."""
+"""Converts between ROS QoS profiles and DDS QoS as rmw_cyclonedds_cpp does (facts/discovery.txt)."""
 
 from __future__ import annotations
 
@@ -27,18 +27,18 @@ _XCDR1 = (ct.c_int16 * 1)(0)
 
 
 def _nanoseconds(duration: Duration) -> int:
-    """A ROS duration for DDS: what is unspecified (0) or beyond the range means infinite."""
+    """Convert a ROS duration for DDS: 0 (unspecified) and values out of range are infinite."""
     nanoseconds = duration.nanoseconds
     return nanoseconds if 0 < nanoseconds < INFINITY else INFINITY
 
 
 @contextmanager
 def endpoint_qos(profile: QoSProfile, user_data: str) -> Iterator[int]:
-    """The DDS QoS of a reader or writer, for the length of a ``with``.
+    """Create the DDS QoS of a reader or writer; the end of the ``with`` frees it.
 
-    ``user_data`` goes to USER_DATA, where ROS 2 announces type hashes and service identifiers.
+    ``user_data`` becomes USER_DATA, with which ROS 2 announces type hashes and service identifiers.
 
-    :raises RCLError: if a policy is UNKNOWN, as where rmw creates an endpoint.
+    :raises RCLError: if a policy is UNKNOWN, as in rmw.
     """
     for name in ("history", "reliability", "durability", "liveliness"):
         if getattr(profile, name).name == "UNKNOWN":
@@ -77,7 +77,7 @@ def endpoint_qos(profile: QoSProfile, user_data: str) -> Iterator[int]:
 
 @contextmanager
 def participant_qos(user_data: str) -> Iterator[int]:
-    """The DDS QoS of a participant, for the length of a ``with``."""
+    """Create the DDS QoS of a participant; the end of the ``with`` frees it."""
     qos = quick.dds_create_qos()
     try:
         encoded = user_data.encode()
@@ -88,7 +88,7 @@ def participant_qos(user_data: str) -> Iterator[int]:
 
 
 def user_data(qos: int | None) -> str:
-    """The USER_DATA of a DDS QoS, '' if there is none."""
+    """Return the USER_DATA of a DDS QoS, '' if there is none."""
     value, size = library.Pointer(), ct.c_size_t()
     if not qos or not quick.dds_qget_userdata(qos, ct.byref(value), ct.byref(size)) or not value:
         return ""
@@ -98,7 +98,7 @@ def user_data(qos: int | None) -> str:
 
 
 def user_data_value(data: str, key: str) -> str:
-    """The value of ``key`` in a USER_DATA of the form ``key=value;key=value;``, '' if it is not there."""
+    """Return the value of ``key`` in USER_DATA of the form ``key=value;key=value;``, by default ''."""
     for entry in data.split(";"):
         name, _, value = entry.partition("=")
         if name == key:
@@ -107,7 +107,7 @@ def user_data_value(data: str, key: str) -> str:
 
 
 def profile_of(qos: int | None) -> QoSProfile:
-    """The ROS profile of a discovered endpoint; history is UNKNOWN where its vendor does not announce it."""
+    """Return the ROS profile of a discovered endpoint; history is UNKNOWN if it is not announced."""
     kind, depth, duration = ct.c_int(), ct.c_int32(), library.Duration()
 
     def nanoseconds(getter: str) -> Duration:

@@ -1,4 +1,4 @@
-"""Communication statuses of readers and writers: what became of deadlines, liveliness, matching and QoS."""
+"""Communication statuses of readers and writers: deadlines, liveliness, matching, QoS and lost samples."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def _structure(name: str, fields: list[tuple[str, Any]]) -> type[ct.Structure]:
     return type(name, (ct.Structure,), {"_fields_": fields})
 
 
-# The statuses by the name of their getter: bit of the DDS status mask, and the C structure.
+# Name in the getter -> bit of the DDS status mask, and the C structure.
 STATUSES: dict[str, tuple[int, type[ct.Structure]]] = {
     "offered_deadline_missed": (1 << 1, _structure("OfferedDeadlineMissed", [*_COUNTS, _HANDLE])),
     "requested_deadline_missed": (1 << 2, _structure("RequestedDeadlineMissed", [*_COUNTS, _HANDLE])),
@@ -57,7 +57,7 @@ _getters = functions(
 
 
 def watch(handle: int, names: list[str]) -> None:
-    """Let a change of the named statuses trigger a wait set that the entity is attached to."""
+    """Make changes of the named statuses trigger the wait sets to which the entity is attached."""
     mask = 0
     for name in names:
         mask |= STATUSES[name][0]
@@ -65,7 +65,7 @@ def watch(handle: int, names: list[str]) -> None:
 
 
 def changed(handle: int, name: str) -> Any:
-    """The status as a structure if it has changed since it was last asked for, else ``None``."""
+    """Return the status if it has changed since the last call, else ``None``."""
     bit, structure = STATUSES[name]
     changes = ct.c_uint32()
     if blocking.dds_get_status_changes(handle, ct.byref(changes)) != 0 or not changes.value & bit:

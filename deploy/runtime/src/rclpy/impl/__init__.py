@@ -1,1 +1,1 @@
-"""Modules behind rclpy's public ones, at the places where rclpy has them."""
+"""Internal modules, with the same paths as in rclpy."""

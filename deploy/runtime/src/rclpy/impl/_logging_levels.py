@@ -1,7 +1,7 @@
 """
-The levels of all loggers: a tree whose branches are named with dots.
+The levels of all loggers: a tree with dots in the names.
 
-A logger whose level is unset has that of its nearest ancestor with a level, else the default level.
+A logger without a level has the level of its nearest ancestor that has one, or else the default level.
 """
 
 from __future__ import annotations
@@ -13,13 +13,13 @@ from rclpy.impl.logging_severity import LoggingSeverity
 _lock = Lock()
 _default = int(LoggingSeverity.INFO)
 _levels: dict[str, int] = {}
-# Effective levels that were asked for. Replaced, never cleared: a thread that computes a level while another
-# one changes it leaves its stale answer in the old dictionary.
+# Cached effective levels. Replaced, never cleared: if another thread changes a level during a computation,
+# the stale result goes into the old dictionary.
 _effective: dict[str, int] = {}
 
 
 def set_level(name: str, level: int) -> None:
-    """Set the level of a logger; '' names the default level."""
+    """Set the level of a logger; '' sets the default level."""
     global _default, _effective
     with _lock:
         _levels[name] = level
@@ -29,12 +29,12 @@ def set_level(name: str, level: int) -> None:
 
 
 def get_level(name: str) -> int:
-    """Return the level set for exactly this logger, UNSET if there is none; '' names the default level."""
+    """Return the level that was set for this logger itself, or UNSET; for '', the default level."""
     return _levels.get(name, int(LoggingSeverity.UNSET)) if name else _default
 
 
 def effective_level(name: str) -> int:
-    """Return the level that decides about the messages of a logger."""
+    """Return the level that applies to the messages of a logger."""
     effective = _effective
     level = effective.get(name)
     if level is None:
@@ -43,7 +43,7 @@ def effective_level(name: str) -> int:
 
 
 def clear() -> None:
-    """Forget all levels; the default is INFO again."""
+    """Reset all levels; the default is INFO."""
     global _default, _effective
     with _lock:
         _levels.clear()

@@ -1,9 +1,9 @@
 """
-Where log messages go: the console, in rcutils' format, and the `/rosout` publishers of the nodes.
+Writes log messages to the console, in rcutils' format, and to the `/rosout` publishers of the nodes.
 
-The environment configures the console as in ROS 2 (docs.ros.org, "About logging and logger configuration"):
-`RCUTILS_CONSOLE_OUTPUT_FORMAT`, `RCUTILS_COLORIZED_OUTPUT`, `RCUTILS_LOGGING_USE_STDOUT` and
-`RCUTILS_LOGGING_BUFFERED_STREAM`.
+Environment variables configure the console as in ROS 2: `RCUTILS_CONSOLE_OUTPUT_FORMAT`,
+`RCUTILS_COLORIZED_OUTPUT`, `RCUTILS_LOGGING_USE_STDOUT` and `RCUTILS_LOGGING_BUFFERED_STREAM`. Source:
+docs.ros.org, "About logging and logger configuration".
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _COLORS = {0: _NO_COLOR, 10: "\033[32m", 20: _NO_COLOR, 30: "\033[33m", 40: "\03
 
 
 class LogRecord(NamedTuple):
-    """One message; `stamp` is nanoseconds of system time, `level` a `LoggingSeverity` value."""
+    """A log message; `stamp` is system time [ns], `level` a `LoggingSeverity` value."""
 
     stamp: int
     level: int
@@ -60,7 +60,7 @@ _TOKENS: dict[str, Callable[[LogRecord], str]] = {
 
 
 def _compile(output_format: str) -> list[str | Callable[[LogRecord], str]]:
-    """Split a format into text and the functions that fill in its tokens; unknown tokens stay as text."""
+    """Split a format into text and functions for its tokens; unknown tokens are text."""
     unescaped = re.sub(r"\\(?:x1b|[abnrt])", lambda escape: _ESCAPES[escape[0]], output_format)
     parts = re.split("(" + "|".join(f"{{{token}}}" for token in _TOKENS) + ")", unescaped)
     return [_TOKENS[part[1:-1]] if index % 2 else part for index, part in enumerate(parts)]
@@ -70,7 +70,7 @@ def _switch(variable: str) -> bool | None:
     """
     Read an environment variable that is 0, 1 or empty.
 
-    :raises RuntimeError: if it is something else.
+    :raises RuntimeError: if it has another value.
     """
     value = os.environ.get(variable, "")
     if value not in ("", "0", "1"):
@@ -79,7 +79,7 @@ def _switch(variable: str) -> bool | None:
 
 
 class _Console:
-    """The console as the environment wants it."""
+    """The console, configured by environment variables."""
 
     def __init__(self) -> None:
         self.use_stdout = bool(_switch("RCUTILS_LOGGING_USE_STDOUT"))
@@ -99,7 +99,7 @@ class _Console:
             if self.flush:
                 stream.flush()
         except (OSError, ValueError):
-            # A closed or full console is no reason to fail; C's fprintf does not either.
+            # A closed or full console is ignored, as by C's fprintf.
             return
 
 
@@ -121,9 +121,9 @@ _publishing = threading.local()
 
 def initialize() -> None:
     """
-    Read the environment, if that has not happened yet.
+    Read the environment variables, unless they were read before.
 
-    :raises RuntimeError: if a variable has a value that is not valid.
+    :raises RuntimeError: if a variable has an invalid value.
     """
     global _console
     if _console is None:
@@ -131,7 +131,7 @@ def initialize() -> None:
 
 
 def shutdown() -> None:
-    """Forget the environment; the next message reads it again."""
+    """Reset the configuration; the next message reads the environment variables again."""
     global _console
     _console = None
 
@@ -144,7 +144,7 @@ def enable_console(enabled: bool) -> None:
 
 def add_rosout_publisher(logger_name: str, publish: Callable[[LogRecord], None]) -> None:
     """
-    Hand each message of the logger `logger_name`, and of its children made from now on, to `publish`.
+    Publish each message of the logger `logger_name`, and of its future children, with `publish`.
 
     `publish` is called on the thread that logs.
     """
@@ -153,18 +153,18 @@ def add_rosout_publisher(logger_name: str, publish: Callable[[LogRecord], None])
 
 
 def remove_rosout_publisher(publish: Callable[[LogRecord], None]) -> None:
-    """End what `add_rosout_publisher` began, for the logger and its children."""
+    """Remove a publisher from the logger and its children."""
     with _rosout_lock:
         for name, publishers in list(_rosout.items()):
             kept = [other for other in publishers if other != publish]
             if kept:
                 _rosout[name] = kept
-            else:  # the garbage collector may have come in between, and taken a child
+            else:  # the garbage collector may just have removed a child
                 _rosout.pop(name, None)
 
 
 def share_rosout_publisher(parent: str, child: str) -> Callable[[LogRecord], None] | None:
-    """Let the logger `child` publish as `parent` does; return the publisher, `None` if there is none."""
+    """Make the logger `child` publish as `parent` does; return the publisher, `None` without one."""
     with _rosout_lock:
         publishers = _rosout.get(parent)
         if not publishers:
@@ -174,7 +174,7 @@ def share_rosout_publisher(parent: str, child: str) -> Callable[[LogRecord], Non
 
 
 def unshare_rosout_publisher(child: str, publish: Callable[[LogRecord], None]) -> None:
-    """End what one call of `share_rosout_publisher` began."""
+    """Undo one call of `share_rosout_publisher`."""
     with _rosout_lock:
         publishers = _rosout.get(child, [])
         if publish in publishers:
@@ -188,7 +188,7 @@ def output(record: LogRecord) -> None:
     if _console_enabled:
         _ready_console().write(record)
     publishers = _rosout.get(record.name)
-    # Publishing may log: such a message reaches the console only, else it would never end.
+    # Publishing may log. Such messages go to the console only, to avoid an endless recursion.
     if publishers and not getattr(_publishing, "active", False):
         _publishing.active = True
         try:

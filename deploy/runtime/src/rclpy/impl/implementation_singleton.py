@@ -1,4 +1,4 @@
-"""The place where rclpy keeps its C extension; see `rclpy._rclpy_pybind11` for what there is of it."""
+"""The module through which rclpy accesses its C extension; here see `rclpy._rclpy_pybind11`."""
 
 from __future__ import annotations
 

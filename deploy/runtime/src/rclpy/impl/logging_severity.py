@@ -1,4 +1,4 @@
-"""How serious a log message is."""
+"""Severities of log messages."""
 
 from __future__ import annotations
 

@@ -8,16 +8,17 @@ from collections.abc import Callable
 from types import CodeType, FrameType
 from typing import Any
 
+from rclpy.clock_type import ClockType
 from rclpy.impl import _logging_levels, _logging_output
 from rclpy.impl.logging_severity import LoggingSeverity
 
 _SEPARATOR = "."
-# Frames of these files log for somebody else; the caller is the first frame outside of them.
+# Logging code: the caller is the first frame that is not in these files.
 _internal_callers = [__file__]
 
 
 def _find_caller(frame: FrameType) -> FrameType:
-    """Return the first frame that is not one of the logging modules."""
+    """Return the first frame outside the logging modules."""
     caller: FrameType | None = frame
     while caller is not None and caller.f_code.co_filename in _internal_callers:
         caller = caller.f_back
@@ -26,7 +27,7 @@ def _find_caller(frame: FrameType) -> FrameType:
 
 class _Filters:
     """
-    What one logging call in the source was asked to leave out, and what it needs to remember for that.
+    The filters of a logging call in the source, and their state.
 
     The filters apply in this order: throttle, skip first, once.
     """
@@ -37,27 +38,24 @@ class _Filters:
 
     def __init__(self, severity: LoggingSeverity, name: str, options: dict[str, Any]) -> None:
         """
-        Begin to filter a call with these keyword `options`.
+        Create the filters of a call from its keyword `options`.
 
-        :raises ValueError: if the time source is no clock.
+        :raises ValueError: if the time source is not a clock.
         """
         self.severity = severity
         self.name = name
         self.options = options
-        # As in rclpy, a clock that begins at zero has just logged.
+        # As in rclpy: with a given clock, time 0 counts as the last message.
         self._last = 0 if options.get("throttle_time_source_type") else -sys.maxsize
         self._skipped = False
         self._logged = False
         clock = options.get("throttle_time_source_type")
-        if options.get("throttle_duration_sec") and clock is not None:
-            from rclpy.clock import Clock
-
-            if not isinstance(clock, Clock):
-                raise ValueError(f'Received throttle_time_source_type of "{clock}" is not a clock instance')
+        if options.get("throttle_duration_sec") and clock is not None and not _is_clock(clock):
+            raise ValueError(f'Received throttle_time_source_type of "{clock}" is not a clock instance')
 
     def check_unchanged(self, severity: LoggingSeverity, name: str, options: dict[str, Any]) -> None:
         """
-        Check that the call still asks for the same.
+        Check that the call has the same arguments as before.
 
         :raises ValueError: if it does not.
         """
@@ -71,11 +69,11 @@ class _Filters:
             raise ValueError("Logging filter parameters cannot be changed between calls.")
 
     def should_log(self) -> bool:
-        """Decide about this call; the filters before the one that leaves a message out have counted it."""
+        """Return whether to log; filters before the rejecting one have updated their state."""
         options = self.options
         if duration := options.get("throttle_duration_sec"):
             clock = options.get("throttle_time_source_type")
-            # Steady by default: setting the wall clock neither opens nor closes the valve.
+            # Steady time by default: setting the wall clock has no effect.
             now = time.monotonic_ns() if clock is None else clock.now().nanoseconds
             if now < self._last + duration * 1e9:
                 return False
@@ -90,8 +88,13 @@ class _Filters:
         return True
 
 
+def _is_clock(value: Any) -> bool:
+    # Not isinstance(value, Clock): the module of clocks imports that of contexts, and that one logging.
+    return isinstance(getattr(value, "clock_type", None), ClockType) and hasattr(value, "now")
+
+
 def _requested(options: dict[str, Any]) -> set[str]:
-    """Name the filters that keyword arguments ask for."""
+    """Return the names of the filters in keyword arguments."""
     return {option.split("_")[0] for option, value in options.items() if value}
 
 
@@ -99,7 +102,7 @@ def _check_options(options: dict[str, Any]) -> None:
     """
     Check the keyword arguments of a logging call.
 
-    :raises TypeError: if one is unknown, or one that another needs is missing.
+    :raises TypeError: if an argument is unknown, or a required one is missing.
     """
     for option in options:
         if option not in _Filters.OPTIONS:
@@ -116,15 +119,15 @@ def _check_options(options: dict[str, Any]) -> None:
 
 class RcutilsLogger:
     """
-    Logs messages under a name; names form a tree with dots.
+    Logs messages under a name; names form a tree, with dots.
 
-    Filters belong to the place in the source that logs: `once=True`, `skip_first=True`,
+    Filters apply to each logging call in the source separately: `once=True`, `skip_first=True`,
     `throttle_duration_sec=` [s] with the optional clock `throttle_time_source_type=`.
     """
 
     def __init__(self, name: str = "") -> None:
         self.name = name
-        # The place of a call in the source -> its filters.
+        # Position of a call in the source -> its filters.
         self.contexts: dict[tuple[CodeType, int], _Filters] = {}
         self._shared_publisher: Callable[[_logging_output.LogRecord], None] | None = None
 
@@ -148,32 +151,32 @@ class RcutilsLogger:
 
     def set_level(self, level: int | LoggingSeverity) -> None:
         """
-        Let messages below `level` be left out; UNSET means as the parent does.
+        Set the level below which messages are not logged; UNSET: the level of the parent.
 
-        :raises ValueError: if `level` is no severity.
+        :raises ValueError: if `level` is not a severity.
         """
         _logging_levels.set_level(self.name, LoggingSeverity(level))
 
     def get_effective_level(self) -> LoggingSeverity:
-        """Return the level that applies: this logger's own, or that of an ancestor."""
+        """Return the effective level: this logger's own, or that of an ancestor."""
         return LoggingSeverity(_logging_levels.effective_level(self.name))
 
     def is_enabled_for(self, severity: int | LoggingSeverity) -> bool:
         """
-        Tell whether messages of `severity` are logged.
+        Return whether messages of `severity` are logged.
 
-        :raises ValueError: if `severity` is none.
+        :raises ValueError: if `severity` is not a severity.
         """
         return LoggingSeverity(severity) >= _logging_levels.effective_level(self.name)
 
     def log(self, message: str, severity: int | LoggingSeverity, **kwargs: Any) -> bool:
         """
-        Log `message`, unless the logger's level or a filter leaves it out.
+        Log `message`, unless the level or a filter rejects it.
 
-        :param kwargs: filters, see the class; and `name`, to log under another name.
+        :param kwargs: filters (see the class), and `name` to log under another name.
         :returns: whether it was logged.
-        :raises TypeError: if `message` is no string or a filter is not known.
-        :raises ValueError: if a filter's value is invalid, or the same call asked for something else before.
+        :raises TypeError: if `message` is not a string, or a filter is unknown.
+        :raises ValueError: if a filter's value is invalid, or the same call had other arguments before.
         """
         if severity.__class__ is not LoggingSeverity:
             severity = LoggingSeverity(severity)
@@ -182,14 +185,14 @@ class RcutilsLogger:
         name = kwargs.pop("name", self.name) if kwargs else self.name
         if kwargs:
             _check_options(kwargs)
-        if message is None or isinstance(message, bytes):  # to C, these are strings
+        if message is None or isinstance(message, bytes):  # rclpy accepts these, too
             message = "(null)" if message is None else message.decode(errors="replace")
         if not isinstance(message, str):
             raise TypeError(f"a log message must be a str, not {type(message).__name__}: {message!r}")
 
         frame = _find_caller(sys._getframe(1))
         code = frame.f_code
-        # The position in the code tells apart two calls on one line.
+        # The position in the bytecode distinguishes two calls on one line.
         place = (code, frame.f_lasti)
         filters = self.contexts.get(place)
         if filters is None:
