@@ -117,7 +117,7 @@ def test_declare_parameters_prefixes_the_namespace() -> None:
     assert len(node.events) == 3
 
 
-def test_declaring_a_parameter_twice_declares_nothing() -> None:
+def test_declaring_a_parameter_twice_is_an_error_and_declares_nothing() -> None:
     node = Node()
     node.declare_parameter("a", 1)
     with pytest.raises(ParameterAlreadyDeclaredException, match="a"):

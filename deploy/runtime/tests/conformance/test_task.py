@@ -82,7 +82,7 @@ def test_an_exception_never_retrieved_is_printed(capsys: pytest.CaptureFixture[s
     assert capsys.readouterr().err == ""
 
 
-def test_cancelling_calls_done_callbacks_but_the_future_is_not_done() -> None:
+def test_cancelling_a_future_calls_its_callbacks_but_leaves_it_not_done() -> None:
     called: list[Future] = []
     future = Future()
     future.add_done_callback(called.append)
@@ -100,7 +100,7 @@ def test_a_done_future_cannot_be_cancelled() -> None:
     assert future.done()
 
 
-def test_a_result_after_a_cancellation_counts() -> None:
+def test_a_cancelled_future_may_still_get_a_result() -> None:
     future = Future()
     future.cancel()
     future.set_result(1)
