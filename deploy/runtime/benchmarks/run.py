@@ -1,4 +1,4 @@
-"""Measures the costs of rclpy: ``make bench`` or ``deploy/runtime/benchmarks/run.py [NAME=COMMAND ...]``.
+"""Measures the costs of rclpy: ``make bench`` or ``python run.py [OPTION ...] [NAME=COMMAND ...]``.
 
 Each COMMAND starts a Python with an rclpy, such as ``embedded=.venv/bin/python`` or a script that sources
 ROS 2 and ends with ``exec python "$@"``. The default is this interpreter. Every round measures all of them,

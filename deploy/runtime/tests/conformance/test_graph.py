@@ -120,9 +120,7 @@ def test_publishers_and_subscribers_are_counted(node: Node) -> None:
     assert node.count_clients("turn_on") == 0
 
 
-def test_a_late_subscription_gets_the_latched_message(
-    make_node: MakeNode, other_context: Context
-) -> None:
+def test_a_late_subscription_gets_the_latched_message(make_node: MakeNode, other_context: Context) -> None:
     latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
     publisher = make_node().create_publisher(Float64, "l1", latched)
     for value in (1.0, 2.0):

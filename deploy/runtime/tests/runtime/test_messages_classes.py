@@ -118,7 +118,7 @@ def test_a_float_may_be_infinite_but_not_out_of_range() -> None:
             r"'value\.byte_array_value\[0\]' must be octet",
         ),
         (ParameterValue(string_array_value=b"ab"), TypeError, r"string_array_value\[0\]"),  # type: ignore[arg-type]
-        (ParameterValue(bool_array_value=np.ones((2, 2), np.bool_)), TypeError, "it is no list"),  # type: ignore[arg-type]
+        (ParameterValue(bool_array_value=np.ones((2, 2), np.bool_)), TypeError, "it is not a list"),  # type: ignore[arg-type]
         (ParameterValue(bool_array_value=np.ones(2)), TypeError, r"bool_array_value\[0\]"),  # type: ignore[arg-type]
         (ParameterDescriptor(integer_range=[IntegerRange()] * 2), ValueError, "2 elements"),
     ],
@@ -131,9 +131,9 @@ def test_serializing_a_wrong_value_is_an_error(message: Any, error: type[Excepti
 
 
 def test_serializing_a_message_of_another_type_is_an_error() -> None:
-    with pytest.raises(TypeError, match=r"a std_msgs/msg/Float64 is expected, not std_msgs\.msg\.Float32"):
+    with pytest.raises(TypeError, match=r"expected a std_msgs/msg/Float64, not std_msgs\.msg\.Float32"):
         Float64._serialize(Float32())
-    with pytest.raises(TypeError, match=r"expected, not 1\.0"):
+    with pytest.raises(TypeError, match=r"expected a std_msgs/msg/Float64, not 1\.0"):
         Float64._serialize(1.0)
 
 

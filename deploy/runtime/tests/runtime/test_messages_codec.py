@@ -122,7 +122,7 @@ def test_every_truncation_of_a_sample_is_refused(name: str, data: st.DataObject)
     cls: Any = type(message)
     written = cls._serialize(message)
     shorter = data.draw(st.integers(0, len(written) - 1))
-    with pytest.raises(ValueError, match=f"{shorter} bytes are no {name}: "):
+    with pytest.raises(ValueError, match=f"{shorter} bytes are not a valid {name}: "):
         cls._deserialize(written[:shorter])
 
 
@@ -236,7 +236,7 @@ def test_string_bounds_are_checked_only_if_messages_check_fields() -> None:
         capture_output=True,
         text=True,
     )
-    assert "ValueError: 272 bytes are no type_description_interfaces/msg/Indiv" in checked.stderr
+    assert "ValueError: 272 bytes are not a valid type_description_interfaces/msg/Indiv" in checked.stderr
 
 
 def test_a_sequence_longer_than_its_bound_is_refused() -> None:
