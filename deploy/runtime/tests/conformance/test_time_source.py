@@ -12,6 +12,7 @@ from builtin_interfaces.msg import Time as TimeMsg
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock, ROSClock
 from rclpy.clock_type import ClockType
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
@@ -86,10 +87,10 @@ def test_use_sim_time_must_be_a_bool(make_node: Callable[..., Node]) -> None:
 
 
 def test_simulated_time_follows_the_clock_topic(
-    make_node: Callable[..., Node], executor: object, spin_until: Callable[..., None]
+    make_node: Callable[..., Node], executor: SingleThreadedExecutor, spin_until: Callable[..., None]
 ) -> None:
     node, simulator = make_node(), make_node("simulator")
-    executor.add_node(node)  # type: ignore[attr-defined]
+    executor.add_node(node)
     set_use_sim_time(node, True)
     publisher = simulator.create_publisher(ClockMsg, "/clock", 1)
 
@@ -117,7 +118,7 @@ def test_wait_for_message_ends_with_its_timeout(make_node: Callable[..., Node]) 
 
 
 def test_a_callback_of_the_node_may_call_wait_for_message(
-    make_node: Callable[..., Node], executor: object, spin_until: Callable[..., None]
+    make_node: Callable[..., Node], executor: SingleThreadedExecutor, spin_until: Callable[..., None]
 ) -> None:
     make_node("talker").create_publisher(String, "chatter", LATCHED).publish(String(data="hello"))
     node = make_node()
@@ -128,7 +129,7 @@ def test_a_callback_of_the_node_may_call_wait_for_message(
         results.append(wait_for_message(String, node, "chatter", qos_profile=LATCHED, time_to_wait=10))
 
     timer = node.create_timer(0.0, wait)
-    executor.add_node(node)  # type: ignore[attr-defined]
+    executor.add_node(node)
     spin_until(lambda: results)
     assert results == [(True, String(data="hello"))]
     rclpy.logging.shutdown()

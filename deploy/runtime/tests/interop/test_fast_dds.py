@@ -202,7 +202,7 @@ def test_a_fast_dds_client_calls_a_service_of_a_node(
     def is_answered() -> bool:
         if peer.samples("rr/switchReply"):
             return True
-        # Repeat the request: the node may not have discovered its reader yet.
+        # Repeat the request: the node may not have discovered the peer's writer yet.
         peer.send("rq/switchRequest", b"\0\1\0\0" + header + b"\1")
         return False
 

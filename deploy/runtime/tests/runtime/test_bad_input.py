@@ -105,9 +105,8 @@ def test_an_invalid_clock_message_is_bad_input(
     type_name = "rosgraph_msgs::msg::dds_::Clock_"
     writers = [writer_for(participant, "rt/clock", type_name, spin_until) for _ in range(2)]
     spin_until(lambda: subscription.get_publisher_count() == 2)
-    for number, writer in enumerate(
-        writers * 2, 1
-    ):  # one by one, because the subscription keeps only the last sample
+    # one by one, because the subscription keeps only the last sample
+    for number, writer in enumerate(writers * 2, 1):
         writer.write(HEADER + struct.pack("<iI", -1, 0))
         spin_until(lambda number=number: subscription._bad_input.count == number)
     assert node.get_clock().now().nanoseconds == 0
