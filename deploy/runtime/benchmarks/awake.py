@@ -1,7 +1,7 @@
-"""Keeps the processors awake while something is measured.
+"""Keeps the processors awake during a measurement.
 
-An idle processor, a virtual one above all, takes so long to wake that this is most of a round trip and of a
-timer's share, and the same for whoever is measured. What an rclpy itself costs shows where none sleeps.
+An idle processor, a virtual one above all, wakes so slowly that this is most of a round trip and of a timer's
+CPU time, on every rclpy alike. With processors that never sleep, the costs of rclpy itself become visible.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 
-# It gives way to everything else, keeps to a processor of its own, and ends with who started it.
+# Runs at idle priority, pinned to one processor, until its parent ends.
 _SPIN = """
 import os, sys
 os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
@@ -26,7 +26,7 @@ while os.getppid() == parent:
 
 @contextmanager
 def processors_awake() -> Iterator[None]:
-    """Let no processor sleep within the block."""
+    """Keep every processor from sleeping within the block."""
     with ExitStack() as stack:
         for processor in os.sched_getaffinity(0):
             command = [sys.executable, "-c", _SPIN, str(processor), str(os.getpid())]

@@ -1,13 +1,14 @@
-"""The nodes that are measured: plain rclpy, so that they run on every rclpy alike.
+"""The measured nodes, in plain rclpy, so they run on every rclpy.
 
-``python nodes.py echo|ping|sink|flood|publish|timer|idle|start``, in their own domain; a line of JSON each.
+``python nodes.py echo|ping|sink|flood|publish|timer|idle|start`` runs one node, which prints its figures as a
+line of JSON. Each measurement needs a ``ROS_DOMAIN_ID`` that nothing else uses.
 """
 
 from __future__ import annotations
 
 import time
 
-BORN = time.perf_counter()  # before the imports: they are part of what a start costs
+STARTED = time.perf_counter()  # before the imports, which are part of the start
 
 import json  # noqa: E402
 import os  # noqa: E402
@@ -21,8 +22,8 @@ from std_msgs.msg import Float64  # noqa: E402
 
 PINGS = 3000
 FLOOD = 60_000
-SECONDS = 5.0
-WARM_UP = 2.0  # discovery has calmed down by then
+SECONDS = 5.0  # of a measurement
+WARM_UP = 2.0  # [s]; discovery is over by then
 _QUEUE = QoSProfile(depth=1000)
 _LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
@@ -36,7 +37,7 @@ def spin(node: Node, end: Future, seconds: float | None = None) -> None:
 
 
 def echo(node: Node) -> None:
-    """Send back what comes, until told to stop."""
+    """Send every message back until a ``stop`` arrives."""
     stop = Future()
     publisher = node.create_publisher(Float64, "pong", _QUEUE)
     node.create_subscription(Float64, "ping", publisher.publish, _QUEUE)
@@ -64,7 +65,7 @@ def ping(node: Node) -> None:
     stop = node.create_publisher(Float64, "stop", _LATCHED)
     while not (publisher.get_subscription_count() and node.count_publishers("pong")):
         rclpy.spin_once(node, timeout_sec=0.01)
-    time.sleep(0.5)  # both directions are matched on both sides by then
+    time.sleep(0.5)  # until both directions are matched on both sides
     sent = time.perf_counter()
     publisher.publish(Float64(data=1.0))
     spin(node, done)
@@ -75,7 +76,7 @@ def ping(node: Node) -> None:
 
 
 def sink(node: Node) -> None:
-    """Count what a flood brings in for some seconds: messages/s, and CPU [µs] for each."""
+    """Measure the reception of a flood: messages/s, and CPU time per message [µs]."""
     count = 0
     began = Future()
 
@@ -94,7 +95,7 @@ def sink(node: Node) -> None:
 
 
 def flood(node: Node) -> None:
-    """Publish as fast as it goes as long as somebody listens: messages/s."""
+    """Publish as fast as possible while there is a subscription: messages/s."""
     publisher = node.create_publisher(Float64, "flood", _QUEUE)
     while not publisher.get_subscription_count():
         time.sleep(0.01)
@@ -107,8 +108,8 @@ def flood(node: Node) -> None:
 
 
 def publish(node: Node) -> None:
-    """Publish to nobody but the wire's end: messages/s, and CPU [µs] for each."""
-    publisher = node.create_publisher(Float64, "nobody", _QUEUE)
+    """Publish without a subscription: messages/s, and CPU time per message [µs]."""
+    publisher = node.create_publisher(Float64, "unread", _QUEUE)
     message = Float64(data=1.0)
     began, cpu = time.perf_counter(), time.process_time()
     for _ in range(FLOOD):
@@ -118,7 +119,7 @@ def publish(node: Node) -> None:
 
 
 def timer(node: Node) -> None:
-    """Run a 100 Hz timer for some seconds: share of a core [%]."""
+    """Measure a 100 Hz timer: share of a core [%]."""
     calls = 0
 
     def tick() -> None:
@@ -134,7 +135,7 @@ def timer(node: Node) -> None:
 
 
 def idle(node: Node) -> None:
-    """Spin with nothing to do for some seconds: share of a core [%]."""
+    """Measure an idle node that spins: share of a core [%]."""
     spin(node, Future(), WARM_UP)
     cpu, began = time.process_time(), time.perf_counter()
     spin(node, Future(), SECONDS)
@@ -142,8 +143,8 @@ def idle(node: Node) -> None:
 
 
 def start(node: Node) -> None:
-    """What a start costs: seconds from the first line to a node, memory [MB], threads."""
-    seconds = time.perf_counter() - BORN
+    """Measure the start of a node: seconds from the first line to the node, memory [MB], threads."""
+    seconds = time.perf_counter() - STARTED
     with open("/proc/self/status", encoding="ascii") as file:
         status = dict(line.split(":", 1) for line in file)
     report(seconds=seconds, megabytes=int(status["VmRSS"].split()[0]) / 1024, threads=int(status["Threads"]))

@@ -1,10 +1,9 @@
-"""What rclpy costs: ``make bench``, or ``python deploy/runtime/benchmarks/run.py [OPTION] [NAME=COMMAND]``.
+"""Measures the costs of rclpy: ``make bench`` or ``python run.py [OPTION ...] [NAME=COMMAND ...]``.
 
-Each COMMAND runs Python with an rclpy of its own, such as ``embedded=.venv/bin/python`` or a script that
-sources ROS 2 first and ends with ``exec python "$@"``; without any, this interpreter's rclpy is measured.
-Every round measures all of them, so that a busy machine harms all alike; medians of the rounds are printed.
-With ``--awake`` no processor sleeps meanwhile: see :mod:`awake`.
-CPU time is that of the whole process, with all its threads.
+Each COMMAND starts a Python with an rclpy, such as ``embedded=.venv/bin/python`` or a script that sources
+ROS 2 and ends with ``exec python "$@"``. The default is this interpreter. Every round measures all of them,
+so a busy machine affects all alike. The table shows the medians of the rounds. With ``--awake`` no processor
+sleeps during a measurement, see :mod:`awake`. CPU time is that of the whole process, with all its threads.
 """
 
 from __future__ import annotations
@@ -25,9 +24,9 @@ from awake import processors_awake
 from reactive_node.domains import reserved_domain
 
 NODES = Path(__file__).with_name("nodes.py")
-PATIENCE = 120.0  # [s]
+TIMEOUT = 120.0  # [s]
 
-# What is measured: the processes of each measurement, in the order of their start.
+# The processes of each measurement, in the order of their start.
 MEASUREMENTS = (("echo", "ping"), ("flood", "sink"), ("publish",), ("timer",), ("idle",), ("start",))
 
 FIGURES = {
@@ -47,7 +46,7 @@ FIGURES = {
 
 
 def measure(command: list[str], roles: tuple[str, ...], domain_id: int) -> dict[str, float]:
-    """Run the processes of one measurement and return what they report."""
+    """Run the processes of one measurement and return the figures that they report."""
     environment = {
         **os.environ,
         "ROS_DOMAIN_ID": str(domain_id),
@@ -58,7 +57,7 @@ def measure(command: list[str], roles: tuple[str, ...], domain_id: int) -> dict[
         for role in roles
     ]
     try:
-        outputs = [process.communicate(timeout=PATIENCE)[0] for process in reversed(processes)]
+        outputs = [process.communicate(timeout=TIMEOUT)[0] for process in reversed(processes)]
     finally:
         for process in processes:
             process.kill()
@@ -81,15 +80,17 @@ def table(results: dict[str, dict[str, list[float]]]) -> str:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description="Measure what rclpy costs.")
-    parser.add_argument("--rounds", type=int, default=3, help="how often everything is measured")
-    parser.add_argument("--awake", action="store_true", help="let no processor sleep meanwhile")
-    parser.add_argument("commands", nargs="*", metavar="NAME=COMMAND", help="a Python with its rclpy")
+    parser = argparse.ArgumentParser(description="Measure the costs of rclpy.")
+    parser.add_argument("--rounds", type=int, default=3, help="how many times to measure (3)")
+    parser.add_argument("--awake", action="store_true", help="keep the processors from sleeping")
+    parser.add_argument(
+        "commands", nargs="*", metavar="NAME=COMMAND", help="a command that starts a Python with an rclpy"
+    )
     arguments = parser.parse_args()
     for word in arguments.commands:
         name, _, command = word.partition("=")
         if not name or not command or shutil.which(shlex.split(command)[0]) is None:
-            parser.error(f"{word} is not NAME=COMMAND, with a command that is there")
+            parser.error(f"{word} is not NAME=COMMAND with an existing command")
     commands = dict(command.split("=", 1) for command in arguments.commands) or {"rclpy": sys.executable}
     results: dict[str, dict[str, list[float]]] = {name: defaultdict(list) for name in commands}
     with processors_awake() if arguments.awake else nullcontext():

@@ -1,4 +1,4 @@
-"""Fixtures for the tests of rclpy: plain nodes, which no executor spins unless the test says so."""
+"""Fixtures for the tests of rclpy: plain nodes, clocks, a second participant, a user's executor."""
 
 from __future__ import annotations
 
@@ -8,17 +8,28 @@ from typing import Any
 
 import pytest
 
+from geometry_msgs.msg import PointStamped
 from rclpy.clock import ROSClock
 from rclpy.context import Context
-from rclpy.executors import SingleThreadedExecutor
+from rclpy.executors import (
+    ConditionReachedException,
+    Executor,
+    SingleThreadedExecutor,
+    TimeoutException,
+    TimeoutObject,
+)
 from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_sensor_data
+from rclpy.task import Future
 from rclpy.time import Time
 from rclpy.time_source import TimeSource
+from std_msgs.msg import Bool, Float64, String
+from std_srvs.srv import Trigger
 
 
 @pytest.fixture
 def make_node(context: Context) -> Iterator[Callable[..., Node]]:
-    """Makes nodes of the test's context and ends them with the test."""
+    """Makes nodes in the test's context and destroys them after the test; no executor spins them."""
     with ExitStack() as stack:
 
         def make(name: str = "node", **options: Any) -> Node:
@@ -31,15 +42,66 @@ def make_node(context: Context) -> Iterator[Callable[..., Node]]:
 
 @pytest.fixture
 def node(make_node: Callable[..., Node], executor: SingleThreadedExecutor) -> Node:
-    """A node that the test's executor spins."""
+    """A node in the test's executor."""
     node = make_node()
     executor.add_node(node)
     return node
 
 
 @pytest.fixture
+def facts_node(make_node: Callable[..., Node]) -> Node:
+    """A node like the one that facts/discovery.txt was recorded from."""
+    node = make_node("facts", namespace="/arm1")
+    node.declare_parameter("value", 2.0)
+    latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    node.create_publisher(Float64, "l1", latched)
+    node.create_publisher(PointStamped, "effector/position", 10)
+    node.create_publisher(String, "/engines", 10)
+    node.create_subscription(Bool, "operator_heartbeat", lambda _: None, qos_profile_sensor_data)
+    node.create_service(Trigger, "turn_on", lambda request, response: response)
+    return node
+
+
+@pytest.fixture
+def other_context(domain_id: int) -> Iterator[Context]:
+    """A second participant in the test's domain, as another process would be."""
+    context = Context()
+    context.init([], domain_id=domain_id)
+    yield context
+    context.try_shutdown()
+    context.destroy()
+
+
+class UserExecutor(Executor):
+    """An executor as a user writes it, with the documented methods only."""
+
+    def spin_once(self, timeout_sec: float | None = None) -> None:
+        self._run_one(timeout_sec, lambda: False)
+
+    def spin_once_until_future_complete(
+        self, future: Future, timeout_sec: float | TimeoutObject | None = None
+    ) -> None:
+        self._run_one(timeout_sec, future.done)
+
+    def _run_one(self, timeout_sec: float | TimeoutObject | None, condition: Callable[[], bool]) -> None:
+        try:
+            task, _, _ = self.wait_for_ready_callbacks(timeout_sec, None, condition)
+        except (TimeoutException, ConditionReachedException):
+            return
+        task()
+        task.result()
+
+
+@pytest.fixture
+def user_executor(context: Context) -> Iterator[UserExecutor]:
+    """A user's executor in the test's context."""
+    with UserExecutor(context=context) as executor:
+        yield executor
+
+
+@pytest.fixture
 def clock() -> ROSClock:
-    """ROS time that stands still, 1 µs after its epoch, unless the test moves it."""
+    """Simulated time at 1 µs, which only the test advances."""
     clock, simulator = ROSClock(), TimeSource()
     simulator.ros_time_is_active = True
     simulator.attach_clock(clock)

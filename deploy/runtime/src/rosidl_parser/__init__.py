@@ -1,1 +1,1 @@
-"""The part of ROS 2's interface parser that message classes refer to: their types."""
+"""The part of ROS 2's interface parser that message classes use: the types of fields."""

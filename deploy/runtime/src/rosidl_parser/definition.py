@@ -1,4 +1,4 @@
-"""Types of fields, as ``SLOT_TYPES`` of a message class names them: those of Jazzy's ``rosidl_parser``."""
+"""The types in ``SLOT_TYPES`` of a message class, as in Jazzy's ``rosidl_parser``."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ class AbstractNestableType(AbstractType):
 
 @dataclass
 class BasicType(AbstractNestableType):
-    """A number, boolean or octet, by its IDL name."""
+    """A number, boolean or octet, with its IDL name."""
 
     typename: str
 
 
 @dataclass
 class NamespacedType(AbstractNestableType):
-    """Another message: its namespaces, such as ``["std_msgs", "msg"]``, and name."""
+    """A message, with its namespaces, such as ``["std_msgs", "msg"]``, and name."""
 
     namespaces: list[str]
     name: str
@@ -33,53 +33,53 @@ class NamespacedType(AbstractNestableType):
 
 
 class AbstractGenericString(AbstractNestableType):
-    """Text."""
+    """A string."""
 
     def has_maximum_size(self) -> bool:
-        """Whether its length is bounded."""
+        """Whether the length is bounded."""
         return hasattr(self, "maximum_size")
 
 
 class AbstractString(AbstractGenericString):
-    """Text of characters of 8 bits."""
+    """A string of 8-bit characters."""
 
 
 class AbstractWString(AbstractGenericString):
-    """Text of characters of 16 bits."""
+    """A string of 16-bit characters."""
 
 
 @dataclass
 class BoundedString(AbstractString):
-    """Text of at most so many characters."""
+    """A string with a maximum number of characters."""
 
     maximum_size: int
 
 
 @dataclass
 class UnboundedString(AbstractString):
-    """Text of any length."""
+    """A string of any length."""
 
 
 @dataclass
 class BoundedWString(AbstractWString):
-    """Text of at most so many wide characters."""
+    """A wide string with a maximum number of characters."""
 
     maximum_size: int
 
 
 @dataclass
 class UnboundedWString(AbstractWString):
-    """Text of any number of wide characters."""
+    """A wide string of any length."""
 
 
 @dataclass
 class AbstractNestedType(AbstractType):
-    """Several elements of one type."""
+    """Elements of one type."""
 
     value_type: AbstractNestableType
 
     def has_maximum_size(self) -> bool:
-        """Whether their number is bounded."""
+        """Whether the number of elements is bounded."""
         return not isinstance(self, UnboundedSequence)
 
 
@@ -91,16 +91,16 @@ class Array(AbstractNestedType):
 
 
 class AbstractSequence(AbstractNestedType):
-    """A number of elements that each message has for itself."""
+    """A number of elements that may differ between messages."""
 
 
 @dataclass
 class BoundedSequence(AbstractSequence):
-    """At most so many elements."""
+    """A sequence with a maximum number of elements."""
 
     maximum_size: int
 
 
 @dataclass
 class UnboundedSequence(AbstractSequence):
-    """Any number of elements."""
+    """A sequence of any length."""

@@ -1,4 +1,4 @@
-"""Message and service types of the embedded runtime: classes, codecs and hashes from definition files."""
+"""Classes, codecs and type hashes of messages and services, made from their definition files."""
 
 from .definition import InvalidDefinition
 from .message import Message, message_class

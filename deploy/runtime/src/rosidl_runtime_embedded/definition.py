@@ -1,8 +1,8 @@
-"""What a ``.msg`` or ``.srv`` file says: fields, constants and default values of a type.
+"""Parses ``.msg`` and ``.srv`` files into fields, constants and default values.
 
-Source of the format: the ROS 2 interface definition language (docs.ros.org, "Interfaces"), in the reading of
-``rosidl_adapter`` of Jazzy. Types bear their IDL names from here on (``double``, ``octet``,
-``sequence<string>``), as they do in ``get_fields_and_field_types()``.
+Source of the format: the ROS 2 interface definition language (docs.ros.org, "Interfaces"), as Jazzy's
+``rosidl_adapter`` reads it. Parsed types have their IDL names (``double``, ``octet``, ``sequence<string>``),
+as in ``get_fields_and_field_types()``.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
 Literal = bool | int | float | str
-"""One value in a definition file."""
+"""A value in a definition file."""
 
 _IDL_NAMES = {
     "bool": "boolean",
@@ -35,28 +35,28 @@ _NAME = re.compile(r"[a-z][a-z0-9]*(?:_[a-z0-9]+)*")
 _CONSTANT_NAME = re.compile(r"[A-Z][A-Z0-9]*(?:_[A-Z0-9]+)*")
 _TYPE_NAME = re.compile(r"[A-Z][A-Za-z0-9]*")
 _QUOTED = re.compile(r"""'(?:\\.|[^'\\])*'|"(?:\\.|[^"\\])*\"""")
-# what Python takes for an escape, also for a bad one; other backslashes stay
+# the escapes of Python, valid or not; other backslashes stay
 _ESCAPE = re.compile(r"""\\(?:[\\'"abfnrtv]|[0-7]{1,3}|x.{0,2}|u.{0,4}|U.{0,8}|N(?:\{[^}]*\})?|$)""")
 _IDL_ESCAPE = re.compile(r"""\\(?:[\\'"abfnrtv]|[0-7]{1,3}|x[0-9a-fA-F]{1,2})""")
 _IDL_STRING = re.compile(r"""(?:[^\\]|\\[^"])*""")
 
 
 class InvalidDefinition(ImportError):
-    """A definition file that is not one. The text is a single line: file, line and reason."""
+    """An invalid definition file. The text is a single line: file, line and reason."""
 
 
 class FieldType(NamedTuple):
-    """The type of a field: a base type, alone, in an array of fixed size or in a sequence."""
+    """The type of a field: a base type, or an array or sequence of it."""
 
     base: str
     """IDL name of a primitive, or the full name of a message (``std_msgs/msg/Header``)."""
     string_bound: int = 0
-    """Most characters of a string; 0 is unbounded."""
+    """Maximum number of characters of a string; 0 is unbounded."""
     array_size: int = 0
-    """Elements of a fixed array; 0 if it is none."""
+    """Number of elements of an array; 0 for other types."""
     is_sequence: bool = False
     sequence_bound: int = 0
-    """Most elements of a sequence; 0 is unbounded."""
+    """Maximum number of elements of a sequence; 0 is unbounded."""
 
     @property
     def is_message(self) -> bool:
@@ -89,7 +89,7 @@ class Field(NamedTuple):
     name: str
     type: FieldType
     default: Literal | tuple[Literal, ...] | None = None
-    """Value that the definition gives; None where it gives none."""
+    """The default value in the definition, or None."""
 
 
 class Constant(NamedTuple):
@@ -110,7 +110,7 @@ class MessageDefinition(NamedTuple):
 
     @property
     def members(self) -> tuple[Field, ...]:
-        """The fields as IDL, CDR and type hashes see them: there no struct is empty."""
+        """The fields in IDL, CDR and type hashes, where a struct cannot be empty."""
         return self.fields or (Field("structure_needs_at_least_one_member", FieldType("uint8")),)
 
 
@@ -124,7 +124,7 @@ class ServiceDefinition(NamedTuple):
 
     @property
     def event(self) -> MessageDefinition:
-        """What service introspection publishes of a call."""
+        """The message that service introspection publishes for each step of a call."""
         return MessageDefinition(
             f"{self.name}_Event",
             (
@@ -138,19 +138,19 @@ class ServiceDefinition(NamedTuple):
 def parse_message(name: str, text: str, source: str, is_defined: Callable[[str], bool]) -> MessageDefinition:
     """Read a ``.msg`` file. Raises InvalidDefinition.
 
-    ``source`` is the file's name for errors; ``is_defined`` tells whether a message exists, by its full name.
+    ``source`` is the file's name in errors. ``is_defined`` tells by its full name whether a message exists.
     """
     return _parse(name, text.splitlines(), source, 1, is_defined)
 
 
 def parse_service(name: str, text: str, source: str, is_defined: Callable[[str], bool]) -> ServiceDefinition:
-    """Read a ``.srv`` file; arguments and errors as of parse_message."""
+    """Read a ``.srv`` file, with the arguments and errors of parse_message."""
     lines = text.splitlines()
     separators = [number for number, line in enumerate(lines) if line.strip() == "---"]
     if len(separators) != 1:
         line = separators[1] + 1 if separators else max(len(lines), 1)
         raise InvalidDefinition(
-            f"{source}:{line}: a service has exactly one line '---', not {len(separators)}"
+            f"{source}:{line}: a service needs exactly one line '---', not {len(separators)}"
         )
     split = separators[0]
     return ServiceDefinition(
@@ -194,20 +194,20 @@ def _parse_field(type_name: str, name: str, default: str, package: str) -> Field
     type_ = _parse_type(type_name, package)
     if not _NAME.fullmatch(name):
         raise ValueError(
-            f"'{name}' is no field name: lower case letters, digits and single underscores make one"
+            f"'{name}' is not a field name: use lower case letters, digits and single underscores"
         )
     if iskeyword(name):
-        raise ValueError(f"a field cannot be called '{name}', a keyword of Python")
+        raise ValueError(f"a field cannot have the name '{name}', a keyword of Python")
     if not default:
         return Field(name, type_)
     if type_.is_message:
-        raise ValueError(f"field '{name}' is a message and can have no default value")
+        raise ValueError(f"field '{name}' is a message and cannot have a default value")
     if not type_.is_plural:
         return Field(name, type_, _parse_value(type_, default))
     values = tuple(_parse_value(type_, value) for value in _split(default))
     most = type_.array_size or type_.sequence_bound
     if len(values) > most > 0 or len(values) < type_.array_size:
-        raise ValueError(f"{len(values)} default values are given for '{name}', which is {type_}")
+        raise ValueError(f"'{name}' is {type_}, but has {len(values)} default values")
     return Field(name, type_, values)
 
 
@@ -217,7 +217,7 @@ def _parse_constant(type_name: str, rest: str) -> Constant:
         raise ValueError(f"a constant cannot have the type '{type_name}': it must be a primitive or a string")
     if not _CONSTANT_NAME.fullmatch(name):
         raise ValueError(
-            f"'{name}' is no constant name: upper case letters, digits and single underscores make one"
+            f"'{name}' is not a constant name: use upper case letters, digits and single underscores"
         )
     type_ = FieldType(_IDL_NAMES[type_name])
     return Constant(name, type_.base, _parse_value(type_, value))
@@ -226,13 +226,13 @@ def _parse_constant(type_name: str, rest: str) -> Constant:
 def _parse_type(text: str, package: str) -> FieldType:
     match = _TYPE.fullmatch(text)
     if not match:
-        raise ValueError(f"'{text}' is no type")
+        raise ValueError(f"'{text}' is not a type")
     base, string_bound, size = match["base"], int(match["bound"] or 0), int(match["size"] or 0)
     if (match["bound"] and not string_bound) or (match["size"] and not size):
         raise ValueError(f"the bound in '{text}' must be greater than 0")
     if match["bound"] and base not in ("string", "wstring"):
         raise ValueError(
-            f"'{text}': only strings are bounded so, sequences are written {base}[<={string_bound}]"
+            f"'{text}': only strings have such a bound; write {base}[<={string_bound}] for a sequence"
         )
     if match["upper"] and not size:
         raise ValueError(f"the bound in '{text}' is missing")
@@ -266,25 +266,25 @@ def _parse_value(field_type: FieldType, text: str) -> Literal:
         try:
             return _unescape_element(value) if field_type.is_plural else _unescape(value)
         except ValueError as error:
-            raise ValueError(f"{text} is no string: {error}") from None
+            raise ValueError(f"{text} is not a valid string: {error}") from None
     if type_ == "boolean":
         if text.lower() not in ("true", "false", "0", "1"):
-            raise ValueError(f"'{text}' is no bool: it must be true, false, 1 or 0")
+            raise ValueError(f"'{text}' is not a valid bool: it must be true, false, 1 or 0")
         return text.lower() in ("true", "1")
     try:
         if type_ in ("float", "double"):
             return float(text)
         number = int(text) if text.lstrip("+-").isdecimal() else int(text, 0)
     except ValueError:
-        raise ValueError(f"'{text}' is no {type_}") from None
+        raise ValueError(f"'{text}' is not a valid {type_}") from None
     low, high = integer_range(type_)
     if not low <= number <= high:
-        raise ValueError(f"{text} is no {type_}: it must be in [{low}, {high}]")
+        raise ValueError(f"{text} is not a valid {type_}: it must be in [{low}, {high}]")
     return number
 
 
 def integer_range(type_: str) -> tuple[int, int]:
-    """Smallest and greatest value of an IDL integer type or of an octet."""
+    """Minimum and maximum of an IDL integer type or of an octet."""
     if type_ == "octet":
         return 0, 255
     bits = int(type_.lstrip("uint"))
@@ -295,25 +295,25 @@ def _unquote(text: str) -> str:
     for quote in "\"'":
         if len(text) > 1 and text[0] == text[-1] == quote:
             if not _QUOTED.fullmatch(text):
-                raise ValueError(f"the quotes inside of {text} must be escaped")
+                raise ValueError(f"quotes inside {text} must be escaped")
             return text[1:-1].replace("\\" + quote, quote)
     return text
 
 
 def _unescape(text: str) -> str:
-    """A string of the definition as ROS 2 has it.
+    """The value that ROS 2 gives a string of the definition.
 
-    There an escape means a byte of UTF-8, and what comes of it is a literal of IDL, with escapes of its own.
+    An escape stands for a byte of UTF-8. The result is a literal of IDL, whose escapes are resolved in turn.
     """
     literal = _ESCAPE.sub(_character, text.encode().decode("latin-1")).encode("latin-1").decode()
     if not _IDL_STRING.fullmatch(literal):
-        raise ValueError("before a quote or the end, backslashes are written by fours")
+        raise ValueError("before a quote or the end, write backslashes in groups of four")
     value = _IDL_ESCAPE.sub(_character, literal)
     return _in_one_line(re.sub(r'\\(["\\])', r"\1", value))
 
 
 def _unescape_element(text: str) -> str:
-    """A string in an array as ROS 2 has it: there an array is a literal of Python."""
+    """The value that ROS 2 gives a string in an array, which it reads as a literal of Python."""
     return _in_one_line(_ESCAPE.sub(_character, text))
 
 
@@ -323,15 +323,15 @@ def _character(escape: re.Match[str]) -> str:
 
 def _in_one_line(value: str) -> str:
     if re.search(r"[\0\n\r]", value):
-        raise ValueError("ROS 2 takes no NUL and no end of a line")
-    value.encode()  # no half of a character
+        raise ValueError("ROS 2 accepts neither NUL nor line breaks")
+    value.encode()  # refuses surrogates
     return value
 
 
 def _split(text: str) -> list[str]:
     """Elements of an array value ``[a, "b, c", d]``."""
     if not (text.startswith("[") and text.endswith("]")):
-        raise ValueError(f"the default value of an array is written in brackets, not {text}")
+        raise ValueError(f"write the default value of an array in brackets, not {text}")
     inner = text[1:-1].strip()
     if not inner:
         return []

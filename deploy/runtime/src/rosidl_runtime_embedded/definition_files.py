@@ -1,8 +1,8 @@
-"""Finds the definition files of message packages, and reads each one once.
+"""Finds the definition files of message packages, and reads each file once.
 
-A message package is a directory with ``msg/*.msg`` and ``srv/*.srv`` in it. The packages of this distribution
-lie beside this one; those of a user in ``<prefix>/share/<package>`` for a prefix of ``AMENT_PREFIX_PATH``.
-The former win.
+A message package is a directory with ``msg/*.msg`` and ``srv/*.srv``. The packages of this distribution are
+the directories beside this one. Packages of users are in ``<prefix>/share/<package>``, for every prefix in
+``AMENT_PREFIX_PATH``. A package of this distribution wins over a user's package of the same name.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def interface_names(package: str, kind: str) -> list[str]:
 def definition_source(name: str) -> tuple[str, str]:
     """File and text that define ``<package>/<msg or srv>/<Name>``. Raises LookupError or InvalidDefinition.
 
-    Kept in memory: the file of a type in use may change, and the type does not.
+    Cached, because a type in use stays the same when its file changes.
     """
     path = _file(name)
     if path is None:
@@ -65,7 +65,7 @@ def definition_source(name: str) -> tuple[str, str]:
 
 
 def is_defined(name: str) -> bool:
-    """Whether there is a definition file of ``<package>/<msg or srv>/<Name>``."""
+    """Whether ``<package>/<msg or srv>/<Name>`` has a definition file."""
     return _file(name) is not None
 
 
@@ -78,11 +78,11 @@ def service_definition(name: str) -> ServiceDefinition:
 
 @cache
 def message_definition(name: str) -> MessageDefinition:
-    """Definition of a message or a service's part by full name. Raises LookupError or InvalidDefinition."""
+    """Definition of a message or of a service's part. Raises LookupError or InvalidDefinition."""
     if "/srv/" in name:
         service, _, part = name.rpartition("_")
         if part not in SERVICE_PARTS:
-            raise LookupError(f"{name} is no message")
+            raise LookupError(f"{name} is not a message")
         definition: MessageDefinition = getattr(service_definition(service), part.lower())
         return definition
     path, text = definition_source(name)

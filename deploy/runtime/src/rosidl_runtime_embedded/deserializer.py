@@ -1,9 +1,9 @@
-"""Code that reads a message type from little-endian XCDR1, made and compiled per type.
+"""Generates the functions that read messages from little-endian XCDR1, one for each type.
 
-The counterpart of :mod:`.serializer`. A sample comes from anywhere: nothing is allocated or repeated on the
-word of a count that the sample is too short for, and whatever is malformed raises ValueError. The bounds of
-strings alone are not checked, as no ROS 2 checks them: C++ sends longer ones. With ROS_PYTHON_CHECK_FIELDS=1
-they are, by the assignment to the field; its AssertionError becomes a ValueError like the others.
+The counterpart of :mod:`.serializer`. Samples are untrusted: a count allocates and repeats nothing if the
+sample is too short for it, and every malformed sample raises ValueError. Only the bounds of strings are not
+checked, as in ROS 2, where C++ sends longer strings. With ROS_PYTHON_CHECK_FIELDS=1 the assignment to the
+field checks them; its AssertionError becomes a ValueError.
 """
 
 from __future__ import annotations
@@ -36,12 +36,12 @@ if TYPE_CHECKING:
 def make_deserializer(
     definition: MessageDefinition, message_class: Callable[[str], type]
 ) -> Callable[[bytes], Any]:
-    """Function from bytes to a message of the class; for all else it raises ValueError and nothing else."""
+    """Function from bytes to a message. It raises ValueError, and only that, for malformed bytes."""
     return _DeserializerGenerator(definition, message_class).compile()
 
 
 def _malformed(cls: Any, data: bytes, reason: object) -> ValueError:
-    return ValueError(f"{len(data)} bytes are no {cls._TYPE_NAME}: {reason}")
+    return ValueError(f"{len(data)} bytes are not a valid {cls._TYPE_NAME}: {reason}")
 
 
 def _bools(data: bytes) -> list[bool]:
@@ -55,7 +55,7 @@ def _octets(data: bytes) -> list[bytes]:
 
 
 def _text(data: bytes) -> str:
-    # as rclpy: a string ends at its first NUL, and what is not UTF-8 is replaced
+    # as in rclpy: a string ends at its first NUL, and invalid UTF-8 is replaced
     return data.decode("utf-8", "replace").partition("\0")[0]
 
 
@@ -68,7 +68,7 @@ def _wide_text(data: bytes) -> str:
 
 
 class _DeserializerGenerator(Generator):
-    """The variable ``p`` has the position where it is known at run time only."""
+    """In the generated code, ``p`` is the position where it is known only at run time."""
 
     def __init__(self, definition: MessageDefinition, message_class: Callable[[str], type]) -> None:
         super().__init__(
@@ -83,7 +83,7 @@ class _DeserializerGenerator(Generator):
             text=_text,
             wide_text=_wide_text,
         )
-        self._after: list[str] = []  # what can be done once the run is read
+        self._after: list[str] = []  # lines to emit after the run is read
 
     def compile(self) -> Callable[[bytes], Any]:
         self._run.append(Item("H2x", HEADER_SIZE, 1, "h"))
@@ -106,7 +106,7 @@ class _DeserializerGenerator(Generator):
         return self._compiled("deserialize", code)
 
     def _message(self, definition: MessageDefinition) -> str:
-        """Read a message; the name of the variable that holds it."""
+        """Emit code that reads a message; return its variable."""
         message = self._variable()
         self._emit(f"{message} = new({self._name(self._message_class(definition.name))})")
         if not definition.fields:
@@ -154,7 +154,7 @@ class _DeserializerGenerator(Generator):
         self._emit(f"else: {target} = ''")
 
     def _plain_elements(self, target: str, type_: FieldType) -> None:
-        """Read an array or a sequence whose elements lie one after the other without anything in between."""
+        """Emit code that reads an array or sequence whose elements are contiguous."""
         code, size = ARRAY_CODES.get(type_.base), SIZES[type_.base]
         if type_.array_size:
             data = self._variable()
@@ -168,7 +168,7 @@ class _DeserializerGenerator(Generator):
         self._emit(f"q = p + {count} * {size}")
         self._emit("if q > end: raise ValueError('it is too short')")
         if code:
-            # through a view: a copy of an image costs more than all the rest
+            # through a view, because a copy of an image costs more than everything else
             numbers = self._variable()
             self._emit(f"{target} = {numbers} = array('{code}')")
             self._emit(f"{numbers}.frombytes(memoryview(data)[p:q])")
@@ -183,7 +183,7 @@ class _DeserializerGenerator(Generator):
         else:
             smallest = smallest_size(message_definition(type_.base)) if type_.is_message else 4
             count = self._count(type_)
-            # before the loop: what a sample claims is not believed for longer than it is
+            # before the loop: refuse a count that the rest of the sample cannot hold
             self._emit(f"if {count} * {smallest} > end - p: raise ValueError('it is too short')")
         elements, element = self._variable(), self._variable()
         self._emit(f"{elements} = []")
@@ -196,7 +196,7 @@ class _DeserializerGenerator(Generator):
         self._emit(f"{target} = {elements}")
 
     def _count(self, type_: FieldType) -> str:
-        """Read the number of elements of a sequence; the variable that has it."""
+        """Emit code that reads the length of a sequence; return its variable."""
         count = self._variable()
         self._run.append(Item("I", 4, 4, count))
         self._flush_to_variable()
@@ -205,14 +205,14 @@ class _DeserializerGenerator(Generator):
         return count
 
     def _flush_to_variable(self) -> None:
-        """Flush, and have the position in variable p from here on."""
+        """Flush, and keep the position in ``p`` from here on."""
         self._flush()
         if self._position is not None:
             self._emit(f"p = {self._position}")
             self._position = None
 
     def _flush(self) -> None:
-        """Read the run gathered so far, and do what waits for it."""
+        """Emit code that reads the collected run, and the lines that wait for it."""
         if self._run:
             values = "".join(f"{item.value}, " for item in self._run if item.value)
             if self._position is None:

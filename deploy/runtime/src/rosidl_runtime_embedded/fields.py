@@ -1,8 +1,8 @@
-"""What a field holds in Python: its first value, and how arrays and sequences of numbers are kept.
+"""The Python values of fields: initial values, arrays and sequences of numbers, conversions.
 
-As in rclpy: a sequence of numbers is an ``array.array``, an array of numbers a ``numpy.ndarray``, everything
-else plural a list, an octet ``bytes`` of length 1. NumPy takes as long to import as all the rest of a node,
-so an array stays an ``array.array`` until somebody looks at it.
+As in rclpy, a sequence of numbers is an ``array.array``, an array of numbers is a ``numpy.ndarray``, every
+other array or sequence is a list, and an octet is ``bytes`` of length 1. NumPy takes as long to import as
+the rest of a node, so an array stays an ``array.array`` until its first read.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ ARRAY_CODES = {
 """Type codes of ``array`` and ``struct`` by the IDL name of a number."""
 
 _SAME_NUMBERS = {"q": "ql", "Q": "QL"}
-"""Type codes that mean the same as one of ours: NumPy says long where we say long long."""
+"""Type codes with the same meaning: NumPy has long where ARRAY_CODES has long long."""
 
 _ZEROS: dict[str, Any] = {
     **dict.fromkeys(ARRAY_CODES, 0),
@@ -51,7 +51,7 @@ _repr.maxstring = _repr.maxother = 100
 
 
 def shown(value: object) -> str:
-    """A value in the single line of an error, however great it is."""
+    """A short text of a value, of any size, for an error of one line."""
     return " ".join(_repr.repr(value).split())
 
 
@@ -61,19 +61,19 @@ def is_numeric(field: Field) -> bool:
 
 
 def slot_of(field: Field) -> str:
-    """Name of the slot that holds the field's value. No field's name ends with an underscore."""
+    """Name of the slot that holds the field's value. No field name ends with an underscore."""
     return f"{field.name}_" if is_numeric(field) else field.name
 
 
 def python_value(base: str, value: Literal | tuple[Literal, ...]) -> Any:
-    """A constant or default value, or a list of them, as Python values of their IDL type."""
+    """A constant or default value, or a list of values, in Python."""
     if isinstance(value, tuple):
         return [python_value(base, element) for element in value]
     return bytes((int(value),)) if base == "octet" else value
 
 
 def initial_value(field: Field, message_class: Callable[[str], type]) -> tuple[Any, bool]:
-    """Value of the field in a new message, and whether it is a factory that makes the value."""
+    """Initial value of the field, and whether it is a factory that makes the value."""
     type_ = field.type
     if type_.is_message:
         if type_.is_sequence:
@@ -93,7 +93,7 @@ def initial_value(field: Field, message_class: Callable[[str], type]) -> tuple[A
 
 
 def converter(type_name: str, field: Field) -> Callable[[Any], array[Any]]:
-    """Function that makes of a value what an array or sequence of numbers holds, or refuses it."""
+    """Function that converts a value to the ``array`` of a numeric field, or raises with a reason."""
     type_ = field.type
     code, size, bound = ARRAY_CODES[type_.base], type_.array_size, type_.sequence_bound
 
@@ -113,7 +113,7 @@ def converter(type_name: str, field: Field) -> Callable[[Any], array[Any]]:
 
 
 def numeric_field(type_name: str, field: Field) -> property:
-    """Property of an array or sequence of numbers: what is assigned is converted or refused with a reason."""
+    """Property of an array or sequence of numbers, which converts or refuses assigned values."""
     slot, code, convert = slot_of(field), ARRAY_CODES[field.type.base], converter(type_name, field)
 
     def get_array(self: object) -> Any:
@@ -133,7 +133,7 @@ def numeric_field(type_name: str, field: Field) -> property:
 
 def _to_array(code: str, value: Any) -> array[Any]:
     if isinstance(value, array) and value.typecode == code:
-        return value[:]  # of its own, as in rclpy: the caller may go on changing theirs
+        return value[:]  # a copy, as in rclpy: the caller may change the original
     try:
         view = memoryview(value)
     except TypeError:
@@ -145,9 +145,9 @@ def _to_array(code: str, value: Any) -> array[Any]:
             return array(code, view.tobytes())
     if code != "f" or isinstance(value, (bytes, bytearray)):
         return array(code, value)
-    given = list(value)  # to be looked at twice, which an iterator cannot be
+    given = list(value)  # the values are read twice, which an iterator does not allow
     numbers = array(code, given)
-    # array makes infinities of what is too great for a float
-    if [number for number, one in zip(numbers, given, strict=True) if isinf(number) and not isinf(one)]:
+    # array converts numbers beyond the range of a float to infinity
+    if [number for number, source in zip(numbers, given, strict=True) if isinf(number) and not isinf(source)]:
         raise OverflowError("it has elements out of range")
     return numbers

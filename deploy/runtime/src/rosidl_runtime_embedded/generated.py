@@ -1,4 +1,4 @@
-"""How generated code is run."""
+"""Runs generated code."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from typing import Any
 
 def run(code: str, names: dict[str, Any]) -> None:
     """
-    Run generated code, which defines its names among ``names``.
+    Run generated code, which defines its names in ``names``.
 
-    It is compiled apart: of a text, CPython remembers a Ctrl-C that comes just then, and ends the program by
-    it although that has caught it.
+    ``exec`` gets compiled code: from a text, CPython remembers a Ctrl-C during the call, and later ends the
+    program with it, although the program has caught it.
     """
     exec(compile(code, "<generated>", "exec"), names)

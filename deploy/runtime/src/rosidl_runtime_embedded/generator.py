@@ -1,4 +1,4 @@
-"""What the makers of serializers and deserializers share: lines of code, and the names that they use."""
+"""The common part of the generators of serializers and deserializers."""
 
 from __future__ import annotations
 
@@ -19,27 +19,27 @@ class Generator:
     def __init__(
         self, definition: MessageDefinition, message_class: Callable[[str], type], **names: object
     ) -> None:
-        """Begin; ``message_class`` gives a class by its full name, ``names`` are global to the code."""
+        """``message_class`` returns a class by its full name; ``names`` are globals of the code."""
         self._definition = definition
         self._message_class = message_class
         self._names: dict[str, Any] = {"cls": message_class(definition.name), **names}
         self._lines: list[str] = []
         self._indent = 2
         self._variables = 0
-        self._run: list[Item] = []  # values of fixed size that one call of struct will do
-        self._position: int | None = 0  # in the sample; None: known at run time only
+        self._run: list[Item] = []  # values of fixed size for one call of struct
+        self._position: int | None = 0  # in the sample; None if known only at run time
 
     def _emit(self, line: str) -> None:
         self._lines.append(" " * self._indent + line)
 
     def _name(self, value: object) -> str:
-        """A name by which the code finds a value."""
+        """Add a value to the globals of the code; return its name."""
         name = f"g{len(self._names)}"
         self._names[name] = value
         return name
 
     def _variable(self) -> str:
-        """A name that no other variable of the code has."""
+        """A new name for a variable of the code."""
         self._variables += 1
         return f"v{self._variables}"
 

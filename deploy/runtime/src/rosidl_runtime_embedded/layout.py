@@ -1,8 +1,8 @@
-"""How values lie in XCDR1: sizes, alignment, and the ``struct`` formats of runs of values.
+"""The layout of values in XCDR1: sizes, alignment, and the ``struct`` formats of runs of values.
 
 Source: DDS-XTypes 1.3, 7.4.1 (plain CDR, version 1). A sample begins with a header of 4 bytes; alignment
-counts from behind it. All samples of ROS 2 Jazzy are little endian on the machines that Cyclone DDS is
-distributed for.
+counts from its end. ROS 2 Jazzy sends little-endian samples on all machines for which Cyclone DDS is
+distributed.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ if TYPE_CHECKING:
 
 HEADER_SIZE = 4
 LITTLE_ENDIAN_CDR = 0x0100
-"""First two bytes of the header, 00 01, as a little-endian number. The other two mean nothing here."""
+"""The first two bytes of the header, 00 01, as a little-endian number. The other two are ignored."""
 
 CODES = {**ARRAY_CODES, "boolean": "?", "octet": "c"}
 """Codes of ``struct`` by IDL primitive."""
 SIZES = {base: Struct(f"={code}").size for base, code in CODES.items()}
-"""Bytes of an IDL primitive; it is aligned to as many."""
+"""Size of an IDL primitive [bytes], which is also its alignment."""
 
 
 class Item(NamedTuple):
@@ -34,11 +34,11 @@ class Item(NamedTuple):
     size: int
     alignment: int = 1
     value: str = ""
-    """Python expression of the value to write, or name that gets the value read; none for padding."""
+    """Python expression of the value to write, or name for the value to read; empty for padding."""
 
 
 def run_format(run: list[Item], position: int) -> tuple[str, int]:
-    """``struct`` format of a run that begins at a position (header included), and the position behind it."""
+    """``struct`` format of a run that begins at a position (header included), and the position of its end."""
     parts = ["<"]
     for item in run:
         padding = (HEADER_SIZE - position) % item.alignment
@@ -50,12 +50,12 @@ def run_format(run: list[Item], position: int) -> tuple[str, int]:
 
 
 def run_alignment(run: list[Item]) -> int:
-    """Greatest alignment in a run: at positions that are equal modulo this, a run has the same format."""
+    """Greatest alignment in a run; the format of the run depends on its position modulo this."""
     return max(item.alignment for item in run)
 
 
 def smallest_size(definition: MessageDefinition) -> int:
-    """Fewest bytes that a message takes on the wire, without padding."""
+    """Minimum size of a message on the wire without padding [bytes]."""
     return sum(_smallest_field(field) for field in definition.members)
 
 

@@ -1,4 +1,4 @@
-"""Message classes, in the shape that ``rosidl_generator_py`` of Jazzy gives them."""
+"""Message classes with the interface of those that Jazzy's ``rosidl_generator_py`` generates."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ if TYPE_CHECKING:
     from .definition import Field, MessageDefinition
 
 _CHECK_FIELDS = os.environ.get("ROS_PYTHON_CHECK_FIELDS") == "1"
-"""Whether messages check what they are assigned if their constructors are not told."""
+"""Whether messages check assigned values by default."""
 _FLAG = "_check_fields_"
-"""The slot of what their constructors are told. No field's name ends with an underscore."""
+"""The slot for ``check_fields`` of the constructor. No field name ends with an underscore."""
 
 
 class _OnFirstUse:
-    """A member of a message class that is made when it is first asked for.
+    """A member of a message class that is made on its first use.
 
-    A process imports many types and uses few: compiling the code of one takes as long as a hundred uses.
+    A process imports many types and uses few; compiling the code of one takes as long as a hundred uses.
     """
 
     def __init__(self, make: Callable[[type[Message]], Any]) -> None:
@@ -45,22 +45,22 @@ class _OnFirstUse:
 
 
 def _message_class(cls: type[Message]) -> type[Message]:
-    """The class that was made for a definition: the class itself, or the one that a user derived it from."""
+    """The class that was made for a definition: the class itself, or the base of a user's class."""
     return next(base for base in cls.__mro__ if "_DEFINITION" in vars(base))
 
 
 @cache
 def _check_assignments(cls: type[Message]) -> None:
-    """Let messages of the class check what they are assigned, those that are to.
+    """Give the class properties that check assigned values if the message has ``check_fields``.
 
-    Fields are plain slots until the first message of the class is to check: so the others pay nothing for it.
+    Until then, fields are plain slots, so messages that check nothing stay fast.
     """
     for field in cls._DEFINITION.fields:
         setattr(cls, field.name, _checked(getattr(cls, field.name), cls._TYPE_NAME, field))
 
 
 def _checked(unchecked: Any, type_name: str, field: Field) -> property:
-    """The property of a field that checks values for messages that check fields."""
+    """Property of a field that checks values if its message checks fields."""
 
     def set_checked(self: object, value: object) -> None:
         if not getattr(self, _FLAG, _CHECK_FIELDS):
@@ -76,8 +76,8 @@ def _checked(unchecked: Any, type_name: str, field: Field) -> property:
 
 
 def _make_constructor(cls: type[Message]) -> Callable[..., None]:
-    """Compile ``__init__``: a keyword for each field, with the field's initial value as default."""
-    # no field begins with an underscore: so the names of fields hide none of these
+    """Compile ``__init__`` with a keyword for each field, whose default is the initial value of the field."""
+    # no field name begins with an underscore, so no field hides one of these
     names: dict[str, Any] = {
         "_unset": object(),
         "_default": _CHECK_FIELDS,
@@ -94,7 +94,7 @@ def _make_constructor(cls: type[Message]) -> Callable[..., None]:
         if is_factory:
             given = name
             if is_numeric(field):
-                # as in rclpy: converted before it could be checked
+                # as in rclpy, converted before the check
                 given = f"_convert_{name}({name})"
                 names[f"_convert_{name}"] = converter(cls._TYPE_NAME, field)
             parameters.append(f"{name}=_unset")
@@ -136,10 +136,10 @@ def _make_slot_types(cls: type[Message]) -> tuple[AbstractType, ...]:
 class Message:
     """Base of all message classes.
 
-    As in rclpy of Jazzy by default, fields are checked when a message is serialized: at publish. Arrays
-    and sequences of numbers are checked when they are assigned, since they are converted then. A message
-    made with ``check_fields=True``, or with ROS_PYTHON_CHECK_FIELDS=1 in the environment, checks all fields
-    when they are assigned: what is wrong is an AssertionError.
+    By default, as in rclpy of Jazzy, serialization checks the fields, that is, publishing does. The
+    assignment of an array or sequence of numbers converts and checks it. A message with
+    ``check_fields=True``, or with ROS_PYTHON_CHECK_FIELDS=1 in the environment, checks every assignment and
+    raises AssertionError.
     """
 
     __slots__ = ()
@@ -162,7 +162,7 @@ class Message:
 
         @classmethod
         def _deserialize(cls, data: bytes) -> Self:
-            """Message from little-endian XCDR1 with its header. Raises ValueError for anything else."""
+            """Message from little-endian XCDR1 with its header. Raises ValueError for other bytes."""
     else:
 
         def __init__(self, /, *args, **fields):
@@ -177,7 +177,7 @@ class Message:
 
     @property
     def _check_fields(self) -> bool:
-        """Whether this message checks what it is assigned."""
+        """Whether this message checks assigned values."""
         return bool(getattr(self, _FLAG, _CHECK_FIELDS))
 
     @_check_fields.setter
@@ -189,11 +189,11 @@ class Message:
 
     @classmethod
     def get_fields_and_field_types(cls) -> dict[str, str]:
-        """Names of the fields and of their types, in order."""
+        """Names of the fields and their types, in order."""
         return dict(cls._fields_and_field_types)
 
     def __repr__(self) -> str:
-        """Text as rclpy's: an ``array.array`` looks like a list."""
+        """The text of rclpy, where an ``array.array`` looks like a list."""
         values = ((name, getattr(self, name)) for name in self._fields_and_field_types)
         fields = (
             f"{name}={value.tolist() if isinstance(value, array) else value!r}" for name, value in values
@@ -201,7 +201,7 @@ class Message:
         return f"{self.__module__}.{type(self).__name__}({', '.join(fields)})"
 
     def __eq__(self, other: object) -> bool:
-        """Whether both are of one type and have equal fields."""
+        """Whether both have the same type and equal fields."""
         if not isinstance(other, self.__class__):
             return False
         for name in self._fields_and_field_types:
@@ -217,9 +217,9 @@ _classes: dict[str, type[Message]] = {}
 
 
 def message_class(name: str) -> type[Message]:
-    """Class of a message or a service's part by full name. Raises LookupError or InvalidDefinition."""
+    """Class of a message or of a service's part by full name. Raises LookupError or InvalidDefinition."""
     if name not in _classes:
-        # setdefault: of two threads that get here at once, both must see one class
+        # setdefault: two threads that get here at once must see the same class
         _classes.setdefault(name, _make_message_class(message_definition(name)))
     return _classes[name]
 
@@ -245,11 +245,11 @@ def _make_message_class(definition: MessageDefinition) -> type[Message]:
     for constant in definition.constants:
         namespace[constant.name] = python_value(constant.type, constant.value)
     cls = type(name, (Message,), namespace)
-    # Whoever walks the slots is to find those of rclpy; ours are the fields as such: no property is as fast.
+    # __slots__ lists the names of rclpy. The real slots have the names of the fields, faster than a property.
     slots = []
     for field in definition.fields:
         slot = f"_{field.name}"
-        if slot in vars(Message) or slot in namespace:  # messages need it themselves
+        if slot in vars(Message) or slot in namespace:  # the name of a member of Message
             slot = field.name
         else:
             setattr(cls, slot, vars(cls)[field.name])

@@ -1,4 +1,4 @@
-"""Message packages as importable modules."""
+"""Makes message packages importable as modules."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def _snake_case(name: str) -> str:
 
 
 def interfaces(module_name: str) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
-    """``__getattr__`` and ``__dir__`` of a module ``<package>.msg`` or ``<package>.srv``."""
+    """The functions ``__getattr__`` and ``__dir__`` of a module ``<package>.msg`` or ``<package>.srv``."""
     package, kind = module_name.split(".")
 
     def names() -> list[str]:
@@ -49,7 +49,7 @@ def interfaces(module_name: str) -> tuple[Callable[[str], Any], Callable[[], lis
 
 
 class NoActions(ImportError, NotImplementedError):
-    """Actions are not there; who can do without them expects an ImportError."""
+    """The runtime has no actions. An ImportError, so code may fall back on doing without them."""
 
 
 class _UserPackages:
@@ -58,10 +58,10 @@ class _UserPackages:
     def find_spec(
         self, name: str, path: Sequence[str] | None = None, target: ModuleType | None = None
     ) -> ModuleSpec | None:
-        """Spec of ``<package>``, ``<package>.msg`` and the like, if Python has at most a directory for it.
+        """Spec of ``<package>``, ``<package>.msg`` and so on, unless Python finds more than a directory.
 
-        Also of ``<package>.msg._pose``, in which ROS 2 has the class Pose: editors import it from there.
-        What else it has is passed on: to find that twice would make every import slower.
+        Also of ``<package>.msg._pose``, the module of the class Pose in ROS 2, from which editors import it.
+        A spec that Python finds is returned, because a second search would slow every import down.
         """
         package, _, kind = name.partition(".")
         kind, _, module = kind.partition(".")
@@ -81,19 +81,19 @@ class _UserPackages:
         """Leave the creation to the import system."""
 
     def exec_module(self, module: ModuleType) -> None:
-        """Give the module its classes."""
+        """Let the module provide its classes."""
         if module.__name__.endswith(".action"):
             raise NoActions(f"{module.__name__}: the embedded runtime has no actions")
         if "." in module.__name__:
-            of = ".".join(module.__name__.split(".")[:2])
-            vars(module)["__getattr__"], vars(module)["__dir__"] = interfaces(of)
+            parent = ".".join(module.__name__.split(".")[:2])
+            vars(module)["__getattr__"], vars(module)["__dir__"] = interfaces(parent)
 
 
 def install() -> None:
-    """Make the packages in AMENT_PREFIX_PATH importable, after all that Python finds but mere directories.
+    """Make the packages in AMENT_PREFIX_PATH importable, unless Python finds a module of that name.
 
-    Python's own finder comes later: to it, any directory of a package's name, as that of its sources, is the
-    package.
+    This finder goes before Python's, which would take any directory with the name of the package, such as
+    that of its sources, for the package.
     """
     if not any(isinstance(finder, _UserPackages) for finder in sys.meta_path):
         finders: list[object] = [*sys.meta_path, PathFinder]

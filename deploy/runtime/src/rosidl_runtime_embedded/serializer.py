@@ -1,9 +1,9 @@
-"""Code that writes a message type as little-endian XCDR1, made and compiled per type.
+"""Generates the functions that write messages as little-endian XCDR1, one for each type.
 
-The generated function reads every field once, checks types on the way, and packs each run of values of fixed
-size with one ``struct`` call. Behind a string or a sequence the padding within a run depends on where it
-begins: such a run has a table of packers, indexed by the position modulo its alignment. What looks wrong is
-left to :mod:`.validation`, which knows the reason.
+A generated function reads every field once, checks its type, and packs each run of values of fixed size
+with one ``struct`` call. After a string or a sequence, the padding within a run depends on its position:
+such a run has a table of packers, indexed by the position modulo its alignment. If a check fails,
+:mod:`.validation` decides and finds the reason.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ _NUL = Item("x", 1)
 def make_serializer(
     definition: MessageDefinition, message_class: Callable[[str], type]
 ) -> Callable[[Any], bytes]:
-    """Function from a message to its bytes; raises TypeError or ValueError naming type, field and value."""
+    """Function from a message to bytes. It raises TypeError or ValueError with type, field and value."""
     return _SerializerGenerator(definition, message_class).compile()
 
 
@@ -47,7 +47,7 @@ class _SerializerGenerator(Generator):
         super().__init__(
             definition, message_class, array=array, elements=elements, validate=validate, error=struct_error
         )
-        self._checks: list[str] = []  # what must not be true of the values in the run
+        self._checks: list[str] = []  # conditions that must be false for the values in the run
 
     def compile(self) -> Callable[[Any], bytes]:
         self._checks.append("type(m) is not cls")
@@ -55,7 +55,7 @@ class _SerializerGenerator(Generator):
         self._message("m", self._definition)
         self._flush()
         has_loop = any(line.lstrip().startswith("for ") for line in self._lines)
-        # a bytearray grows in place, bytes are faster while there are few parts
+        # a bytearray grows in place; bytes are faster for few parts
         first = next(number for number, line in enumerate(self._lines) if "out = " in line)
         if has_loop:
             self._lines[first] = self._lines[first].replace("out = ", "out = bytearray(") + ")"
@@ -105,7 +105,7 @@ class _SerializerGenerator(Generator):
             self._append(data)
             self._run.append(_NUL)
         elif type_.base == "wstring":
-            # Jazzy sends UTF-16 code units in 4 bytes each, and no terminator
+            # Jazzy sends UTF-16 code units in 4 bytes each, without a terminator
             data = self._variable()
             self._emit(f"{data} = array('I', array('H', {value}.encode('utf-16-le')))")
             self._run.append(Item("I", 4, 4, f"len({data})"))
@@ -148,17 +148,17 @@ class _SerializerGenerator(Generator):
         self._indent -= 1
 
     def _append(self, data: str) -> None:
-        """Append bytes whose number is known at run time only."""
+        """Append bytes whose number is known only at run time."""
         self._flush()
         self._emit(f"out += {data}")
         self._position = None
 
     def _flush(self) -> None:
-        """Check and write the values gathered so far."""
+        """Emit code that checks and writes the collected values."""
         if self._checks:
             wrong = " or ".join(self._checks)
             if self._indent > 2:
-                # in a loop: once for all the values that are of their types, but not exactly
+                # in a loop, validate only once: values of subclasses are valid, but fail the quick check
                 self._emit(f"if ({wrong}) and not valid: validate(m, cls); valid = True")
             else:
                 self._emit(f"if {wrong}: validate(m, cls)")

@@ -1,4 +1,4 @@
-"""Service classes, in the shape that ``rosidl_generator_py`` of Jazzy gives them."""
+"""Service classes with the interface of those that Jazzy's ``rosidl_generator_py`` generates."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Types of a message's fields as ``rosidl_parser`` describes them: ``SLOT_TYPES`` of its class."""
+"""The types in ``SLOT_TYPES`` of a message class, as ``rosidl_parser`` describes them."""
 
 from __future__ import annotations
 

@@ -21,12 +21,13 @@ def type_description(name: str) -> Message:
 
 
 def type_sources(description: Any) -> list[Message]:
-    """``type_description_interfaces/msg/TypeSource`` of what a ``TypeDescription`` describes, in its order.
+    """``type_description_interfaces/msg/TypeSource`` of every type in a ``TypeDescription``, in its order.
 
-    A service's parts have no definition of their own: theirs is empty, its encoding ``implicit`` (as in rcl).
+    The parts of a service have no definition file: their source is empty, with the encoding ``implicit``, as
+    in rcl.
     """
     individual = [description.type_description, *description.referenced_type_descriptions]
-    return [_to_message("TypeSource", _source(one.type_name)) for one in individual]
+    return [_to_message("TypeSource", _source(each.type_name)) for each in individual]
 
 
 def _source(name: str) -> dict[str, str]:

@@ -1,4 +1,4 @@
-"""RIHS01 type hashes, and the type descriptions that they are made from (REP 2011, REP 2016)."""
+"""RIHS01 type hashes and the type descriptions that they hash (REP 2011, REP 2016)."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ _NESTED, _BOUNDED_TEXT, _ARRAY, _BOUNDED_SEQUENCE, _SEQUENCE = 1, 4, 48, 96, 144
 
 
 def is_part(name: str) -> bool:
-    """Whether a full name is that of a service's request, response or event."""
+    """Whether a full name is the name of a service's request, response or event."""
     return "/srv/" in name and name.rpartition("_")[2] in SERVICE_PARTS
 
 
 def _individual(name: str) -> MessageDefinition:
-    """A type as a struct; that of a service has its three messages as members."""
+    """The type as a struct; a service is a struct of its three messages."""
     if "/srv/" not in name or is_part(name):
         return message_definition(name)
     service = service_definition(name)
@@ -73,7 +73,7 @@ def _individual_description(name: str) -> dict[str, Any]:
 
 
 def describe(name: str) -> tuple[dict[str, Any], list[dict[str, Any]]]:
-    """Description of a type, and those of all types in it, sorted by name."""
+    """The descriptions of a type and of all types in it, the latter sorted by name."""
     found: dict[str, dict[str, Any]] = {}
     waiting = [name]
     while waiting:
@@ -87,7 +87,7 @@ def describe(name: str) -> tuple[dict[str, Any], list[dict[str, Any]]]:
 
 
 def type_hash(name: str) -> str:
-    """RIHS01 hash of a message or service by full name: SHA-256 of its description in JSON, no defaults."""
+    """RIHS01 hash of a message or service: SHA-256 of its description in JSON without default values."""
     description, referenced = describe(name)
     for struct in (description, *referenced):
         for field in struct["fields"]:

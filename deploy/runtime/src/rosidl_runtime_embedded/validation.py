@@ -1,4 +1,4 @@
-"""Why a message cannot be serialized, or a field not be assigned a value: the slow, exact checks."""
+"""The slow, exact checks of messages and of assigned values, with the reason of a failure."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ if TYPE_CHECKING:
 
 
 def validate(message: object, cls: Any) -> None:
-    """Raise TypeError or ValueError, naming type, field and value, if it is no valid message of a class."""
+    """Raise TypeError or ValueError with type, field and value if a message is not valid for its class."""
     if not isinstance(message, cls):
-        raise TypeError(f"a {cls._TYPE_NAME} is expected, not {shown(message)}")
+        raise TypeError(f"expected a {cls._TYPE_NAME}, not {shown(message)}")
     _message(message, cls._TYPE_NAME, "")
 
 
 def validate_assignment(value: object, field: Field, top: str) -> None:
-    """Raise TypeError or ValueError if a field may not be assigned the value where fields are checked.
+    """Raise TypeError or ValueError if a message that checks fields must refuse the value.
 
-    A nested message has to be of the right class: its own fields are its own affair.
+    Of a nested message only the class is checked: it checks its fields itself.
     """
     type_ = field.type
     if not type_.is_plural:
@@ -36,7 +36,7 @@ def validate_assignment(value: object, field: Field, top: str) -> None:
 
 
 def _is_array(value: object, type_: FieldType, top: str, where: str) -> bool:
-    """Whether it is what rclpy holds such numbers in, and not to be looked at one by one."""
+    """Whether the value is the array that rclpy uses for these numbers, whose elements need no check."""
     code = ARRAY_CODES[type_.base]
     if type_.array_size:
         import numpy
@@ -55,7 +55,7 @@ def _message(message: Any, top: str, path: str) -> None:
         except AttributeError:
             raise TypeError(f"{top}: field '{where}' is not set") from None
         if is_numeric(field):
-            # the property has converted it, but an array.array can be changed afterwards
+            # the property has converted the value, but an array.array can change later
             if len(value) > field.type.sequence_bound > 0:
                 raise _wrong(ValueError, top, where, field.type, value)
         elif field.type.is_plural:
@@ -71,7 +71,7 @@ def _wrong(
 
 
 def elements(value: Any, base: str) -> list[Any]:
-    """What rclpy publishes of a value as a list of the base type. Raises TypeError if it is no such thing."""
+    """The list that rclpy publishes for a value. Raises TypeError if the value is not a list of any kind."""
     if getattr(value, "ndim", 0) == 1:  # a NumPy array or the like
         value = value.tobytes() if base == "octet" and value.itemsize == 1 else value.tolist()
     if base == "octet" and isinstance(value, (bytes, bytearray)):
@@ -81,13 +81,13 @@ def elements(value: Any, base: str) -> list[Any]:
 
 def _as_list(value: Any) -> list[Any]:
     if not isinstance(value, (Sequence, Set, UserList)) or isinstance(value, (str, UserString)):
-        raise TypeError("it is no list")
+        raise TypeError("it is not a list")
     return list(value)
 
 
 def _list(given: Any, type_: FieldType, top: str, where: str, nested: bool = True) -> None:
     try:
-        # rclpy is more particular about what is assigned than about what is published
+        # rclpy is stricter in assignments than in publishing
         value = elements(given, type_.base) if nested else _as_list(given)
     except TypeError as error:
         raise _wrong(TypeError, top, where, type_, given, str(error)) from None
@@ -125,7 +125,7 @@ def _single(value: Any, type_: FieldType, top: str, where: str, nested: bool = T
                 raise _wrong(ValueError, top, where, type_, value, "it is out of range") from None
     else:
         if not isinstance(value, int):
-            # rclpy publishes whatever is an integer, such as NumPy's; only a check of fields refuses it.
+            # rclpy publishes any integer type, such as NumPy's; only the check of fields refuses it.
             if not nested or not hasattr(value, "__index__"):
                 raise _wrong(TypeError, top, where, type_, value)
             value = index(value)

@@ -1,4 +1,4 @@
-"""What sensor_msgs_py had of its own before NumPy did."""
+"""Functions that sensor_msgs_py offered before NumPy did."""
 
 from numpy.lib.recfunctions import structured_to_unstructured, unstructured_to_structured
 

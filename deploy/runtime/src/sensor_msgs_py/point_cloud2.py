@@ -1,6 +1,6 @@
-"""Point clouds as NumPy arrays: reads and makes sensor_msgs/msg/PointCloud2.
+"""Point clouds as NumPy arrays: reads and creates sensor_msgs/msg/PointCloud2.
 
-A mistake of the caller is an AssertionError, as in common_interfaces.
+Wrong arguments raise AssertionError, as in common_interfaces.
 """
 
 from __future__ import annotations
@@ -37,22 +37,22 @@ def dtype_from_fields(fields: Iterable[PointField], point_step: int | None = Non
     """
     Return the type of a point with these fields, in this machine's byte order.
 
-    A field without a name becomes ``unnamed_field_<number>``; one of several elements becomes a field for
-    each, ``<name>_0`` and so on.
+    A field without a name becomes ``unnamed_field_<number>``. A field of several elements becomes several
+    fields, ``<name>_0`` and so on.
 
-    :param point_step: size of a point [bytes]; by default it ends with its last field.
+    :param point_step: size of a point [bytes]; by default, a point ends with its last field.
     """
     names: list[str] = []
     formats: list[str] = []
     offsets: list[int] = []
     for number, field in enumerate(fields):
         assert field.count > 0, f"field '{field.name}' has no elements (count=0)"
-        assert field.datatype in _TYPES, f"field '{field.name}' is of no known type: {field.datatype}"
+        assert field.datatype in _TYPES, f"field '{field.name}' has an unknown type: {field.datatype}"
         name, format_ = field.name or f"{DUMMY_FIELD_PREFIX}_{number}", np.dtype(_TYPES[field.datatype])
         names += [f"{name}_{element}" for element in range(field.count)] if field.count > 1 else [name]
         formats += [format_.str] * field.count
         offsets += [field.offset + element * format_.itemsize for element in range(field.count)]
-    assert len(set(names)) == len(names), f"fields of the same name: {', '.join(names)}"
+    assert len(set(names)) == len(names), f"several fields have the same name: {', '.join(names)}"
     layout: Any = {"names": names, "formats": formats, "offsets": offsets}
     if point_step is not None:
         layout["itemsize"] = point_step
@@ -68,15 +68,15 @@ def read_points(
     reshape_organized_cloud: bool = False,
 ) -> NDArray[Any]:
     """
-    Return the points as a structured array, which shares the memory of the message where it can.
+    Return the points as a structured array, which shares the memory of the message if possible.
 
     :param field_names: the fields to read, by default all.
-    :param skip_nans: whether to leave out points with a NaN in one of these fields; a cloud that calls itself
-        dense has none.
-    :param uvs: the numbers of the points to read, by default all.
+    :param skip_nans: whether to omit points with a NaN in one of these fields; a dense cloud has no such
+        point.
+    :param uvs: the indices of the points to read, by default all.
     :param reshape_organized_cloud: whether a cloud of several rows becomes an array of shape (width, height).
     """
-    assert isinstance(cloud, PointCloud2), f"a PointCloud2 is needed, not {type(cloud).__name__}"
+    assert isinstance(cloud, PointCloud2), f"expected a PointCloud2, not {type(cloud).__name__}"
     native = dtype_from_fields(cloud.fields, cloud.point_step)
     foreign = bool(cloud.is_bigendian) != _BIG_ENDIAN
     type_ = native.newbyteorder() if foreign else native
@@ -104,9 +104,9 @@ def read_points_numpy(
     uvs: Iterable[int] | None = None,
     reshape_organized_cloud: bool = False,
 ) -> NDArray[Any]:
-    """Return fields of one type as a plain array, a row for each point; see :func:`read_points`."""
+    """Return fields of one type as a plain array with a row for each point; see :func:`read_points`."""
     points = read_points(cloud, field_names, skip_nans, uvs, reshape_organized_cloud)
-    assert len(_types(points.dtype)) <= 1, "the fields are of several types: use read_points()"
+    assert len(_types(points.dtype)) <= 1, "the fields have several types: use read_points()"
     return structured_to_unstructured(points)
 
 
@@ -116,7 +116,7 @@ def read_points_list(
     skip_nans: bool = False,
     uvs: Iterable[int] | None = None,
 ) -> list[Any]:
-    """Return the points as named tuples, which is slow; see :func:`read_points`."""
+    """Return the points as named tuples; slower than :func:`read_points`."""
     points = read_points(cloud, field_names, skip_nans, uvs)
     point = namedtuple("Point", points.dtype.names or ())  # type: ignore[misc]  # names of the cloud
     return [point._make(values) for values in points]
@@ -128,21 +128,21 @@ def create_cloud(
     """
     Return a cloud of points.
 
-    :param points: for each point its values, in the order of the fields; or an array with a row for each, or
-        a structured one with the type of :func:`dtype_from_fields`. A second dimension makes it organized:
-        width by height.
-    :param point_step: size of a point [bytes]; by default it ends with its last field.
+    :param points: the values of each point, in the order of the fields; or an array with a row for each
+        point; or a structured array with the type of :func:`dtype_from_fields`. Another dimension makes an
+        organized cloud: width by height.
+    :param point_step: size of a point [bytes]; by default, a point ends with its last field.
     """
     type_ = dtype_from_fields(fields, point_step)
     if not isinstance(points, np.ndarray):
         structured = np.array([tuple(point) for point in points], type_)
     elif points.dtype.names is None:
-        assert len(_types(type_)) <= 1, "the fields are of several types: use a structured array"
+        assert len(_types(type_)) <= 1, "the fields have several types: use a structured array"
         structured = unstructured_to_structured(points, type_)
     else:
-        assert points.dtype == type_, f"points of type {points.dtype} do not fit the fields: {type_}"
+        assert points.dtype == type_, f"points of type {points.dtype} do not fit the fields of type {type_}"
         structured = points
-    assert structured.ndim <= 2, f"points in {structured.ndim} dimensions: a cloud has rows at most"
+    assert structured.ndim <= 2, f"the points have {structured.ndim} dimensions: a cloud has at most 2"
     width, height = (*structured.shape, 1)[:2]
     return PointCloud2(
         header=header,
@@ -158,7 +158,7 @@ def create_cloud(
 
 
 def create_cloud_xyz32(header: Header, points: Iterable[Any]) -> PointCloud2:
-    """Return a cloud of points with the fields x, y and z of 32 bits; see :func:`create_cloud`."""
+    """Return a cloud of points with the 32-bit fields x, y and z; see :func:`create_cloud`."""
     fields = [
         PointField(name=name, offset=4 * number, datatype=PointField.FLOAT32, count=1)
         for number, name in enumerate("xyz")

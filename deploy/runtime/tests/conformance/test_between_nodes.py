@@ -1,4 +1,4 @@
-"""Parameters, logs and QoS overrides between real nodes, by nothing but rclpy's public names."""
+"""Parameters, QoS overrides and logs between real nodes, through rclpy's public names."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ Result = Callable[[Future], Any]
 
 @pytest.fixture
 def server(make_node: MakeNode, executor: SingleThreadedExecutor) -> Node:
-    """A node with parameters of which some cannot be set, or not to everything."""
+    """A node with parameters; some are read-only, some have ranges."""
     node = make_node("server", namespace="/arm")
     executor.add_node(node)
     speed = ParameterDescriptor(
@@ -59,7 +59,7 @@ def server(make_node: MakeNode, executor: SingleThreadedExecutor) -> Node:
 
 @pytest.fixture
 def asking(make_node: MakeNode, executor: SingleThreadedExecutor) -> Node:
-    """The node from which the tests look at the server."""
+    """The node from which the tests observe the server."""
     node = make_node("asking", namespace="/arm")
     executor.add_node(node)
     return node
@@ -75,7 +75,7 @@ def client(server: Node, asking: Node, spin_until: SpinUntil) -> AsyncParameterC
 
 @pytest.fixture
 def result(spin_until: SpinUntil) -> Result:
-    """Waits for what a call returns."""
+    """Waits for the result of a call."""
 
     def wait(future: Future) -> Any:
         spin_until(future.done)
@@ -86,7 +86,7 @@ def result(spin_until: SpinUntil) -> Result:
 
 @pytest.fixture
 def events(client: AsyncParameterClient, spin_until: SpinUntil) -> list[ParameterEvent]:
-    """What the server tells of its parameters on ``/parameter_events`` from now on."""
+    """The server's messages on ``/parameter_events`` from now on."""
     heard: list[ParameterEvent] = []
 
     def hear(event: ParameterEvent) -> None:
@@ -98,8 +98,8 @@ def events(client: AsyncParameterClient, spin_until: SpinUntil) -> list[Paramete
     return heard
 
 
-def brief(event: ParameterEvent) -> tuple[dict[str, object], dict[str, object], set[str]]:
-    """New and changed parameters with their values, and the names of those that are gone."""
+def summary(event: ParameterEvent) -> tuple[dict[str, object], dict[str, object], set[str]]:
+    """New and changed parameters with their values, and the names of deleted ones."""
     new, changed, gone = (
         {message.name: Parameter.from_parameter_msg(message).value for message in messages}
         for messages in (event.new_parameters, event.changed_parameters, event.deleted_parameters)
@@ -110,7 +110,7 @@ def brief(event: ParameterEvent) -> tuple[dict[str, object], dict[str, object], 
 # Parameter services
 
 
-def test_names_are_listed_below_a_prefix_and_to_a_depth(client: AsyncParameterClient, result: Result) -> None:
+def test_names_are_listed_by_prefix_and_depth(client: AsyncParameterClient, result: Result) -> None:
     listed = result(client.list_parameters()).result
     assert {"speed", "serial", "joint.count", "joint.left.name"} <= set(listed.names)
     assert {"joint", "joint.left"} <= set(listed.prefixes)
@@ -118,7 +118,7 @@ def test_names_are_listed_below_a_prefix_and_to_a_depth(client: AsyncParameterCl
     assert list(result(client.list_parameters(["joint"], depth=1)).result.names) == ["joint.count"]
 
 
-def test_values_types_and_descriptors_are_got(client: AsyncParameterClient, result: Result) -> None:
+def test_values_types_and_descriptors_are_read(client: AsyncParameterClient, result: Result) -> None:
     speed, serial, count = result(client.get_parameters(["speed", "serial", "joint.count"])).values
     assert (speed.double_value, serial.string_value, count.integer_value) == (0.5, "A7", 3)
     types = result(client.get_parameter_types(["speed", "serial"])).types
@@ -129,14 +129,14 @@ def test_values_types_and_descriptors_are_got(client: AsyncParameterClient, resu
     assert (speed.read_only, serial.read_only) == (False, True)
 
 
-def test_what_is_not_declared_has_no_value_and_no_descriptor(
+def test_an_undeclared_parameter_has_no_value_and_no_descriptor(
     client: AsyncParameterClient, result: Result
 ) -> None:
     assert list(result(client.get_parameters(["missing"])).values) == []
     assert list(result(client.describe_parameters(["missing"])).descriptors) == []
 
 
-def test_each_parameter_is_set_or_refused_for_itself_with_the_reason(
+def test_each_parameter_is_set_or_refused_with_a_reason(
     server: Node, client: AsyncParameterClient, result: Result
 ) -> None:
     def even(parameters: list[Parameter]) -> SetParametersResult:
@@ -154,8 +154,8 @@ def test_each_parameter_is_set_or_refused_for_itself_with_the_reason(
         Parameter("missing", value=1),
     ]
     results = result(client.set_parameters(wanted)).results
-    assert [one.successful for one in results] == [True, False, False, False, False, True, False]
-    reasons = [one.reason for one in results]
+    assert [answer.successful for answer in results] == [True, False, False, False, False, True, False]
+    reasons = [answer.reason for answer in results]
     assert reasons[0] == reasons[5] == ""
     for reason, fragments in (
         (reasons[1], ("speed", "2.5", "2.0")),
@@ -185,7 +185,7 @@ def test_parameters_are_set_together_or_not_at_all(
 def test_only_a_dynamically_typed_parameter_can_be_deleted(
     server: Node, client: AsyncParameterClient, result: Result
 ) -> None:
-    assert [one.successful for one in result(client.delete_parameters(["note", "speed"])).results] == [
+    assert [answer.successful for answer in result(client.delete_parameters(["note", "speed"])).results] == [
         True,
         False,
     ]
@@ -196,7 +196,7 @@ def test_a_file_is_loaded(server: Node, client: AsyncParameterClient, result: Re
     path = tmp_path / "parameters.yaml"
     path.write_text("/arm/server:\n  ros__parameters:\n    speed: 1.25\n    joint:\n      count: 6\n")
     results = result(client.load_parameter_file(str(path))).results
-    assert [one.successful for one in results] == [True, True]
+    assert [answer.successful for answer in results] == [True, True]
     assert [server.get_parameter(name).value for name in ("speed", "joint.count")] == [1.25, 6]
 
 
@@ -208,7 +208,7 @@ def test_a_callback_gets_the_future_of_its_call(client: AsyncParameterClient, sp
     assert future.result().values[0].double_value == 0.5
 
 
-def test_a_server_that_is_not_there_is_not_ready_until_it_comes(
+def test_a_client_is_not_ready_before_its_server_exists(
     asking: Node, make_node: MakeNode, executor: SingleThreadedExecutor, result: Result
 ) -> None:
     client = AsyncParameterClient(asking, "/late")
@@ -220,13 +220,13 @@ def test_a_server_that_is_not_there_is_not_ready_until_it_comes(
     executor.add_node(late)
     assert client.wait_for_services(timeout_sec=10.0)
     assert result(client.get_parameters(["speed"])).values[0].double_value == 3.0
-    assert not call.done()  # a request is not kept for servers to come
+    assert not call.done()  # a request is not kept for later servers
 
 
 # /parameter_events
 
 
-def test_what_becomes_of_parameters_is_told_to_all(
+def test_every_change_is_published_as_a_parameter_event(
     server: Node, client: AsyncParameterClient, events: list[ParameterEvent], spin_until: SpinUntil
 ) -> None:
     before = server.get_clock().now()
@@ -236,17 +236,17 @@ def test_what_becomes_of_parameters_is_told_to_all(
     server.set_parameters([Parameter("joint.count", value=4)])
     client.delete_parameters(["note"])
     spin_until(lambda: len(events) == 4)
-    told = [brief(event) for event in events]
-    assert told[0] == ({}, {"speed": 1.5}, set())
-    assert told[1] == ({"extra": "x"}, {}, set())
-    assert told[2] == ({}, {"joint.count": 4}, set())
-    assert told[3] == ({}, {}, {"note"})
+    summaries = [summary(event) for event in events]
+    assert summaries[0] == ({}, {"speed": 1.5}, set())
+    assert summaries[1] == ({"extra": "x"}, {}, set())
+    assert summaries[2] == ({}, {"joint.count": 4}, set())
+    assert summaries[3] == ({}, {}, {"note"})
     for event in events:
         stamp = event.stamp.sec * 10**9 + event.stamp.nanosec
         assert before.nanoseconds <= stamp <= server.get_clock().now().nanoseconds
 
 
-def test_what_is_refused_is_told_to_nobody(
+def test_a_refused_change_is_not_published(
     client: AsyncParameterClient, events: list[ParameterEvent], result: Result, spin_until: SpinUntil
 ) -> None:
     result(client.set_parameters([Parameter("speed", value=-1.0), Parameter("serial", value="B8")]))
@@ -254,10 +254,10 @@ def test_what_is_refused_is_told_to_nobody(
         client.set_parameters_atomically([Parameter("speed", value=1.0), Parameter("joint.count", value=4)])
     )
     spin_until(lambda: events)
-    assert [brief(event) for event in events] == [({}, {"speed": 1.0, "joint.count": 4}, set())]
+    assert [summary(event) for event in events] == [({}, {"speed": 1.0, "joint.count": 4}, set())]
 
 
-def test_callbacks_hear_of_their_parameter_and_of_all_events(
+def test_callbacks_get_their_parameter_or_all_events(
     server: Node, asking: Node, spin_until: SpinUntil
 ) -> None:
     handler = ParameterEventHandler(asking)
@@ -268,7 +268,7 @@ def test_callbacks_hear_of_their_parameter_and_of_all_events(
 
     handler.add_parameter_callback("speed", "/arm/server", note("absolute"))
     handle = handler.add_parameter_callback("speed", "server", note("relative"))
-    handler.add_parameter_callback("speed", "", note("my own"))
+    handler.add_parameter_callback("speed", "", note("same node"))
     handler.add_parameter_event_callback(lambda event: heard.append(("event", event.node)))
     spin_until(lambda: handler.parameter_event_subscription.get_publisher_count() == 2)
     server.set_parameters([Parameter("speed", value=1.5)])
@@ -286,7 +286,7 @@ def test_callbacks_hear_of_their_parameter_and_of_all_events(
         ("event", "/arm/asking"),
         ("event", "/arm/server"),
         ("event", "/arm/server"),
-        ("my own", 9.0),
+        ("same node", 9.0),
     ]
     handler.destroy()
 
@@ -303,14 +303,16 @@ def overridden(**policies: object) -> list[Parameter]:
     ]
 
 
-def effective_qos(asked: Callable[[str], list[TopicEndpointInfo]], spin_until: SpinUntil) -> QoSProfile:
+def effective_qos(
+    endpoints_of: Callable[[str], list[TopicEndpointInfo]], spin_until: SpinUntil
+) -> QoSProfile:
     """The QoS of the only publisher or subscription of ``x``, once it is discovered."""
-    spin_until(lambda: asked("x"))
-    (info,) = asked("x")
+    spin_until(lambda: endpoints_of("x"))
+    (info,) = endpoints_of("x")
     return info.qos_profile
 
 
-def test_parameters_override_the_qos_that_others_see(
+def test_parameters_override_the_qos_of_the_endpoints(
     make_node: MakeNode, asking: Node, spin_until: SpinUntil
 ) -> None:
     overrides = overridden(
@@ -324,14 +326,14 @@ def test_parameters_override_the_qos_that_others_see(
     node.create_subscription(
         Float64, "x", lambda message: None, QoSProfile(depth=1), qos_overriding_options=options
     )
-    for asked in (asking.get_publishers_info_by_topic, asking.get_subscriptions_info_by_topic):
-        qos = effective_qos(asked, spin_until)
+    for endpoints_of in (asking.get_publishers_info_by_topic, asking.get_subscriptions_info_by_topic):
+        qos = effective_qos(endpoints_of, spin_until)
         assert (qos.history, qos.depth) == (HistoryPolicy.KEEP_LAST, 7)
         assert qos.reliability == ReliabilityPolicy.BEST_EFFORT
         assert qos.durability == DurabilityPolicy.TRANSIENT_LOCAL
 
 
-def test_only_the_policies_that_were_opened_are_overridden(
+def test_only_policies_declared_overridable_are_overridden(
     make_node: MakeNode, asking: Node, spin_until: SpinUntil
 ) -> None:
     overrides = overridden(
@@ -367,7 +369,7 @@ def test_only_the_policies_that_were_opened_are_overridden(
     assert subscription.liveliness_lease_duration == Duration(seconds=2)
 
 
-def test_an_identifier_and_a_remapped_topic_name_the_parameters(
+def test_parameter_names_contain_the_entity_id_and_the_remapped_topic(
     make_node: MakeNode, asking: Node, spin_until: SpinUntil
 ) -> None:
     arguments = ["-r", "x:=y", "-p", "qos_overrides./arm/y.publisher_left.depth:=9"]
@@ -380,7 +382,7 @@ def test_an_identifier_and_a_remapped_topic_name_the_parameters(
     assert node.get_parameter("qos_overrides./arm/y.publisher_left.depth").value == 9
 
 
-def test_what_the_callback_rejects_is_not_created(make_node: MakeNode, asking: Node) -> None:
+def test_a_profile_that_the_callback_rejects_creates_nothing(make_node: MakeNode, asking: Node) -> None:
     def deep(qos: QoSProfile) -> SetParametersResult:
         return SetParametersResult(successful=qos.depth > 5, reason=f"a depth of {qos.depth} is too little")
 
@@ -394,7 +396,7 @@ def test_what_the_callback_rejects_is_not_created(make_node: MakeNode, asking: N
 # /rosout
 
 
-def test_what_a_node_logs_is_heard_on_rosout(
+def test_log_messages_of_a_node_are_published_on_rosout(
     server: Node, asking: Node, spin_until: SpinUntil, capfd: pytest.CaptureFixture[str]
 ) -> None:
     heard: list[Log] = []
@@ -409,7 +411,7 @@ def test_what_a_node_logs_is_heard_on_rosout(
     assert (warning.name, warning.level, warning.msg) == ("arm.server", 30, "the arm ist müde")
     assert (error.name, error.level, error.msg) == ("arm.server.joint", 40, "it hurts")
     assert Path(warning.file).name == Path(__file__).name
-    assert warning.function == "test_what_a_node_logs_is_heard_on_rosout"
+    assert warning.function == "test_log_messages_of_a_node_are_published_on_rosout"
     assert 0 < warning.line < error.line
     for message in heard:
         stamp = message.stamp.sec * 10**9 + message.stamp.nanosec

@@ -8,10 +8,10 @@ from rclpy.callback_groups import CallbackGroup, MutuallyExclusiveCallbackGroup,
 
 
 class Entity:
-    """Stands for a subscription or timer."""
+    """Stands for a subscription or a timer."""
 
 
-def test_a_group_knows_its_entities_without_keeping_them_alive() -> None:
+def test_a_group_does_not_keep_its_entities_alive() -> None:
     group = ReentrantCallbackGroup()
     entity, other = Entity(), Entity()
     group.add_entity(entity)
@@ -35,13 +35,13 @@ def test_a_mutually_exclusive_group_runs_one_entity_at_a_time() -> None:
     assert group.beginning_execution(second)
 
 
-def test_ending_what_was_not_begun_is_an_error() -> None:
+def test_ending_a_callback_that_never_began_is_an_error() -> None:
     group = MutuallyExclusiveCallbackGroup()
     with pytest.raises(AssertionError):
         group.ending_execution(Entity())
 
 
-def test_a_reentrant_group_always_lets_run() -> None:
+def test_a_reentrant_group_lets_every_entity_run() -> None:
     group = ReentrantCallbackGroup()
     entity = Entity()
     for _ in range(3):
@@ -50,7 +50,7 @@ def test_a_reentrant_group_always_lets_run() -> None:
     group.ending_execution(entity)
 
 
-def test_the_base_class_decides_nothing() -> None:
+def test_the_base_class_implements_no_decision() -> None:
     group, entity = CallbackGroup(), Entity()
     for decide in (group.can_execute, group.beginning_execution, group.ending_execution):
         with pytest.raises(NotImplementedError):

@@ -1,4 +1,4 @@
-"""Contexts, the default one above all: what init and shutdown leave behind."""
+"""Contexts: init, shutdown, shutdown callbacks, logging and signal handlers."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def _fresh_default_context(domain_id: int) -> Iterator[None]:
     rclpy.signals.uninstall_signal_handlers()
 
 
-def test_what_is_to_run_at_shutdown_may_be_said_before_init() -> None:
+def test_a_shutdown_callback_may_be_added_before_init() -> None:
     context = Context()
     called: list[str] = []
     context.on_shutdown(lambda: called.append("shutdown"))
@@ -35,7 +35,7 @@ def test_what_is_to_run_at_shutdown_may_be_said_before_init() -> None:
     assert called == ["shutdown", "late"]
 
 
-def test_a_method_of_a_builtin_may_run_at_shutdown() -> None:
+def test_a_builtin_method_may_be_a_shutdown_callback() -> None:
     context = Context()
     held = threading.Lock()
     held.acquire()
@@ -45,7 +45,7 @@ def test_a_method_of_a_builtin_may_run_at_shutdown() -> None:
     assert not held.locked()
 
 
-def test_a_method_that_is_to_run_at_shutdown_does_not_keep_its_object_alive() -> None:
+def test_a_shutdown_callback_does_not_keep_its_object_alive() -> None:
     class Listener:
         def listen(self) -> None:
             raise AssertionError
@@ -56,7 +56,7 @@ def test_a_method_that_is_to_run_at_shutdown_does_not_keep_its_object_alive() ->
     context.shutdown()
 
 
-def test_the_first_context_says_for_the_whole_process_how_to_log(
+def test_the_first_context_configures_logging_for_the_process(
     monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(rclpy.context, "g_logging_ref_count", 0)
@@ -64,40 +64,40 @@ def test_the_first_context_says_for_the_whole_process_how_to_log(
     try:
         first.init(args=["--ros-args", "--disable-stdout-logs", "--log-level", "error"])
         second.init(args=["--ros-args", "--log-level", "debug"])
-        get_logger("quiet").error("this is not for the console")
+        get_logger("quiet").error("not on the console")
         assert capfd.readouterr().err == ""
         assert get_logger_effective_level("quiet") == LoggingSeverity.ERROR
         first.shutdown()
         second.shutdown()
         third.init(args=["--ros-args", "--log-level", "debug"])
-        get_logger("loud").debug("this is")
-        assert "this is" in capfd.readouterr().err
+        get_logger("loud").debug("on the console")
+        assert "on the console" in capfd.readouterr().err
     finally:
         for context in (first, second, third):
             context.try_shutdown()
         clear_config()
 
 
-def test_init_returns_nothing_that_code_could_come_to_rely_on() -> None:
+def test_init_returns_nothing() -> None:
     assert rclpy.init(args=[]) is None  # type: ignore[func-returns-value]
 
 
-def test_after_try_shutdown_rclpy_can_begin_anew_though_a_signal_had_shut_it_down() -> None:
+def test_after_a_signal_and_try_shutdown_init_works_again() -> None:
     rclpy.init(args=[])
-    get_default_context().shutdown()  # what a signal does
+    get_default_context().shutdown()  # as a signal does
     rclpy.try_shutdown()
     rclpy.init(args=[])
     assert rclpy.ok()
 
 
-def test_a_shutdown_of_the_default_context_handles_signals_no_more_however_it_was_named() -> None:
+def test_shutdown_of_the_default_context_removes_the_signal_handlers() -> None:
     rclpy.init(args=[])
     assert get_current_signal_handlers_options() == SignalHandlerOptions.ALL
     rclpy.shutdown(context=get_default_context())
     assert get_current_signal_handlers_options() == SignalHandlerOptions.NO
 
 
-def test_a_shutdown_of_another_context_leaves_the_signal_handlers_alone() -> None:
+def test_shutdown_of_another_context_keeps_the_signal_handlers() -> None:
     rclpy.init(args=[])
     context = Context()
     rclpy.init(args=[], context=context)

@@ -1,4 +1,4 @@
-"""What is known of endpoints, type hashes, and messages as bytes."""
+"""Endpoint information, serialization, type support and hidden names."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from std_srvs.srv import Trigger
 HASH = "RIHS01_" + "0123456789abcdef" * 4
 
 
-def test_an_endpoint_of_which_nothing_is_known_says_so() -> None:
+def test_an_empty_endpoint_info_has_unknown_properties() -> None:
     info = TopicEndpointInfo()
     assert (info.node_name, info.node_namespace, info.topic_type, info.endpoint_gid) == ("", "", "", [])
     assert info.endpoint_type is TopicEndpointTypeEnum.INVALID
@@ -27,7 +27,7 @@ def test_an_endpoint_of_which_nothing_is_known_says_so() -> None:
     assert str(info.topic_type_hash) == "INVALID"
 
 
-def test_an_endpoint_reads_as_in_rclpy() -> None:
+def test_the_text_of_an_endpoint_is_that_of_rclpy() -> None:
     info = TopicEndpointInfo(
         node_name="talker",
         node_namespace="/ns",
@@ -79,7 +79,7 @@ def test_a_property_of_a_wrong_type_or_name_is_an_error(properties: dict[str, An
         TopicEndpointInfo(**properties)
 
 
-def test_a_message_becomes_bytes_and_back() -> None:
+def test_a_message_survives_serialization() -> None:
     data = serialize_message(String(data="hello"))
     assert data[:4] == b"\x00\x01\x00\x00"
     assert deserialize_message(data, String) == String(data="hello")
@@ -87,14 +87,14 @@ def test_a_message_becomes_bytes_and_back() -> None:
         deserialize_message(data[:5], Float64)
 
 
-def test_what_is_no_message_does_not_become_bytes() -> None:
+def test_only_messages_can_be_serialized() -> None:
     with pytest.raises(AttributeError):
         serialize_message("hello")
     with pytest.raises(AttributeError):
         deserialize_message(b"", str)
 
 
-def test_a_type_is_one_of_messages_or_of_services() -> None:
+def test_message_and_service_types_are_told_apart() -> None:
     check_is_valid_msg_type(String)
     check_is_valid_srv_type(Trigger)
     for check in (check_for_type_support, check_is_valid_msg_type, check_is_valid_srv_type):
@@ -110,5 +110,5 @@ def test_a_type_is_one_of_messages_or_of_services() -> None:
     ("name", "hidden"),
     [("/chatter", False), ("/a/_b/c", True), ("_a", True), ("/a_b/c_", False), ("", False)],
 )
-def test_a_name_with_a_token_that_begins_with_an_underscore_is_hidden(name: str, hidden: bool) -> None:
+def test_a_name_is_hidden_if_a_token_begins_with_an_underscore(name: str, hidden: bool) -> None:
     assert topic_or_service_is_hidden(name) is hidden

@@ -1,4 +1,4 @@
-"""QoS events: what publishers and subscriptions are told of each other."""
+"""QoS events of publishers and subscriptions."""
 
 from __future__ import annotations
 
@@ -29,22 +29,22 @@ from rclpy.qos import (
 from rclpy.waitable import NumberOfEntities
 from std_msgs.msg import Bool, Float64
 
-# rclpy 7.1.3 warns of what it uses itself.
+# rclpy 7.1.3 itself uses the class that it deprecates.
 pytestmark = pytest.mark.filterwarnings("ignore:QoSEventHandler is deprecated")
 
 SpinUntil = Callable[..., None]
 
 
 def ignore(message: Float64) -> None:
-    """A subscription's callback where the messages do not matter."""
+    """A subscription's callback for tests that need no messages."""
 
 
 def counts(info: QoSPublisherMatchedInfo | QoSSubscriptionMatchedInfo) -> tuple[int, int, int, int]:
-    """All matches and those of now, each with its change."""
+    """Total and current matches, each with its change."""
     return info.total_count, info.total_count_change, info.current_count, info.current_count_change
 
 
-def test_both_sides_hear_that_they_are_matched_and_are_no_more(node: Node, spin_until: SpinUntil) -> None:
+def test_both_sides_get_events_of_matching_and_unmatching(node: Node, spin_until: SpinUntil) -> None:
     offered: list[QoSPublisherMatchedInfo] = []
     requested: list[QoSSubscriptionMatchedInfo] = []
     publisher = node.create_publisher(
@@ -61,7 +61,7 @@ def test_both_sides_hear_that_they_are_matched_and_are_no_more(node: Node, spin_
     node.destroy_publisher(publisher)
 
 
-def test_both_sides_hear_of_incompatible_qos_and_of_the_policy(node: Node, spin_until: SpinUntil) -> None:
+def test_both_sides_get_events_of_incompatible_qos(node: Node, spin_until: SpinUntil) -> None:
     heard: list[Any] = []
     node.create_publisher(
         Float64, "x", 1, event_callbacks=PublisherEventCallbacks(incompatible_qos=heard.append)
@@ -83,7 +83,7 @@ def test_both_sides_hear_of_incompatible_qos_and_of_the_policy(node: Node, spin_
     ] * 2
 
 
-def test_incompatible_qos_is_logged_in_rclpys_words_unless_told_otherwise(
+def test_incompatible_qos_is_logged_with_the_text_of_rclpy(
     node: Node, spin_until: SpinUntil, capfd: pytest.CaptureFixture[str]
 ) -> None:
     best_effort = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -109,7 +109,7 @@ def test_incompatible_qos_is_logged_in_rclpys_words_unless_told_otherwise(
     assert subscription.event_handlers == []
 
 
-def test_a_with_on_an_event_handler_does_not_end_it(node: Node, spin_until: SpinUntil) -> None:
+def test_entering_and_leaving_an_event_handler_keeps_it_alive(node: Node, spin_until: SpinUntil) -> None:
     matched: list[Any] = []
     publisher = node.create_publisher(
         Float64, "x", 1, event_callbacks=PublisherEventCallbacks(matched=matched.append)
@@ -121,7 +121,7 @@ def test_a_with_on_an_event_handler_does_not_end_it(node: Node, spin_until: Spin
     spin_until(lambda: matched)
 
 
-def test_both_sides_hear_of_a_missed_deadline(node: Node, spin_until: SpinUntil) -> None:
+def test_both_sides_get_events_of_a_missed_deadline(node: Node, spin_until: SpinUntil) -> None:
     profile = QoSProfile(depth=1, deadline=Duration(seconds=0.05))
     offered: list[Any] = []
     requested: list[Any] = []
@@ -138,7 +138,7 @@ def test_both_sides_hear_of_a_missed_deadline(node: Node, spin_until: SpinUntil)
     assert requested[0].total_count >= 1
 
 
-def test_a_publisher_that_does_not_assert_its_liveliness_is_missed(node: Node, spin_until: SpinUntil) -> None:
+def test_a_publisher_that_stops_asserting_loses_its_liveliness(node: Node, spin_until: SpinUntil) -> None:
     profile = QoSProfile(
         depth=1,
         liveliness=LivelinessPolicy.MANUAL_BY_TOPIC,
@@ -156,20 +156,20 @@ def test_a_publisher_that_does_not_assert_its_liveliness_is_missed(node: Node, s
     publisher.publish(Float64())
     spin_until(lambda: lost and any(info.not_alive_count for info in changed))
     count = len(changed)
-    # More than once: what is told is how it is when it is told, and 0.2 s are soon over.
+    # Publish repeatedly: an event carries the state at its delivery, and the lease lasts only 0.2 s.
     spin_until(lambda: publisher.publish(Float64()) or any(info.alive_count for info in changed[count:]))
 
 
-def test_a_message_whose_lifespan_is_over_is_not_delivered(node: Node, spin_until: SpinUntil) -> None:
+def test_a_message_is_not_delivered_after_its_lifespan(node: Node, spin_until: SpinUntil) -> None:
     latched = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-    brief = QoSProfile(
+    short = QoSProfile(
         depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL, lifespan=Duration(nanoseconds=1000)
     )
-    node.create_publisher(Float64, "x", brief).publish(Float64(data=1.0))
+    node.create_publisher(Float64, "x", short).publish(Float64(data=1.0))
     node.create_publisher(Float64, "x", latched).publish(Float64(data=2.0))
 
     def kept() -> list[float]:
-        """What a late subscription gets by now."""
+        """The samples that a late subscription gets now."""
         received: list[float] = []
         subscription = node.create_subscription(
             Float64, "x", lambda message: received.append(message.data), latched
@@ -193,7 +193,7 @@ def test_an_event_callback_may_be_a_coroutine(node: Node, spin_until: SpinUntil)
     spin_until(lambda: heard)
 
 
-def test_who_asks_for_incompatible_types_hears_of_the_rest(node: Node, spin_until: SpinUntil) -> None:
+def test_incompatible_type_callbacks_do_not_prevent_other_events(node: Node, spin_until: SpinUntil) -> None:
     heard: list[Any] = []
     offering = PublisherEventCallbacks(incompatible_type=heard.append, matched=heard.append)
     requesting = SubscriptionEventCallbacks(incompatible_type=heard.append, matched=heard.append)
@@ -204,7 +204,7 @@ def test_who_asks_for_incompatible_types_hears_of_the_rest(node: Node, spin_unti
     assert {type(info) for info in heard} == {QoSPublisherMatchedInfo, QoSSubscriptionMatchedInfo}
 
 
-def test_the_old_name_of_the_module_still_works_with_a_warning() -> None:
+def test_the_deprecated_module_qos_event_works_and_warns() -> None:
     with pytest.warns(UserWarning, match="deprecated"):
         qos_event = importlib.import_module("rclpy.qos_event")
     assert qos_event.SubscriptionEventCallbacks is SubscriptionEventCallbacks

@@ -1,4 +1,4 @@
-"""What the errors say."""
+"""The texts of rclpy's exceptions."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from rclpy import exceptions
 from rclpy.parameter import Parameter
 
 
-def test_a_name_error_points_at_the_place() -> None:
+def test_a_name_error_points_at_the_invalid_character() -> None:
     assert str(exceptions.InvalidNodeNameException("a?b", "bad character", 1)) == (
         "Invalid node name: bad character:\n  'a?b'\n    ^"
     )
@@ -32,7 +32,7 @@ def test_parameter_errors_name_the_parameters() -> None:
     assert all(word in types for word in ("'a'", "'1'", "INTEGER", "STRING"))
 
 
-def test_using_rclpy_too_early_or_too_late_says_so() -> None:
+def test_errors_before_init_and_after_shutdown_name_the_reason() -> None:
     assert str(exceptions.NotInitializedException()) == "rclpy.init() has not been called."
     assert str(exceptions.NotInitializedException("no node")) == (
         "rclpy.init() has not been called. msg:no node"

@@ -1,4 +1,4 @@
-"""Executors: what runs, in which order, on which thread, and who wakes whom."""
+"""Executors: order, threads, timeouts, wake-ups and shutdown."""
 
 from __future__ import annotations
 
@@ -15,13 +15,11 @@ from rclpy.clock import Clock, ClockType
 from rclpy.context import Context
 from rclpy.duration import Duration
 from rclpy.executors import (
-    ConditionReachedException,
     Executor,
     ExternalShutdownException,
     MultiThreadedExecutor,
     SingleThreadedExecutor,
     TimeoutException,
-    TimeoutObject,
 )
 from rclpy.node import Node
 from rclpy.task import Future
@@ -33,9 +31,7 @@ SpinUntil = Callable[..., None]
 STEADY = Clock(clock_type=ClockType.STEADY_TIME)
 
 
-def test_a_subscription_gets_what_a_publisher_of_the_same_process_publishes(
-    spin_until: SpinUntil, node: Node
-) -> None:
+def test_messages_arrive_within_one_process(spin_until: SpinUntil, node: Node) -> None:
     received: list[float] = []
     publisher = node.create_publisher(Float64, "x", 10)
     node.create_subscription(Float64, "x", lambda message: received.append(message.data), 10)
@@ -45,7 +41,7 @@ def test_a_subscription_gets_what_a_publisher_of_the_same_process_publishes(
     assert received == [0.0, 1.0, 2.0, 3.0, 4.0]
 
 
-def test_a_slow_callback_delays_others_by_no_more_than_itself(
+def test_a_slow_callback_delays_others_by_at_most_one_call(
     executor: SingleThreadedExecutor, node: Node
 ) -> None:
     order: list[str] = []
@@ -67,26 +63,28 @@ def test_a_slow_callback_delays_others_by_no_more_than_itself(
     node.create_timer(0.015, lambda: order.append("timer"))
     end = Future()
     executor.spin_until_future_complete(end, timeout_sec=0.5)
-    messages = [one for one in order if one != "timer"]
-    assert [one[-1] for one in messages] == list("001122")  # in turns
+    messages = [call for call in order if call != "timer"]
+    assert [call[-1] for call in messages] == list("001122")  # the two subscriptions alternate
     first, last = order.index(messages[0]), order.index(messages[-1])
     assert order[first:last].count("timer") >= 2
 
 
-def test_spin_once_returns_after_its_timeout_when_nothing_happens(executor: SingleThreadedExecutor) -> None:
+def test_spin_once_returns_after_its_timeout(executor: SingleThreadedExecutor) -> None:
     before = STEADY.now()
     executor.spin_once(timeout_sec=0.05)
     assert (STEADY.now() - before).nanoseconds >= 50_000_000
 
 
-def test_spin_once_with_timeout_zero_runs_what_is_ready(executor: SingleThreadedExecutor, node: Node) -> None:
+def test_spin_once_with_timeout_zero_runs_a_ready_callback(
+    executor: SingleThreadedExecutor, node: Node
+) -> None:
     triggered: list[bool] = []
     node.create_guard_condition(lambda: triggered.append(True)).trigger()
     executor.spin_once(timeout_sec=0)
     assert triggered == [True]
 
 
-def test_an_exception_in_a_callback_comes_out_of_spin_once(
+def test_an_exception_in_a_callback_propagates_from_spin_once(
     executor: SingleThreadedExecutor, node: Node
 ) -> None:
     def fail() -> None:
@@ -97,9 +95,7 @@ def test_an_exception_in_a_callback_comes_out_of_spin_once(
         executor.spin_once(timeout_sec=5)
 
 
-def test_an_exception_in_a_coroutine_callback_comes_out_of_spinning(
-    spin_until: SpinUntil, node: Node
-) -> None:
+def test_an_exception_in_a_coroutine_callback_propagates_from_spin(spin_until: SpinUntil, node: Node) -> None:
     async def fail() -> None:
         raise ZeroDivisionError("planted")
 
@@ -108,9 +104,7 @@ def test_an_exception_in_a_coroutine_callback_comes_out_of_spinning(
         spin_until(lambda: False)
 
 
-def test_a_callback_may_await_a_future_that_another_callback_completes(
-    spin_until: SpinUntil, node: Node
-) -> None:
+def test_a_callback_may_await_a_future_of_another_callback(spin_until: SpinUntil, node: Node) -> None:
     future: Future = Future()
     results: list[int] = []
 
@@ -118,16 +112,14 @@ def test_a_callback_may_await_a_future_that_another_callback_completes(
         results.append(await future)
 
     node.create_guard_condition(wait).trigger()
-    # The waiting coroutine holds the default group: what completes it needs one of its own.
+    # The waiting coroutine holds the default group: the timer needs another group.
     other = MutuallyExclusiveCallbackGroup()
     node.create_timer(0.02, lambda: future.done() or future.set_result(42), other)
     spin_until(lambda: results)
     assert results == [42]
 
 
-def test_while_a_coroutine_holds_its_group_nothing_else_of_the_group_runs(
-    spin_until: SpinUntil, node: Node
-) -> None:
+def test_an_awaiting_coroutine_blocks_its_callback_group(spin_until: SpinUntil, node: Node) -> None:
     future: Future = Future()
     events: list[str] = []
 
@@ -167,7 +159,7 @@ def test_a_future_completed_on_another_thread_ends_spinning_at_once(
     assert (STEADY.now() - before).nanoseconds < 10_000_000_000
 
 
-def test_what_has_run_does_not_live_on_while_the_executor_waits_for_more(
+def test_a_waiting_executor_keeps_no_reference_to_finished_tasks(
     executor: SingleThreadedExecutor,
 ) -> None:
     class Job:
@@ -197,7 +189,7 @@ def test_spin_until_future_complete_gives_up_after_its_timeout(executor: SingleT
     assert not future.done()
 
 
-def test_spin_until_future_complete_with_timeout_zero_runs_what_is_ready(
+def test_spin_until_future_complete_with_timeout_zero_runs_once(
     executor: SingleThreadedExecutor, node: Node
 ) -> None:
     future: Future = Future()
@@ -206,7 +198,7 @@ def test_spin_until_future_complete_with_timeout_zero_runs_what_is_ready(
     assert future.result() == "done"
 
 
-def test_spin_until_future_complete_leaves_a_node_with_the_executor_that_had_it(
+def test_spin_until_future_complete_keeps_the_executor_of_a_node(
     make_node: MakeNode, executor: SingleThreadedExecutor
 ) -> None:
     node, guest = make_node("node"), make_node("guest")
@@ -218,18 +210,18 @@ def test_spin_until_future_complete_leaves_a_node_with_the_executor_that_had_it(
     assert executor.get_nodes() == [node]
 
 
-def test_an_entity_created_on_another_thread_while_the_executor_waits_is_seen_at_once(
+def test_an_entity_created_on_another_thread_wakes_the_executor(
     executor: SingleThreadedExecutor, node: Node
 ) -> None:
     called = threading.Event()
-    spinning = threading.Thread(target=executor.spin_once)  # waits for ever: nothing is there yet
+    spinning = threading.Thread(target=executor.spin_once)  # waits for ever: the node has no entity yet
     spinning.start()
     node.create_timer(0.0, called.set)
     spinning.join(10)
     assert called.is_set()
 
 
-def test_a_subscription_destroyed_in_its_own_callback_is_not_called_again(
+def test_a_subscription_destroyed_in_its_callback_is_not_called_again(
     spin_until: SpinUntil, node: Node
 ) -> None:
     received: list[float] = []
@@ -256,7 +248,7 @@ def test_a_flooded_subscription_does_not_starve_a_timer(spin_until: SpinUntil, n
     def feed_itself(message: Float64) -> None:
         nonlocal received
         received += 1
-        publisher.publish(message)  # there is always a next message
+        publisher.publish(message)  # the queue is never empty
 
     node.create_subscription(Float64, "x", feed_itself, 10)
     ticks: list[int] = []
@@ -266,7 +258,7 @@ def test_a_flooded_subscription_does_not_starve_a_timer(spin_until: SpinUntil, n
     assert received > len(ticks)
 
 
-def test_shutting_the_context_down_on_another_thread_ends_spinning_with_external_shutdown(
+def test_context_shutdown_on_another_thread_ends_spin_once(
     context: Context, executor: SingleThreadedExecutor
 ) -> None:
     threading.Timer(0.05, context.shutdown).start()
@@ -274,7 +266,7 @@ def test_shutting_the_context_down_on_another_thread_ends_spinning_with_external
         executor.spin_once()
 
 
-def test_a_multi_threaded_executor_returns_from_spinning_when_the_context_is_shut_down(
+def test_context_shutdown_ends_a_multi_threaded_spin(
     context: Context,
 ) -> None:
     with MultiThreadedExecutor(2, context=context) as executor:
@@ -293,7 +285,7 @@ def test_a_multi_threaded_executor_returns_from_spinning_when_the_context_is_shu
     ],
     ids=["shutdown", "try_shutdown", "Context.shutdown", "Context.try_shutdown"],
 )
-def test_shutting_rclpy_down_on_another_thread_lets_spin_return(
+def test_rclpy_shutdown_on_another_thread_ends_rclpy_spin(
     domain_id: int, shut_down: Callable[[], None]
 ) -> None:
     rclpy.init(args=[])
@@ -304,17 +296,17 @@ def test_shutting_rclpy_down_on_another_thread_lets_spin_return(
     thread.join()
     node.destroy_node()
     assert not rclpy.ok()
-    rclpy.try_shutdown()  # so that there may be another beginning
+    rclpy.try_shutdown()  # allows the next rclpy.init()
 
 
-def test_shutting_the_executor_down_on_another_thread_ends_spinning(
+def test_executor_shutdown_on_another_thread_ends_spin(
     executor: SingleThreadedExecutor,
 ) -> None:
     threading.Timer(0.05, executor.shutdown).start()
     executor.spin()
 
 
-def test_spinning_for_a_future_returns_when_a_callback_shuts_the_context_down(
+def test_context_shutdown_ends_spin_until_future_complete(
     context: Context, executor: SingleThreadedExecutor, node: Node
 ) -> None:
     node.create_guard_condition(context.shutdown).trigger()
@@ -341,7 +333,7 @@ def test_a_callback_may_shut_its_multi_threaded_executor_down(make_node: MakeNod
     assert executor.get_nodes() == []
 
 
-def test_a_node_moves_to_the_executor_that_it_is_added_to_last(
+def test_adding_a_node_to_a_second_executor_moves_it(
     make_node: MakeNode, context: Context, executor: SingleThreadedExecutor
 ) -> None:
     node = make_node()
@@ -367,7 +359,7 @@ def test_a_node_knows_the_executor_that_spun_it_last(
     assert node.executor is None
 
 
-def test_what_a_node_had_ready_runs_where_it_went(
+def test_ready_callbacks_move_with_their_node(
     make_node: MakeNode, context: Context, executor: SingleThreadedExecutor
 ) -> None:
     node = make_node()
@@ -391,7 +383,7 @@ def test_what_a_node_had_ready_runs_where_it_went(
         assert threads == ["first", "second"]
 
 
-def test_messages_of_a_node_that_left_stay_for_the_executor_that_has_it(
+def test_unread_messages_of_a_removed_node_wait_for_its_return(
     make_node: MakeNode, context: Context, executor: SingleThreadedExecutor, spin_until: SpinUntil
 ) -> None:
     node = make_node()
@@ -410,38 +402,11 @@ def test_messages_of_a_node_that_left_stay_for_the_executor_that_has_it(
     assert received == [0.0, 1.0, 2.0]
 
 
-class OwnExecutor(Executor):
-    """An executor as users write them: with what rclpy documents."""
-
-    def spin_once(self, timeout_sec: float | None = None) -> None:
-        self._run_one(timeout_sec, lambda: False)
-
-    def spin_once_until_future_complete(
-        self, future: Future, timeout_sec: float | TimeoutObject | None = None
-    ) -> None:
-        self._run_one(timeout_sec, future.done)
-
-    def _run_one(self, timeout_sec: float | TimeoutObject | None, condition: Callable[[], bool]) -> None:
-        try:
-            task, _, _ = self.wait_for_ready_callbacks(timeout_sec, None, condition)
-        except (TimeoutException, ConditionReachedException):
-            return
-        task()
-        task.result()
-
-
-@pytest.fixture
-def own_executor(context: Context) -> Iterator[OwnExecutor]:
-    """An executor of the test's context, made by a user."""
-    with OwnExecutor(context=context) as executor:
-        yield executor
-
-
-def test_an_executor_of_ones_own_spins_until_a_future_is_complete(
-    make_node: MakeNode, own_executor: OwnExecutor
+def test_a_user_executor_spins_until_a_future_is_complete(
+    make_node: MakeNode, user_executor: Executor
 ) -> None:
     node = make_node()
-    own_executor.add_node(node)
+    user_executor.add_node(node)
     future: Future = Future()
     calls: list[bool] = []
 
@@ -451,18 +416,18 @@ def test_an_executor_of_ones_own_spins_until_a_future_is_complete(
             future.set_result("done")
 
     node.create_timer(0.0, call)
-    own_executor.spin_until_future_complete(future)
+    user_executor.spin_until_future_complete(future)
     assert future.result() == "done"
     assert len(calls) == 3
 
 
-def test_an_executor_of_ones_own_gives_up_after_its_timeout(own_executor: OwnExecutor) -> None:
+def test_a_user_executor_gives_up_after_its_timeout(user_executor: Executor) -> None:
     future: Future = Future()
-    own_executor.spin_until_future_complete(future, timeout_sec=0.05)
+    user_executor.spin_until_future_complete(future, timeout_sec=0.05)
     assert not future.done()
 
 
-def test_an_executor_of_ones_own_has_to_say_how_it_spins(context: Context) -> None:
+def test_a_user_executor_must_implement_spin_once(context: Context) -> None:
     with Executor(context=context) as executor:
         with pytest.raises(NotImplementedError):
             executor.spin_once()
@@ -470,26 +435,26 @@ def test_an_executor_of_ones_own_has_to_say_how_it_spins(context: Context) -> No
             executor.spin_until_future_complete(Future())
 
 
-def test_callbacks_may_be_waited_for_of_some_nodes_only(
-    make_node: MakeNode, own_executor: OwnExecutor
+def test_wait_for_ready_callbacks_accepts_a_list_of_nodes(
+    make_node: MakeNode, user_executor: Executor
 ) -> None:
     first, second = make_node("first"), make_node("second")
     guards = []
     for node in (first, second):
-        own_executor.add_node(node)
+        user_executor.add_node(node)
         guards.append(node.create_guard_condition(lambda: None))
         guards[-1].trigger()
-    task, entity, node_of_it = own_executor.wait_for_ready_callbacks(5, [second])
-    assert (entity, node_of_it) == (guards[1], second)
+    task, entity, its_node = user_executor.wait_for_ready_callbacks(5, [second])
+    assert (entity, its_node) == (guards[1], second)
     task()
     with pytest.raises(TimeoutException):
-        own_executor.wait_for_ready_callbacks(0, nodes=[second])
-    task, entity, node_of_it = own_executor.wait_for_ready_callbacks(5)
-    assert (entity, node_of_it) == (guards[0], first)
+        user_executor.wait_for_ready_callbacks(0, nodes=[second])
+    task, entity, its_node = user_executor.wait_for_ready_callbacks(5)
+    assert (entity, its_node) == (guards[0], first)
     task()
 
 
-def test_a_second_thread_cannot_spin_an_executor_meanwhile(
+def test_a_second_thread_cannot_spin_the_same_executor(
     make_node: MakeNode, executor: SingleThreadedExecutor
 ) -> None:
     errors: list[ValueError] = []
@@ -501,7 +466,7 @@ def test_a_second_thread_cannot_spin_an_executor_meanwhile(
             errors.append(error)
 
     class Group(MutuallyExclusiveCallbackGroup):
-        """Is asked on the spinning thread."""
+        """Starts a second spin while the first asks for a callback."""
 
         def can_execute(self, entity: object) -> bool:
             if not errors:
@@ -533,9 +498,7 @@ def test_a_callback_may_spin_its_executor(executor: SingleThreadedExecutor, node
     assert called == ["outer", "inner"]
 
 
-def test_a_reentrant_group_lets_callbacks_overlap_on_a_multi_threaded_executor(
-    make_node: MakeNode, context: Context
-) -> None:
+def test_callbacks_of_a_reentrant_group_overlap(make_node: MakeNode, context: Context) -> None:
     node = make_node()
     meeting = threading.Barrier(2)
     group = ReentrantCallbackGroup()
@@ -551,9 +514,7 @@ def test_a_reentrant_group_lets_callbacks_overlap_on_a_multi_threaded_executor(
     assert not meeting.broken
 
 
-def test_a_mutually_exclusive_group_never_overlaps_on_a_multi_threaded_executor(
-    make_node: MakeNode, context: Context
-) -> None:
+def test_callbacks_of_a_mutually_exclusive_group_never_overlap(make_node: MakeNode, context: Context) -> None:
     node = make_node()
     running = threading.Lock()
     calls: list[bool] = []
@@ -576,8 +537,8 @@ def test_a_mutually_exclusive_group_never_overlaps_on_a_multi_threaded_executor(
     assert calls == [True] * 200
 
 
-class Busy:
-    """A multi-threaded executor, and a subscription whose callbacks keep both its threads busy."""
+class BusyExecutor:
+    """A multi-threaded executor whose two threads are kept busy by a subscription's callbacks."""
 
     def __init__(self, node: Node, executor: MultiThreadedExecutor) -> None:
         self.received: list[float] = []
@@ -606,15 +567,15 @@ class Busy:
 
 
 @pytest.fixture
-def busy(make_node: MakeNode, context: Context) -> Iterator[Busy]:
+def busy(make_node: MakeNode, context: Context) -> Iterator[BusyExecutor]:
     with MultiThreadedExecutor(2, context=context) as executor:
-        busy = Busy(make_node(), executor)
+        busy = BusyExecutor(make_node(), executor)
         busy.fill()
         yield busy
         busy.release.set()
 
 
-def test_a_message_is_not_taken_before_a_thread_is_free_so_that_the_newest_is(busy: Busy) -> None:
+def test_messages_are_taken_only_when_a_thread_is_free(busy: BusyExecutor) -> None:
     for number in range(2, 50):
         busy.publisher.publish(Float64(data=float(number)))
         busy.executor.spin_once(timeout_sec=0)
@@ -623,7 +584,7 @@ def test_a_message_is_not_taken_before_a_thread_is_free_so_that_the_newest_is(bu
     assert busy.received == [0.0, 1.0, 49.0]
 
 
-def test_while_all_threads_are_busy_a_timeout_still_ends_spin_once(busy: Busy) -> None:
+def test_spin_once_times_out_while_all_threads_are_busy(busy: BusyExecutor) -> None:
     busy.publisher.publish(Float64())
     before = STEADY.now()
     busy.executor.spin_once(timeout_sec=0.05)
@@ -640,8 +601,8 @@ def test_while_all_threads_are_busy_a_timeout_still_ends_spin_once(busy: Busy) -
     ],
     ids=["future", "context", "executor"],
 )
-def test_while_all_threads_are_busy_the_end_still_ends_spinning(
-    busy: Busy, end: Callable[[MultiThreadedExecutor, Future], None]
+def test_spinning_ends_while_all_threads_are_busy(
+    busy: BusyExecutor, end: Callable[[MultiThreadedExecutor, Future], None]
 ) -> None:
     future: Future = Future()
     spinning = threading.Thread(target=busy.executor.spin_until_future_complete, args=(future,))
@@ -652,7 +613,7 @@ def test_while_all_threads_are_busy_the_end_still_ends_spinning(
     assert not spinning.is_alive()
 
 
-def test_no_thread_that_gets_free_is_overlooked(make_node: MakeNode, context: Context) -> None:
+def test_every_free_thread_gets_work(make_node: MakeNode, context: Context) -> None:
     node = make_node()
     left = threading.Semaphore(999)
     done: Future = Future()
@@ -671,7 +632,7 @@ def test_no_thread_that_gets_free_is_overlooked(make_node: MakeNode, context: Co
     assert done.done()
 
 
-def test_an_exception_on_a_pool_thread_comes_out_of_spinning(make_node: MakeNode, context: Context) -> None:
+def test_an_exception_on_a_pool_thread_propagates_from_spin(make_node: MakeNode, context: Context) -> None:
     node = make_node()
 
     def fail() -> None:

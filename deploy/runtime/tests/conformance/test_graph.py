@@ -1,14 +1,13 @@
-"""The graph: what nodes tell of themselves on the wire, and what they know of others."""
+"""The graph: discovery of nodes and endpoints, their descriptions, and remapping."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from geometry_msgs.msg import PointStamped
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
@@ -17,9 +16,8 @@ from rclpy.qos import (
     DurabilityPolicy,
     QoSProfile,
     ReliabilityPolicy,
-    qos_profile_sensor_data,
 )
-from std_msgs.msg import Bool, Float64, String
+from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 
 MakeNode = Callable[..., Node]
@@ -28,48 +26,27 @@ FACTS = Path(__file__).parents[1] / "facts"
 
 
 @pytest.fixture
-def other_context(domain_id: int) -> Iterator[Context]:
-    """A second participant in the test's domain, as another process would be."""
-    context = Context()
-    context.init([], domain_id=domain_id)
-    yield context
-    context.try_shutdown()
-    context.destroy()
-
-
-def facts_node(make_node: MakeNode) -> Node:
-    """The node that tests/facts/discovery.txt was recorded from."""
-    node = make_node("facts", namespace="/arm1")
-    node.declare_parameter("value", 2.0)
-    latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-    node.create_publisher(Float64, "l1", latched)
-    node.create_publisher(PointStamped, "effector/position", 10)
-    node.create_publisher(String, "/engines", 10)
-    node.create_subscription(Bool, "operator_heartbeat", lambda _: None, qos_profile_sensor_data)
-    node.create_service(Trigger, "turn_on", lambda request, response: response)
-    return node
-
-
-def is_known(node: Node) -> bool:
-    """Whether the graph knows the facts node's last publisher, subscription and service: that takes time."""
-    return all(
-        (
-            node.count_publishers("/engines"),
-            node.count_subscribers("operator_heartbeat"),
-            node.count_services("turn_on"),
+def node(facts_node: Node, spin_until: SpinUntil) -> Node:
+    """The facts node, after the discovery of its last publisher, subscription and service."""
+    spin_until(
+        lambda: (
+            facts_node.count_publishers("/engines")
+            and facts_node.count_subscribers("operator_heartbeat")
+            and facts_node.count_services("turn_on")
         )
     )
+    return facts_node
 
 
 def recorded_hash(topic: str) -> str:
-    """The type hash that a real node announced with its publisher."""
+    """The type hash that a real node announced with its publisher of the topic."""
     text = (FACTS / "discovery.txt").read_text()
     match = re.search(rf"^PUB \S+ {topic} .*?typehash=(\w+);", text, re.MULTILINE)
     assert match
     return match[1]
 
 
-def test_nodes_of_another_participant_are_seen_and_their_end_too(
+def test_nodes_of_another_participant_appear_and_disappear(
     make_node: MakeNode, other_context: Context, spin_until: SpinUntil
 ) -> None:
     here = make_node("here")
@@ -81,15 +58,11 @@ def test_nodes_of_another_participant_are_seen_and_their_end_too(
     spin_until(lambda: here.get_node_names() == ["here"])
 
 
-def test_waiting_for_a_node_that_never_comes_ends_with_its_timeout(make_node: MakeNode) -> None:
-    assert not make_node().wait_for_node("/nobody", timeout=0.05)
+def test_waiting_for_a_missing_node_ends_with_the_timeout(make_node: MakeNode) -> None:
+    assert not make_node().wait_for_node("/missing", timeout=0.05)
 
 
-def test_topics_and_types_are_listed_with_and_without_demangling(
-    make_node: MakeNode, spin_until: SpinUntil
-) -> None:
-    node = facts_node(make_node)
-    spin_until(lambda: is_known(node))
+def test_topics_and_types_are_listed_with_and_without_demangling(node: Node) -> None:
     topics = dict(node.get_topic_names_and_types())
     assert topics["/arm1/l1"] == ["std_msgs/msg/Float64"]
     assert topics["/arm1/operator_heartbeat"] == ["std_msgs/msg/Bool"]
@@ -99,11 +72,10 @@ def test_topics_and_types_are_listed_with_and_without_demangling(
     ]
 
 
-def test_what_a_node_has_is_listed_by_node(make_node: MakeNode, spin_until: SpinUntil) -> None:
-    node = facts_node(make_node)
+def test_endpoints_are_listed_by_node(node: Node, make_node: MakeNode, spin_until: SpinUntil) -> None:
     client = make_node("caller")
     client.create_client(Trigger, "/arm1/turn_on")
-    spin_until(lambda: is_known(node) and node.get_client_names_and_types_by_node("caller", "/"))
+    spin_until(lambda: node.get_client_names_and_types_by_node("caller", "/"))
     assert dict(node.get_publisher_names_and_types_by_node("facts", "/arm1")).keys() == {
         "/arm1/l1",
         "/arm1/effector/position",
@@ -123,16 +95,12 @@ def test_what_a_node_has_is_listed_by_node(make_node: MakeNode, spin_until: Spin
     assert ("/arm1/turn_on", ["std_srvs/srv/Trigger"]) in node.get_service_names_and_types()
 
 
-def test_asking_for_an_unknown_node_is_an_error(make_node: MakeNode) -> None:
+def test_a_query_for_an_unknown_node_is_an_error(make_node: MakeNode) -> None:
     with pytest.raises(rclpy_implementation.NodeNameNonExistentError):
-        make_node().get_publisher_names_and_types_by_node("nobody", "/nowhere")
+        make_node().get_publisher_names_and_types_by_node("missing", "/nowhere")
 
 
-def test_endpoints_are_described_with_node_type_qos_and_hash(
-    make_node: MakeNode, spin_until: SpinUntil
-) -> None:
-    node = facts_node(make_node)
-    spin_until(lambda: is_known(node))
+def test_endpoints_are_described_with_node_type_qos_and_hash(node: Node) -> None:
     (info,) = node.get_publishers_info_by_topic("l1")
     assert (info.node_name, info.node_namespace) == ("facts", "/arm1")
     assert info.topic_type == "std_msgs/msg/Float64"
@@ -144,9 +112,7 @@ def test_endpoints_are_described_with_node_type_qos_and_hash(
     assert info.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT
 
 
-def test_publishers_and_subscribers_are_counted(make_node: MakeNode, spin_until: SpinUntil) -> None:
-    node = facts_node(make_node)
-    spin_until(lambda: is_known(node))
+def test_publishers_and_subscribers_are_counted(node: Node) -> None:
     assert node.count_publishers("l1") == 1
     assert node.count_subscribers("l1") == 0
     assert node.count_subscribers("operator_heartbeat") == 1
@@ -154,9 +120,7 @@ def test_publishers_and_subscribers_are_counted(make_node: MakeNode, spin_until:
     assert node.count_clients("turn_on") == 0
 
 
-def test_a_late_subscription_in_another_participant_gets_the_latched_message(
-    make_node: MakeNode, other_context: Context
-) -> None:
+def test_a_late_subscription_gets_the_latched_message(make_node: MakeNode, other_context: Context) -> None:
     latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
     publisher = make_node().create_publisher(Float64, "l1", latched)
     for value in (1.0, 2.0):
@@ -172,7 +136,7 @@ def test_a_late_subscription_in_another_participant_gets_the_latched_message(
     assert received == [2.0]
 
 
-def test_names_are_remapped_by_arguments(make_node: MakeNode) -> None:
+def test_arguments_remap_names(make_node: MakeNode) -> None:
     rules = "x:=y", "__node:=renamed", "__ns:=/arm2", "serve:=/other"
     node = make_node(cli_args=["--ros-args", *(word for rule in rules for word in ("-r", rule))])
     assert node.get_fully_qualified_name() == "/arm2/renamed"
@@ -182,7 +146,7 @@ def test_names_are_remapped_by_arguments(make_node: MakeNode) -> None:
     assert node.resolve_service_name("serve") == "/other"
 
 
-def test_to_count_endpoints_does_not_remap_their_name_to_list_them_does(
+def test_listing_endpoints_remaps_the_name_but_counting_does_not(
     make_node: MakeNode, spin_until: SpinUntil
 ) -> None:
     rules = "x:=y", "serve:=/other"

@@ -1,4 +1,4 @@
-"""Names and handles of a node, as code for rclpy uses them: also wrong ones, and after the end."""
+"""Names and handles of a node: invalid names, use after shutdown and after destruction."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def test_an_invalid_name_is_not_resolved(
         (Node.get_subscriptions_info_by_topic, InvalidTopicNameException),
     ],
 )
-def test_asking_about_an_invalid_name_is_an_error(
+def test_a_query_for_an_invalid_name_is_an_error(
     make_node: MakeNode, ask: Callable[..., Any], error: type[Exception]
 ) -> None:
     node = make_node()
@@ -58,7 +58,7 @@ def test_asking_about_an_invalid_name_is_an_error(
 
 
 @pytest.mark.parametrize("name", ["", "a b", "a//b"])
-def test_nothing_is_created_under_an_invalid_name(make_node: MakeNode, name: str) -> None:
+def test_an_invalid_name_creates_nothing(make_node: MakeNode, name: str) -> None:
     node = make_node()
     with pytest.raises(InvalidTopicNameException):
         node.create_publisher(Float64, name, 1)
@@ -70,7 +70,7 @@ def test_nothing_is_created_under_an_invalid_name(make_node: MakeNode, name: str
         node.create_client(Trigger, name)
 
 
-def test_nothing_is_left_of_a_publisher_whose_class_fails(make_node: MakeNode, spin_until: SpinUntil) -> None:
+def test_a_publisher_class_that_fails_leaves_no_publisher(make_node: MakeNode, spin_until: SpinUntil) -> None:
     class Failing(Publisher):
         def __init__(self, *args: Any, **options: Any) -> None:
             raise ZeroDivisionError("planted")
@@ -82,7 +82,7 @@ def test_nothing_is_left_of_a_publisher_whose_class_fails(make_node: MakeNode, s
     spin_until(lambda: not node.count_publishers("x"))
 
 
-ASKING: list[Callable[[Node], Any]] = [
+QUERIES: list[Callable[[Node], Any]] = [
     Node.get_node_names,
     Node.get_node_names_and_namespaces,
     Node.get_node_names_and_namespaces_with_enclaves,
@@ -94,7 +94,7 @@ ASKING: list[Callable[[Node], Any]] = [
     lambda node: node.get_publishers_info_by_topic("x"),
     lambda node: node.get_publisher_names_and_types_by_node("node", "/"),
 ]
-CREATING: list[Callable[[Node], Any]] = [
+CREATIONS: list[Callable[[Node], Any]] = [
     lambda node: node.create_publisher(Float64, "x", 1),
     lambda node: node.create_subscription(Float64, "x", print, 1),
     lambda node: node.create_service(Trigger, "x", print),
@@ -104,8 +104,8 @@ CREATING: list[Callable[[Node], Any]] = [
 ]
 
 
-@pytest.mark.parametrize("use", ASKING + CREATING)
-def test_after_the_shutdown_a_node_only_knows_its_own_names(
+@pytest.mark.parametrize("use", QUERIES + CREATIONS)
+def test_after_the_shutdown_a_node_knows_only_its_names(
     make_node: MakeNode, context: Context, use: Callable[[Node], Any]
 ) -> None:
     node = make_node()
@@ -115,15 +115,15 @@ def test_after_the_shutdown_a_node_only_knows_its_own_names(
     assert node.get_fully_qualified_name() == node.resolve_topic_name("node") == "/node"
 
 
-@pytest.mark.parametrize("use", ASKING + CREATING[:4])
-def test_a_node_that_was_destroyed_is_of_no_use(make_node: MakeNode, use: Callable[[Node], Any]) -> None:
+@pytest.mark.parametrize("use", QUERIES + CREATIONS[:4])
+def test_a_destroyed_node_is_an_invalid_handle(make_node: MakeNode, use: Callable[[Node], Any]) -> None:
     node = make_node()
     node.destroy_node()
     with pytest.raises(InvalidHandle):
         use(node)
 
 
-def test_a_with_on_a_handle_changes_nothing(make_node: MakeNode, context: Context) -> None:
+def test_entering_and_leaving_a_handle_changes_nothing(make_node: MakeNode, context: Context) -> None:
     node = make_node()
     entities: list[Any] = [
         node,
@@ -149,7 +149,7 @@ def test_a_subscription_can_be_polled(
     make_node: MakeNode, executor: SingleThreadedExecutor, spin_until: SpinUntil
 ) -> None:
     node = make_node()
-    executor.remove_node(node)  # nobody else takes what comes
+    executor.remove_node(node)  # the executor would take the messages
     subscription = node.create_subscription(Float64, "x", print, 10)
     publisher = node.create_publisher(Float64, "x", 10)
     spin_until(publisher.get_subscription_count)
@@ -159,10 +159,10 @@ def test_a_subscription_can_be_polled(
 
     def take(raw: bool) -> bool:
         with subscription.handle:
-            one = subscription.handle.take_message(Float64, raw)
-        if one is not None:
-            taken.append(one)
-        return one is not None
+            sample = subscription.handle.take_message(Float64, raw)
+        if sample is not None:
+            taken.append(sample)
+        return sample is not None
 
     spin_until(lambda: take(raw=False))
     spin_until(lambda: take(raw=True))

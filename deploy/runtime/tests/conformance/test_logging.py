@@ -20,7 +20,7 @@ def fresh_configuration() -> Iterator[None]:
     rclpy.logging.shutdown()
 
 
-def test_a_logger_without_a_level_has_that_of_its_nearest_ancestor_with_one() -> None:
+def test_a_logger_inherits_the_level_of_its_nearest_ancestor() -> None:
     rclpy.logging.set_logger_level("robot", LoggingSeverity.WARN)
     rclpy.logging.set_logger_level("robot.arm.motor", LoggingSeverity.DEBUG)
     effective = rclpy.logging.get_logger_effective_level
@@ -31,7 +31,7 @@ def test_a_logger_without_a_level_has_that_of_its_nearest_ancestor_with_one() ->
     assert effective("robot.arm") == LoggingSeverity.INFO
 
 
-def test_a_changed_level_counts_at_once() -> None:
+def test_a_changed_level_takes_effect_at_once() -> None:
     logger = get_logger("changing")
     assert not logger.debug("before")
     logger.set_level(LoggingSeverity.DEBUG)
@@ -41,21 +41,21 @@ def test_a_changed_level_counts_at_once() -> None:
     assert logger.get_effective_level() == LoggingSeverity.DEBUG
 
 
-def test_the_level_of_the_empty_name_is_the_default_of_all() -> None:
+def test_the_level_of_the_empty_name_is_the_default() -> None:
     rclpy.logging.set_logger_level("", LoggingSeverity.ERROR)
     assert rclpy.logging.get_logger_level("") == LoggingSeverity.ERROR
-    assert not get_logger("anyone").warning("left out")
-    assert rclpy.logging.get_logger_level("anyone") == LoggingSeverity.UNSET
+    assert not get_logger("any").warning("omitted")
+    assert rclpy.logging.get_logger_level("any") == LoggingSeverity.UNSET
 
 
-def test_clearing_the_configuration_forgets_all_levels() -> None:
+def test_clear_config_resets_all_levels() -> None:
     rclpy.logging.set_logger_level("", LoggingSeverity.ERROR)
     rclpy.logging.set_logger_level("a", LoggingSeverity.DEBUG)
     rclpy.logging.clear_config()
     assert rclpy.logging.get_logger_effective_level("a") == LoggingSeverity.INFO
 
 
-def test_severities_have_names_and_only_these_are_levels() -> None:
+def test_only_the_named_severities_are_levels() -> None:
     assert rclpy.logging.get_logging_severity_from_string("warn") == LoggingSeverity.WARN
     assert rclpy.logging.get_logging_severity_from_string("FATAL") == LoggingSeverity.FATAL
     with pytest.raises(RuntimeError):
@@ -66,7 +66,7 @@ def test_severities_have_names_and_only_these_are_levels() -> None:
     assert not get_logger("a").is_enabled_for(LoggingSeverity.DEBUG)
 
 
-def test_loggers_need_names_and_children_have_those_of_their_ancestors() -> None:
+def test_a_child_logger_has_the_names_of_its_ancestors() -> None:
     assert get_logger("a").get_child("b").get_child("c").name == "a.b.c"
     assert RcutilsLogger().get_child("a").name == "a"
     for get in (get_logger, get_logger("a").get_child):
@@ -74,7 +74,7 @@ def test_loggers_need_names_and_children_have_those_of_their_ancestors() -> None
             get("")
 
 
-def test_a_message_is_a_string() -> None:
+def test_a_message_must_be_a_string() -> None:
     with pytest.raises(TypeError):
         get_logger("a").info(5)  # type: ignore[arg-type]
 
@@ -88,7 +88,7 @@ def test_an_unknown_option_is_an_error() -> None:
         get_logger("a").info("hello", throttle_duration_sec=1.0, throttle_time_source_type="wall")
 
 
-def test_a_call_may_not_change_what_it_asks_for() -> None:
+def test_a_log_call_cannot_change_its_severity_name_or_filters() -> None:
     logger = get_logger("fickle")
 
     def log(severity: LoggingSeverity, **options: object) -> None:
@@ -103,23 +103,23 @@ def test_a_call_may_not_change_what_it_asks_for() -> None:
         log(LoggingSeverity.INFO, skip_first=True)
 
 
-def test_once_logs_the_first_message_of_a_place_only() -> None:
+def test_once_logs_only_the_first_message_of_a_call_site() -> None:
     logger = get_logger("once")
     assert [logger.info(str(i), once=True) for i in range(3)] == [True, False, False]
-    assert logger.info("another place", once=True)
+    assert logger.info("another call site", once=True)
 
 
-def test_two_calls_on_one_line_are_two_places() -> None:
+def test_two_calls_on_one_line_are_two_call_sites() -> None:
     logger = get_logger("line")
     assert (logger.info("a", once=True), logger.info("b", once=True)) == (True, True)
 
 
-def test_skip_first_leaves_out_the_first_message_of_a_place() -> None:
+def test_skip_first_omits_the_first_message_of_a_call_site() -> None:
     logger = get_logger("skip")
     assert [logger.info(str(i), skip_first=True) for i in range(3)] == [False, True, True]
 
 
-def test_throttle_follows_the_clock_it_is_given(clock: ROSClock) -> None:
+def test_throttle_follows_the_given_clock(clock: ROSClock) -> None:
     logger = get_logger("throttle")
     logged = []
     for tenth in range(100, 125):
@@ -152,7 +152,7 @@ def test_a_filtered_message_below_the_level_does_not_count() -> None:
 
 
 @pytest.mark.parametrize(("message", "shown"), [(None, "(null)"), (b"bytes", "bytes")])
-def test_what_c_takes_for_a_string_is_logged(
+def test_none_and_bytes_are_logged_as_strings(
     message: object, shown: str, capfd: pytest.CaptureFixture[str]
 ) -> None:
     assert get_logger("strings").error(message)  # type: ignore[arg-type]

@@ -1,4 +1,4 @@
-"""Messages that check what they are assigned: ``check_fields`` and ROS_PYTHON_CHECK_FIELDS, as rclpy's."""
+"""Messages that check assigned values: ``check_fields`` and ROS_PYTHON_CHECK_FIELDS, as in rclpy."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ ACCEPTED = [
     (Float32, "data", float("inf")),
     (Int8, "data", True),
     (Byte, "data", b"\1"),
-    (PointStamped, "point", Point(y="checked by its own flag alone")),  # type: ignore[arg-type]
+    (PointStamped, "point", Point(y="only its own flag decides")),  # type: ignore[arg-type]
     (JointState, "name", ("a", "b")),
     (JointState, "name", UserList(["a"])),
     (DiagnosticArray, "status", [DiagnosticStatus(name=5)]),  # type: ignore[arg-type]
@@ -81,7 +81,7 @@ ACCEPTED_NUMBERS = [
 
 
 def assert_assignment_is_refused(cls: Any, field: str, value: Any) -> None:
-    """Assign a value to a field of a message that checks fields, in vain."""
+    """A message that checks fields refuses this value and keeps its old one."""
     message = cls(check_fields=True)
     with pytest.raises(AssertionError, match=f"'{field}"):
         setattr(message, field, value)
@@ -96,19 +96,19 @@ def test_a_message_that_checks_fields_refuses_a_wrong_value(cls: Any, field: str
 
 
 @pytest.mark.parametrize(("cls", "field", "value"), ACCEPTED)
-def test_a_message_that_checks_fields_takes_what_fits(cls: Any, field: str, value: Any) -> None:
+def test_a_message_that_checks_fields_accepts_fitting_values(cls: Any, field: str, value: Any) -> None:
     message = cls(check_fields=True, **{field: value})
     setattr(message, field, value)
     assert getattr(message, field) == value
 
 
 @pytest.mark.parametrize(("cls", "field", "value"), WRONG_NUMBERS)
-def test_wrong_numbers_are_refused_when_they_are_assigned(cls: Any, field: str, value: Any) -> None:
+def test_wrong_numbers_are_refused_at_assignment(cls: Any, field: str, value: Any) -> None:
     assert_assignment_is_refused(cls, field, value)
 
 
 @pytest.mark.parametrize(("cls", "field", "value"), ACCEPTED_NUMBERS)
-def test_numbers_that_fit_are_taken(cls: Any, field: str, value: Any) -> None:
+def test_fitting_numbers_are_accepted(cls: Any, field: str, value: Any) -> None:
     message = cls(check_fields=True)
     setattr(message, field, value)
     assert list(getattr(message, field)) == list(value)
@@ -121,7 +121,7 @@ def test_a_constructor_converts_numbers_before_they_are_checked() -> None:
 
 
 @pytest.mark.parametrize(("cls", "field", "value"), WRONG)
-def test_other_messages_take_anything(cls: Any, field: str, value: Any) -> None:
+def test_other_messages_accept_any_value(cls: Any, field: str, value: Any) -> None:
     earlier = cls()
     cls(check_fields=True)
     for message in (earlier, cls(), cls(check_fields=False), cls(**{field: value})):
@@ -129,17 +129,17 @@ def test_other_messages_take_anything(cls: Any, field: str, value: Any) -> None:
         assert getattr(message, field) is value
 
 
-def test_a_message_that_checks_fields_is_like_any_other() -> None:
+def test_a_message_that_checks_fields_behaves_like_any_other() -> None:
     message = PointStamped(header=Header(stamp=Time(sec=1)), point=Point(x=2.0), check_fields=True)
     assert message == PointStamped(header=Header(stamp=Time(sec=1)), point=Point(x=2.0))
     assert type(message) is PointStamped
     assert repr(message) == repr(copy.copy(message))
     assert deserialize_message(serialize_message(message), PointStamped) == message
-    message.point.x = 5  # checked by its own flag alone
+    message.point.x = 5  # only its own flag decides
     assert Empty(check_fields=True) == Empty()
 
 
-def test_a_copy_of_a_message_that_checks_fields_does_so_too() -> None:
+def test_a_copy_checks_fields_if_its_original_does() -> None:
     message = Float64(data=1.0, check_fields=True)
     for twin in (copy.copy(message), copy.deepcopy(message), pickle.loads(pickle.dumps(message))):
         assert twin == message
@@ -158,7 +158,7 @@ def test_a_class_derived_from_a_message_can_check_fields() -> None:
 
 
 @pytest.mark.parametrize(("variable", "checks"), [("1", True), ("0", False), ("true", False), ("", False)])
-def test_the_environment_lets_all_messages_check_fields(variable: str, checks: bool) -> None:
+def test_an_environment_variable_makes_all_messages_check_fields(variable: str, checks: bool) -> None:
     code = f"""
 from pytest import raises
 from rclpy.serialization import deserialize_message, serialize_message

@@ -71,7 +71,7 @@ def test_nested_defaults_are_not_shared_between_messages() -> None:
     assert not PoseWithCovariance().covariance.any()
 
 
-def test_constants_are_attributes_with_the_values_of_rclpy() -> None:
+def test_constants_have_the_values_of_rclpy() -> None:
     assert [DiagnosticStatus.OK, DiagnosticStatus.STALE] == [b"\0", b"\3"]
     assert Log.INFO == 20
     assert ParameterType.PARAMETER_DOUBLE == 3
@@ -84,7 +84,7 @@ def test_a_field_that_does_not_exist_cannot_be_set() -> None:
         Float64().dta = 1.0  # type: ignore[attr-defined]
 
 
-def test_messages_are_equal_if_their_types_and_fields_are() -> None:
+def test_messages_are_equal_if_types_and_fields_are_equal() -> None:
     assert Float64(data=1.0) == Float64(data=1.0)
     assert Float64(data=1.0) != Float64(data=2.0)
     assert Float64(data=1.0) != Float32(data=1.0)
@@ -98,7 +98,7 @@ def test_messages_are_unhashable_as_they_can_change() -> None:
         hash(Float64())
 
 
-def test_all_slots_of_a_message_are_set_and_tell_its_fields() -> None:
+def test_every_slot_of_a_message_is_set() -> None:
     for message in (
         Float64(data=1.0),
         deserialize_message(serialize_message(Float64(data=1.0)), Float64),
@@ -131,7 +131,7 @@ def test_messages_survive_copy_and_pickle() -> None:
     assert (joints.header.frame_id, joints.position[0]) == ("base", 1.5)
 
 
-def test_a_sequence_of_numbers_is_an_array_array_whatever_was_assigned() -> None:
+def test_a_sequence_of_numbers_is_always_an_array_array() -> None:
     joints = JointState()
     for values in (
         [1.0, 2.0],
@@ -144,13 +144,13 @@ def test_a_sequence_of_numbers_is_an_array_array_whatever_was_assigned() -> None
         joints.position = values
         assert joints.position == array("d", [1.0, 2.0])
         assert joints.position.typecode == "d"
-    mine = array("d", [3.0])
-    joints.position = mine
-    mine.append(4.0)
+    given = array("d", [3.0])
+    joints.position = given
+    given.append(4.0)
     assert joints.position == array("d", [3.0])
 
 
-def test_a_sequence_of_numbers_takes_an_iterator() -> None:
+def test_a_sequence_of_numbers_accepts_an_iterator() -> None:
     for make in (lambda: map(float, [1, 2]), lambda: (x for x in [1.0, 2.0]), lambda: reversed([2.0, 1.0])):
         scan, joints = LaserScan(ranges=make()), JointState(position=make())
         assert scan.ranges == array("f", [1.0, 2.0])
@@ -159,18 +159,18 @@ def test_a_sequence_of_numbers_takes_an_iterator() -> None:
         assert scan.ranges == array("f", [1.0, 2.0])
 
 
-def test_bytes_are_a_sequence_of_numbers_as_they_lie_in_memory() -> None:
+def test_bytes_are_read_as_the_memory_of_a_sequence_of_numbers() -> None:
     for kind in (bytes, bytearray):
         assert LaserScan(ranges=kind(array("f", [1.0, 2.0]))).ranges == array("f", [1.0, 2.0])
         assert JointState(position=kind(array("d", [1.0, 2.0]))).position == array("d", [1.0, 2.0])
 
 
-def test_bytes_are_a_sequence_of_octets_of_an_image() -> None:
+def test_an_image_accepts_bytes_and_integers_as_octets() -> None:
     for data in (b"\1\2", bytearray(b"\1\2"), memoryview(b"\1\2"), np.array([1, 2], np.uint8), [1, 2]):
         assert Image(data=data).data == array("B", [1, 2])
 
 
-def test_an_array_of_numbers_is_a_numpy_array_of_the_fields_type() -> None:
+def test_an_array_of_numbers_is_a_numpy_array_of_its_type() -> None:
     gid = Gid(data=list(range(16)))
     assert isinstance(gid.data, np.ndarray)
     assert gid.data.dtype == np.uint8
@@ -214,13 +214,11 @@ def test_a_service_has_three_messages_and_no_instances() -> None:
         ),
     ],
 )
-def test_a_class_tells_the_types_of_its_fields_as_rosidl_parser_does(
-    cls: Any, types: tuple[AbstractType, ...]
-) -> None:
+def test_slot_types_are_those_of_rosidl_parser(cls: Any, types: tuple[AbstractType, ...]) -> None:
     assert types == cls.SLOT_TYPES
 
 
-def test_a_type_tells_whether_its_size_is_bounded() -> None:
+def test_a_slot_type_knows_whether_its_size_is_bounded() -> None:
     number = BasicType("double")
     assert all(
         type_.has_maximum_size() for type_ in (Array(number, 2), BoundedSequence(number, 2), BoundedString(2))

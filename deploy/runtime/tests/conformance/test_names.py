@@ -1,4 +1,4 @@
-"""Names of nodes, namespaces, topics and services: which are valid, and what they expand to."""
+"""Names of nodes, namespaces, topics and services: validation and expansion."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ from rclpy.validate_node_name import validate_node_name
 from rclpy.validate_topic_name import validate_topic_name
 
 
-def place_of(error: BaseException) -> int:
+def caret_index(error: BaseException) -> int:
     """Return the index that the caret in an error's message points at."""
     lines = str(error).splitlines()
     return lines[2].index("^") - lines[1].index("'") - 1
 
 
 @pytest.mark.parametrize("name", ["my_node", "_hidden", "Node1", "n" * 255])
-def test_these_node_names_are_valid(name: str) -> None:
+def test_valid_node_names(name: str) -> None:
     assert validate_node_name(name) is True
 
 
 @pytest.mark.parametrize(
-    ("name", "reason", "place"),
+    ("name", "reason", "index"),
     [
         ("", "must not be empty", 0),
         ("invalid_node?", "must not contain characters", 12),
@@ -41,21 +41,19 @@ def test_these_node_names_are_valid(name: str) -> None:
         ("n" * 256, "should not exceed '255'", 254),
     ],
 )
-def test_these_node_names_are_not_and_the_error_points_at_the_place(
-    name: str, reason: str, place: int
-) -> None:
+def test_errors_of_node_names_point_at_the_invalid_character(name: str, reason: str, index: int) -> None:
     with pytest.raises(InvalidNodeNameException, match=reason) as caught:
         validate_node_name(name)
-    assert place_of(caught.value) == place
+    assert caret_index(caught.value) == index
 
 
 @pytest.mark.parametrize("namespace", ["/", "/my_ns", "/a/b/c"])
-def test_these_namespaces_are_valid(namespace: str) -> None:
+def test_valid_namespaces(namespace: str) -> None:
     assert validate_namespace(namespace) is True
 
 
 @pytest.mark.parametrize(
-    ("namespace", "reason", "place"),
+    ("namespace", "reason", "index"),
     [
         ("", "must not be empty", 0),
         ("relative", "must be absolute", 0),
@@ -66,19 +64,19 @@ def test_these_namespaces_are_valid(namespace: str) -> None:
         ("/" + "n" * 245, "should not exceed", 244),
     ],
 )
-def test_these_namespaces_are_not(namespace: str, reason: str, place: int) -> None:
+def test_errors_of_namespaces_point_at_the_invalid_character(namespace: str, reason: str, index: int) -> None:
     with pytest.raises(InvalidNamespaceException, match=reason) as caught:
         validate_namespace(namespace)
-    assert place_of(caught.value) == place
+    assert caret_index(caught.value) == index
 
 
 @pytest.mark.parametrize("name", ["/chatter", "/a/b_c/d1", "/_hidden", "/" + "t" * 246])
-def test_these_full_topic_names_are_valid(name: str) -> None:
+def test_valid_full_topic_names(name: str) -> None:
     assert validate_full_topic_name(name) is True
 
 
 @pytest.mark.parametrize(
-    ("name", "reason", "place"),
+    ("name", "reason", "index"),
     [
         ("", "must not be empty", 0),
         ("chatter", "must be absolute", 0),
@@ -90,22 +88,24 @@ def test_these_full_topic_names_are_valid(name: str) -> None:
         ("/" + "t" * 247, "should not exceed", 246),
     ],
 )
-def test_these_full_topic_names_are_not(name: str, reason: str, place: int) -> None:
+def test_errors_of_full_topic_names_point_at_the_invalid_character(
+    name: str, reason: str, index: int
+) -> None:
     with pytest.raises(InvalidTopicNameException, match=reason) as caught:
         validate_full_topic_name(name)
-    assert place_of(caught.value) == place
+    assert caret_index(caught.value) == index
 
 
 @pytest.mark.parametrize(
     "name",
     ["chatter", "{node}/chatter", "~/chatter", "~", "/chatter", "{ns}/x", "foo/{my_sub}", "a_{node}_b"],
 )
-def test_these_topic_names_are_valid_before_expansion(name: str) -> None:
+def test_valid_topic_names_before_expansion(name: str) -> None:
     assert validate_topic_name(name) is True
 
 
 @pytest.mark.parametrize(
-    ("name", "reason", "place"),
+    ("name", "reason", "index"),
     [
         ("", "must not be empty", 0),
         ("/", "must not end with", 0),
@@ -122,14 +122,14 @@ def test_these_topic_names_are_valid_before_expansion(name: str) -> None:
         ("foo/{4bar}", "substitution name must not start", 5),
     ],
 )
-def test_these_topic_names_are_not(name: str, reason: str, place: int) -> None:
+def test_errors_of_topic_names_point_at_the_invalid_character(name: str, reason: str, index: int) -> None:
     with pytest.raises(InvalidTopicNameException, match=reason) as caught:
         validate_topic_name(name)
-    assert place_of(caught.value) == place
+    assert caret_index(caught.value) == index
 
 
 @pytest.mark.parametrize("validate", [validate_topic_name, validate_full_topic_name])
-def test_a_service_has_an_error_of_its_own(validate: Callable[..., bool]) -> None:
+def test_invalid_service_names_have_their_own_error(validate: Callable[..., bool]) -> None:
     with pytest.raises(InvalidServiceNameException, match="Invalid service name"):
         validate("/bad?", is_service=True)
 
@@ -149,7 +149,7 @@ def test_a_service_has_an_error_of_its_own(validate: Callable[..., bool]) -> Non
         ("{namespace}/{node}/x", "/a/b", "/a/b/node/x"),
     ],
 )
-def test_a_name_expands_as_its_node_means_it(name: str, namespace: str, expanded: str) -> None:
+def test_a_name_expands_relative_to_its_node(name: str, namespace: str, expanded: str) -> None:
     assert expand_topic_name(name, "node", namespace) == expanded
 
 
@@ -162,7 +162,7 @@ def test_a_name_expands_as_its_node_means_it(name: str, namespace: str, expanded
         ("{unknown}", "node", "/ns", "unknown substitution: {unknown}"),
     ],
 )
-def test_a_name_of_an_impossible_node_or_with_an_unknown_substitution_does_not_expand(
+def test_invalid_names_and_substitutions_do_not_expand(
     name: str, node: str, namespace: str, reason: str
 ) -> None:
     with pytest.raises(ValueError, match=reason):

@@ -1,4 +1,4 @@
-"""The parameters of a node: declaring, setting, describing, and the callbacks that have a say."""
+"""The parameters of a node: declaring, reading, setting, ranges, callbacks and descriptors."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def default_context(module_domain_id: int) -> Iterator[None]:
 
 
 class Node(rclpy.node.Node):
-    """A node that keeps what it tells of its parameters, and has no others than the test's."""
+    """A node that collects its parameter events; ``values`` leaves out the parameters that every node has."""
 
     made: list[Node] = []
 
@@ -50,7 +50,7 @@ class Node(rclpy.node.Node):
         self.made.append(self)
         parameters = [Parameter(name, value=value) for name, value in (overrides or {}).items()]
         super().__init__("node", namespace="/ns", parameter_overrides=parameters, **options)
-        self._born_with = {*self.list_parameters([], 0).names} - (overrides or {}).keys()
+        self._initial_names = {*self.list_parameters([], 0).names} - (overrides or {}).keys()
         self.events.clear()
 
     def create_publisher(self, msg_type: Any, *arguments: Any, **options: Any) -> Any:
@@ -59,13 +59,13 @@ class Node(rclpy.node.Node):
         return super().create_publisher(msg_type, *arguments, **options)
 
     def values(self) -> dict[str, Any]:
-        """The parameters that the node was not born with."""
+        """The values of the parameters that the test declared."""
         names = self.own(self.list_parameters([], 0).names)
         return {parameter.name: parameter.value for parameter in self.get_parameters(names)}
 
     def own(self, names: Iterable[str]) -> list[str]:
-        """Those of the names that the node was not born with."""
-        return [name for name in names if name not in self._born_with]
+        """The names of parameters that the test declared."""
+        return [name for name in names if name not in self._initial_names]
 
 
 def changes(event: ParameterEvent) -> tuple[list[str], list[str], list[str]]:
@@ -80,7 +80,7 @@ def changes(event: ParameterEvent) -> tuple[list[str], list[str], list[str]]:
 # Declaring
 
 
-def test_a_declared_parameter_has_its_default_and_is_announced() -> None:
+def test_a_declared_parameter_has_its_default_and_publishes_an_event() -> None:
     node = Node()
     parameter = node.declare_parameter("rate", 10)
     assert (parameter.name, parameter.value) == ("rate", 10)
@@ -92,7 +92,7 @@ def test_a_declared_parameter_has_its_default_and_is_announced() -> None:
     assert event.stamp.sec > 0
 
 
-def test_an_override_takes_the_place_of_the_default() -> None:
+def test_an_override_replaces_the_default() -> None:
     node = Node({"rate": 20, "unused": 1})
     assert node.declare_parameter("rate", 10).value == 20
     assert not node.has_parameter("unused")
@@ -107,7 +107,7 @@ def test_an_override_of_another_type_is_an_error_that_names_both_types() -> None
     assert node.events == []
 
 
-def test_several_parameters_share_a_namespace() -> None:
+def test_declare_parameters_prefixes_the_namespace() -> None:
     node = Node()
     declared = node.declare_parameters(
         "arm", [("l1", 1.0, ParameterDescriptor()), ("l2", Parameter.Type.DOUBLE), ("name", "left")]
@@ -117,7 +117,7 @@ def test_several_parameters_share_a_namespace() -> None:
     assert len(node.events) == 3
 
 
-def test_declaring_twice_is_an_error_and_declares_nothing_else() -> None:
+def test_declaring_a_parameter_twice_is_an_error_and_declares_nothing() -> None:
     node = Node()
     node.declare_parameter("a", 1)
     with pytest.raises(ParameterAlreadyDeclaredException, match="a"):
@@ -139,14 +139,12 @@ def test_declaring_twice_is_an_error_and_declares_nothing_else() -> None:
         (("a", None, ParameterDescriptor()), ValueError),
     ],
 )
-def test_a_declaration_that_makes_no_sense_is_an_error(
-    declaration: tuple[Any, ...], error: type[Exception]
-) -> None:
+def test_an_invalid_declaration_is_an_error(declaration: tuple[Any, ...], error: type[Exception]) -> None:
     with pytest.raises(error):
         cast(Any, Node()).declare_parameters("", [declaration])
 
 
-def test_declaring_a_name_only_works_as_it_once_did_and_warns() -> None:
+def test_declaring_only_a_name_is_dynamic_and_deprecated() -> None:
     node = Node({"b": 5})
     with pytest.warns(UserWarning, match="named 'a'.*deprecated"):
         assert node.declare_parameter("a").value is None
@@ -178,7 +176,7 @@ def test_declaring_all_overrides_gives_each_its_own_type() -> None:
 # Undeclaring
 
 
-def test_an_undeclared_parameter_is_gone_without_a_word() -> None:
+def test_undeclaring_a_parameter_publishes_no_event() -> None:
     node = Node()
     node.declare_parameter("a", 1)
     node.events.clear()
@@ -189,7 +187,7 @@ def test_an_undeclared_parameter_is_gone_without_a_word() -> None:
         node.undeclare_parameter("a")
 
 
-def test_a_read_only_parameter_is_neither_set_nor_undeclared_but_may_be_overridden() -> None:
+def test_a_read_only_parameter_can_only_be_overridden() -> None:
     node = Node({"a": 2})
     node.declare_parameter("a", 1, ParameterDescriptor(read_only=True))
     assert node.get_parameter("a").value == 2
@@ -206,7 +204,7 @@ def test_a_read_only_parameter_is_neither_set_nor_undeclared_but_may_be_overridd
 # Reading
 
 
-def test_undeclared_parameters_are_an_error_unless_they_are_allowed() -> None:
+def test_undeclared_parameters_are_an_error_unless_allowed() -> None:
     node = Node()
     for read in (
         node.get_parameter,
@@ -236,13 +234,13 @@ def test_types_are_numbers_as_in_rclpy() -> None:
     assert list[object](node.get_parameter_types(["a", "b"])) == [2, 9]
 
 
-def test_names_are_strings() -> None:
+def test_names_must_be_strings() -> None:
     for read in (Node().get_parameters, Node().get_parameter_types):
         with pytest.raises(TypeError, match="instances of type str"):
             read([1])  # type: ignore[list-item]
 
 
-def test_parameters_below_a_prefix_are_named_without_it() -> None:
+def test_parameters_by_prefix_are_named_without_the_prefix() -> None:
     node = Node()
     for name in ("foo.ping", "foo.pong.x", "foobar", "bar.baz"):
         node.declare_parameter(name, name)
@@ -277,7 +275,7 @@ def test_names_are_listed_by_prefix_and_depth(
     assert (node.own(result.names), result.prefixes) == (names, found)
 
 
-def test_a_list_of_names_needs_prefixes_and_a_depth() -> None:
+def test_listing_names_needs_a_list_of_prefixes_and_an_integer_depth() -> None:
     for prefixes, depth, error in [("b", 0, TypeError), ([1], 0, TypeError), ([], 1.0, TypeError)]:
         with pytest.raises(error):
             Node().list_parameters(prefixes, depth)  # type: ignore[arg-type]
@@ -288,7 +286,7 @@ def test_a_list_of_names_needs_prefixes_and_a_depth() -> None:
 # Setting
 
 
-def test_parameters_are_set_one_by_one_or_all_or_none() -> None:
+def test_parameters_are_set_individually_or_atomically() -> None:
     node = Node()
     node.declare_parameters("", [("a", 1), ("b", 1)])
     node.events.clear()
@@ -301,12 +299,12 @@ def test_parameters_are_set_one_by_one_or_all_or_none() -> None:
     assert [changes(event) for event in node.events] == [([], ["a"], []), ([], ["a", "b"], [])]
 
 
-def test_only_parameters_can_be_set() -> None:
+def test_setting_needs_parameter_objects() -> None:
     with pytest.raises(TypeError, match="Parameter"):
         Node().set_parameters([("a", 1)])  # type: ignore[list-item]
 
 
-def test_the_type_of_a_parameter_stays_unless_it_is_dynamic() -> None:
+def test_only_a_dynamic_parameter_may_change_its_type() -> None:
     node = Node()
     node.declare_parameter("fixed", 1)
     node.declare_parameter("free", 1, ParameterDescriptor(dynamic_typing=True))
@@ -316,7 +314,7 @@ def test_the_type_of_a_parameter_stays_unless_it_is_dynamic() -> None:
     assert node.describe_parameter("free").type == Parameter.Type.STRING.value
 
 
-def test_a_dynamic_parameter_set_to_nothing_is_undeclared() -> None:
+def test_setting_a_dynamic_parameter_to_not_set_undeclares_it() -> None:
     node = Node()
     node.declare_parameter("fixed", 1)
     node.declare_parameter("free", 1, ParameterDescriptor(dynamic_typing=True))
@@ -334,7 +332,7 @@ def test_a_dynamic_parameter_set_to_nothing_is_undeclared() -> None:
     ("value", "valid"),
     [(-10, True), (-8, True), (-7, False), (0, True), (9, True), (8, True), (10, False), (-11, False)],
 )
-def test_an_integer_lies_in_its_range_on_a_step_or_at_its_end(value: int, valid: bool) -> None:
+def test_an_integer_must_lie_on_a_step_or_at_the_end_of_its_range(value: int, valid: bool) -> None:
     node, allowed = Node(), IntegerRange(from_value=-10, to_value=9, step=2)
     node.declare_parameter("a", 0, ParameterDescriptor(integer_range=[allowed]))
     assert node.set_parameters([Parameter("a", value=value)])[0].successful is valid
@@ -354,13 +352,13 @@ def test_an_integer_lies_in_its_range_on_a_step_or_at_its_end(value: int, valid:
         (float("inf"), False),
     ],
 )
-def test_a_double_lies_in_its_range_close_to_a_step_or_its_end(value: float, valid: bool) -> None:
+def test_a_double_must_lie_near_a_step_or_the_end_of_its_range(value: float, valid: bool) -> None:
     node, allowed = Node(), FloatingPointRange(from_value=0.0, to_value=1.2, step=0.5)
     node.declare_parameter("a", 1.0, ParameterDescriptor(floating_point_range=[allowed]))
     assert node.set_parameters([Parameter("a", value=value)])[0].successful is valid
 
 
-def test_a_range_may_be_given_backwards_and_without_steps() -> None:
+def test_a_range_may_be_reversed_and_have_no_step() -> None:
     node, allowed = Node(), FloatingPointRange(from_value=1.0, to_value=-1.0)
     node.declare_parameter("a", 0.123, ParameterDescriptor(floating_point_range=[allowed]))
     result = node.set_parameters([Parameter("a", value=1.5)])[0]
@@ -375,7 +373,7 @@ def test_a_default_or_override_out_of_range_is_an_error() -> None:
         assert not node.has_parameter("a")
 
 
-def test_a_range_of_another_type_does_not_matter() -> None:
+def test_a_range_of_another_type_is_ignored() -> None:
     descriptor = ParameterDescriptor(integer_range=[IntegerRange(from_value=0, to_value=5)])
     assert Node().declare_parameter("a", 100.0, descriptor).value == 100.0
 
@@ -387,7 +385,7 @@ def accept(parameters: list[Parameter]) -> SetParametersResult:
     return SetParametersResult(successful=True)
 
 
-def test_a_callback_that_rejects_keeps_everything_as_it_was() -> None:
+def test_a_rejecting_callback_keeps_all_parameters() -> None:
     node = Node()
     node.declare_parameter("a", 1)
     node.events.clear()
@@ -405,7 +403,7 @@ def test_a_callback_that_rejects_keeps_everything_as_it_was() -> None:
     assert node.set_parameters([Parameter("a", value=2)])[0].successful
 
 
-def test_callbacks_are_asked_before_and_told_after_the_last_added_first() -> None:
+def test_on_set_callbacks_run_before_and_post_set_after_newest_first() -> None:
     node, calls = Node(), []
     node.declare_parameter("a", 1)
 
@@ -427,7 +425,7 @@ def test_callbacks_are_asked_before_and_told_after_the_last_added_first() -> Non
     assert calls == [("on 2", 1), ("on 1", 1), ("post 2", 2), ("post 1", 2)]
 
 
-def test_a_pre_set_callback_replaces_the_parameters_to_be_set() -> None:
+def test_a_pre_set_callback_replaces_the_parameters() -> None:
     node = Node()
     node.declare_parameters("", [("l1", 1.0), ("l2", 1.0)])
 
@@ -445,7 +443,7 @@ def test_a_pre_set_callback_replaces_the_parameters_to_be_set() -> None:
     assert "cannot be empty" in node.set_parameters([Parameter("l1", value=1.0)])[0].reason
 
 
-def test_a_callback_may_remove_itself_and_only_what_was_added_can_be_removed() -> None:
+def test_a_callback_may_remove_itself_but_unknown_ones_are_an_error() -> None:
     node, calls = Node(), []
 
     def once(parameters: list[Parameter]) -> None:
@@ -464,7 +462,7 @@ def test_a_callback_may_remove_itself_and_only_what_was_added_can_be_removed() -
 # Descriptors
 
 
-def test_a_new_descriptor_keeps_the_value_or_takes_the_alternative() -> None:
+def test_a_new_descriptor_keeps_the_value_or_uses_the_alternative() -> None:
     node = Node()
     node.declare_parameter("a", 5)
     fits = ParameterDescriptor(type=2, integer_range=[IntegerRange(from_value=0, to_value=10)])

@@ -1,4 +1,4 @@
-"""Parameters as values: types, messages, text and files."""
+"""Parameters: types, messages, text and files."""
 
 from __future__ import annotations
 
@@ -32,9 +32,7 @@ VALUES = [
 
 
 @pytest.mark.parametrize(("type_", "value"), VALUES)
-def test_a_parameter_has_the_type_of_its_value_and_survives_its_message(
-    type_: Parameter.Type, value: Any
-) -> None:
+def test_a_parameter_survives_conversion_to_a_message(type_: Parameter.Type, value: Any) -> None:
     parameter = Parameter("name", value=value)
     assert (parameter.name, parameter.type_, parameter.value) == ("name", type_, value)
     message = parameter.to_parameter_msg()
@@ -46,7 +44,7 @@ def test_a_parameter_has_the_type_of_its_value_and_survives_its_message(
 
 
 @pytest.mark.parametrize(("type_", "value"), VALUES)
-def test_a_value_agrees_with_its_own_type_only(type_: Parameter.Type, value: Any) -> None:
+def test_a_value_fits_only_its_type(type_: Parameter.Type, value: Any) -> None:
     for other in Parameter.Type:
         is_an_int_too = type_ in (Parameter.Type.BOOL, Parameter.Type.BOOL_ARRAY)
         if is_an_int_too and other in (Parameter.Type.INTEGER, Parameter.Type.INTEGER_ARRAY):
@@ -61,18 +59,18 @@ def test_tuples_and_numeric_arrays_are_values_too() -> None:
     assert not Parameter.Type.STRING_ARRAY.check(array.array("q", [1]))
 
 
-def test_an_empty_list_is_of_any_list_type_and_guessed_as_bytes() -> None:
+def test_an_empty_list_fits_any_array_type_and_defaults_to_bytes() -> None:
     assert Parameter("x", value=[]).type_ is Parameter.Type.BYTE_ARRAY
     assert Parameter("x", Parameter.Type.STRING_ARRAY, []).value == []
 
 
 @pytest.mark.parametrize("value", [{}, object(), [1, "a"], [1, 2.0], [None], {1, 2}])
-def test_other_values_are_of_no_type(value: Any) -> None:
+def test_values_of_other_types_are_an_error(value: Any) -> None:
     with pytest.raises(TypeError, match="allowed types"):
         Parameter("x", value=value)
 
 
-def test_a_value_of_another_type_than_the_given_one_is_an_error() -> None:
+def test_a_value_that_does_not_fit_the_given_type_is_an_error() -> None:
     with pytest.raises(ValueError, match="do not agree"):
         Parameter("x", Parameter.Type.STRING, 1)
     with pytest.raises(ValueError, match="do not agree"):
@@ -81,13 +79,13 @@ def test_a_value_of_another_type_than_the_given_one_is_an_error() -> None:
         Parameter("x", "STRING", "a")  # type: ignore[arg-type]
 
 
-def test_a_type_is_named_as_in_rclpy() -> None:
+def test_types_have_the_names_and_numbers_of_rclpy() -> None:
     assert str(Parameter.Type.BOOL) == "Type.BOOL"
     assert [type_.value for type_ in Parameter.Type] == list(range(10))
     assert Parameter.Type.BOOL.value == ParameterType.PARAMETER_BOOL
 
 
-def test_a_message_of_an_unknown_type_is_an_error() -> None:
+def test_a_message_with_an_unknown_type_is_an_error() -> None:
     with pytest.raises(RuntimeError, match="unexpected parameter type 17"):
         parameter_value_to_python(ParameterValue(type=17))
     with pytest.raises(ValueError, match="17 is not a valid"):
@@ -113,11 +111,11 @@ def test_a_message_of_an_unknown_type_is_an_error() -> None:
         ("[1", "[1"),
     ],
 )
-def test_a_text_becomes_what_yaml_sees_in_it_else_a_string(text: str, value: Any) -> None:
+def test_a_text_is_parsed_as_yaml_or_kept_as_a_string(text: str, value: Any) -> None:
     assert parameter_value_to_python(get_parameter_value(text)) == value
 
 
-def test_an_empty_list_as_text_is_a_list_of_bools_as_in_rclpy() -> None:
+def test_an_empty_list_as_text_is_a_bool_array() -> None:
     assert get_parameter_value("[]").type == ParameterType.PARAMETER_BOOL_ARRAY
 
 
@@ -138,10 +136,10 @@ def read(path: Path, **arguments: Any) -> dict[str, Any]:
     return {name: parameter_value_to_python(message.value) for name, message in messages.items()}
 
 
-def test_a_file_gives_the_parameters_of_the_nodes_asked_for(tmp_path: Path) -> None:
+def test_a_file_is_read_for_the_target_nodes(tmp_path: Path) -> None:
     path = tmp_path / "parameters.yaml"
     path.write_text(FILE)
-    own = {"own": 2, "nested.deep.x": 1.5, "text": 12}  # quotes do not count
+    own = {"own": 2, "nested.deep.x": 1.5, "text": 12}  # quotes are ignored, as in rclpy
     assert read(path, target_nodes=["/first"]) == own
     assert read(path, target_nodes=["/first"], use_wildcard=True) == {"shared": 1, **own}
     assert read(path, target_nodes=["/second"], namespace="ns.") == {"ns.second": ["a"]}
@@ -151,7 +149,7 @@ def test_a_file_gives_the_parameters_of_the_nodes_asked_for(tmp_path: Path) -> N
         read(path)
 
 
-def test_a_file_without_targets_gives_all_but_the_wildcard(tmp_path: Path) -> None:
+def test_without_targets_all_nodes_but_the_wildcard_are_read(tmp_path: Path) -> None:
     path = tmp_path / "parameters.yaml"
     path.write_text(FILE.replace("/broken: 5", ""))
     assert set(read(path)) == {"own", "nested.deep.x", "text", "second"}

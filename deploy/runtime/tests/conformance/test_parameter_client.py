@@ -1,4 +1,4 @@
-"""The parameter client and the event handler: what they send, and whom they call."""
+"""The parameter client and the parameter event handler: requests and callbacks."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from rclpy.task import Future
 
 
 class Client:
-    """A client whose server is there or not, and that keeps its requests."""
+    """A client that keeps its requests; ``ready`` says whether it has a server."""
 
     def __init__(self, name: str) -> None:
         self.name = name
@@ -76,7 +76,7 @@ def client_of(node: Node) -> AsyncParameterClient:
     return AsyncParameterClient(node, "other")  # type: ignore[arg-type]
 
 
-def test_all_services_must_be_there(node: Node) -> None:
+def test_all_services_must_be_available(node: Node) -> None:
     client = client_of(node)
     assert len(node.clients) == 6
     assert client.services_are_ready()
@@ -86,7 +86,7 @@ def test_all_services_must_be_there(node: Node) -> None:
     assert not client.wait_for_services(timeout_sec=0.0)
 
 
-def test_requests_carry_what_was_asked(node: Node) -> None:
+def test_requests_carry_the_arguments_of_the_call(node: Node) -> None:
     client = client_of(node)
     assert client.get_parameters(["a"]).result().names == ["a"]
     assert client.describe_parameters(["a"]).result().names == ["a"]
@@ -111,12 +111,12 @@ def test_parameters_are_set_as_values_or_messages(node: Node) -> None:
     assert len(node.clients["other/set_parameters_atomically"].requests) == 1
 
 
-def test_parameters_are_deleted_by_setting_them_to_nothing(node: Node) -> None:
+def test_deleting_sets_parameters_to_not_set(node: Node) -> None:
     request = client_of(node).delete_parameters(["a", "b"]).result()
     assert [(p.name, p.value.type) for p in request.parameters] == [("a", 0), ("b", 0)]
 
 
-def test_a_file_is_loaded_one_by_one_or_at_once(node: Node, tmp_path: Path) -> None:
+def test_a_file_is_loaded_parameter_by_parameter_or_atomically(node: Node, tmp_path: Path) -> None:
     path = tmp_path / "parameters.yaml"
     path.write_text("/other: {ros__parameters: {a: 1, b: {c: x}}}\n/**: {ros__parameters: {d: 2.5}}")
     client = client_of(node)
@@ -127,13 +127,13 @@ def test_a_file_is_loaded_one_by_one_or_at_once(node: Node, tmp_path: Path) -> N
     assert len(node.clients["other/set_parameters_atomically"].requests) == 1
 
 
-def test_the_callback_of_a_call_gets_its_future(node: Node) -> None:
+def test_a_callback_gets_the_future_of_its_call(node: Node) -> None:
     done: list[Future] = []
     future = client_of(node).get_parameters(["a"], callback=done.append)
     assert done == [future]
 
 
-def test_events_of_all_nodes_are_subscribed_to(node: Node) -> None:
+def test_the_client_subscribes_to_the_events_of_all_nodes(node: Node) -> None:
     assert client_of(node).on_parameter_event(print) is not None
     assert node.subscriptions == [("/parameter_events", print)]
 
@@ -156,9 +156,7 @@ def handler_of(node: Node) -> ParameterEventHandler:
 @pytest.mark.parametrize(
     ("given", "resolved"), [("", "/ns/me"), ("other", "/ns/other"), ("/far/other", "/far/other")]
 )
-def test_a_callback_is_called_for_its_parameter_of_its_node_only(
-    node: Node, given: str, resolved: str
-) -> None:
+def test_a_callback_gets_only_its_parameter_of_its_node(node: Node, given: str, resolved: str) -> None:
     handler, values = handler_of(node), []
     handler.add_parameter_callback("a", given, lambda message: values.append(message.value.integer_value))
     send = node.subscriptions[0][1]
@@ -169,7 +167,7 @@ def test_a_callback_is_called_for_its_parameter_of_its_node_only(
     assert values == [1, 3]
 
 
-def test_a_node_in_the_root_namespace_resolves_names_there() -> None:
+def test_a_node_in_the_root_namespace_resolves_node_names_there() -> None:
     node = Node("/")
     handler = handler_of(node)
     values: list[ParameterMsg] = []
@@ -178,7 +176,7 @@ def test_a_node_in_the_root_namespace_resolves_names_there() -> None:
     assert len(values) == 1
 
 
-def test_the_last_callback_added_is_called_first_and_those_for_events_last(node: Node) -> None:
+def test_newest_callbacks_run_first_and_event_callbacks_run_last(node: Node) -> None:
     handler, calls = handler_of(node), []
     handler.add_parameter_event_callback(lambda event: calls.append("event 1"))
     handler.add_parameter_event_callback(lambda event: calls.append("event 2"))
@@ -212,6 +210,6 @@ def test_all_new_values_of_an_event_can_be_read(node: Node) -> None:
     assert ParameterEventHandler.get_parameter_from_event(message, "b", "/ns/me") is None
 
 
-def test_a_handler_ends_with_its_subscription(node: Node) -> None:
+def test_destroying_a_handler_destroys_its_subscription(node: Node) -> None:
     handler_of(node).destroy()
     assert node.subscriptions == []

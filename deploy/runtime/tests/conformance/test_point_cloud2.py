@@ -48,7 +48,7 @@ def test_points_share_the_memory_of_the_message(cloud: PointCloud2) -> None:
     assert point_cloud2.read_points(cloud)["x"][2] == 4.0
 
 
-def test_some_fields_and_some_points_are_read(cloud: PointCloud2) -> None:
+def test_selected_fields_and_points_are_read(cloud: PointCloud2) -> None:
     points = point_cloud2.read_points(cloud, field_names=("intensity", "x"), uvs=[2, 0])
     assert points.dtype.names == ("intensity", "x")
     assert [tuple(point) for point in points] == [(65535, -1.0), (7, 0.0)]
@@ -56,14 +56,14 @@ def test_some_fields_and_some_points_are_read(cloud: PointCloud2) -> None:
     assert [int(point["intensity"]) for point in selected] == [8]
 
 
-def test_points_with_nan_in_the_fields_that_are_read_may_be_skipped(cloud: PointCloud2) -> None:
+def test_points_with_nan_in_a_selected_field_may_be_skipped(cloud: PointCloud2) -> None:
     assert len(point_cloud2.read_points(cloud, skip_nans=True)) == 2
     assert len(point_cloud2.read_points(cloud, field_names=["x", "z"], skip_nans=True)) == 3
     cloud.is_dense = True
     assert len(point_cloud2.read_points(cloud, skip_nans=True)) == 3
 
 
-def test_fields_of_one_type_make_a_plain_array(cloud: PointCloud2) -> None:
+def test_fields_of_one_type_are_read_as_a_plain_array(cloud: PointCloud2) -> None:
     array = point_cloud2.read_points_numpy(cloud, field_names=["x", "z"])
     assert array.dtype == np.float32
     np.testing.assert_equal(array, [[0.0, 1.0], [1.5, 2.0], [-1.0, 3.0]])
@@ -76,7 +76,7 @@ def test_points_are_read_as_named_tuples(cloud: PointCloud2) -> None:
     assert [(point.x, point.intensity) for point in points] == [(0.0, 7), (-1.0, 65535)]
 
 
-def test_a_cloud_of_the_other_byte_order_is_read(cloud: PointCloud2) -> None:
+def test_a_cloud_in_the_other_byte_order_is_read(cloud: PointCloud2) -> None:
     type_ = point_cloud2.dtype_from_fields(XYZI, point_step=20)
     swapped = np.array(POINTS, type_.newbyteorder())
     cloud.data = list(swapped.tobytes())
@@ -94,13 +94,13 @@ def test_a_cloud_of_the_other_byte_order_is_read(cloud: PointCloud2) -> None:
     ],
     ids=["lists", "iterator", "array", "strided array"],
 )
-def test_a_cloud_of_xyz_is_made_of_anything_with_rows(points: Any) -> None:
+def test_a_cloud_of_xyz_is_created_from_any_rows(points: Any) -> None:
     cloud = point_cloud2.create_cloud_xyz32(HEADER, points)
     assert (cloud.width, cloud.height, cloud.point_step) == (2, 1, 12)
     np.testing.assert_equal(point_cloud2.read_points_numpy(cloud), [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]])
 
 
-def test_a_cloud_is_made_of_a_structured_array_of_its_type(cloud: PointCloud2) -> None:
+def test_a_cloud_is_created_from_a_structured_array_of_its_type(cloud: PointCloud2) -> None:
     again = point_cloud2.create_cloud(HEADER, XYZI, point_cloud2.read_points(cloud), point_step=20)
     np.testing.assert_equal(
         point_cloud2.read_points_list(again), [tuple(point) for point in point_cloud2.read_points(cloud)]
@@ -117,7 +117,7 @@ def test_an_organized_cloud_keeps_its_shape() -> None:
     assert point_cloud2.read_points(cloud).shape == (8,)
 
 
-def test_fields_of_several_elements_and_without_a_name_get_names() -> None:
+def test_unnamed_fields_and_fields_of_several_elements_get_names() -> None:
     fields = [
         PointField(name="", offset=0, datatype=PointField.FLOAT64, count=1),
         PointField(name="rgb", offset=8, datatype=PointField.UINT8, count=3),
@@ -133,12 +133,12 @@ def test_fields_of_several_elements_and_without_a_name_get_names() -> None:
     [[XYZI[0], XYZI[0]], [PointField(name="none", datatype=PointField.INT8, count=0)]],
     ids=["twice", "no elements"],
 )
-def test_fields_that_make_no_point_are_refused(fields: list[PointField]) -> None:
+def test_duplicate_and_empty_fields_are_an_error(fields: list[PointField]) -> None:
     with pytest.raises(AssertionError):
         point_cloud2.dtype_from_fields(fields)
 
 
-def test_a_field_that_is_not_there_and_what_is_no_cloud_are_refused(cloud: PointCloud2) -> None:
+def test_unknown_fields_and_other_messages_are_an_error(cloud: PointCloud2) -> None:
     with pytest.raises(AssertionError):
         point_cloud2.read_points(cloud, field_names=["w"])
     with pytest.raises(AssertionError):

@@ -1,4 +1,4 @@
-"""Publishing: what arrives, in which form, and what is refused."""
+"""Publishing: the bytes on the wire, accepted values, and errors."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ GOLDEN = json.loads((Path(__file__).parents[1] / "facts" / "cdr_golden.json").re
 
 
 @pytest.mark.parametrize("name", ["float64", "float64_pi4"])
-def test_on_the_wire_is_the_recorded_cdr(name: str, spin_until: SpinUntil, node: Node) -> None:
+def test_the_wire_carries_the_recorded_cdr(name: str, spin_until: SpinUntil, node: Node) -> None:
     received: list[bytes] = []
     node.create_subscription(Float64, "x", received.append, 10, raw=True)
     expected = bytes.fromhex(GOLDEN[name]["cdr"])
@@ -39,9 +39,7 @@ def test_on_the_wire_is_the_recorded_cdr(name: str, spin_until: SpinUntil, node:
     assert received == [expected, expected]
 
 
-def test_a_message_is_padded_on_the_wire_as_dds_wants_and_read_without(
-    spin_until: SpinUntil, node: Node
-) -> None:
+def test_strings_of_any_length_arrive_despite_padding(spin_until: SpinUntil, node: Node) -> None:
     received: list[str] = []
     node.create_subscription(String, "x", lambda message: received.append(message.data), 10)
     publisher = node.create_publisher(String, "x", 10)
@@ -51,15 +49,13 @@ def test_a_message_is_padded_on_the_wire_as_dds_wants_and_read_without(
     assert received == ["", "a", "ab", "abc", "Wrocław"]
 
 
-def test_integers_of_numpy_are_integers() -> None:
+def test_numpy_integers_serialize_as_integers() -> None:
     for type_ in (np.int8, np.int32, np.int64):
         data = serialize_message(Int32(data=type_(-3)))
         assert deserialize_message(data, Int32) == Int32(data=-3)
 
 
-def test_bytes_and_numpy_arrays_are_published_as_the_lists_that_they_mean(
-    spin_until: SpinUntil, node: Node
-) -> None:
+def test_bytes_and_numpy_arrays_arrive_as_lists(spin_until: SpinUntil, node: Node) -> None:
     received: list[ParameterValue] = []
     node.create_subscription(ParameterValue, "x", received.append, 10)
     publisher = node.create_publisher(ParameterValue, "x", 10)
@@ -80,9 +76,7 @@ def test_bytes_and_numpy_arrays_are_published_as_the_lists_that_they_mean(
         received.clear()
 
 
-def test_a_callback_with_two_arguments_learns_when_a_message_was_written(
-    spin_until: SpinUntil, node: Node
-) -> None:
+def test_a_callback_with_two_arguments_gets_the_timestamps(spin_until: SpinUntil, node: Node) -> None:
     infos: list[dict[str, int]] = []
     node.create_subscription(Float64, "x", lambda message, info: infos.append(info), 10)
     before = time.time_ns()
@@ -101,13 +95,13 @@ def test_only_the_last_messages_wait_for_a_slow_subscription(spin_until: SpinUnt
     assert received == [8.0, 9.0]
 
 
-def test_publishing_something_else_than_the_topics_type_is_a_type_error(make_node: MakeNode) -> None:
+def test_publishing_a_message_of_another_type_is_a_type_error(make_node: MakeNode) -> None:
     publisher = make_node().create_publisher(Float64, "x", 10)
     with pytest.raises(TypeError):
         publisher.publish(String())
 
 
-def test_publishing_after_the_end_is_an_error(make_node: MakeNode, context: Context) -> None:
+def test_publishing_after_destruction_or_shutdown_is_an_error(make_node: MakeNode, context: Context) -> None:
     node = make_node()
     destroyed = node.create_publisher(Float64, "x", 10)
     node.destroy_publisher(destroyed)

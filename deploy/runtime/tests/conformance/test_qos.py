@@ -25,7 +25,7 @@ from rclpy.qos import (
 FACTS = Path(__file__).parents[1] / "facts" / "rclpy_api.json"
 
 
-def test_presets_and_policies_are_those_recorded_from_rclpy() -> None:
+def test_presets_and_policies_match_the_recorded_facts() -> None:
     recorded = json.loads(FACTS.read_text())["rclpy.qos"]
     for name, entry in recorded.items():
         if not name.startswith("class ") or "members" not in entry:
@@ -37,7 +37,7 @@ def test_presets_and_policies_are_those_recorded_from_rclpy() -> None:
         assert members == entry["members"], name
 
 
-def test_a_profile_needs_a_depth_or_a_history_that_needs_none() -> None:
+def test_a_profile_needs_a_depth_unless_it_keeps_all() -> None:
     assert QoSProfile(depth=3).history == HistoryPolicy.KEEP_LAST
     assert QoSProfile(history=HistoryPolicy.KEEP_ALL).depth == 10
     with pytest.raises(InvalidQoSProfileException, match="History and/or depth"):
@@ -46,7 +46,7 @@ def test_a_profile_needs_a_depth_or_a_history_that_needs_none() -> None:
         QoSProfile(history=HistoryPolicy.KEEP_LAST)
 
 
-def test_a_profile_takes_its_other_policies_from_the_default_profile() -> None:
+def test_missing_policies_come_from_the_default_profile() -> None:
     assert QoSProfile(depth=10) == qos.qos_profile_default
 
 
@@ -72,7 +72,7 @@ def test_a_policy_of_a_wrong_type_or_name_is_an_error(arguments: dict[str, objec
         QoSProfile(**arguments)
 
 
-def test_keeping_the_last_none_warns() -> None:
+def test_a_depth_of_zero_warns() -> None:
     with pytest.warns(UserWarning, match="zero depth"):
         QoSProfile(depth=0)
 
@@ -85,7 +85,7 @@ def test_profiles_with_equal_policies_are_equal_and_have_no_hash() -> None:
         hash(QoSProfile(depth=1))
 
 
-def test_short_keys_name_policies_and_presets_whatever_their_case() -> None:
+def test_short_keys_ignore_case() -> None:
     assert ReliabilityPolicy.short_keys() == [
         "system_default",
         "reliable",
@@ -101,7 +101,7 @@ def test_short_keys_name_policies_and_presets_whatever_their_case() -> None:
         DurabilityPolicy.get_from_short_key("forever")
 
 
-def test_the_names_of_old_still_work_and_warn() -> None:
+def test_deprecated_names_still_work_and_warn() -> None:
     assert qos.QoSReliabilityPolicy is ReliabilityPolicy
     with pytest.warns(UserWarning, match=r"Use HistoryPolicy\.KEEP_ALL instead"):
         assert HistoryPolicy.RMW_QOS_POLICY_HISTORY_KEEP_ALL is HistoryPolicy.KEEP_ALL  # type: ignore[attr-defined]
@@ -113,7 +113,7 @@ def test_a_policy_kind_has_a_name() -> None:
 
 
 def profile(**policies: object) -> QoSProfile:
-    """Return a profile in which nothing is left to the middleware."""
+    """Return a profile that leaves no policy to the middleware."""
     return QoSProfile(**{"depth": 1, "liveliness": LivelinessPolicy.AUTOMATIC, **policies})
 
 
@@ -161,14 +161,14 @@ def test_equal_profiles_are_compatible() -> None:
         ),
     ],
 )
-def test_a_subscription_that_requests_more_than_is_offered_is_incompatible(
+def test_requesting_more_than_offered_is_incompatible(
     publisher: dict[str, object], subscription: dict[str, object], reason: str
 ) -> None:
     result = qos_check_compatible(profile(**publisher), profile(**subscription))
     assert result == (QoSCompatibility.ERROR, reason)
 
 
-def test_a_subscription_that_requests_less_than_is_offered_is_compatible() -> None:
+def test_requesting_less_than_offered_is_compatible() -> None:
     publisher = profile(
         durability=DurabilityPolicy.TRANSIENT_LOCAL,
         deadline=Duration(seconds=1),
@@ -198,14 +198,14 @@ def test_a_subscription_that_requests_less_than_is_offered_is_compatible() -> No
         ),
     ],
 )
-def test_what_is_left_to_the_middleware_may_be_incompatible(
+def test_policies_left_to_the_middleware_may_be_incompatible(
     publisher: dict[str, object], subscription: dict[str, object], reason: str
 ) -> None:
     result = qos_check_compatible(profile(**publisher), profile(**subscription))
     assert result == (QoSCompatibility.WARNING, reason)
 
 
-def test_all_reasons_are_given_at_once() -> None:
+def test_every_incompatible_policy_is_reported() -> None:
     publisher = profile(reliability=ReliabilityPolicy.BEST_EFFORT)
     subscription = profile(durability=DurabilityPolicy.TRANSIENT_LOCAL)
     assert qos_check_compatible(publisher, subscription)[1].count("ERROR:") == 2

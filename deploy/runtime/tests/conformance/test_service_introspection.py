@@ -1,4 +1,4 @@
-"""Service introspection: what others can see of the calls of a service and a client."""
+"""Service introspection: the events of a service and of a client."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def negate(request: SetBool.Request, response: SetBool.Response) -> SetBool.Resp
     return response
 
 
-class Watched:
+class Introspected:
     """A service, its client, and the events of both."""
 
     def __init__(self, node: Node, spin_until: SpinUntil) -> None:
@@ -57,18 +57,18 @@ class Watched:
 
 
 @pytest.fixture
-def watched(
+def introspected(
     make_node: Callable[..., Node], executor: SingleThreadedExecutor, spin_until: SpinUntil
-) -> Watched:
+) -> Introspected:
     node = make_node()
     executor.add_node(node)
-    return Watched(node, spin_until)
+    return Introspected(node, spin_until)
 
 
-def test_contents_tells_both_sides_of_a_call_with_request_and_response(watched: Watched) -> None:
-    watched.configure(CONTENTS)
-    before = watched.node.get_clock().now()
-    events = watched.call()
+def test_contents_publishes_requests_and_responses_of_both_sides(introspected: Introspected) -> None:
+    introspected.configure(CONTENTS)
+    before = introspected.node.get_clock().now()
+    events = introspected.call()
     request, response = SetBool.Request(data=True), SetBool.Response(success=False)
     assert [(event.info.event_type, event.request, event.response) for event in events] == [
         (ServiceEventInfo.REQUEST_SENT, [request], []),
@@ -82,41 +82,41 @@ def test_contents_tells_both_sides_of_a_call_with_request_and_response(watched: 
     assert times == sorted(times)
 
 
-def test_each_side_names_the_client_alike_before_and_after(watched: Watched) -> None:
-    watched.configure(METADATA)
-    sent, received, answered, done = (bytes(event.info.client_gid) for event in watched.call())
-    (client,) = watched.node.get_publishers_info_by_topic("rq/negateRequest", no_mangle=True)
+def test_both_events_of_a_side_carry_the_same_client_gid(introspected: Introspected) -> None:
+    introspected.configure(METADATA)
+    sent, received, answered, done = (bytes(event.info.client_gid) for event in introspected.call())
+    (client,) = introspected.node.get_publishers_info_by_topic("rq/negateRequest", no_mangle=True)
     assert sent == done
-    assert sent[:12] == bytes(client.endpoint_gid)[:12]  # its participant's
+    assert sent[:12] == bytes(client.endpoint_gid)[:12]  # the prefix of its participant
     assert received == answered
 
 
-def test_metadata_keeps_requests_and_responses_to_itself(watched: Watched) -> None:
-    watched.configure(METADATA)
-    assert all(event.request == event.response == [] for event in watched.call())
+def test_metadata_omits_requests_and_responses(introspected: Introspected) -> None:
+    introspected.configure(METADATA)
+    assert all(event.request == event.response == [] for event in introspected.call())
 
 
-def test_the_state_changes_and_ends_without_a_trace(watched: Watched) -> None:
-    watched.configure(CONTENTS)
-    watched.configure(METADATA)
-    assert not any(event.request for event in watched.call())
-    watched.configure(OFF)
-    watched.configure(OFF)
-    watched.configure(CONTENTS, qos_profile_system_default)
-    watched.node.destroy_service(watched.service)
-    watched.node.destroy_client(watched.client)
-    assert watched.node.count_publishers("negate/_service_event") == 0
+def test_changing_the_state_and_destroying_leaves_no_publisher(introspected: Introspected) -> None:
+    introspected.configure(CONTENTS)
+    introspected.configure(METADATA)
+    assert not any(event.request for event in introspected.call())
+    introspected.configure(OFF)
+    introspected.configure(OFF)
+    introspected.configure(CONTENTS, qos_profile_system_default)
+    introspected.node.destroy_service(introspected.service)
+    introspected.node.destroy_client(introspected.client)
+    assert introspected.node.count_publishers("negate/_service_event") == 0
 
 
-def test_the_events_publisher_is_not_one_of_the_nodes(watched: Watched) -> None:
-    before = list(watched.node.publishers)
-    watched.configure(METADATA)
-    assert list(watched.node.publishers) == before
+def test_the_event_publisher_is_not_listed_among_the_nodes_publishers(introspected: Introspected) -> None:
+    before = list(introspected.node.publishers)
+    introspected.configure(METADATA)
+    assert list(introspected.node.publishers) == before
 
 
 @pytest.mark.parametrize("side", ["service", "client"])
-def test_what_was_destroyed_cannot_be_watched(watched: Watched, side: str) -> None:
-    destroyed: Any = getattr(watched, side)
+def test_a_destroyed_service_or_client_cannot_be_introspected(introspected: Introspected, side: str) -> None:
+    destroyed: Any = getattr(introspected, side)
     destroyed.destroy()
     with pytest.raises(InvalidHandle):
-        destroyed.configure_introspection(watched.node.get_clock(), QoSProfile(depth=1), METADATA)
+        destroyed.configure_introspection(introspected.node.get_clock(), QoSProfile(depth=1), METADATA)

@@ -1,4 +1,4 @@
-"""Services and clients: calls, timeouts, cancellation, servers that die, several clients at once."""
+"""Services and clients: calls, timeouts, removed requests, lost servers, several clients."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def test_a_call_gets_its_reply(spin_until: SpinUntil, node: Node) -> None:
     assert future.result() == Trigger.Response(success=True, message="ok")
 
 
-def test_each_of_several_clients_gets_its_own_replies(
+def test_several_clients_get_their_replies(
     make_node: MakeNode, executor: SingleThreadedExecutor, spin_until: SpinUntil
 ) -> None:
     server = make_node("server")
@@ -54,14 +54,14 @@ def test_each_of_several_clients_gets_its_own_replies(
     assert all(client.wait_for_service(timeout_sec=10) for client in clients)
     calls = [
         (value, client.call_async(SetBool.Request(data=value)))
-        for value in (True, False, True)  # nine: the queues of a service hold ten
+        for value in (True, False, True)  # nine calls, because the queues of a service hold ten
         for client in clients
     ]
     spin_until(lambda: all(future.done() for _, future in calls))
     assert [future.result().success for _, future in calls] == [not value for value, _ in calls]
 
 
-def test_a_coroutine_may_answer_later(spin_until: SpinUntil, node: Node) -> None:
+def test_a_coroutine_may_answer_a_request_later(spin_until: SpinUntil, node: Node) -> None:
     ready: Future = Future()
 
     async def answer_later(request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
@@ -92,24 +92,20 @@ def test_a_blocking_call_works_while_another_thread_spins(make_node: MakeNode, c
     assert response.message == "ok"
 
 
-def test_a_blocking_call_without_a_server_returns_none_after_its_timeout(make_node: MakeNode) -> None:
-    client = make_node().create_client(Trigger, "nobody")
+def test_a_blocking_call_without_a_server_times_out(make_node: MakeNode) -> None:
+    client = make_node().create_client(Trigger, "missing")
     assert client.call(Trigger.Request(), timeout_sec=0.05) is None
 
 
 @pytest.mark.parametrize("timeout", [0.05, 0.0, -1.0])
-def test_waiting_for_a_service_that_never_comes_ends_with_its_timeout(
-    make_node: MakeNode, timeout: float
-) -> None:
-    client = make_node().create_client(Trigger, "nobody")
+def test_waiting_for_a_missing_service_ends_with_the_timeout(make_node: MakeNode, timeout: float) -> None:
+    client = make_node().create_client(Trigger, "missing")
     assert not client.service_is_ready()
     assert not client.wait_for_service(timeout_sec=timeout)
 
 
-def test_whoever_waits_for_a_service_in_a_loop_is_ended_by_the_shutdown(
-    make_node: MakeNode, context: Context
-) -> None:
-    client = make_node().create_client(Trigger, "nowhere")
+def test_shutdown_ends_a_loop_that_waits_for_a_service(make_node: MakeNode, context: Context) -> None:
+    client = make_node().create_client(Trigger, "missing")
     threading.Timer(0.2, context.shutdown).start()
 
     def wait() -> None:
@@ -120,7 +116,7 @@ def test_whoever_waits_for_a_service_in_a_loop_is_ended_by_the_shutdown(
         wait()
 
 
-def test_a_reply_that_nobody_waits_for_any_more_is_dropped(spin_until: SpinUntil, node: Node) -> None:
+def test_a_reply_to_a_removed_request_is_dropped(spin_until: SpinUntil, node: Node) -> None:
     served: list[bool] = []
 
     def note(request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
@@ -138,7 +134,7 @@ def test_a_reply_that_nobody_waits_for_any_more_is_dropped(spin_until: SpinUntil
     assert not forgotten.done()
 
 
-def test_after_a_server_has_died_another_one_answers(
+def test_a_second_server_answers_after_the_first_is_destroyed(
     make_node: MakeNode, executor: SingleThreadedExecutor, spin_until: SpinUntil
 ) -> None:
     client_node, first = make_node("client"), make_node("first")
@@ -160,7 +156,7 @@ def test_after_a_server_has_died_another_one_answers(
     assert not lost.done()
 
 
-def test_an_exception_in_a_service_callback_comes_out_of_spinning(spin_until: SpinUntil, node: Node) -> None:
+def test_an_exception_in_a_service_callback_propagates_from_spin(spin_until: SpinUntil, node: Node) -> None:
     def fail(request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         raise ZeroDivisionError("planted")
 
@@ -172,15 +168,13 @@ def test_an_exception_in_a_service_callback_comes_out_of_spinning(spin_until: Sp
         spin_until(lambda: False)
 
 
-def test_calling_with_something_else_than_a_request_is_a_type_error(make_node: MakeNode) -> None:
+def test_calling_with_another_type_than_the_request_is_a_type_error(make_node: MakeNode) -> None:
     client = make_node().create_client(Trigger, "turn_on")
     with pytest.raises(TypeError):
         client.call_async(SetBool.Request())
 
 
-def test_answering_with_something_else_than_a_response_is_a_type_error(
-    spin_until: SpinUntil, node: Node
-) -> None:
+def test_answering_with_another_type_is_a_type_error(spin_until: SpinUntil, node: Node) -> None:
     node.create_service(Trigger, "wrong", lambda request, response: True)
     client = node.create_client(Trigger, "wrong")
     assert client.wait_for_service(timeout_sec=10)

@@ -1,4 +1,4 @@
-"""Subclasses of Node have private names of their own, and those are none of rclpy's business."""
+"""Subclasses of Node may use any private name without disturbing rclpy."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ FOREIGN: dict[str, Any] = {
 
 
 def never_called(*arguments: object, **options: object) -> None:
-    raise AssertionError("rclpy calls what is not its own")
+    raise AssertionError("rclpy calls a private method of a user's class")
 
 
 class Busy(Node):
-    """A node with attributes and methods as a user may call them."""
+    """A node with private attributes and methods as a user may name them."""
 
     _add = _change = _declare = _destroy = _entities = _resolve = _store = never_called
 
@@ -44,7 +44,7 @@ class Busy(Node):
 
 
 @pytest.mark.parametrize("first", [True, False])
-def test_a_subclass_may_call_its_attributes_and_methods_what_it_likes(
+def test_a_subclass_may_use_any_private_name(
     context: Context, executor: SingleThreadedExecutor, spin_until: Callable[..., None], first: bool
 ) -> None:
     node = Busy(context, first=first)

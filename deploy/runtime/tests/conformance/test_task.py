@@ -1,4 +1,4 @@
-"""Futures and tasks, without an executor and with one that only collects what it is given."""
+"""Futures and tasks, without an executor and with one that the test runs by hand."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ import pytest
 from rclpy.task import Future, Task
 
 
-class Collector:
-    """An executor that keeps its tasks and runs them when told."""
+class ManualExecutor:
+    """An executor that keeps its tasks until the test runs them."""
 
     def __init__(self) -> None:
         self.tasks: list[Task] = []
@@ -27,7 +27,7 @@ class Collector:
             task()
 
 
-def future_of(executor: Collector) -> Future:
+def future_of(executor: ManualExecutor) -> Future:
     return Future(executor=executor)  # type: ignore[arg-type]
 
 
@@ -72,7 +72,7 @@ def test_a_future_with_an_exception_is_done_and_raises_it() -> None:
         future.result()
 
 
-def test_an_exception_that_nobody_fetched_is_printed_at_the_end(capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_exception_never_retrieved_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
     Future().set_exception(ValueError("lost"))
     assert "never retrieved: lost" in capsys.readouterr().err
     fetched = Future()
@@ -82,7 +82,7 @@ def test_an_exception_that_nobody_fetched_is_printed_at_the_end(capsys: pytest.C
     assert capsys.readouterr().err == ""
 
 
-def test_a_cancelled_future_is_not_done_but_its_callbacks_are_called() -> None:
+def test_cancelling_a_future_calls_its_callbacks_but_leaves_it_not_done() -> None:
     called: list[Future] = []
     future = Future()
     future.add_done_callback(called.append)
@@ -100,14 +100,14 @@ def test_a_done_future_cannot_be_cancelled() -> None:
     assert future.done()
 
 
-def test_a_result_after_a_cancellation_counts() -> None:
+def test_a_cancelled_future_may_still_get_a_result() -> None:
     future = Future()
     future.cancel()
     future.set_result(1)
     assert (future.cancelled(), future.done(), future.result()) == (False, True, 1)
 
 
-def test_done_callbacks_without_an_executor_run_at_once_and_cannot_stop_each_other() -> None:
+def test_a_failing_done_callback_does_not_stop_the_others() -> None:
     called: list[Future] = []
 
     def fail(future: Future) -> None:
@@ -121,7 +121,7 @@ def test_done_callbacks_without_an_executor_run_at_once_and_cannot_stop_each_oth
     assert called == [future]
 
 
-def test_a_done_callback_of_a_done_future_runs_at_once_and_may_raise() -> None:
+def test_a_callback_added_to_a_done_future_runs_at_once_and_may_raise() -> None:
     future = Future()
     future.set_result(None)
     called: list[Future] = []
@@ -137,7 +137,7 @@ def test_a_done_callback_of_a_done_future_runs_at_once_and_may_raise() -> None:
 
 def test_done_callbacks_run_on_the_executor() -> None:
     called: list[Future] = []
-    executor = Collector()
+    executor = ManualExecutor()
     future = future_of(executor)
     future.add_done_callback(called.append)
     future.set_result(None)
@@ -149,7 +149,7 @@ def test_done_callbacks_run_on_the_executor() -> None:
 
 def test_a_future_does_not_keep_its_executor_alive() -> None:
     called: list[Future] = []
-    executor = Collector()
+    executor = ManualExecutor()
     future = future_of(executor)
     future.add_done_callback(called.append)
     del executor
@@ -157,7 +157,7 @@ def test_a_future_does_not_keep_its_executor_alive() -> None:
     assert called == [future]
 
 
-def test_a_task_stores_what_its_function_returns_or_raises() -> None:
+def test_a_task_stores_the_result_or_exception_of_its_function() -> None:
     task = Task(lambda a, b: a + b, args=[1], kwargs={"b": 2})
     task()
     assert (task.done(), task.executing(), task.result()) == (True, False, 3)
@@ -176,7 +176,7 @@ def test_a_task_runs_once() -> None:
     assert calls == [1]
 
 
-def test_a_task_that_is_executing_says_so_and_does_not_run_again_within_itself() -> None:
+def test_an_executing_task_does_not_run_again() -> None:
     observed: list[bool] = []
 
     def function() -> None:
@@ -188,7 +188,7 @@ def test_a_task_that_is_executing_says_so_and_does_not_run_again_within_itself()
     assert observed == [True]
 
 
-def test_a_coroutine_advances_to_its_next_await_at_each_call() -> None:
+def test_each_call_advances_a_coroutine_to_its_next_await() -> None:
     future = Future()
 
     async def coroutine(x: int) -> int:
@@ -204,7 +204,7 @@ def test_a_coroutine_advances_to_its_next_await_at_each_call() -> None:
     assert task.result() == 3
 
 
-def test_a_coroutine_object_may_be_given_in_place_of_a_function() -> None:
+def test_a_task_accepts_a_coroutine_object() -> None:
     async def coroutine() -> str:
         return "done"
 
@@ -230,7 +230,7 @@ def test_a_coroutine_awaits_tasks_and_gets_their_exceptions() -> None:
     assert outer.result() == "caught"
 
 
-def test_a_finished_task_lets_go_of_its_arguments() -> None:
+def test_a_finished_task_releases_its_arguments() -> None:
     import weakref
 
     class Big:

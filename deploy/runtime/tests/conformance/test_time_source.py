@@ -1,4 +1,4 @@
-"""Simulated time: a node's parameter, the topic /clock and the clocks that follow it; one message awaited."""
+"""Simulated time (``use_sim_time``, ``/clock``, clocks that follow it) and ``wait_for_message``."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from builtin_interfaces.msg import Time as TimeMsg
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock, ROSClock
 from rclpy.clock_type import ClockType
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
@@ -24,7 +25,7 @@ from std_msgs.msg import String
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
-def use_sim_time(node: Node, value: object) -> SetParametersResult:
+def set_use_sim_time(node: Node, value: object) -> SetParametersResult:
     return node.set_parameters([Parameter("use_sim_time", value=value)])[0]
 
 
@@ -32,7 +33,7 @@ def clock_topics(node: Node) -> list[str]:
     return [subscription.topic_name for subscription in node.subscriptions]
 
 
-def test_a_clock_follows_the_source_while_it_is_active() -> None:
+def test_a_clock_follows_an_active_time_source() -> None:
     source, clock = TimeSource(), ROSClock()
     source.attach_clock(clock)
     assert not clock.ros_time_is_active
@@ -47,7 +48,7 @@ def test_a_clock_follows_the_source_while_it_is_active() -> None:
     assert not clock.ros_time_is_active
 
 
-def test_a_clock_that_is_attached_late_has_the_latest_time() -> None:
+def test_a_clock_attached_late_gets_the_latest_time() -> None:
     source, clock = TimeSource(), ROSClock()
     source.ros_time_is_active = True
     source.clock_callback(ClockMsg(clock=TimeMsg(sec=5)))
@@ -55,42 +56,42 @@ def test_a_clock_that_is_attached_late_has_the_latest_time() -> None:
     assert clock.now().nanoseconds == 5_000_000_000
 
 
-def test_only_clocks_of_ros_time_follow() -> None:
+def test_only_clocks_of_ros_time_can_be_attached() -> None:
     with pytest.raises(ValueError, match="ROS_TIME"):
         TimeSource().attach_clock(Clock(clock_type=ClockType.STEADY_TIME))  # type: ignore[arg-type]
     with pytest.raises(TypeError, match=r"rclpy\.node\.Node"):
         TimeSource(node="node")  # type: ignore[arg-type]
 
 
-def test_a_node_follows_its_parameter(make_node: Callable[..., Node]) -> None:
+def test_a_node_follows_its_parameter_use_sim_time(make_node: Callable[..., Node]) -> None:
     node = make_node()
     assert node.get_parameter("use_sim_time").value is False
-    assert use_sim_time(node, True).successful
+    assert set_use_sim_time(node, True).successful
     assert node.get_clock().ros_time_is_active  # type: ignore[attr-defined]
     assert node.get_clock().now().nanoseconds == 0
     assert clock_topics(node) == ["/clock"]
-    assert use_sim_time(node, False).successful
+    assert set_use_sim_time(node, False).successful
     assert not node.get_clock().ros_time_is_active  # type: ignore[attr-defined]
     assert clock_topics(node) == []
 
 
-def test_a_node_may_be_born_into_simulated_time(make_node: Callable[..., Node]) -> None:
+def test_a_node_may_start_in_simulated_time(make_node: Callable[..., Node]) -> None:
     node = make_node(parameter_overrides=[Parameter("use_sim_time", value=True)])
     assert node.get_clock().now().nanoseconds == 0
 
 
-def test_simulated_time_is_on_or_off(make_node: Callable[..., Node]) -> None:
+def test_use_sim_time_must_be_a_bool(make_node: Callable[..., Node]) -> None:
     node = make_node(allow_undeclared_parameters=True)
-    assert not use_sim_time(node, "yes").successful
+    assert not set_use_sim_time(node, "yes").successful
     assert node.get_parameter("use_sim_time").value is False
 
 
-def test_time_goes_on_with_the_messages_on_the_clock_topic(
-    make_node: Callable[..., Node], executor: object, spin_until: Callable[..., None]
+def test_simulated_time_follows_the_clock_topic(
+    make_node: Callable[..., Node], executor: SingleThreadedExecutor, spin_until: Callable[..., None]
 ) -> None:
     node, simulator = make_node(), make_node("simulator")
-    executor.add_node(node)  # type: ignore[attr-defined]
-    use_sim_time(node, True)
+    executor.add_node(node)
+    set_use_sim_time(node, True)
     publisher = simulator.create_publisher(ClockMsg, "/clock", 1)
 
     def at(seconds: int) -> bool:
@@ -101,7 +102,7 @@ def test_time_goes_on_with_the_messages_on_the_clock_topic(
         spin_until(lambda: at(seconds))  # noqa: B023
 
 
-def test_a_message_that_is_there_is_waited_for_without_spinning(make_node: Callable[..., Node]) -> None:
+def test_wait_for_message_needs_no_executor(make_node: Callable[..., Node]) -> None:
     publisher = make_node("talker").create_publisher(String, "chatter", LATCHED)
     publisher.publish(String(data="hello"))
     node = make_node()
@@ -110,14 +111,14 @@ def test_a_message_that_is_there_is_waited_for_without_spinning(make_node: Calla
     assert list(node.subscriptions) == []
 
 
-def test_a_message_that_does_not_come_is_waited_for_so_long(make_node: Callable[..., Node]) -> None:
+def test_wait_for_message_ends_with_its_timeout(make_node: Callable[..., Node]) -> None:
     node = make_node()
     assert wait_for_message(String, node, "silence", time_to_wait=0.01) == (False, None)
     assert list(node.subscriptions) == []
 
 
-def test_a_callback_of_the_node_may_wait_for_a_message(
-    make_node: Callable[..., Node], executor: object, spin_until: Callable[..., None]
+def test_a_callback_of_the_node_may_call_wait_for_message(
+    make_node: Callable[..., Node], executor: SingleThreadedExecutor, spin_until: Callable[..., None]
 ) -> None:
     make_node("talker").create_publisher(String, "chatter", LATCHED).publish(String(data="hello"))
     node = make_node()
@@ -128,7 +129,7 @@ def test_a_callback_of_the_node_may_wait_for_a_message(
         results.append(wait_for_message(String, node, "chatter", qos_profile=LATCHED, time_to_wait=10))
 
     timer = node.create_timer(0.0, wait)
-    executor.add_node(node)  # type: ignore[attr-defined]
+    executor.add_node(node)
     spin_until(lambda: results)
     assert results == [(True, String(data="hello"))]
     rclpy.logging.shutdown()

@@ -20,56 +20,57 @@ MakeNode = Callable[..., Node]
 SpinUntil = Callable[..., None]
 
 
-def simulated(nanoseconds: int) -> Time:
+def ros_time(nanoseconds: int) -> Time:
     return Time(nanoseconds=nanoseconds, clock_type=ClockType.ROS_TIME)
 
 
-def test_a_timer_of_simulated_time_is_due_exactly_after_its_period(
+def test_a_timer_in_simulated_time_is_due_exactly_after_its_period(
     make_node: MakeNode, clock: ROSClock
 ) -> None:
     timer = make_node().create_timer(1e-6, lambda: None, clock=clock)
     assert timer.time_until_next_call() == 1000
-    clock.set_ros_time_override(simulated(1999))
+    clock.set_ros_time_override(ros_time(1999))
     assert not timer.is_ready()
-    clock.set_ros_time_override(simulated(2000))
+    clock.set_ros_time_override(ros_time(2000))
     assert timer.is_ready()
 
 
-@pytest.mark.parametrize(("now", "left"), [(4300, 700), (3000, 1000)])  # the latter: exactly some periods
+# The second case skips a whole number of periods.
+@pytest.mark.parametrize(("now", "left"), [(4300, 700), (3000, 1000)])
 def test_a_timer_skips_missed_periods_and_does_not_drift(
     clock: ROSClock, executor: SingleThreadedExecutor, now: int, left: int, node: Node
 ) -> None:
     calls: list[int] = []
     timer = node.create_timer(1e-6, lambda: calls.append(clock.now().nanoseconds), clock=clock)
-    clock.set_ros_time_override(simulated(now))
+    clock.set_ros_time_override(ros_time(now))
     executor.spin_once(timeout_sec=0)
     executor.spin_once(timeout_sec=0)
     assert calls == [now]
     assert timer.time_until_next_call() == left
 
 
-def test_when_time_jumps_back_a_timer_starts_a_new_period(make_node: MakeNode, clock: ROSClock) -> None:
+def test_a_jump_back_starts_a_new_period(make_node: MakeNode, clock: ROSClock) -> None:
     timer = make_node().create_timer(1e-6, lambda: None, clock=clock)
-    clock.set_ros_time_override(simulated(500))
+    clock.set_ros_time_override(ros_time(500))
     assert timer.time_until_next_call() == 1000
 
 
-def test_a_timer_begins_its_period_with_the_first_time_that_a_simulator_tells(make_node: MakeNode) -> None:
+def test_the_first_simulated_time_begins_the_period(make_node: MakeNode) -> None:
     clock = ROSClock()
     timer = make_node().create_timer(1e-6, lambda: None, clock=clock)
     simulator = TimeSource()
     simulator.ros_time_is_active = True
     simulator.attach_clock(clock)
     assert not timer.is_ready()
-    clock.set_ros_time_override(simulated(5_000_000))
+    clock.set_ros_time_override(ros_time(5_000_000))
     assert not timer.is_ready()
     assert timer.time_until_next_call() == 1000
 
 
-def test_a_canceled_timer_rests_until_it_is_reset(make_node: MakeNode, clock: ROSClock) -> None:
+def test_a_canceled_timer_is_never_ready_until_its_reset(make_node: MakeNode, clock: ROSClock) -> None:
     timer = make_node().create_timer(1e-6, lambda: None, clock=clock)
     timer.cancel()
-    clock.set_ros_time_override(simulated(9000))
+    clock.set_ros_time_override(ros_time(9000))
     assert timer.is_canceled()
     assert not timer.is_ready()
     assert timer.time_until_next_call() is None
@@ -82,13 +83,13 @@ def test_a_timer_without_autostart_waits_for_its_reset(make_node: MakeNode, cloc
     assert timer.is_canceled()
 
 
-def test_a_new_period_counts_from_the_next_call_on(
+def test_a_changed_period_takes_effect_at_the_next_call(
     clock: ROSClock, executor: SingleThreadedExecutor, node: Node
 ) -> None:
     timer = node.create_timer(1e-6, lambda: None, clock=clock)
     timer.timer_period_ns = 5000
     assert timer.time_until_next_call() == 1000
-    clock.set_ros_time_override(simulated(2000))
+    clock.set_ros_time_override(ros_time(2000))
     executor.spin_once(timeout_sec=0)
     assert timer.time_until_next_call() == 5000
 
@@ -102,7 +103,7 @@ def test_a_destroyed_timer_cannot_be_used(make_node: MakeNode) -> None:
         timer.is_ready()
 
 
-def test_a_timer_shortened_on_another_thread_is_called_at_once(
+def test_shortening_the_period_on_another_thread_wakes_the_executor(
     executor: SingleThreadedExecutor, node: Node
 ) -> None:
     called = threading.Event()
@@ -115,7 +116,7 @@ def test_a_timer_shortened_on_another_thread_is_called_at_once(
     assert called.is_set()
 
 
-def test_jump_callbacks_hear_what_exceeds_their_threshold(clock: ROSClock) -> None:
+def test_jump_callbacks_are_called_at_or_beyond_their_threshold(clock: ROSClock) -> None:
     jumps: list[int] = []
 
     def note(jump: TimeJump) -> None:
@@ -124,22 +125,22 @@ def test_jump_callbacks_hear_what_exceeds_their_threshold(clock: ROSClock) -> No
     threshold = JumpThreshold(min_forward=Duration(nanoseconds=100), min_backward=Duration(nanoseconds=-50))
     with clock.create_jump_callback(threshold, post_callback=note):
         for nanoseconds in (1099, 1199, 1150, 1149, 1099):
-            clock.set_ros_time_override(simulated(nanoseconds))
-    clock.set_ros_time_override(simulated(5000))
+            clock.set_ros_time_override(ros_time(nanoseconds))
+    clock.set_ros_time_override(ros_time(5000))
     assert jumps == [100, -50]
 
 
-def test_sleep_until_ends_when_simulated_time_gets_there(context: Context, clock: ROSClock) -> None:
+def test_sleep_until_ends_at_its_simulated_time(context: Context, clock: ROSClock) -> None:
     ended: list[bool] = []
-    sleeper = threading.Thread(target=lambda: ended.append(clock.sleep_until(simulated(2000), context)))
+    sleeper = threading.Thread(target=lambda: ended.append(clock.sleep_until(ros_time(2000), context)))
     sleeper.start()
     for nanoseconds in (1500, 1999, 2000):
-        clock.set_ros_time_override(simulated(nanoseconds))
+        clock.set_ros_time_override(ros_time(nanoseconds))
     sleeper.join(10)
     assert ended == [True]
 
 
-def test_sleep_until_ends_when_the_context_does(context: Context, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_sleep_until_ends_with_its_context(context: Context, monkeypatch: pytest.MonkeyPatch) -> None:
     ended: list[bool] = []
     begun = threading.Event()
     context_ok = context.ok
@@ -159,7 +160,7 @@ def test_sleep_until_ends_when_the_context_does(context: Context, monkeypatch: p
     assert ended == [False]
 
 
-def test_a_rate_wakes_its_sleeper_once_a_period(executor: SingleThreadedExecutor, node: Node) -> None:
+def test_a_rate_wakes_its_sleeper_every_period(executor: SingleThreadedExecutor, node: Node) -> None:
     rate = node.create_rate(100.0)
     slept: list[bool] = []
 
@@ -176,7 +177,7 @@ def test_a_rate_wakes_its_sleeper_once_a_period(executor: SingleThreadedExecutor
     assert slept == [True] * 3
 
 
-def test_a_destroyed_rate_lets_its_sleeper_go(make_node: MakeNode) -> None:
+def test_destroying_a_rate_wakes_its_sleeper(make_node: MakeNode) -> None:
     node = make_node()
     rate = node.create_rate(0.001)
     ended: list[bool] = []

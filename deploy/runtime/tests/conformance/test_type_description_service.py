@@ -1,4 +1,4 @@
-"""The service ``~/get_type_description``, asked as others ask it: what it tells of the types a node uses."""
+"""The service ``~/get_type_description``: descriptions and sources of the types that a node uses."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ MakeNode = Callable[..., Node]
 SpinUntil = Callable[..., None]
 Ask = Callable[..., Any]
 
-# The hashes that every ROS 2 has for these types.
+# The hashes of these types in ROS 2.
 TRIGGER_REQUEST = "RIHS01_d010825374ce8918e72bfd826c82603e60f45419e932ea976f807b74a863a199"
 TRIGGER_EVENT = "RIHS01_ec4a1d26b0575e61906890342aba9523a2360e9845857c5590fa6e23bc39e1c2"
 HEADER = "RIHS01_f49fb3ae2cf070f793645ff749683ac6b06203e41c891e17701b1cb597ce6a01"
@@ -28,7 +28,7 @@ NOT_IN_USE = "Type not currently in use by this node"
 
 @pytest.fixture
 def node(make_node: MakeNode, executor: SingleThreadedExecutor) -> Node:
-    """A node that publishes headers and serves a trigger; an error in one of its callbacks fails the test."""
+    """A node that publishes a Header and serves a Trigger; an error in a callback fails the test."""
     node = make_node("node")
     executor.add_node(node)
     node.create_publisher(Header, "x", 1)
@@ -38,7 +38,7 @@ def node(make_node: MakeNode, executor: SingleThreadedExecutor) -> Node:
 
 @pytest.fixture
 def ask(node: Node, make_node: MakeNode, executor: SingleThreadedExecutor, spin_until: SpinUntil) -> Ask:
-    """Asks the node what a type looks like, from another node."""
+    """Requests the description of a type from another node."""
     other = make_node("other")
     executor.add_node(other)
     client = other.create_client(GetTypeDescription, "node/get_type_description")
@@ -55,11 +55,11 @@ def ask(node: Node, make_node: MakeNode, executor: SingleThreadedExecutor, spin_
 
 
 def described(response: Any) -> list[str]:
-    """Names of the type and of all types it refers to, in the order of the answer."""
+    """Names of the type and of all types that it refers to, in the order of the response."""
     assert (response.successful, response.failure_reason) == (True, "")
-    description = response.type_description
-    individual = [description.type_description, *description.referenced_type_descriptions]
-    return [one.type_name for one in individual]
+    top = response.type_description
+    individual = [top.type_description, *top.referenced_type_descriptions]
+    return [description.type_name for description in individual]
 
 
 def test_a_message_is_described_with_the_files_that_define_it(ask: Ask) -> None:
@@ -72,13 +72,13 @@ def test_a_message_is_described_with_the_files_that_define_it(ask: Ask) -> None:
     assert "uint32 nanosec" in time.raw_file_contents
 
 
-def test_sources_are_told_only_to_who_wants_them(ask: Ask) -> None:
+def test_sources_are_included_only_on_request(ask: Ask) -> None:
     response = ask("std_msgs/msg/Header", HEADER, include_type_sources=False)
     assert len(described(response)) == 2
     assert response.type_sources == []
 
 
-def test_the_parts_of_a_service_have_no_file_of_their_own(ask: Ask) -> None:
+def test_the_messages_of_a_service_have_implicit_sources(ask: Ask) -> None:
     response = ask("std_srvs/srv/Trigger", TRIGGER)
     names = [
         "std_srvs/srv/Trigger",
@@ -95,7 +95,7 @@ def test_the_parts_of_a_service_have_no_file_of_their_own(ask: Ask) -> None:
     assert [bool(source.raw_file_contents) for source in sources] == [True, True, True, *[False] * 3]
 
 
-def test_the_hash_alone_says_which_type_is_meant(ask: Ask) -> None:
+def test_the_hash_alone_identifies_the_type(ask: Ask) -> None:
     assert described(ask("std_msgs/msg/Nothing", HEADER))[0] == "std_msgs/msg/Header"
     assert described(ask("std_msgs/msg/Header", TRIGGER))[0] == "std_srvs/srv/Trigger"
 
@@ -112,7 +112,7 @@ def test_the_hash_alone_says_which_type_is_meant(ask: Ask) -> None:
         ("Header", "", "Failed to parse type hash"),
     ],
 )
-def test_what_the_node_does_not_use_it_does_not_describe(
+def test_a_type_that_the_node_does_not_use_is_not_described(
     ask: Ask, type_name: str, type_hash: str, reason: str
 ) -> None:
     response = ask(type_name, type_hash)

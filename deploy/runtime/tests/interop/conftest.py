@@ -1,4 +1,4 @@
-"""A peer on Fast DDS, built when the tests begin, and a node that talks to it."""
+"""A DDS peer on Fast DDS, built on first use, and nodes on loopback to talk to it."""
 
 from __future__ import annotations
 
@@ -8,16 +8,10 @@ import queue
 import shutil
 import subprocess
 import threading
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-
-import rclpy
-from rclpy.context import Context
-from rclpy.executors import SingleThreadedExecutor
-from rclpy.node import Node
 
 SOURCE = Path(__file__).with_name("peer.cpp")
 LIBRARIES = ("-lfastrtps", "-lfastcdr")
@@ -25,12 +19,11 @@ LOOPBACK = (
     '<CycloneDDS><Domain><General><Interfaces><NetworkInterface name="lo" multicast="true"/></Interfaces>'
     "</General></Domain></CycloneDDS>"
 )
-SECONDS = 15.0  # until discovery or a message must have come
 
 
 @pytest.fixture(scope="session")
 def peer_program(pytestconfig: pytest.Config, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The peer's program; built anew when its source has changed."""
+    """The peer's program, built once for each version of its source."""
     compiler = shutil.which("g++")
     if compiler is None:
         pytest.skip("no g++ here: apt-get install g++ libfastrtps-dev")
@@ -56,13 +49,19 @@ def peer_program(pytestconfig: pytest.Config, tmp_path_factory: pytest.TempPathF
         built = tmp_path_factory.mktemp("build") / "peer"
         options = ["-std=c++17", "-O1", "-Wall", "-Wextra", "-Werror"]
         subprocess.run([compiler, *options, "-o", str(built), str(SOURCE), *LIBRARIES], check=True)
-        # Its name has all of it or nothing: from another file system it is copied.
+        # The last step is a rename, so a program of this name is always complete.
         os.replace(shutil.copy(built, program.with_suffix(".new")), program)
     return program
 
 
+@pytest.fixture(autouse=True)
+def loopback(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Bind nodes to loopback, like the peer."""
+    monkeypatch.setenv("CYCLONEDDS_URI", LOOPBACK)
+
+
 class FastPeer:
-    """A process with Fast DDS readers and writers, named by their DDS topics."""
+    """A process with Fast DDS readers and writers, addressed by their DDS topics."""
 
     def __init__(self, program: Path, domain_id: int) -> None:
         self._process = subprocess.Popen(
@@ -72,17 +71,17 @@ class FastPeer:
             text=True,
             bufsize=1,
         )
-        self._told: queue.Queue[list[str]] = queue.Queue()
-        self._listener = threading.Thread(target=self._listen)
-        self._listener.start()
-        self.heard: list[list[str]] = []
+        self._lines: queue.Queue[list[str]] = queue.Queue()
+        self._reader = threading.Thread(target=self._read_lines)
+        self._reader.start()
+        self.reports: list[list[str]] = []
 
-    def _listen(self) -> None:
+    def _read_lines(self) -> None:
         assert self._process.stdout is not None
         for line in self._process.stdout:
-            self._told.put(line.split())
+            self._lines.put(line.split())
 
-    def _say(self, *words: str) -> None:
+    def _send_line(self, *words: str) -> None:
         assert self._process.stdin is not None
         print(*words, file=self._process.stdin, flush=True)
 
@@ -97,25 +96,25 @@ class FastPeer:
         user_data: str = "",
     ) -> None:
         """Create a ``reader`` or a ``writer``."""
-        self._say(kind, topic, type_name, reliability, durability, user_data)
+        self._send_line(kind, topic, type_name, reliability, durability, user_data)
 
     def send(self, topic: str, data: bytes) -> None:
         """Write CDR with its encapsulation header."""
-        self._say("send", topic, data.hex())
+        self._send_line("send", topic, data.hex())
 
-    def hears(self, *words: str) -> bool:
-        """Whether the peer has told something that begins with these words."""
-        while not self._told.empty():
-            self.heard.append(self._told.get())
-        return any(line[: len(words)] == list(words) for line in self.heard)
+    def has_reported(self, *words: str) -> bool:
+        """Whether the peer has reported a line that begins with these words."""
+        while not self._lines.empty():
+            self.reports.append(self._lines.get())
+        return any(line[: len(words)] == list(words) for line in self.reports)
 
     def samples(self, topic: str) -> list[bytes]:
-        """What the peer has read on a topic so far."""
-        self.hears()
-        return [bytes.fromhex(line[2]) for line in self.heard if line[:2] == ["sample", topic]]
+        """The samples that the peer has read on a topic so far."""
+        self.has_reported()
+        return [bytes.fromhex(line[2]) for line in self.reports if line[:2] == ["sample", topic]]
 
     def close(self) -> None:
-        """End the process; it says goodbye to DDS."""
+        """End the process; it leaves the DDS domain properly."""
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         self._process.stdin.close()
@@ -124,7 +123,7 @@ class FastPeer:
         finally:
             self._process.kill()
             self._process.wait()
-            self._listener.join()
+            self._reader.join()
             self._process.stdout.close()
 
 
@@ -134,31 +133,3 @@ def peer(peer_program: Path, domain_id: int) -> Iterator[FastPeer]:
     peer = FastPeer(peer_program, domain_id)
     yield peer
     peer.close()
-
-
-@pytest.fixture
-def node(domain_id: int, monkeypatch: pytest.MonkeyPatch) -> Iterator[Node]:
-    """A node in the test's domain, on loopback alone as the peer is."""
-    monkeypatch.setenv("CYCLONEDDS_URI", LOOPBACK)
-    context = Context()
-    rclpy.init(args=[], context=context, domain_id=domain_id)
-    node = Node("ours", context=context)
-    yield node
-    node.destroy_node()
-    context.shutdown()
-
-
-@pytest.fixture
-def spin_until(node: Node) -> Iterator[Callable[[Callable[[], object]], None]]:
-    """Runs the node until a condition is true; fails when that takes too long."""
-    executor = SingleThreadedExecutor(context=node.context)
-    executor.add_node(node)
-
-    def spin(condition: Callable[[], object]) -> None:
-        deadline = time.monotonic() + SECONDS
-        while not condition():
-            assert time.monotonic() < deadline, f"not within {SECONDS} s"
-            executor.spin_once(timeout_sec=0.02)
-
-    yield spin
-    executor.shutdown()

@@ -1,16 +1,16 @@
 // A DDS peer of another vendor: Fast DDS, the family of ROS 2's default middleware, on loopback only.
 //
-// It knows no ROS and no types: it carries CDR as it is, so that the bytes of the other side meet nothing of ours.
-// `peer DOMAIN` obeys lines on its standard input
+// It knows neither ROS nor types: it carries serialized CDR, so the tests see the bytes of the wire unchanged.
+// `peer DOMAIN` reads commands from its standard input
 //
 //   reader|writer TOPIC TYPE reliable|best_effort volatile|transient_local USER_DATA
 //   send TOPIC HEX
 //
-// and tells on its standard output
+// and writes reports to its standard output
 //
 //   sample TOPIC HEX | matched reader|writer TOPIC COUNT | incompatible reader|writer TOPIC POLICY
 //
-// A POLICY is an identifier of the DDS specification. The end of the input is the end of the peer.
+// A POLICY is an identifier of the DDS specification. The peer ends at the end of its input.
 
 #include <cstring>
 #include <functional>
@@ -40,7 +40,7 @@ namespace rtps = eprosima::fastrtps::rtps;
 
 using Bytes = std::vector<unsigned char>;
 
-static void tell(const std::string& line)
+static void report(const std::string& line)
 {
     static std::mutex mutex;
     std::lock_guard<std::mutex> lock(mutex);
@@ -67,7 +67,7 @@ static Bytes from_hex(const std::string& text)
     return bytes;
 }
 
-// A type whose samples are serialized already, encapsulation header included.
+// A type whose samples are already serialized, including the encapsulation header.
 class Serialized : public fast::TopicDataType {
 public:
     explicit Serialized(const std::string& name)
@@ -114,20 +114,20 @@ public:
         fast::SampleInfo info;
         while (reader->take_next_sample(&bytes, &info) == ReturnCode_t::RETCODE_OK) {
             if (info.valid_data) {
-                tell("sample " + topic_ + " " + to_hex(bytes));
+                report("sample " + topic_ + " " + to_hex(bytes));
             }
         }
     }
 
     void on_subscription_matched(fast::DataReader*, const fast::SubscriptionMatchedStatus& status) override
     {
-        tell("matched reader " + topic_ + " " + std::to_string(status.current_count));
+        report("matched reader " + topic_ + " " + std::to_string(status.current_count));
     }
 
     void on_requested_incompatible_qos(
         fast::DataReader*, const fast::RequestedIncompatibleQosStatus& status) override
     {
-        tell("incompatible reader " + topic_ + " " + std::to_string(status.last_policy_id));
+        report("incompatible reader " + topic_ + " " + std::to_string(status.last_policy_id));
     }
 
 private:
@@ -140,20 +140,20 @@ public:
 
     void on_publication_matched(fast::DataWriter*, const fast::PublicationMatchedStatus& status) override
     {
-        tell("matched writer " + topic_ + " " + std::to_string(status.current_count));
+        report("matched writer " + topic_ + " " + std::to_string(status.current_count));
     }
 
     void on_offered_incompatible_qos(
         fast::DataWriter*, const fast::OfferedIncompatibleQosStatus& status) override
     {
-        tell("incompatible writer " + topic_ + " " + std::to_string(status.last_policy_id));
+        report("incompatible writer " + topic_ + " " + std::to_string(status.last_policy_id));
     }
 
 private:
     std::string topic_;
 };
 
-// What readers and writers have in common: the QoS that a line asks for.
+// The QoS that a command requests, for a reader or a writer.
 template <class Qos>
 static Qos qos_of(Qos qos, const std::string& reliability, const std::string& durability,
     const std::string& user_data)
@@ -165,7 +165,7 @@ static Qos qos_of(Qos qos, const std::string& reliability, const std::string& du
     qos.history().kind = fast::KEEP_LAST_HISTORY_QOS;
     qos.history().depth = 10;
     qos.user_data().setValue(Bytes(user_data.begin(), user_data.end()));
-    // Samples have any size.
+    // Samples may have any size.
     qos.endpoint().history_memory_policy = rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
     return qos;
 }
@@ -178,7 +178,7 @@ int main(int, char** argv)
     fast::DomainParticipantQos participant_qos = fast::PARTICIPANT_QOS_DEFAULT;
     participant_qos.transport().use_builtin_transports = false;
     participant_qos.transport().user_transports.push_back(transport);
-    // As ROS 2 does it on a single host: ask every participant index on localhost, without multicast.
+    // As ROS 2 on a single host: probe every participant index on localhost, without multicast.
     rtps::Locator_t localhost;
     rtps::IPLocator::setIPv4(localhost, "127.0.0.1");
     participant_qos.wire_protocol().builtin.initialPeersList.push_back(localhost);

@@ -1,4 +1,4 @@
-"""Nodes against a second vendor's DDS: the bytes are those recorded from real ROS 2 nodes, not ours."""
+"""Nodes against the DDS of a second vendor, with bytes recorded from real ROS 2 nodes."""
 
 from __future__ import annotations
 
@@ -45,24 +45,24 @@ def golden(name: str) -> tuple[Any, str, bytes]:
 
 
 def padded(data: bytes) -> bytes:
-    """A sample as it is on the wire: RTPS pads it to four bytes."""
+    """A sample on the wire: RTPS pads it to a multiple of four bytes."""
     return data + bytes(-len(data) % 4)
 
 
 def value(data: float) -> tuple[std_msgs.msg.Float64, bytes]:
-    """A Float64 and its bytes, for where the recorded ones do not matter."""
+    """A Float64 and its bytes."""
     return std_msgs.msg.Float64(data=data), b"\0\1\0\0" + struct.pack("<d", data)
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_fast_dds_reader_gets_what_a_node_publishes(
+def test_a_fast_dds_reader_gets_messages_of_a_node(
     name: str, peer: FastPeer, node: Node, spin_until: SpinUntil
 ) -> None:
     message, type_name, data = golden(name)
     publisher = node.create_publisher(type(message), "topic", 10)
     peer.create("reader", "rt/topic", type_name)
     spin_until(
-        lambda: publisher.get_subscription_count() and peer.hears("matched", "reader", "rt/topic", "1")
+        lambda: publisher.get_subscription_count() and peer.has_reported("matched", "reader", "rt/topic", "1")
     )
     publisher.publish(message)
     spin_until(lambda: peer.samples("rt/topic"))
@@ -70,7 +70,7 @@ def test_a_fast_dds_reader_gets_what_a_node_publishes(
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_node_gets_what_a_fast_dds_writer_writes(
+def test_a_node_gets_samples_of_a_fast_dds_writer(
     name: str, peer: FastPeer, node: Node, spin_until: SpinUntil
 ) -> None:
     message, type_name, data = golden(name)
@@ -78,14 +78,14 @@ def test_a_node_gets_what_a_fast_dds_writer_writes(
     subscription = node.create_subscription(type(message), "topic", received.append, 10)
     peer.create("writer", "rt/topic", type_name)
     spin_until(
-        lambda: subscription.get_publisher_count() and peer.hears("matched", "writer", "rt/topic", "1")
+        lambda: subscription.get_publisher_count() and peer.has_reported("matched", "writer", "rt/topic", "1")
     )
     peer.send("rt/topic", data)
     spin_until(lambda: received)
     assert received == [message]
 
 
-def test_a_late_fast_dds_reader_gets_what_a_node_has_latched(
+def test_a_late_fast_dds_reader_gets_the_latched_sample_of_a_node(
     peer: FastPeer, node: Node, spin_until: SpinUntil
 ) -> None:
     latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -97,7 +97,7 @@ def test_a_late_fast_dds_reader_gets_what_a_node_has_latched(
     assert peer.samples("rt/topic") == [value(2.0)[1]]
 
 
-def test_a_late_node_gets_what_a_fast_dds_writer_has_latched(
+def test_a_late_node_gets_the_latched_samples_of_a_fast_dds_writer(
     peer: FastPeer, node: Node, spin_until: SpinUntil
 ) -> None:
     peer.create("writer", "rt/topic", FLOAT64, durability="transient_local")
@@ -124,7 +124,7 @@ def test_a_late_node_gets_what_a_fast_dds_writer_has_latched(
         (QoSProfile(depth=1), QoSPolicyKind.DURABILITY, DURABILITY),
     ],
 )
-def test_both_sides_notice_that_a_node_offers_less_than_fast_dds_requests(
+def test_both_sides_report_a_node_that_offers_too_little(
     offered: QoSProfile,
     kind: QoSPolicyKind,
     policy: str,
@@ -132,13 +132,13 @@ def test_both_sides_notice_that_a_node_offers_less_than_fast_dds_requests(
     node: Node,
     spin_until: SpinUntil,
 ) -> None:
-    noticed: list[Any] = []
-    events = PublisherEventCallbacks(incompatible_qos=noticed.append)
-    publisher = node.create_publisher(std_msgs.msg.Float64, "topic", offered, event_callbacks=events)
+    events: list[Any] = []
+    callbacks = PublisherEventCallbacks(incompatible_qos=events.append)
+    publisher = node.create_publisher(std_msgs.msg.Float64, "topic", offered, event_callbacks=callbacks)
     durability = "transient_local" if kind == QoSPolicyKind.DURABILITY else "volatile"
     peer.create("reader", "rt/topic", FLOAT64, durability=durability)
-    spin_until(lambda: noticed and peer.hears("incompatible", "reader", "rt/topic", policy))
-    assert QoSPolicyKind(noticed[0].last_policy_kind) == kind
+    spin_until(lambda: events and peer.has_reported("incompatible", "reader", "rt/topic", policy))
+    assert QoSPolicyKind(events[0].last_policy_kind) == kind
     assert publisher.get_subscription_count() == 0
 
 
@@ -157,7 +157,7 @@ def test_both_sides_notice_that_a_node_offers_less_than_fast_dds_requests(
         ),
     ],
 )
-def test_both_sides_notice_that_fast_dds_offers_less_than_a_node_requests(
+def test_both_sides_report_a_node_that_requests_too_much(
     requested: QoSProfile,
     kind: QoSPolicyKind,
     policy: str,
@@ -165,18 +165,18 @@ def test_both_sides_notice_that_fast_dds_offers_less_than_a_node_requests(
     node: Node,
     spin_until: SpinUntil,
 ) -> None:
-    noticed: list[Any] = []
-    events = SubscriptionEventCallbacks(incompatible_qos=noticed.append)
+    events: list[Any] = []
+    callbacks = SubscriptionEventCallbacks(incompatible_qos=events.append)
     node.create_subscription(
-        std_msgs.msg.Float64, "topic", lambda message: None, requested, event_callbacks=events
+        std_msgs.msg.Float64, "topic", lambda message: None, requested, event_callbacks=callbacks
     )
     peer.create("writer", "rt/topic", FLOAT64, reliability="best_effort")
-    spin_until(lambda: noticed and peer.hears("incompatible", "writer", "rt/topic", policy))
-    assert QoSPolicyKind(noticed[0].last_policy_kind) == kind
+    spin_until(lambda: events and peer.has_reported("incompatible", "writer", "rt/topic", policy))
+    assert QoSPolicyKind(events[0].last_policy_kind) == kind
 
 
-# A service as rmw_cyclonedds_cpp does it: a topic each way, samples that begin with the client's identity and
-# a sequence number, and USER_DATA that says which reader and writer belong together.
+# Services as in rmw_cyclonedds_cpp: one topic in each direction. A sample begins with the client's identity
+# and a sequence number; USER_DATA pairs a reader with its writer.
 HEADER = 16
 SET_BOOL = "std_srvs::srv::dds_::SetBool"
 
@@ -193,8 +193,8 @@ def test_a_fast_dds_client_calls_a_service_of_a_node(
     peer.create("writer", "rq/switchRequest", f"{SET_BOOL}_Request_", user_data="clientid=1.2.3;")
     spin_until(
         lambda: (
-            peer.hears("matched", "reader", "rr/switchReply", "1")
-            and peer.hears("matched", "writer", "rq/switchRequest", "1")
+            peer.has_reported("matched", "reader", "rr/switchReply", "1")
+            and peer.has_reported("matched", "writer", "rq/switchRequest", "1")
         )
     )
     header = bytes(range(HEADER))
@@ -202,7 +202,7 @@ def test_a_fast_dds_client_calls_a_service_of_a_node(
     def is_answered() -> bool:
         if peer.samples("rr/switchReply"):
             return True
-        # Again and again: the node may not have met its writer yet.
+        # Repeat the request: the node may not have discovered the peer's writer yet.
         peer.send("rq/switchRequest", b"\0\1\0\0" + header + b"\1")
         return False
 
@@ -220,8 +220,8 @@ def test_a_node_calls_a_service_of_a_fast_dds_server(
     spin_until(
         lambda: (
             client.service_is_ready()
-            and peer.hears("matched", "reader", "rq/switchRequest", "1")
-            and peer.hears("matched", "writer", "rr/switchReply", "1")
+            and peer.has_reported("matched", "reader", "rq/switchRequest", "1")
+            and peer.has_reported("matched", "writer", "rr/switchReply", "1")
         )
     )
     future = client.call_async(SetBool.Request(data=True))

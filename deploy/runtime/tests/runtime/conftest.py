@@ -1,4 +1,4 @@
-"""What tests of the embedded runtime may rely on besides."""
+"""Fixtures for tests of the embedded runtime."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from rclpy._dds import Participant
 
 @pytest.fixture
 def participant(domain_id: int) -> Iterator[Participant]:
-    """A member of the test's domain that is no node's, and writes what it wants."""
+    """A DDS participant in the test's domain, without a node, that may write arbitrary bytes."""
     participant = Participant(domain_id, "enclave=/;")
     yield participant
     participant.close()

@@ -1,4 +1,4 @@
-"""The command line: remaps, parameters, log levels, and the errors it is worth reading."""
+"""The command line: remapping, parameters, parameter files, logging and errors."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def values(arguments: RosArguments, fqn: str) -> dict[str, Any]:
     return {name: parameter.value for name, parameter in arguments.parameter_overrides(fqn).items()}
 
 
-# What is for ROS and what is not
+# ROS arguments among others
 
 
 def test_ros_arguments_stand_between_their_flag_and_two_dashes() -> None:
@@ -39,14 +39,14 @@ def test_ros_arguments_stand_between_their_flag_and_two_dashes() -> None:
     assert values(arguments, "/n") == {"c": 1}
 
 
-def test_no_arguments_are_the_default(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_empty_list_means_no_arguments_and_none_means_sys_argv(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sys.argv", ["program", "--ros-args", "-r", "__node:=other"])
     assert parse([]) == RosArguments(parameters=({},))
     assert parse(None).node_name("n", "/") == ("other", "/")
     assert remove_ros_args(None) == ["program"]
 
 
-def test_a_remap_among_the_other_arguments_works_as_it_once_did_and_warns(
+def test_a_remap_outside_of_ros_args_works_and_warns(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     arguments = parse(["program", "a:=b", "--x:=y"])
@@ -55,7 +55,7 @@ def test_a_remap_among_the_other_arguments_works_as_it_once_did_and_warns(
     assert "This syntax is deprecated" in capsys.readouterr().err
 
 
-def test_unknown_ros_arguments_are_all_named() -> None:
+def test_an_error_names_all_unknown_ros_arguments() -> None:
     with pytest.raises(UnknownROSArgsError, match=r"\['--foo', 'bar'\]"):
         ros("--foo", "bar", "-p", "a:=1")
 
@@ -66,13 +66,13 @@ def test_a_flag_without_its_value_is_an_error(flag: str) -> None:
         ros(flag)
 
 
-def test_log_files_are_refused_by_name() -> None:
+def test_log_file_options_are_refused_by_name() -> None:
     for flag in ("--log-config-file", "--log-file-name"):
         with pytest.raises(NotImplementedError, match=flag):
             ros(flag, "x")
 
 
-def test_an_enclave_is_kept() -> None:
+def test_an_enclave_is_parsed() -> None:
     assert ros().enclave == "/"
     assert ros("-e", "/secret").enclave == "/secret"
     assert ros("--enclave", "/secret").enclave == "/secret"
@@ -81,13 +81,13 @@ def test_an_enclave_is_kept() -> None:
 # Remaps
 
 
-def test_a_node_gets_the_name_and_namespace_it_is_given() -> None:
+def test_rules_change_the_name_and_namespace_of_a_node() -> None:
     assert ros("-r", "__node:=new", "-r", "__ns:=/a/b").node_name("old", "/") == ("new", "/a/b")
     assert ros("--remap", "__name:=new").node_name("old", "/ns") == ("new", "/ns")
     assert ros("-r", "__ns:=/").node_name("old", "/ns") == ("old", "/")
 
 
-def test_a_rule_with_a_prefix_is_for_the_node_of_that_name() -> None:
+def test_a_rule_with_a_prefix_applies_only_to_that_node() -> None:
     arguments = ros("-r", "one:__node:=uno", "-r", "two:__ns:=/zwei", "-r", "uno:a:=b", "-r", "uno:__ns:=/x")
     assert arguments.node_name("one", "/") == ("uno", "/x")
     assert arguments.node_name("two", "/") == ("two", "/zwei")
@@ -95,7 +95,7 @@ def test_a_rule_with_a_prefix_is_for_the_node_of_that_name() -> None:
     assert arguments.remap_topic("/x/a", "two", "/x") == "/x/a"
 
 
-def test_names_in_rules_expand_as_the_node_means_them() -> None:
+def test_names_in_rules_expand_relative_to_the_node() -> None:
     arguments = ros("-r", "chatter:=talk", "-r", "~/status:=/status", "-r", "/fixed:=~/mine")
     assert arguments.remap_topic("/ns/chatter", "n", "/ns") == "/ns/talk"
     assert arguments.remap_topic("/chatter", "n", "/ns") == "/chatter"
@@ -103,11 +103,11 @@ def test_names_in_rules_expand_as_the_node_means_them() -> None:
     assert arguments.remap_topic("/fixed", "n", "/ns") == "/ns/n/mine"
 
 
-def test_the_first_rule_that_matches_counts() -> None:
+def test_the_first_matching_rule_applies() -> None:
     assert ros("-r", "a:=b", "-r", "a:=c", "-r", "b:=d").remap_topic("/a", "n", "/") == "/b"
 
 
-def test_a_rule_may_be_for_topics_or_services_only() -> None:
+def test_a_rule_may_apply_to_topics_or_services_only() -> None:
     arguments = ros("-r", "rostopic://a:=t", "-r", "rosservice://a:=s", "-r", "b:=both")
     assert arguments.remap_topic("/a", "n", "/") == "/t"
     assert arguments.remap_service("/a", "n", "/") == "/s"
@@ -118,13 +118,13 @@ def test_a_rule_may_be_for_topics_or_services_only() -> None:
     "rule",
     ["a", "a:=", ":=b", "a:=b:=c", "a/:=b", "a:=b/", "1a:=b", "a:=*", "*:=a", "__node:=/a", "__ns:=a", "a:b"],
 )
-def test_a_rule_that_cannot_be_understood_is_an_error_of_one_line(rule: str) -> None:
+def test_an_invalid_rule_is_an_error_of_one_line(rule: str) -> None:
     with pytest.raises(RCLInvalidROSArgsError, match="Failed to parse ROS arguments: '-r ") as caught:
         ros("-r", rule)
     assert "\n" not in str(caught.value)
 
 
-def test_a_nodes_own_rules_and_parameters_come_before_those_of_its_process() -> None:
+def test_arguments_of_a_node_precede_those_of_its_process() -> None:
     process = ros("-r", "a:=process", "-r", "b:=process", "-p", "x:=1", "-p", "y:=1")
     node = ros("-r", "a:=node", "-p", "x:=2")
     arguments = node.before(process)
@@ -133,7 +133,7 @@ def test_a_nodes_own_rules_and_parameters_come_before_those_of_its_process() -> 
     assert values(arguments, "/n") == {"x": 2, "y": 1}
 
 
-def test_the_outputs_of_a_process_are_not_a_nodes_business() -> None:
+def test_log_outputs_are_those_of_the_process() -> None:
     assert not ros("-e", "/mine").before(ros("--disable-rosout-logs")).rosout_logs
 
 
@@ -185,7 +185,7 @@ def test_the_outputs_of_a_process_are_not_a_nodes_business() -> None:
         ("/dev/ttyS0", "/dev/ttyS0"),
     ],
 )
-def test_a_value_has_the_type_that_ros_sees_in_it(text: str, value: Any) -> None:
+def test_a_value_has_the_type_that_ros_gives_its_text(text: str, value: Any) -> None:
     found = values(ros("-p", f"x:={text}"), "/n")["x"]
     assert found == value
     assert type(found) is type(value)
@@ -195,7 +195,7 @@ def test_nan_is_a_value() -> None:
     assert str(values(ros("-p", "x:=.nan"), "/n")["x"]) == "nan"
 
 
-def test_parameters_are_for_all_nodes_or_for_those_of_one_name() -> None:
+def test_parameters_apply_to_all_nodes_or_to_one_name() -> None:
     arguments = ros("-p", "x:=1", "--param", "talker:x:=2", "-p", "talker:a.b:=3")
     assert values(arguments, "/ns/listener") == {"x": 1}
     assert values(arguments, "/talker") == {"x": 2, "a.b": 3}
@@ -226,7 +226,7 @@ def test_a_parameter_may_be_named_after_a_topic() -> None:
         ("x:=" + "[" * 5000, "nested too deeply"),
     ],
 )
-def test_a_parameter_that_cannot_be_understood_is_an_error_of_one_line(rule: str, reason: str) -> None:
+def test_an_invalid_parameter_is_an_error_of_one_line(rule: str, reason: str) -> None:
     with pytest.raises(RCLInvalidROSArgsError, match=reason) as caught:
         ros("-p", rule)
     assert "\n" not in str(caught.value)
@@ -325,7 +325,7 @@ def test_later_sources_win_within_a_pattern_and_later_patterns_win(tmp_path: Pat
         ("n: &a\n  ros__parameters: {x: 1}\nm: *a", "line 3: aliases are not supported"),
     ],
 )
-def test_a_mistake_in_a_file_is_told_in_one_line_with_file_key_and_reason(
+def test_an_error_in_a_file_is_one_line_with_file_key_and_reason(
     tmp_path: Path, text: str, message: str
 ) -> None:
     path = write(tmp_path, text)
@@ -336,30 +336,30 @@ def test_a_mistake_in_a_file_is_told_in_one_line_with_file_key_and_reason(
 
 
 @given(text=st.text() | st.text("[]{}:,-'\"&*!#|>\n ~a1.", min_size=1))
-def test_any_text_is_a_value_or_a_mistake(text: str) -> None:
-    mistake = ""
+def test_any_text_is_a_value_or_an_error_of_one_line(text: str) -> None:
+    error_message = ""
     try:
         Parameter("x", value=parse_value(text))
     except ValueError as error:
-        mistake = str(error)
-    assert "\n" not in mistake
+        error_message = str(error)
+    assert "\n" not in error_message
 
 
 @given(text=st.text() | st.text("[]{}:,-'\"&*!#|>\n ~a1./", min_size=1))
 @example(text="{0\n\n0}")
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
-def test_any_text_in_a_file_is_understood_or_a_mistake(tmp_path: Path, text: str) -> None:
+def test_any_text_in_a_file_is_read_or_an_error_of_one_line(tmp_path: Path, text: str) -> None:
     path = tmp_path / "any.yaml"
     path.write_text(f"n:\n  ros__parameters:\n    {text}", encoding="utf-8", errors="replace")
-    mistake = ""
+    error_message = ""
     try:
         read_parameter_file(str(path))
     except ParameterFileError as error:
-        mistake = str(error)
-    assert "\n" not in mistake
+        error_message = str(error)
+    assert "\n" not in error_message
 
 
-def test_a_file_that_cannot_be_read_is_named(tmp_path: Path) -> None:
+def test_an_error_names_an_unreadable_file(tmp_path: Path) -> None:
     with pytest.raises(RCLInvalidROSArgsError, match=r"missing\.yaml: No such file"):
         ros("--params-file", str(tmp_path / "missing.yaml"))
     (tmp_path / "binary.yaml").write_bytes(b"\xff\xfe\xff")
@@ -367,7 +367,7 @@ def test_a_file_that_cannot_be_read_is_named(tmp_path: Path) -> None:
         ros("--params-file", str(tmp_path / "binary.yaml"))
 
 
-def test_an_empty_file_says_nothing(tmp_path: Path) -> None:
+def test_an_empty_file_sets_no_parameters(tmp_path: Path) -> None:
     assert values(ros("--params-file", write(tmp_path, "# nothing\n")), "/n") == {}
 
 
@@ -382,24 +382,24 @@ def logging_configuration() -> Iterator[None]:
 
 
 @pytest.mark.usefixtures("logging_configuration")
-def test_log_levels_are_those_of_all_or_of_named_loggers(capsys: pytest.CaptureFixture[str]) -> None:
+def test_log_levels_apply_to_all_or_to_named_loggers(capsys: pytest.CaptureFixture[str]) -> None:
     arguments = ros("--log-level", "warn", "--log-level", "talker.arm:=DEBUG", "--disable-stdout-logs")
     assert arguments.log_level == LoggingSeverity.WARN
     assert arguments.log_levels == {"talker.arm": LoggingSeverity.DEBUG}
     rclpy.logging._apply_arguments(arguments)
-    assert rclpy.logging.get_logger_effective_level("anyone") == LoggingSeverity.WARN
+    assert rclpy.logging.get_logger_effective_level("any") == LoggingSeverity.WARN
     assert rclpy.logging.get_logger_effective_level("talker.arm.left") == LoggingSeverity.DEBUG
     rclpy.logging.get_logger("talker").error("silent")
     assert capsys.readouterr().err == ""
 
 
 @pytest.mark.parametrize("level", ["loud", "talker:=loud", ":=info", "talker:="])
-def test_a_level_that_is_none_is_an_error(level: str) -> None:
+def test_an_invalid_log_level_is_an_error(level: str) -> None:
     with pytest.raises(RCLInvalidROSArgsError, match="--log-level"):
         ros("--log-level", level)
 
 
-def test_outputs_are_switched_on_and_off_and_the_last_word_counts() -> None:
+def test_the_last_option_decides_about_a_log_output() -> None:
     arguments = ros("--disable-rosout-logs", "--disable-stdout-logs", "--enable-stdout-logs")
     assert not arguments.rosout_logs
     assert arguments.stdout_logs

@@ -1,4 +1,4 @@
-"""What is no message of its type, on topics and services: dropped, counted, logged once for each writer."""
+"""Malformed samples on topics and services are dropped, counted, and logged once for each writer."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ LATCHED = QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 def writer_for(participant: Participant, topic: str, type_name: str, spin_until: SpinUntil) -> Writer:
-    """A writer that has found its reader."""
+    """A writer that is matched with its reader."""
     writer = participant.create_writer(topic, type_name, LATCHED, "")
     spin_until(writer.matched)
     return writer
@@ -65,10 +65,10 @@ def test_bad_samples_are_dropped_counted_and_logged_once(
     assert capfd.readouterr().err.count("octets on /x") == 1
 
 
-def test_who_polls_hears_of_a_bad_sample(
+def test_polling_a_bad_sample_raises_an_error(
     node: Node, executor: SingleThreadedExecutor, participant: Participant, spin_until: SpinUntil
 ) -> None:
-    executor.remove_node(node)  # nobody else takes what comes
+    executor.remove_node(node)  # the executor would take the samples
     subscription = node.create_subscription(Float64, "x", lambda message: None, QUEUE)
     writer = writer_for(participant, "rt/x", "std_msgs::msg::dds_::Float64_", spin_until)
     writer.write(HEADER + b"\1")
@@ -81,18 +81,18 @@ def test_who_polls_hears_of_a_bad_sample(
     assert taken[-1][0] == Float64(data=2.0)
 
 
-def test_each_writer_of_bad_samples_is_logged_for_itself(
+def test_each_writer_of_bad_samples_is_logged_once(
     node: Node, participant: Participant, spin_until: SpinUntil, capfd: pytest.CaptureFixture[str]
 ) -> None:
     subscription = node.create_subscription(String, "x", lambda message: None, QUEUE)
     writers = [writer_for(participant, "rt/x", "std_msgs::msg::dds_::String_", spin_until) for _ in range(3)]
     for writer in writers * 2:
-        writer.write(HEADER + b"\xff\xff\xff\x7fabcd")  # a string of 2 GB, they say
+        writer.write(HEADER + b"\xff\xff\xff\x7fabcd")  # claims a string of 2 GB
     spin_until(lambda: subscription._bad_input.count == 6)
     assert capfd.readouterr().err.count("octets on /x") == 3
 
 
-def test_a_time_of_a_simulator_that_is_none_is_bad_input_too(
+def test_an_invalid_clock_message_is_bad_input(
     make_node: MakeNode,
     executor: SingleThreadedExecutor,
     participant: Participant,
@@ -105,7 +105,8 @@ def test_a_time_of_a_simulator_that_is_none_is_bad_input_too(
     type_name = "rosgraph_msgs::msg::dds_::Clock_"
     writers = [writer_for(participant, "rt/clock", type_name, spin_until) for _ in range(2)]
     spin_until(lambda: subscription.get_publisher_count() == 2)
-    for number, writer in enumerate(writers * 2, 1):  # one by one: the subscription keeps only the last
+    # one by one, because the subscription keeps only the last sample
+    for number, writer in enumerate(writers * 2, 1):
         writer.write(HEADER + struct.pack("<iI", -1, 0))
         spin_until(lambda number=number: subscription._bad_input.count == number)
     assert node.get_clock().now().nanoseconds == 0
@@ -114,7 +115,7 @@ def test_a_time_of_a_simulator_that_is_none_is_bad_input_too(
     assert capfd.readouterr().err.count("octets on /clock") == 2
 
 
-def test_huge_counts_cost_no_memory_and_no_time(
+def test_samples_with_huge_counts_are_dropped(
     node: Node, participant: Participant, spin_until: SpinUntil
 ) -> None:
     subscription = node.create_subscription(DiagnosticArray, "x", lambda message: None, QUEUE)
@@ -125,14 +126,16 @@ def test_huge_counts_cost_no_memory_and_no_time(
     spin_until(lambda: subscription._bad_input.count == 3)
 
 
-def test_random_samples_do_no_harm(node: Node, participant: Participant, spin_until: SpinUntil) -> None:
+def test_random_samples_are_dropped_or_delivered(
+    node: Node, participant: Participant, spin_until: SpinUntil
+) -> None:
     good: list[Any] = []
     subscription = node.create_subscription(DiagnosticArray, "x", good.append, QUEUE)
     writer = writer_for(participant, "rt/x", "diagnostic_msgs::msg::dds_::DiagnosticArray_", spin_until)
-    chance = random.Random(0)
+    source = random.Random(0)
     for _ in range(10):
         for _ in range(50):
-            writer.write(HEADER + chance.randbytes(chance.randrange(1, 200)))
+            writer.write(HEADER + source.randbytes(source.randrange(1, 200)))
         done = subscription._bad_input.count + len(good) + 50
         spin_until(lambda done=done: subscription._bad_input.count + len(good) == done)
 
@@ -163,9 +166,9 @@ def test_the_parameter_services_survive_bad_requests(
         "rcl_interfaces::srv::dds_::SetParameters_Request_",
         spin_until,
     )
-    chance = random.Random(1)
+    source = random.Random(1)
     for _ in range(200):
-        writer.write(HEADER + bytes(16) + chance.randbytes(chance.randrange(1, 60)))
+        writer.write(HEADER + bytes(16) + source.randbytes(source.randrange(1, 60)))
     client = node.create_client(SetParameters, "node/set_parameters")
     spin_until(client.service_is_ready)
     future = client.call_async(SetParameters.Request())
@@ -185,13 +188,13 @@ def test_a_client_survives_bad_replies(node: Node, participant: Participant, spi
     future = client.call_async(SetBool.Request(data=True))
     samples: list[bytes] = []
 
-    def asked() -> bool:
+    def has_request() -> bool:
         sample = requests.take()
         if sample is not None:
             samples.append(sample.data)
         return bool(samples)
 
-    spin_until(asked)
+    spin_until(has_request)
     identity = samples[0][4:20]
     for data in (b"\1", bytes(12), identity + b"\1", identity + b"\1\0\0\0\xff\xff\xff\xff"):
         writer.write(HEADER + data)
@@ -202,7 +205,7 @@ def test_a_client_survives_bad_replies(node: Node, participant: Participant, spi
     assert future.result() == SetBool.Response(success=True)
 
 
-def test_what_nobody_can_read_in_ros_discovery_info_is_dropped_counted_and_logged_once(
+def test_bad_discovery_info_is_dropped_counted_and_logged_once(
     node: Node, participant: Participant, spin_until: SpinUntil, capfd: pytest.CaptureFixture[str]
 ) -> None:
     writers = [
@@ -214,14 +217,14 @@ def test_what_nobody_can_read_in_ros_discovery_info_is_dropped_counted_and_logge
         )
         for _ in range(2)
     ]
-    chance = random.Random(2)
+    source = random.Random(2)
     for _ in range(100):
         for writer in writers:
-            # The GUIDs differ: of each participant only what it said last is looked at.
-            writer.write(HEADER + chance.randbytes(16) + b"\xff" * chance.randrange(1, 200))
+            # Random GUIDs, because only the last sample of each participant is read.
+            writer.write(HEADER + source.randbytes(16) + b"\xff" * source.randrange(1, 200))
 
     def all_are_counted() -> bool:
-        node.get_node_names()  # who asks has it looked at
+        node.get_node_names()  # a query reads the pending samples
         return node._rclpy_graph._bad_input.count == 200
 
     spin_until(all_are_counted)
@@ -229,15 +232,15 @@ def test_what_nobody_can_read_in_ros_discovery_info_is_dropped_counted_and_logge
     assert capfd.readouterr().err.count("octets on ros_discovery_info") == 2
 
 
-def test_what_others_say_of_themselves_is_read_though_much_of_it_is_nonsense(
+def test_good_discovery_info_is_read_among_bad_samples(
     node: Node, participant: Participant, spin_until: SpinUntil
 ) -> None:
     writer = writer_for(
         participant, "ros_discovery_info", "rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_", spin_until
     )
-    chance = random.Random(2)
+    source = random.Random(2)
     for _ in range(100):
-        writer.write(HEADER + chance.randbytes(chance.randrange(1, 200)))
+        writer.write(HEADER + source.randbytes(source.randrange(1, 200)))
     writer.write(encode(participant.gid, [NodeEntities("/far", "stranger")]))
     received: list[Float64] = []
     node.create_subscription(Float64, "x", received.append, 1)

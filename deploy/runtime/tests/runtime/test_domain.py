@@ -1,8 +1,7 @@
-"""How a process joins its DDS domain, and what travels on the wire."""
+"""The DDS domain of a process: its identifier, interfaces, peers and Cyclone's configuration."""
 
 from __future__ import annotations
 
-import json
 import os
 import socket
 import subprocess
@@ -13,18 +12,15 @@ from pathlib import Path
 import pytest
 
 from rclpy._dds import Participant, domain
-from rclpy.context import Context
 from rclpy.exceptions import RCLError
 from rclpy.node import Node
 
 MakeNode = Callable[..., Node]
-SpinUntil = Callable[..., None]
-GOLDEN = json.loads((Path(__file__).parents[1] / "facts" / "cdr_golden.json").read_text())
 
 
 @pytest.fixture(autouse=True)
-def names(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Every name has an address but nowhere's."""
+def name_lookup(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Resolves every host name except ``nowhere``."""
 
     def look_up(name: str, *_: object) -> list[object]:
         if name == "nowhere":
@@ -34,7 +30,7 @@ def names(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(socket, "getaddrinfo", look_up)
 
 
-def test_a_peer_without_an_address_is_left_out(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_peer_without_an_address_is_ignored_with_a_warning(capsys: pytest.CaptureFixture[str]) -> None:
     configuration = domain.configuration({"ROS_STATIC_PEERS": "nowhere;10.0.0.7;robot1:7410"})
     assert configuration == domain.configuration({"ROS_STATIC_PEERS": "10.0.0.7;robot1:7410"})
     assert capsys.readouterr().err == (
@@ -42,13 +38,13 @@ def test_a_peer_without_an_address_is_left_out(capsys: pytest.CaptureFixture[str
     )
 
 
-def test_the_domain_is_0_unless_the_environment_says_otherwise() -> None:
+def test_the_domain_id_defaults_to_0() -> None:
     assert domain.domain_id_from_environment({}) == 0
     assert domain.domain_id_from_environment({"ROS_DOMAIN_ID": "42"}) == 42
 
 
 @pytest.mark.parametrize("text", ["-1", "233", "one", "4.2"])
-def test_a_domain_that_is_none_is_refused_in_one_line(text: str) -> None:
+def test_an_invalid_domain_id_is_refused_in_one_line(text: str) -> None:
     with pytest.raises(RCLError, match=r"^ROS_DOMAIN_ID must be a whole number from 0 to 232, not '"):
         domain.domain_id_from_environment({"ROS_DOMAIN_ID": text})
 
@@ -59,27 +55,27 @@ def test_localhost_uses_loopback_only() -> None:
     assert '<Peer address="localhost"/>' in configuration
 
 
-def test_the_deprecated_localhost_only_variable_is_still_obeyed() -> None:
+def test_the_deprecated_localhost_only_variable_still_works() -> None:
     old = domain.configuration({"ROS_LOCALHOST_ONLY": "1"})
     assert old == domain.configuration({"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"})
 
 
 @pytest.mark.parametrize("discovery_range", ["OFF", "SUBNET", "SYSTEM_DEFAULT"])
-def test_localhost_only_prevails_over_range_and_peers(discovery_range: str) -> None:
+def test_localhost_only_overrides_range_and_peers(discovery_range: str) -> None:
     new = {"ROS_AUTOMATIC_DISCOVERY_RANGE": discovery_range, "ROS_STATIC_PEERS": "robot1"}
     old = domain.configuration({**new, "ROS_LOCALHOST_ONLY": "1"})
     assert old == domain.configuration({"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"})
     assert domain.configuration({**new, "ROS_LOCALHOST_ONLY": "0"}) == domain.configuration(new)
 
 
-def test_in_a_subnet_a_process_can_be_found_by_those_that_name_its_host_as_peer() -> None:
+def test_subnet_takes_a_participant_index_and_keeps_multicast() -> None:
     configuration = domain.configuration({})
     assert "<ParticipantIndex>auto</ParticipantIndex>" in configuration
     assert "<Peer " not in configuration
     assert "Multicast" not in configuration
 
 
-def test_system_default_leaves_cyclone_to_its_own_defaults() -> None:
+def test_system_default_configures_nothing() -> None:
     environment = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "SYSTEM_DEFAULT", "ROS_STATIC_PEERS": "robot1"}
     assert domain.configuration(environment) == ""
 
@@ -90,12 +86,12 @@ def test_off_hides_a_process_from_all_others() -> None:
     assert "<Tag>ros_discovery_off_" in configuration
 
 
-def test_static_peers_are_asked_besides() -> None:
+def test_static_peers_are_added() -> None:
     configuration = domain.configuration({"ROS_STATIC_PEERS": "robot1; 10.0.0.7"})
     assert '<Peer address="robot1"/><Peer address="10.0.0.7"/>' in configuration
 
 
-def test_peers_of_a_process_on_localhost_are_met_whatever_interface_leads_there() -> None:
+def test_localhost_with_static_peers_uses_any_interface_without_multicast() -> None:
     environment = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", "ROS_STATIC_PEERS": "robot1"}
     configuration = domain.configuration(environment)
     assert '<Peer address="localhost"/><Peer address="robot1"/>' in configuration
@@ -112,9 +108,7 @@ input()
 """
 
 
-def test_a_process_on_localhost_that_has_peers_meets_one_that_has_none(
-    make_node: MakeNode, domain_id: int
-) -> None:
+def test_localhost_processes_with_and_without_peers_meet(make_node: MakeNode, domain_id: int) -> None:
     environment = {**os.environ, "ROS_DOMAIN_ID": str(domain_id), "ROS_STATIC_PEERS": "127.0.0.1"}
     with subprocess.Popen([sys.executable, "-c", NODE], env=environment, stdin=subprocess.PIPE) as process:
         assert make_node().wait_for_node("/other", 10)
@@ -122,9 +116,9 @@ def test_a_process_on_localhost_that_has_peers_meets_one_that_has_none(
 
 
 def test_settings_of_cyclonedds_uri_come_last_and_win() -> None:
-    own = "<CycloneDDS><Domain/></CycloneDDS>"
-    environment = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", "CYCLONEDDS_URI": own}
-    assert domain.configuration(environment).endswith(f",{own}")
+    settings = "<CycloneDDS><Domain/></CycloneDDS>"
+    environment = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", "CYCLONEDDS_URI": settings}
+    assert domain.configuration(environment).endswith(f",{settings}")
 
 
 LOOPBACK = '<General><Interfaces><NetworkInterface name="lo" multicast="true"/></Interfaces></General>'
@@ -140,7 +134,7 @@ LOOPBACK = '<General><Interfaces><NetworkInterface name="lo" multicast="true"/><
     ids=["named", "in a comment", "not named"],
 )
 @pytest.mark.parametrize("where", ["text", "file", "file: URI", "second of two"])
-def test_network_interfaces_of_cyclonedds_uri_are_the_only_ones(
+def test_network_interfaces_of_cyclonedds_uri_replace_the_default(
     form: str, only: bool, where: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, domain_id: int
 ) -> None:
     text = form.format(LOOPBACK)
@@ -154,7 +148,7 @@ def test_network_interfaces_of_cyclonedds_uri_are_the_only_ones(
     }[where]
     monkeypatch.setenv("CYCLONEDDS_URI", uri)
     assert domain.configuration().removesuffix(uri).count("<NetworkInterface") == (not only)
-    Participant(domain_id, "enclave=/;").close()  # Cyclone would refuse an interface that is named twice
+    Participant(domain_id, "enclave=/;").close()  # Cyclone refuses an interface that is named twice
 
 
 def test_an_unknown_range_is_refused_in_one_line() -> None:
@@ -162,14 +156,6 @@ def test_an_unknown_range_is_refused_in_one_line() -> None:
         domain.configuration({"ROS_AUTOMATIC_DISCOVERY_RANGE": "moon"})
 
 
-def test_peers_that_are_no_addresses_are_refused() -> None:
+def test_invalid_peers_are_refused() -> None:
     with pytest.raises(RCLError, match="ROS_STATIC_PEERS"):
         domain.configuration({"ROS_STATIC_PEERS": '"/><Evil'})
-
-
-def test_a_context_forgets_the_shutdown_callbacks_of_objects_that_are_gone(context: Context) -> None:
-    class Listener:
-        def hear(self) -> None: ...
-
-    context.on_shutdown(Listener().hear)
-    assert context._callbacks == []

@@ -1,4 +1,4 @@
-"""What nobody ends, but nobody keeps either: the garbage collector takes it, and nothing of it stays."""
+"""Objects dropped without destruction: the garbage collector removes them and their DDS entities."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ from std_srvs.srv import Trigger
 MakeNode = Callable[..., Node]
 
 
-class Furnished(Node):
-    """A node with one of everything."""
+class FullNode(Node):
+    """A node with one entity of each kind."""
 
     def __init__(self, name: str, **options: Any) -> None:
         super().__init__(name, **options)
@@ -42,55 +42,55 @@ class Furnished(Node):
         pass
 
 
-class Failing(Furnished):
-    """A node whose subclass cannot be made."""
+class FailingNode(FullNode):
+    """A node whose subclass fails in its constructor."""
 
     def __init__(self, name: str, **options: Any) -> None:
         super().__init__(name, **options)
         raise ZeroDivisionError("planted")
 
 
-def is_alone(node: Node) -> bool:
-    """Whether `node` knows of no other node, and of no endpoints but its own."""
+def sees_no_other(node: Node) -> bool:
+    """Whether ``node`` discovers no other node and no endpoint of one."""
     ends = node.count_publishers("x"), node.count_subscribers("x"), node.count_services("trigger")
     return node.get_node_names() == [node.get_name()] and ends == (0, 0, 0)
 
 
-def comes_true(node: Node, condition: Callable[[], bool]) -> bool:
+def becomes_true(node: Node, condition: Callable[[], bool]) -> bool:
     return node._rclpy_graph.wait_for(condition, 10, node.context.ok)
 
 
-def comes_true_by_collecting(condition: Callable[[], bool]) -> bool:
-    """Whether it does: the thread that ran an executor's last callback holds it for a moment longer."""
+def becomes_true_after_collection(condition: Callable[[], bool]) -> bool:
+    """Collect repeatedly: the thread of an executor's last callback may hold it a moment longer."""
     deadline = time.monotonic() + 10
     while not condition() and time.monotonic() < deadline:
         gc.collect()
     return condition()
 
 
-def test_a_node_that_is_dropped_leaves_the_graph(make_node: MakeNode, context: Context) -> None:
+def test_a_dropped_node_leaves_the_graph(make_node: MakeNode, context: Context) -> None:
     other = make_node("other")
-    node = Furnished("dropped", context=context)
+    node = FullNode("dropped", context=context)
     node.get_logger().info("here", once=True)
     dropped = weakref.ref(node)
     assert other.count_subscribers("x") == 1
     del node
     gc.collect()
     assert dropped() is None
-    assert comes_true(other, lambda: is_alone(other))
-    assert comes_true(other, lambda: "dropped" not in _logging_output._rosout)
+    assert becomes_true(other, lambda: sees_no_other(other))
+    assert becomes_true(other, lambda: "dropped" not in _logging_output._rosout)
 
 
 def test_a_node_whose_subclass_fails_leaves_the_graph(make_node: MakeNode, context: Context) -> None:
     other = make_node("other")
     with pytest.raises(ZeroDivisionError, match="planted"):
-        Failing("dropped", context=context)
+        FailingNode("dropped", context=context)
     gc.collect()
-    assert comes_true(other, lambda: is_alone(other))
+    assert becomes_true(other, lambda: sees_no_other(other))
 
 
 @pytest.mark.parametrize("parameter", ["use_sim_time", "start_type_description_service"])
-def test_a_node_that_cannot_be_made_leaves_nothing(
+def test_a_node_whose_constructor_fails_leaves_nothing(
     make_node: MakeNode, context: Context, parameter: str
 ) -> None:
     other = make_node("other")
@@ -98,17 +98,17 @@ def test_a_node_that_cannot_be_made_leaves_nothing(
     try:
         with pytest.raises(InvalidParameterTypeException):
             Node("failing", context=context, parameter_overrides=[Parameter(parameter, value="wrong")])
-        assert is_alone(other)
+        assert sees_no_other(other)
         assert "failing" not in _logging_output._rosout
         assert len(other.get_publishers_info_by_topic("/parameter_events")) == 1
     finally:
         gc.enable()
 
 
-def test_a_node_that_is_dropped_waits_for_no_lock(make_node: MakeNode, context: Context) -> None:
-    """The garbage collector may come while another thread holds the lock, and waits for this one."""
+def test_dropping_a_node_waits_for_no_lock(make_node: MakeNode, context: Context) -> None:
+    """The garbage collector may run while another thread holds the lock and waits for this thread."""
     other = make_node("other")
-    dropped = weakref.ref(Furnished("dropped", context=context))
+    dropped = weakref.ref(FullNode("dropped", context=context))
     held, free = threading.Event(), threading.Event()
 
     def hold() -> None:
@@ -125,13 +125,13 @@ def test_a_node_that_is_dropped_waits_for_no_lock(make_node: MakeNode, context: 
     assert holder.is_alive()
     free.set()
     holder.join()
-    assert comes_true(other, lambda: is_alone(other))
+    assert becomes_true(other, lambda: sees_no_other(other))
 
 
-def test_the_last_node_that_is_dropped_after_the_shutdown_leaves_the_domain(domain_id: int) -> None:
+def test_dropping_the_last_node_after_shutdown_leaves_the_domain(domain_id: int) -> None:
     context = Context()
     rclpy.init(args=[], context=context, domain_id=domain_id)
-    node = Furnished("dropped", context=context)
+    node = FullNode("dropped", context=context)
     listener = node._rclpy_graph._listener
     context.shutdown()
     assert listener.is_alive()
@@ -143,7 +143,7 @@ def test_the_last_node_that_is_dropped_after_the_shutdown_leaves_the_domain(doma
 
 
 @pytest.mark.parametrize("kind", [SingleThreadedExecutor, MultiThreadedExecutor])
-def test_an_executor_that_is_dropped_leaves_nothing_in_dds(
+def test_a_dropped_executor_leaves_nothing_in_dds(
     make_node: MakeNode, context: Context, kind: type[Executor]
 ) -> None:
     executor = kind(context=context)
@@ -154,6 +154,14 @@ def test_an_executor_that_is_dropped_leaves_nothing_in_dds(
     handles = [entity.handle for entity in executor._dds]
     assert all(blocking.dds_triggered(handle) >= 0 for handle in handles)
     del executor
-    assert comes_true_by_collecting(
+    assert becomes_true_after_collection(
         lambda: dropped() is None and all(blocking.dds_triggered(handle) < 0 for handle in handles)
     )
+
+
+def test_a_context_drops_the_shutdown_callbacks_of_dead_objects(context: Context) -> None:
+    class Listener:
+        def hear(self) -> None: ...
+
+    context.on_shutdown(Listener().hear)
+    assert context._callbacks == []

@@ -1,4 +1,4 @@
-"""The example program of the runtime's README, run as it stands there."""
+"""The example program of the runtime's README, unchanged."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pathlib import Path
 README = Path(__file__).parents[2] / "README.md"
 
 
-def test_the_example_hears_itself_until_it_is_interrupted(domain_id: int, tmp_path: Path) -> None:
+def test_the_example_of_the_readme_runs_until_interrupted(domain_id: int, tmp_path: Path) -> None:
     (text,) = re.findall(r"```python\n(.*?)```", README.read_text(), re.DOTALL)
     program = tmp_path / "echo.py"
     program.write_text(text)

@@ -1,4 +1,4 @@
-"""Where the errors of rclpy's C extension are, and what they are."""
+"""The errors of rclpy's C extension: base classes and import paths."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def test_errors_can_be_caught_by_their_bases(error: type[Exception], base: type[
     assert issubclass(error, base)
 
 
-def test_the_errors_of_the_c_extension_are_where_code_looks_for_them() -> None:
+def test_errors_of_the_c_extension_have_the_import_paths_of_rclpy() -> None:
     from rclpy._rclpy_pybind11 import InvalidHandle, RCLError
     from rclpy.impl.implementation_singleton import rclpy_implementation
 

@@ -1,4 +1,4 @@
-"""Executors that are shut down, or fail, at bad moments."""
+"""Executors that are shut down or fail at critical moments."""
 
 from __future__ import annotations
 
@@ -6,15 +6,11 @@ import threading
 from collections.abc import Callable
 
 import pytest
-from deploy.runtime.tests.conformance.test_executors import OwnExecutor
 
 import rclpy
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.context import Context
-from rclpy.executors import (
-    MultiThreadedExecutor,
-    SingleThreadedExecutor,
-)
+from rclpy.executors import Executor, MultiThreadedExecutor, SingleThreadedExecutor
 from rclpy.node import Node
 from std_msgs.msg import Float64
 
@@ -22,20 +18,18 @@ MakeNode = Callable[..., Node]
 SpinUntil = Callable[..., None]
 
 
-def test_shut_down_between_taking_and_running_an_executor_runs_what_it_took(
-    make_node: MakeNode, context: Context
-) -> None:
+def test_a_callback_taken_before_the_shutdown_still_runs(make_node: MakeNode, context: Context) -> None:
     node = make_node()
     executor = MultiThreadedExecutor(2, context=context)
 
-    class Untimely(MutuallyExclusiveCallbackGroup):
-        """Its entity is about to be taken when a signal's handler shuts the executor down."""
+    class ShuttingDown(MutuallyExclusiveCallbackGroup):
+        """Shuts the executor down while it takes the entity, as a signal handler may do."""
 
         def beginning_execution(self, entity: object) -> bool:
             executor.shutdown(timeout_sec=0)
             return super().beginning_execution(entity)
 
-    group = Untimely()
+    group = ShuttingDown()
     called: list[bool] = []
     guard = node.create_guard_condition(lambda: called.append(True), group)
     executor.add_node(node)
@@ -46,7 +40,7 @@ def test_shut_down_between_taking_and_running_an_executor_runs_what_it_took(
     assert group.can_execute(guard)
 
 
-def test_a_message_that_cannot_be_taken_does_not_keep_its_callback_group_busy(
+def test_a_take_that_fails_releases_the_callback_group(
     executor: SingleThreadedExecutor, spin_until: SpinUntil, monkeypatch: pytest.MonkeyPatch, node: Node
 ) -> None:
     received: list[float] = []
@@ -66,68 +60,68 @@ def test_a_message_that_cannot_be_taken_does_not_keep_its_callback_group_busy(
     assert received == [2.0]
 
 
-def test_a_node_has_no_executor_once_that_was_shut_down(executor: SingleThreadedExecutor, node: Node) -> None:
+def test_shutting_an_executor_down_removes_it_from_its_nodes(
+    executor: SingleThreadedExecutor, node: Node
+) -> None:
     executor.shutdown()
     assert node.executor is None
 
 
-def test_a_callback_that_ends_on_another_thread_lets_the_next_of_its_group_run(
-    make_node: MakeNode, context: Context
+def test_a_callback_ending_on_another_thread_frees_its_group(
+    make_node: MakeNode, user_executor: Executor
 ) -> None:
-    with OwnExecutor(context=context) as own_executor:
-        node = make_node()
-        own_executor.add_node(node)
-        group = MutuallyExclusiveCallbackGroup()
-        node.create_subscription(Float64, "x", lambda message: None, 10, callback_group=group)
-        node.create_subscription(Float64, "x", lambda message: None, 10, callback_group=group)
-        node.create_publisher(Float64, "x", 10).publish(Float64())
-        first, entity, _ = own_executor.wait_for_ready_callbacks(10)
-        looked = threading.Event()
+    node = make_node()
+    user_executor.add_node(node)
+    group = MutuallyExclusiveCallbackGroup()
+    node.create_subscription(Float64, "x", lambda message: None, 10, callback_group=group)
+    node.create_subscription(Float64, "x", lambda message: None, 10, callback_group=group)
+    node.create_publisher(Float64, "x", 10).publish(Float64())
+    first, entity, _ = user_executor.wait_for_ready_callbacks(10)
+    polled = threading.Event()
 
-        def run() -> None:
-            looked.wait(10)
-            first()
+    def run() -> None:
+        polled.wait(10)
+        first()
 
-        def look() -> bool:
-            looked.set()
-            return False
+    def poll() -> bool:
+        polled.set()
+        return False
 
-        thread = threading.Thread(target=run)
-        thread.start()
-        second = own_executor.wait_for_ready_callbacks(10, condition=look)[1]
-        thread.join()
-        assert {entity, second} == set(node.subscriptions)
+    thread = threading.Thread(target=run)
+    thread.start()
+    second = user_executor.wait_for_ready_callbacks(10, condition=poll)[1]
+    thread.join()
+    assert {entity, second} == set(node.subscriptions)
 
 
-def test_a_callback_that_ends_while_the_next_of_its_group_is_put_aside_lets_that_run(
-    make_node: MakeNode, context: Context
+def test_a_callback_ending_during_the_check_of_the_next_frees_its_group(
+    make_node: MakeNode, user_executor: Executor
 ) -> None:
-    class Untimely(MutuallyExclusiveCallbackGroup):
-        """The callback that runs ends right after somebody has seen that it still does."""
+    class EndingFirst(MutuallyExclusiveCallbackGroup):
+        """Ends the running callback right after the executor has seen it run."""
 
         def can_execute(self, entity: object) -> bool:
             could = super().can_execute(entity)
             first()
             return could
 
-    with OwnExecutor(context=context) as own_executor:
-        node = make_node()
-        own_executor.add_node(node)
-        received: list[float] = []
-        node.create_subscription(
-            Float64, "x", lambda message: received.append(message.data), 10, callback_group=Untimely()
-        )
-        publisher = node.create_publisher(Float64, "x", 10)
-        publisher.publish(Float64(data=1.0))
-        publisher.publish(Float64(data=2.0))
-        first = own_executor.wait_for_ready_callbacks(10)[0]
-        second = own_executor.wait_for_ready_callbacks(10)[0]
-        assert received == [1.0]
-        second()
-        assert received == [1.0, 2.0]
+    node = make_node()
+    user_executor.add_node(node)
+    received: list[float] = []
+    node.create_subscription(
+        Float64, "x", lambda message: received.append(message.data), 10, callback_group=EndingFirst()
+    )
+    publisher = node.create_publisher(Float64, "x", 10)
+    publisher.publish(Float64(data=1.0))
+    publisher.publish(Float64(data=2.0))
+    first = user_executor.wait_for_ready_callbacks(10)[0]
+    second = user_executor.wait_for_ready_callbacks(10)[0]
+    assert received == [1.0]
+    second()
+    assert received == [1.0, 2.0]
 
 
-def test_what_blocks_on_another_thread_does_not_keep_rclpy_from_shutting_down(domain_id: int) -> None:
+def test_a_blocking_callback_on_another_thread_allows_shutdown(domain_id: int) -> None:
     rclpy.init(args=[])
     node = Node("node")
     entered, shut_down = threading.Event(), threading.Event()
@@ -148,7 +142,7 @@ def test_what_blocks_on_another_thread_does_not_keep_rclpy_from_shutting_down(do
     assert outcome == [True]
 
 
-def test_a_thousand_entities_come_and_go_under_traffic_and_nothing_is_left(
+def test_a_thousand_entities_under_traffic_leave_nothing_behind(
     context: Context, executor: SingleThreadedExecutor, node: Node
 ) -> None:
     publisher = node.create_publisher(Float64, "x", 10)

@@ -1,4 +1,4 @@
-"""The end of the interpreter while nodes work, without rclpy.shutdown(); ROS 2's own rclpy aborts there."""
+"""Interpreter exit while a node works, without rclpy.shutdown(); ROS 2's rclpy aborts there."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-DAEMON = """
+PROGRAM = """
 import threading
 import rclpy
 from std_msgs.msg import Float64
@@ -23,8 +23,6 @@ begun.wait()
 
 
 @pytest.mark.parametrize("attempt", range(3))
-def test_the_end_of_a_program_in_which_a_daemon_thread_spins_is_no_crash(
-    domain_id: int, attempt: int
-) -> None:
-    done = subprocess.run([sys.executable, "-c", DAEMON], capture_output=True, text=True, timeout=60)
+def test_a_program_exits_cleanly_while_a_daemon_thread_spins(domain_id: int, attempt: int) -> None:
+    done = subprocess.run([sys.executable, "-c", PROGRAM], capture_output=True, text=True, timeout=60)
     assert done.returncode == 0, done.stderr

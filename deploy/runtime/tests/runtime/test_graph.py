@@ -1,4 +1,4 @@
-"""What nodes tell of themselves on the wire."""
+"""The announcements of nodes on the wire."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
-from deploy.runtime.tests.conformance.test_graph import facts_node
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -21,7 +20,7 @@ FACTS = Path(__file__).parents[1] / "facts"
 
 
 def recorded(kind: str) -> dict[str, tuple[str, str]]:
-    """Topic → (type, user data without the service's own identifier) of the recorded endpoints."""
+    """Topic → (type, user data without the service identifier) of the recorded endpoints."""
     endpoints = {}
     for line in (FACTS / "discovery.txt").read_text().splitlines():
         if line.startswith(kind):
@@ -33,27 +32,27 @@ def recorded(kind: str) -> dict[str, tuple[str, str]]:
 
 
 def announced(endpoints: list[object]) -> dict[str, tuple[str, str]]:
+    """The same of the discovered endpoints."""
     return {
         endpoint.topic: (endpoint.type_name, re.sub(r"serviceid=[^;]*;", "serviceid;", endpoint.user_data))
         for endpoint in endpoints
     }
 
 
-def test_a_node_announces_the_same_writers_and_readers_as_a_real_one(make_node: MakeNode) -> None:
-    node = facts_node(make_node)
-    discovery = Discovery(node._rclpy_graph.participant.handle)
+def test_writers_and_readers_are_announced_as_recorded(facts_node: Node) -> None:
+    discovery = Discovery(facts_node._rclpy_graph.participant.handle)
     assert announced(discovery.writers()) == recorded("PUB")
     assert announced(discovery.readers()) == recorded("SUB")
 
 
-def test_a_participant_announces_its_enclave_as_a_real_one(make_node: MakeNode) -> None:
+def test_a_participant_announces_its_enclave(make_node: MakeNode) -> None:
     node = make_node()
     graph = node._rclpy_graph
     assert Discovery(graph.participant.handle).participants()[graph.participant.gid] == "enclave=/;"
 
 
-def test_service_identifiers_have_the_form_of_the_recorded_ones(make_node: MakeNode) -> None:
-    graph = facts_node(make_node)._rclpy_graph
+def test_service_identifiers_have_the_recorded_form(facts_node: Node) -> None:
+    graph = facts_node._rclpy_graph
     data = [endpoint.user_data for endpoint in Discovery(graph.participant.handle).writers()]
     identifiers = [
         match[1] for text in data if (match := re.match(r"serviceid=( [0-9a-f.]+);typehash", text))
@@ -63,7 +62,7 @@ def test_service_identifiers_have_the_form_of_the_recorded_ones(make_node: MakeN
     assert set(identifiers) == {f" {prefix}.0.0.0.{number:x}" for number in range(1, 9)}
 
 
-def test_the_recorded_discovery_info_is_read_and_written_back_octet_by_octet() -> None:
+def test_the_recorded_discovery_info_survives_a_round_trip() -> None:
     data = bytes.fromhex(
         json.loads((FACTS / "wire_samples.json").read_text())["samples"]["ros_discovery_info"]
     )
@@ -74,7 +73,7 @@ def test_the_recorded_discovery_info_is_read_and_written_back_octet_by_octet() -
 
 
 @given(st.binary(max_size=300))
-def test_discovery_info_from_anybody_is_understood_or_refused(data: bytes) -> None:
+def test_arbitrary_discovery_info_is_decoded_or_refused(data: bytes) -> None:
     with suppress(ValueError):
         decode(b"\x00\x01\x00\x00" + data)
 
@@ -90,7 +89,7 @@ def test_discovery_info_from_anybody_is_understood_or_refused(data: bytes) -> No
         max_size=4,
     )
 )
-def test_discovery_info_survives_writing_and_reading(
+def test_discovery_info_survives_a_round_trip(
     nodes: list[tuple[str, str, list[bytes], list[bytes]]],
 ) -> None:
     entities = []

@@ -1,4 +1,4 @@
-"""Nodes that fail or are destroyed leave nothing behind, and nothing is left to them."""
+"""Failed creations leave nothing behind, and destroyed nodes create nothing."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ MakeNode = Callable[..., Node]
         (lambda node: node.create_client(Trigger, "x"), "rq/xRequest"),
     ],
 )
-def test_nothing_is_left_of_a_service_or_client_that_cannot_read(
+def test_a_failed_service_or_client_leaves_no_endpoint(
     make_node: MakeNode, monkeypatch: pytest.MonkeyPatch, create: Callable[[Node], Any], topic: str
 ) -> None:
     def fail(*args: Any) -> None:
@@ -40,7 +40,7 @@ def test_nothing_is_left_of_a_service_or_client_that_cannot_read(
 @pytest.mark.parametrize(
     "create", [lambda node: node.create_timer(1.0, print), lambda node: node.create_guard_condition(print)]
 )
-def test_a_node_that_was_destroyed_creates_nothing_that_could_wake_it(
+def test_a_destroyed_node_creates_no_timer_and_no_guard_condition(
     make_node: MakeNode, create: Callable[[Node], Any]
 ) -> None:
     node = make_node()

@@ -1,4 +1,4 @@
-"""Loggers: levels, filters, the console's format and environment, and what goes to /rosout."""
+"""Loggers: levels, filters, console format, environment variables and /rosout."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def configure(monkeypatch: pytest.MonkeyPatch, **environment: str) -> None:
 # Levels
 
 
-def test_messages_below_info_are_left_out_by_default(capsys: pytest.CaptureFixture[str]) -> None:
+def test_messages_below_info_are_omitted_by_default(capsys: pytest.CaptureFixture[str]) -> None:
     logger = get_logger("quiet")
     assert logger.debug("not this") is False
     assert logger.info("this") is True
@@ -112,7 +112,7 @@ def test_the_format_may_contain_every_token_and_escape(
     )
 
 
-def test_the_file_name_is_that_of_the_caller_even_through_a_child(
+def test_a_child_logger_reports_the_file_of_its_caller(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     configure(monkeypatch, RCUTILS_CONSOLE_OUTPUT_FORMAT="{file_name}")
@@ -134,7 +134,7 @@ def test_the_date_is_local_with_milliseconds(
     assert capsys.readouterr().err == "2020-09-13 12:26:40.007\n"
 
 
-def test_colors_are_forced_and_follow_the_severity(
+def test_forced_colors_follow_the_severity(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     configure(monkeypatch, RCUTILS_COLORIZED_OUTPUT="1", RCUTILS_CONSOLE_OUTPUT_FORMAT="{message}")
@@ -149,12 +149,12 @@ def test_colors_are_forced_and_follow_the_severity(
     assert colors == ["\033[32m", "\033[0m", "\033[33m", "\033[31m", "\033[31m"]
 
 
-def test_there_is_no_color_in_a_file(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_file_gets_no_colors(capsys: pytest.CaptureFixture[str]) -> None:
     get_logger("plain").error("m")
     assert "\033" not in capsys.readouterr().err
 
 
-def test_messages_go_to_stdout_where_the_environment_wants_it(
+def test_the_environment_can_send_messages_to_stdout(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     configure(monkeypatch, RCUTILS_LOGGING_USE_STDOUT="1", RCUTILS_LOGGING_BUFFERED_STREAM="1")
@@ -165,13 +165,15 @@ def test_messages_go_to_stdout_where_the_environment_wants_it(
 
 
 @pytest.mark.parametrize("variable", ENVIRONMENT[1:])
-def test_a_wrong_value_in_the_environment_is_named(monkeypatch: pytest.MonkeyPatch, variable: str) -> None:
+def test_an_error_names_the_wrong_environment_variable(
+    monkeypatch: pytest.MonkeyPatch, variable: str
+) -> None:
     with pytest.raises(RuntimeError, match=rf"\[yes\] specified for {variable}"):
         configure(monkeypatch, **{variable: "yes"})
     monkeypatch.delenv(variable)
 
 
-def test_a_wrong_value_in_the_environment_does_not_silence_a_program_that_never_initialized(
+def test_a_wrong_environment_variable_does_not_prevent_logging(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     rclpy.logging.shutdown()
@@ -182,7 +184,7 @@ def test_a_wrong_value_in_the_environment_does_not_silence_a_program_that_never_
     assert "[n]: hello" in error
 
 
-def test_a_closed_console_is_no_error(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_logging_to_a_closed_console_is_no_error(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     stream = (tmp_path / "console").open("w")
     stream.close()
     monkeypatch.setattr(sys, "stderr", stream)
@@ -204,7 +206,7 @@ def test_characters_that_the_console_cannot_show_are_escaped(
 # /rosout
 
 
-def test_messages_of_a_node_and_its_children_reach_its_rosout_publisher() -> None:
+def test_messages_of_a_node_and_its_children_reach_rosout() -> None:
     records: list[LogRecord] = []
     _logging_output.add_rosout_publisher("node", records.append)
     try:
@@ -223,10 +225,10 @@ def test_messages_of_a_node_and_its_children_reach_its_rosout_publisher() -> Non
         ("node.child", 30, "b"),
     ]
     assert records[0].file == __file__
-    assert records[0].function == "test_messages_of_a_node_and_its_children_reach_its_rosout_publisher"
+    assert records[0].function == "test_messages_of_a_node_and_its_children_reach_rosout"
 
 
-def test_a_child_that_is_gone_is_forgotten() -> None:
+def test_a_deleted_child_logger_is_forgotten() -> None:
     records: list[LogRecord] = []
     _logging_output.add_rosout_publisher("node", records.append)
     try:
@@ -242,12 +244,12 @@ def test_a_child_that_is_gone_is_forgotten() -> None:
     assert not _logging_output._rosout
 
 
-def test_a_child_may_go_while_its_publisher_is_removed() -> None:
+def test_a_child_logger_may_be_collected_during_remove_rosout_publisher() -> None:
     class Publisher:
         def __call__(self, record: LogRecord) -> None:
             raise AssertionError
 
-        def __eq__(self, other: object) -> bool:  # here the garbage collector may come
+        def __eq__(self, other: object) -> bool:  # the garbage collector may run here
             children.clear()
             return self is other
 
@@ -264,7 +266,7 @@ def test_a_child_may_go_while_its_publisher_is_removed() -> None:
     assert _logging_output._rosout == {}
 
 
-def test_a_publisher_that_logs_or_fails_neither_recurses_nor_fails_the_program(
+def test_a_rosout_publisher_may_log_and_fail(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     def publish(record: LogRecord) -> None:
@@ -281,7 +283,7 @@ def test_a_publisher_that_logs_or_fails_neither_recurses_nor_fails_the_program(
     assert "no network" in error
 
 
-def test_the_console_may_be_switched_off_and_rosout_goes_on(capsys: pytest.CaptureFixture[str]) -> None:
+def test_rosout_works_without_the_console(capsys: pytest.CaptureFixture[str]) -> None:
     records: list[LogRecord] = []
     _logging_output.add_rosout_publisher("node", records.append)
     _logging_output.enable_console(False)
@@ -294,7 +296,7 @@ def test_the_console_may_be_switched_off_and_rosout_goes_on(capsys: pytest.Captu
     assert len(records) == 1
 
 
-def test_threads_that_log_at_once_do_not_mix_their_lines(capsys: pytest.CaptureFixture[str]) -> None:
+def test_lines_of_concurrent_threads_do_not_mix(capsys: pytest.CaptureFixture[str]) -> None:
     def log(name: str) -> None:
         logger = get_logger(name)
         for i in range(200):
@@ -333,7 +335,7 @@ def test_a_wrapper_can_hide_itself_as_in_rclpy(
         ({"HOME": "/home/me", "ROS_LOG_DIR": "~/logs", "ROS_HOME": "/srv/ros"}, "/home/me/logs"),
     ],
 )
-def test_the_logging_directory_is_where_ros_has_it(
+def test_the_logging_directory_is_that_of_ros(
     monkeypatch: pytest.MonkeyPatch, environment: dict[str, str], directory: str
 ) -> None:
     for variable in ("ROS_LOG_DIR", "ROS_HOME"):

@@ -1,4 +1,4 @@
-"""Message classes of the embedded runtime: values, defaults, errors – as rclpy's."""
+"""Message classes: equality, accepted and refused values, signatures."""
 
 from __future__ import annotations
 
@@ -15,12 +15,7 @@ import pytest
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import Point, Point32, PointStamped, PoseWithCovariance, Quaternion
-from rcl_interfaces.msg import (
-    IntegerRange,
-    Parameter,
-    ParameterDescriptor,
-    ParameterValue,
-)
+from rcl_interfaces.msg import IntegerRange, Parameter, ParameterDescriptor, ParameterValue
 from rmw_dds_common.msg import Gid
 from sensor_msgs.msg import JointState, LaserScan
 from std_msgs.msg import Bool, Byte, Float32, Float64, Header, Int8, String, UInt8MultiArray
@@ -28,7 +23,7 @@ from std_srvs.srv import SetBool
 from visualization_msgs.msg import Marker
 
 
-def test_messages_are_equal_only_if_all_numbers_of_their_arrays_are() -> None:
+def test_messages_are_equal_only_if_their_arrays_are_equal() -> None:
     pose, other = PoseWithCovariance(), PoseWithCovariance()
     assert pose == other
     other.covariance[35] = 1.0
@@ -37,11 +32,11 @@ def test_messages_are_equal_only_if_all_numbers_of_their_arrays_are() -> None:
     assert pose == other
 
 
-def test_an_array_of_octets_takes_bytes() -> None:
+def test_an_array_of_octets_accepts_bytes() -> None:
     assert Gid(data=bytes(range(16))).data.tolist() == list(range(16))
 
 
-def test_a_constructor_takes_keywords_only_and_refuses_what_is_no_field() -> None:
+def test_a_constructor_accepts_only_keywords_that_name_fields() -> None:
     with pytest.raises(TypeError, match="Float64"):
         Float64(1.0)  # type: ignore[call-arg]
     with pytest.raises(TypeError, match=r"Float64.*dta"):
@@ -52,7 +47,7 @@ def test_a_constructor_takes_keywords_only_and_refuses_what_is_no_field() -> Non
     ("values", "reason"),
     [([1.0] * 35, "35 elements"), (np.zeros((6, 6)), "2 dimensions"), ([0.0] * 37, "37 elements")],
 )
-def test_an_array_of_another_shape_is_refused_when_it_is_assigned(values: Any, reason: str) -> None:
+def test_assigning_an_array_of_another_shape_is_an_error(values: Any, reason: str) -> None:
     with pytest.raises(
         (TypeError, ValueError), match=rf"geometry_msgs/msg/PoseWithCovariance: field 'covariance'.*{reason}"
     ):
@@ -60,7 +55,7 @@ def test_an_array_of_another_shape_is_refused_when_it_is_assigned(values: Any, r
 
 
 @pytest.mark.parametrize("values", [["1"], "12", 5, None, [None], [1.0, "x"]])
-def test_what_is_no_sequence_of_numbers_is_refused_when_it_is_assigned(values: Any) -> None:
+def test_assigning_other_values_to_a_numeric_sequence_is_an_error(values: Any) -> None:
     with pytest.raises(
         TypeError, match="sensor_msgs/msg/JointState: field 'position' must be sequence<double>"
     ):
@@ -68,14 +63,14 @@ def test_what_is_no_sequence_of_numbers_is_refused_when_it_is_assigned(values: A
 
 
 @pytest.mark.parametrize("values", [[256], [-1], [1 << 80]])
-def test_numbers_out_of_range_are_refused_when_they_are_assigned(values: list[int]) -> None:
+def test_assigning_numbers_out_of_range_is_an_error(values: list[int]) -> None:
     with pytest.raises(
         ValueError, match="std_msgs/msg/UInt8MultiArray: field 'data' must be sequence<uint8>"
     ):
         UInt8MultiArray(data=values)
 
 
-def test_a_number_too_great_for_a_float_is_refused_though_an_infinite_one_is_not() -> None:
+def test_a_float_may_be_infinite_but_not_out_of_range() -> None:
     for make in (list, iter, np.array):
         assert LaserScan(ranges=make([math.inf, -math.inf])).ranges.tolist() == [math.inf, -math.inf]
         with pytest.raises(ValueError, match=r"must be sequence<float>, .*: it has elements out of range"):
@@ -123,35 +118,33 @@ def test_a_number_too_great_for_a_float_is_refused_though_an_infinite_one_is_not
             r"'value\.byte_array_value\[0\]' must be octet",
         ),
         (ParameterValue(string_array_value=b"ab"), TypeError, r"string_array_value\[0\]"),  # type: ignore[arg-type]
-        (ParameterValue(bool_array_value=np.ones((2, 2), np.bool_)), TypeError, "it is no list"),  # type: ignore[arg-type]
+        (ParameterValue(bool_array_value=np.ones((2, 2), np.bool_)), TypeError, "it is not a list"),  # type: ignore[arg-type]
         (ParameterValue(bool_array_value=np.ones(2)), TypeError, r"bool_array_value\[0\]"),  # type: ignore[arg-type]
         (ParameterDescriptor(integer_range=[IntegerRange()] * 2), ValueError, "2 elements"),
     ],
 )
-def test_a_wrong_value_is_refused_when_the_message_is_serialized(
-    message: Any, error: type[Exception], reason: str
-) -> None:
+def test_serializing_a_wrong_value_is_an_error(message: Any, error: type[Exception], reason: str) -> None:
     with pytest.raises(error, match=reason) as caught:
         type(message)._serialize(message)
     assert "\n" not in str(caught.value)
     assert caught.value.__context__ is None or caught.value.__suppress_context__
 
 
-def test_a_message_of_another_type_is_refused() -> None:
-    with pytest.raises(TypeError, match=r"a std_msgs/msg/Float64 is expected, not std_msgs\.msg\.Float32"):
+def test_serializing_a_message_of_another_type_is_an_error() -> None:
+    with pytest.raises(TypeError, match=r"expected a std_msgs/msg/Float64, not std_msgs\.msg\.Float32"):
         Float64._serialize(Float32())
-    with pytest.raises(TypeError, match=r"expected, not 1\.0"):
+    with pytest.raises(TypeError, match=r"expected a std_msgs/msg/Float64, not 1\.0"):
         Float64._serialize(1.0)
 
 
-def test_a_field_that_was_deleted_is_reported() -> None:
+def test_serializing_a_deleted_field_is_an_error() -> None:
     message = Float64()
     del message.data
     with pytest.raises(TypeError, match="field 'data' is not set"):
         Float64._serialize(message)
 
 
-def test_values_of_subclasses_and_other_sequences_are_accepted_as_by_rclpy() -> None:
+def test_subclasses_and_other_sequences_are_accepted_as_by_rclpy() -> None:
     def serialize(message: Any) -> bytes:
         data: bytes = type(message)._serialize(message)
         return data
@@ -163,7 +156,7 @@ def test_values_of_subclasses_and_other_sequences_are_accepted_as_by_rclpy() -> 
     assert math.isnan(Float64._deserialize(serialize(Float64(data=math.nan))).data)
 
 
-def test_a_message_is_validated_once_however_many_of_its_values_are_not_exactly_of_their_types() -> None:
+def test_a_message_with_values_of_subclasses_is_validated_once() -> None:
     class Points(list[Point]):
         walks = 0
 
@@ -177,7 +170,7 @@ def test_a_message_is_validated_once_however_many_of_its_values_are_not_exactly_
     assert marker.points.walks == 2  # type: ignore[attr-defined]
 
 
-def test_a_class_derived_from_a_message_is_that_message_on_the_wire() -> None:
+def test_a_derived_class_is_its_message_on_the_wire() -> None:
     class Length(Float64):
         def __init__(self, metres: float) -> None:
             super().__init__(data=metres)

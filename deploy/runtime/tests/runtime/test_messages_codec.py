@@ -1,6 +1,6 @@
-"""Codecs of the embedded runtime: against rosbags, another implementation, and against malformed input.
+"""Codecs: against rosbags, an independent implementation, and against malformed input.
 
-``python tests/runtime/test_messages_codec.py 1000000`` feeds each main decoder so many malformed samples.
+``python tests/runtime/test_messages_codec.py 1000000`` feeds each main decoder that many malformed samples.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ def elements(type_: FieldType) -> st.SearchStrategy[Any]:
 
 
 def messages(name: str) -> st.SearchStrategy[Any]:
-    """Messages of a type with any values."""
+    """Messages of a type with arbitrary values."""
     fields = {}
     for field in message_definition(name).fields:
         size = field.type.array_size
@@ -122,17 +122,17 @@ def test_every_truncation_of_a_sample_is_refused(name: str, data: st.DataObject)
     cls: Any = type(message)
     written = cls._serialize(message)
     shorter = data.draw(st.integers(0, len(written) - 1))
-    with pytest.raises(ValueError, match=f"{shorter} bytes are no {name}: "):
+    with pytest.raises(ValueError, match=f"{shorter} bytes are not a valid {name}: "):
         cls._deserialize(written[:shorter])
 
 
 @pytest.mark.parametrize("header", ["00000000", "00020000", "00030000", "01000000", "00070000", "ffff0000"])
-def test_any_other_header_than_that_of_little_endian_cdr_is_refused(header: str) -> None:
+def test_headers_other_than_little_endian_cdr_are_refused(header: str) -> None:
     with pytest.raises(ValueError, match="header"):
         message_class("std_msgs/msg/Float64")._deserialize(bytes.fromhex(header) + bytes(8))
 
 
-def test_options_in_the_header_mean_nothing() -> None:
+def test_options_in_the_header_are_ignored() -> None:
     cls: Any = message_class("std_msgs/msg/Float64")
     assert cls._deserialize(bytes.fromhex("00010003") + bytes(8)) == cls()
 
@@ -153,7 +153,7 @@ PLURALS = st.sampled_from(["", "", "", "[]", "[<=2]", "[1]", "[3]"])
 
 
 def definitions(bases: list[str]) -> st.SearchStrategy[str]:
-    """Definition files of any fields."""
+    """Definition files with arbitrary fields."""
     types = st.lists(st.builds(str.__add__, st.sampled_from(bases), PLURALS), max_size=6)
     return types.map(lambda types: "".join(f"{type_} field{n}\n" for n, type_ in enumerate(types)))
 
@@ -169,10 +169,8 @@ def prefix(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
 
 @settings(max_examples=60, suppress_health_check=list(HealthCheck))
 @given(data=st.data())
-def test_messages_of_any_definition_are_written_as_by_rosbags_and_read_back(
-    data: st.DataObject, prefix: Path
-) -> None:
-    # names of their own for each example: we remember types
+def test_messages_of_any_definition_are_written_as_by_rosbags(data: st.DataObject, prefix: Path) -> None:
+    # unique names for each example, because types are cached
     number = next(NUMBERS)
     directory = prefix / "share" / "any_msgs" / "msg"
     directory.mkdir(parents=True, exist_ok=True)
@@ -209,7 +207,7 @@ def test_strings_are_read_as_rclpy_reads_them() -> None:
 
 
 @pytest.mark.parametrize("count", [2, 1000, 0x7FFFFFFF, 0xFFFFFFFF])
-def test_a_count_that_the_sample_is_too_short_for_is_refused_at_once(count: int) -> None:
+def test_a_count_beyond_the_end_of_the_sample_is_refused_at_once(count: int) -> None:
     claim = bytes((0, 1, 0, 0)) + struct.pack("<I", count)
     header = bytes((0, 1, 0, 0)) + struct.pack("<iIIxxxx", 0, 0, 1)
     for name, sample in {
@@ -225,7 +223,7 @@ def test_a_count_that_the_sample_is_too_short_for_is_refused_at_once(count: int)
             message_class(name)._deserialize(sample)
 
 
-def test_a_string_longer_than_its_bound_is_malformed_only_where_messages_check_fields() -> None:
+def test_string_bounds_are_checked_only_if_messages_check_fields() -> None:
     code = (
         "from type_description_interfaces.msg import IndividualTypeDescription as Description\n"
         "data = bytes.fromhex('00010000 04010000') + b'x' * 259 + bytes(5)\n"
@@ -238,7 +236,7 @@ def test_a_string_longer_than_its_bound_is_malformed_only_where_messages_check_f
         capture_output=True,
         text=True,
     )
-    assert "ValueError: 272 bytes are no type_description_interfaces/msg/Indiv" in checked.stderr
+    assert "ValueError: 272 bytes are not a valid type_description_interfaces/msg/Indiv" in checked.stderr
 
 
 def test_a_sequence_longer_than_its_bound_is_refused() -> None:
@@ -249,7 +247,7 @@ def test_a_sequence_longer_than_its_bound_is_refused() -> None:
         cls._deserialize(bytes(sample) + bytes(64))
 
 
-def test_wide_strings_are_utf16_code_units_of_4_bytes_each(
+def test_wide_strings_are_utf_16_code_units_of_4_bytes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("AMENT_PREFIX_PATH", str(tmp_path))
@@ -289,7 +287,7 @@ def populated(name: str) -> Any:
 
 
 def mutated(sample: bytes, source: random.Random) -> bytes:
-    """A sample with random damage: to bits, bytes, counts or its length, or noise behind a good header."""
+    """A sample with random damage to bits, bytes, counts or length, or noise behind a valid header."""
     data = bytearray(sample)
     kind = source.randrange(5)
     if kind == 0:
@@ -313,10 +311,10 @@ def mutated(sample: bytes, source: random.Random) -> bytes:
 
 
 def feed(name: str, inputs: int, source: random.Random) -> tuple[int, int]:
-    """Numbers of malformed samples that a decoder took and refused; it may do nothing else with them."""
+    """Numbers of malformed samples that a decoder accepts and refuses; any other result is an error."""
     cls: Any = message_class(name)
     samples = [cls._serialize(cls()), cls._serialize(populated(name))]
-    taken = refused = 0
+    accepted = refused = 0
     for _ in range(inputs):
         sample = mutated(source.choice(samples), source)
         try:
@@ -324,18 +322,18 @@ def feed(name: str, inputs: int, source: random.Random) -> tuple[int, int]:
         except ValueError:
             refused += 1
             continue
-        taken += 1
-        if taken % 10 == 0:
-            # what was read is a valid message: it can be written, and read again
+        accepted += 1
+        if accepted % 10 == 0:
+            # an accepted sample is a valid message: writing and reading it gives the same bytes
             written = cls._serialize(message)
             assert cls._serialize(cls._deserialize(written)) == written
-    return taken, refused
+    return accepted, refused
 
 
 @pytest.mark.parametrize("name", MAIN_TYPES)
 def test_malformed_samples_are_refused_or_read_as_valid_messages(name: str) -> None:
-    taken, refused = feed(name, 3000, random.Random(name))
-    assert taken
+    accepted, refused = feed(name, 3000, random.Random(name))
+    assert accepted
     assert refused
 
 
@@ -352,7 +350,7 @@ def test_noise_is_refused_or_read_as_a_valid_message(name: str, noise: bytes) ->
         assert isinstance(message, cls)
 
 
-def test_floats_that_are_no_numbers_survive() -> None:
+def test_nan_and_infinity_survive_a_round_trip() -> None:
     cls: Any = message_class("geometry_msgs/msg/Point")
     point = cls._deserialize(cls._serialize(cls(x=math.nan, y=math.inf, z=-math.inf)))
     assert math.isnan(point.x)
@@ -360,11 +358,11 @@ def test_floats_that_are_no_numbers_survive() -> None:
 
 
 def main() -> None:
-    """Feed as many malformed samples to each decoder as the command line says."""
+    """Feed the number of malformed samples on the command line to each decoder."""
     inputs = int(sys.argv[1])
     for name in MAIN_TYPES:
-        taken, refused = feed(name, inputs, random.Random(f"{name} {inputs}"))
-        print(f"{name}: {inputs} inputs, {refused} refused, {taken} read", flush=True)
+        accepted, refused = feed(name, inputs, random.Random(f"{name} {inputs}"))
+        print(f"{name}: {inputs} inputs, {refused} refused, {accepted} read", flush=True)
 
 
 if __name__ == "__main__":

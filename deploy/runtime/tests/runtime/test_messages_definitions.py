@@ -1,4 +1,4 @@
-"""Definition files: those of this distribution against rosbags, and a user's own packages."""
+"""Definition files: those of this distribution against rosbags, and packages of users."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ PACKAGES = sorted(
 )
 MESSAGES = [f"{package}/msg/{name}" for package in PACKAGES for name in interface_names(package, "msg")]
 STORE = get_typestore(Stores.ROS2_JAZZY)
-NOT_OURS = ("rosbag2_interfaces/", "tf2_msgs/")
-# rosbags hashes a char as a char; rosidl makes it a uint8 first, as the recorded announcements show
+NOT_INCLUDED = ("rosbag2_interfaces/", "tf2_msgs/")
+# rosbags hashes a char as char; rosidl converts it to uint8 first, as the recorded announcements show
 WITH_CHAR = {
     "std_msgs/msg/Char",
     "service_msgs/msg/ServiceEventInfo",
@@ -35,8 +35,8 @@ WITH_CHAR = {
 }
 
 
-def test_all_messages_of_jazzy_that_rosbags_knows_are_defined() -> None:
-    assert sorted(MESSAGES) == sorted(name for name in STORE.fielddefs if not name.startswith(NOT_OURS))
+def test_every_message_of_jazzy_that_rosbags_knows_is_defined() -> None:
+    assert sorted(MESSAGES) == sorted(name for name in STORE.fielddefs if not name.startswith(NOT_INCLUDED))
 
 
 @pytest.mark.parametrize("name", MESSAGES)
@@ -61,7 +61,7 @@ def define(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Define]:
     packages = []
 
     def define(files: dict[str, str]) -> str:
-        # a name of its own for each package: Python and we remember what was imported
+        # a unique name for each package, because imports and definitions are cached
         package = f"user_msgs{next(_numbers)}"
         packages.append(package)
         for name, text in files.items():
@@ -114,15 +114,15 @@ def test_a_users_package_is_imported_without_a_build_step(define: Define) -> Non
     assert dir(importlib.import_module(f"{package}.msg")) == ["Arm", "Joint"]
 
 
-def test_a_users_package_is_found_in_a_process_that_imports_it_first(define: Define) -> None:
+def test_the_first_import_of_a_process_finds_a_users_package(define: Define) -> None:
     package = define({"Joint.msg": JOINT})
-    # what site does with the .pth file of an installed distribution
+    # as site does with the .pth file of an installed distribution
     code = f"import site; site.addsitedir({str(SOURCE)!r}); from {package}.msg import Joint; print(Joint())"
     done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
     assert done.stdout == f"{package}.msg.Joint(name='', angle=0.5)\n"
 
 
-def test_a_users_package_wins_over_a_mere_directory_of_its_name(
+def test_a_users_package_wins_over_a_plain_directory(
     define: Define, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     package = define({"Joint.msg": JOINT})
@@ -133,19 +133,19 @@ def test_a_users_package_wins_over_a_mere_directory_of_its_name(
     assert done.stdout == f"{package}.msg.Joint(name='', angle=0.5)\n"
 
 
-def test_a_users_package_yields_to_what_python_finds_by_itself(
+def test_a_users_package_yields_to_an_ordinary_python_module(
     define: Define, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     package, module = define({"Joint.msg": JOINT}), define({"Joint.msg": JOINT})
     (tmp_path / "src" / package).mkdir(parents=True)
-    (tmp_path / "src" / package / "__init__.py").write_text("msg = 'mine'\n")
-    (tmp_path / "src" / f"{module}.py").write_text("msg = 'mine'\n")
+    (tmp_path / "src" / package / "__init__.py").write_text("msg = 'module'\n")
+    (tmp_path / "src" / f"{module}.py").write_text("msg = 'module'\n")
     monkeypatch.syspath_prepend(tmp_path / "src")
-    assert importlib.import_module(package).msg == "mine"
-    assert importlib.import_module(module).msg == "mine"
+    assert importlib.import_module(package).msg == "module"
+    assert importlib.import_module(module).msg == "module"
 
 
-def test_every_kind_of_type_is_understood(define: Define) -> None:
+def test_every_kind_of_type_is_supported(define: Define) -> None:
     package = define(
         {
             "All.msg": """
@@ -222,7 +222,7 @@ def test_every_kind_of_type_is_understood(define: Define) -> None:
         (r"\xc3\xa9", "é", "Ã©"),
     ],
 )
-def test_escapes_in_a_string_mean_what_ros_2_makes_of_them(
+def test_string_escapes_have_the_meaning_of_ros_2(
     define: Define, text: str, value: str, element: str
 ) -> None:
     fields = f'string text "{text}"\nwstring wide "{text}"\nstring[] all ["{text}", b]\n'
@@ -237,42 +237,42 @@ def test_escapes_in_a_string_mean_what_ros_2_makes_of_them(
     ("line", "reason"),
     [
         ("flot64 x", r"unknown type 'flot64'"),
-        ("float64", "'' is no field name"),
-        ("float64 X", "'X' is no field name"),
-        ("float64 a__b", "'a__b' is no field name"),
-        ("float64 a_", "'a_' is no field name"),
-        ("float64 " + "x" * 40 + "-", "is no field name"),
+        ("float64", "'' is not a field name"),
+        ("float64 X", "'X' is not a field name"),
+        ("float64 a__b", "'a__b' is not a field name"),
+        ("float64 a_", "'a_' is not a field name"),
+        ("float64 " + "x" * 40 + "-", "is not a field name"),
         ("float64 class", "keyword of Python"),
-        ("float64 x one", "'one' is no double"),
-        ("uint8 x 256", r"256 is no uint8: it must be in \[0, 255\]"),
-        ("int8 x 1.5", "'1.5' is no int8"),
-        ("bool x maybe", "'maybe' is no bool"),
-        ("float64[] x 1", "written in brackets"),
-        ("float64[2] x [1]", r"1 default values are given for 'x', which is double\[2\]"),
+        ("float64 x one", "'one' is not a valid double"),
+        ("uint8 x 256", r"256 is not a valid uint8: it must be in \[0, 255\]"),
+        ("int8 x 1.5", "'1.5' is not a valid int8"),
+        ("bool x maybe", "'maybe' is not a valid bool"),
+        ("float64[] x 1", "in brackets"),
+        ("float64[2] x [1]", r"'x' is double\[2\], but has 1 default values"),
         ("float64[<=2] x [1, 2, 3]", "3 default values"),
         ("float64[0] x", "greater than 0"),
         ("float64[<=] x", "bound .* is missing"),
         ("float64<=3 x", "only strings"),
-        ("float64[ x", r"'float64\[' is no type"),
+        ("float64[ x", r"'float64\[' is not a type"),
         ("string<=2 x abc", "longer than 2 characters"),
         ('string x "a"b"', "must be escaped"),
         (r'string<=1 x "\t"', "longer than 1 characters"),
-        (r'string x "\x4"', r'"\\x4" is no string: .*truncated \\xXX escape'),
-        (r'string[] x ["\x4"]', r'"\\x4" is no string: .*truncated \\xXX escape'),
-        (r'string X="\xe9"', "is no string: 'utf-8' codec can't decode"),
-        (r'string x "\u017c"', "is no string: .*can't encode"),
-        ("string x a\\", r"is no string: .* \\ at end of string"),
-        (r"string x a\\", "by fours"),
-        (r"string x a\\\"b", "by fours"),
-        (r'string x "\n"', "no end of a line"),
-        (r'string x "C:\\new"', "no end of a line"),
-        (r'string[] x ["\0"]', "no NUL"),
+        (r'string x "\x4"', r'"\\x4" is not a valid string: .*truncated \\xXX escape'),
+        (r'string[] x ["\x4"]', r'"\\x4" is not a valid string: .*truncated \\xXX escape'),
+        (r'string X="\xe9"', "is not a valid string: 'utf-8' codec can't decode"),
+        (r'string x "\u017c"', "is not a valid string: .*can't encode"),
+        ("string x a\\", r"is not a valid string: .* \\ at end of string"),
+        (r"string x a\\", "in groups of four"),
+        (r"string x a\\\"b", "in groups of four"),
+        (r'string x "\n"', "neither NUL nor line breaks"),
+        (r'string x "C:\\new"', "neither NUL nor line breaks"),
+        (r'string[] x ["\0"]', "neither NUL nor line breaks"),
         (r'string[] x ["\udcff"]', "surrogates not allowed"),
-        ("uint8 lower=1", "'lower' is no constant name"),
-        ("uint8 TWO__=1", "'TWO__' is no constant name"),
-        ("uint8 " + "X" * 40 + "-=1", "is no constant name"),
+        ("uint8 lower=1", "'lower' is not a constant name"),
+        ("uint8 TWO__=1", "'TWO__' is not a constant name"),
+        ("uint8 " + "X" * 40 + "-=1", "is not a constant name"),
         ("std_msgs/Header ONE=1", "a constant cannot have the type"),
-        ("std_msgs/Header x 1", "can have no default value"),
+        ("std_msgs/Header x 1", "cannot have a default value"),
         ("std_msgs/Missing x", "there is no definition of std_msgs/msg/Missing"),
         ("std_msgs/msg/Header x", "unknown type 'std_msgs/msg/Header'"),
         ("time stamp", "unknown type 'time'"),
@@ -280,7 +280,7 @@ def test_escapes_in_a_string_mean_what_ros_2_makes_of_them(
         ("uint8 ONE=1", "constant 'ONE' is defined twice"),
     ],
 )
-def test_a_mistake_is_one_line_with_file_line_and_reason(define: Define, line: str, reason: str) -> None:
+def test_an_error_is_one_line_with_file_line_and_reason(define: Define, line: str, reason: str) -> None:
     package = define({"Wrong.msg": f"# first\nuint8 ONE=0\nfloat64 good\n{line}\n"})
     with pytest.raises(InvalidDefinition, match=rf"/share/{package}/msg/Wrong\.msg:4: .*{reason}") as caught:
         load(package, "Wrong")
@@ -290,11 +290,11 @@ def test_a_mistake_is_one_line_with_file_line_and_reason(define: Define, line: s
 @pytest.mark.parametrize(("text", "line"), [("", 1), ("bool a\nbool b\n", 2), ("---\nbool a\n---\n", 3)])
 def test_a_service_needs_exactly_one_separator(define: Define, text: str, line: int) -> None:
     package = define({"Wrong.srv": text})
-    with pytest.raises(InvalidDefinition, match=rf"Wrong\.srv:{line}: a service has exactly one line '---'"):
+    with pytest.raises(InvalidDefinition, match=rf"Wrong\.srv:{line}: .* exactly one line '---'"):
         load(package, "Wrong", "srv")
 
 
-def test_a_mistake_in_a_response_is_reported_with_the_line_of_the_file(define: Define) -> None:
+def test_an_error_in_a_response_has_the_line_of_the_file(define: Define) -> None:
     package = define({"Wrong.srv": "bool a\n---\nbool b\nbool b\n"})
     with pytest.raises(InvalidDefinition, match=r"Wrong\.srv:4: field 'b' is defined twice"):
         load(package, "Wrong", "srv")
@@ -307,7 +307,7 @@ def test_a_file_that_is_not_utf8_is_reported(define: Define, tmp_path: Path) -> 
         load(package, "Wrong")
 
 
-def test_what_nobody_defines_cannot_be_imported(define: Define) -> None:
+def test_undefined_packages_and_messages_cannot_be_imported(define: Define) -> None:
     package = define({"Here.msg": ""})
     with pytest.raises(ModuleNotFoundError, match="user_msgs_nowhere"):
         importlib.import_module("user_msgs_nowhere.msg")
@@ -323,13 +323,13 @@ def test_what_nobody_defines_cannot_be_imported(define: Define) -> None:
         service_class("std_srvs/srv/Gone")
 
 
-def test_actions_are_said_to_be_missing(define: Define) -> None:
+def test_importing_actions_names_the_reason(define: Define) -> None:
     package = define({"Move.action": "---\n---\n"})
     with pytest.raises(ImportError, match=rf"{package}\.action: the embedded runtime has no actions"):
         importlib.import_module(f"{package}.action")
 
 
-def test_the_packages_of_the_distribution_win_over_a_users(define: Define, tmp_path: Path) -> None:
+def test_included_packages_win_over_a_users_package(define: Define, tmp_path: Path) -> None:
     define({})
     path = tmp_path / "share" / "std_msgs" / "msg" / "Float64.msg"
     path.parent.mkdir(parents=True)
@@ -339,7 +339,7 @@ def test_the_packages_of_the_distribution_win_over_a_users(define: Define, tmp_p
     assert message_definition("std_msgs/msg/Float64").fields[0].type == FieldType("double")
 
 
-def test_a_type_description_has_all_nested_types_and_the_defaults(define: Define) -> None:
+def test_a_type_description_has_nested_types_and_defaults(define: Define) -> None:
     package = define(
         {
             "A.msg": "PACKAGE/B b\nfloat64[2] pair [1, 2]\nstring<=4 name x\n",
@@ -401,9 +401,7 @@ def test_a_field_may_have_any_name(define: Define) -> None:
 
 
 @pytest.mark.parametrize("name", ["self", "check_fields", "serialize", "fields_and_field_types"])
-def test_a_field_may_be_named_as_what_a_message_needs_itself(
-    define: Define, tmp_path: Path, name: str
-) -> None:
+def test_a_field_may_have_the_name_of_a_message_attribute(define: Define, tmp_path: Path, name: str) -> None:
     package = define({"Plain.msg": f"string {name}\n", "Numbers.msg": f"float64[2] {name}\n"})
     for cls, value in ((load(package, "Plain"), "a"), (load(package, "Numbers"), [1.0, 2.0])):
         message = cls(**{name: value})

@@ -1,4 +1,4 @@
-"""Message types of the embedded runtime against what a real ROS 2 Jazzy wrote and announced."""
+"""Message types against the bytes and announcements of a real ROS 2 Jazzy."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ ANNOUNCEMENTS = re.findall(
 
 
 @pytest.mark.parametrize("entry", GOLDEN.values(), ids=GOLDEN)
-def test_golden_bytes_are_read_and_written_as_rclpy_does(entry: dict[str, str]) -> None:
+def test_golden_bytes_are_read_and_written_as_by_rclpy(entry: dict[str, str]) -> None:
     cls: Any = message_class(entry["type"])
     data = bytes.fromhex(entry["cdr"])
     message = cls._deserialize(data)
@@ -32,13 +32,13 @@ def test_golden_bytes_are_read_and_written_as_rclpy_does(entry: dict[str, str]) 
 
 
 @pytest.mark.parametrize("name", FIELDS)
-def test_fields_and_their_types_are_rclpys(name: str) -> None:
+def test_fields_and_their_types_are_those_of_rclpy(name: str) -> None:
     fields = message_class(name).get_fields_and_field_types()
     assert list(fields.items()) == list(FIELDS[name].items())
 
 
 @pytest.mark.parametrize("announcement", ANNOUNCEMENTS, ids=lambda announcement: " ".join(announcement[:2]))
-def test_an_announcement_has_the_dds_name_and_the_hash_of_its_message(
+def test_dds_names_and_type_hashes_are_the_announced_ones(
     announcement: tuple[str, str, str, str],
 ) -> None:
     _, _, dds_name, type_hash = announcement
@@ -47,12 +47,12 @@ def test_an_announcement_has_the_dds_name_and_the_hash_of_its_message(
     assert type_hash == message_class(name)._TYPE_HASH
 
 
-def test_the_facts_announce_all_that_they_should() -> None:
+def test_the_facts_are_complete() -> None:
     assert len(ANNOUNCEMENTS) == 24
     assert len(FIELDS) == 111
 
 
-def test_ros_discovery_info_from_the_wire_is_read_and_written_back() -> None:
+def test_recorded_discovery_info_survives_a_round_trip() -> None:
     cls: Any = message_class("rmw_dds_common/msg/ParticipantEntitiesInfo")
     data = bytes.fromhex(WIRE["ros_discovery_info"])
     info = cls._deserialize(data)
@@ -72,12 +72,10 @@ def test_ros_discovery_info_from_the_wire_is_read_and_written_back() -> None:
         ("rr/arm1/facts/set_parametersReply", "rcl_interfaces/srv/SetParameters_Response"),
     ],
 )
-def test_service_calls_from_the_wire_are_read_and_written_back_behind_their_header(
-    topic: str, name: str
-) -> None:
+def test_recorded_service_calls_survive_a_round_trip(topic: str, name: str) -> None:
     cls: Any = message_class(name)
     sample = bytes.fromhex(WIRE[topic])
-    data = sample[:4] + sample[20:]
+    data = sample[:4] + sample[20:]  # without the identity of the call
     written = cls._serialize(cls._deserialize(data))
     # DDS pads a sample to a multiple of 4 bytes
     assert written + bytes(-len(written) % 4) == data
@@ -91,7 +89,7 @@ def test_service_calls_from_the_wire_are_read_and_written_back_behind_their_head
         ("SetBool_Event", "RIHS01_3c4c20015afb4303eafd347b1d6a786f171a89c814726961a9593ef10df878cf"),
     ],
 )
-def test_a_service_and_its_event_have_the_hashes_that_rosidl_gives_them(name: str, type_hash: str) -> None:
+def test_a_service_and_its_event_have_the_hashes_of_rosidl(name: str, type_hash: str) -> None:
     import std_srvs.srv
 
     assert type_hash == getattr(std_srvs.srv, name)._TYPE_HASH

@@ -1,4 +1,4 @@
-"""Declaring and setting parameters where rclpy changes what it is given, or refuses or tells less."""
+"""Parameters of a node where rclpy changes its arguments, accepts less or reports less."""
 
 from __future__ import annotations
 
@@ -6,22 +6,17 @@ from collections.abc import Callable
 
 import pytest
 
-from rcl_interfaces.msg import (
-    ParameterDescriptor,
-    ParameterValue,
-)
-from rclpy.exceptions import (
-    ParameterNotDeclaredException,
-)
+from rcl_interfaces.msg import ParameterDescriptor, ParameterValue
+from rclpy.exceptions import ParameterNotDeclaredException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 
-def test_the_default_may_be_a_message(make_node: Callable[..., Node]) -> None:
+def test_a_default_may_be_a_parameter_value_message(make_node: Callable[..., Node]) -> None:
     assert make_node().declare_parameter("a", ParameterValue(type=2, integer_value=3)).value == 3
 
 
-def test_a_descriptor_may_be_shared_since_it_is_not_changed(make_node: Callable[..., Node]) -> None:
+def test_a_shared_descriptor_is_not_changed(make_node: Callable[..., Node]) -> None:
     node, shared = make_node(), ParameterDescriptor(description="a length [m]")
     node.declare_parameter("l1", 1.0, shared)
     node.declare_parameter("l2", 2, shared)
@@ -33,7 +28,7 @@ def test_a_descriptor_may_be_shared_since_it_is_not_changed(make_node: Callable[
     ]
 
 
-def test_all_undeclared_parameters_of_a_list_are_named(make_node: Callable[..., Node]) -> None:
+def test_an_error_names_all_undeclared_parameters(make_node: Callable[..., Node]) -> None:
     node = make_node()
     node.declare_parameter("a", 1)
     with pytest.raises(ParameterNotDeclaredException, match=r"\['b', 'c'\]"):
@@ -41,7 +36,7 @@ def test_all_undeclared_parameters_of_a_list_are_named(make_node: Callable[..., 
     assert node.get_parameter("a").value == 1
 
 
-def test_the_warning_of_a_declaration_without_a_value_names_the_line_that_makes_it(
+def test_the_deprecation_warning_names_the_file_of_the_caller(
     make_node: Callable[..., Node],
 ) -> None:
     node = make_node()
@@ -50,7 +45,7 @@ def test_the_warning_of_a_declaration_without_a_value_names_the_line_that_makes_
     assert caught[0].filename == __file__
 
 
-def test_who_asks_for_what_is_not_declared_is_told_its_name(make_node: Callable[..., Node]) -> None:
+def test_an_error_names_the_undeclared_parameter(make_node: Callable[..., Node]) -> None:
     node = make_node()
     for read in (node.get_parameter, node.get_parameter_type, lambda name: node.get_parameters([name])):
         with pytest.raises(ParameterNotDeclaredException, match="unknown"):

@@ -1,4 +1,4 @@
-"""Parameters as text and files that rclpy cannot read, or makes impossible values of."""
+"""Texts and files of parameters that rclpy cannot read, or reads as impossible values."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from rclpy.parameter import get_parameter_value, parameter_dict_from_yaml_file, 
 
 
 @pytest.mark.parametrize("text", ["{a: 1}", "2020-01-01", "a: b: c"])
-def test_a_text_that_yaml_takes_for_no_parameter_or_for_nothing_is_a_string(text: str) -> None:
+def test_a_text_that_is_no_parameter_in_yaml_is_a_string(text: str) -> None:
     assert parameter_value_to_python(get_parameter_value(text)) == text
 
 
-def test_an_empty_file_is_no_parameter_file(tmp_path: Path) -> None:
+def test_an_empty_file_is_not_a_valid_parameter_file(tmp_path: Path) -> None:
     path = tmp_path / "parameters.yaml"
     path.write_text("")
     with pytest.raises(RuntimeError, match="not a valid ROS parameter file"):

@@ -1,4 +1,4 @@
-"""Handlers of parameter events that change while they are called."""
+"""Parameter event handlers that change during a call."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The parameter and logger services: what they answer, called as the service server calls them."""
+"""The responses of the parameter and logger services, called without DDS."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from rclpy.qos import QoSProfile
 
 
 class Node(NodeParameters):
-    """A node with parameters, and with services that are called by name."""
+    """A node with parameters and with services that the test calls by name."""
 
     def __init__(self, *, allow_undeclared: bool = False) -> None:
         self.services: dict[str, tuple[Any, Callable[[Any, Any], Any], QoSProfile]] = {}
@@ -77,7 +77,7 @@ def double(name: str, value: float) -> ParameterMsg:
     return ParameterMsg(name=name, value=ParameterValue(type=3, double_value=value))
 
 
-def test_there_are_six_services_deep_enough_for_a_thousand_requests(node: Node) -> None:
+def test_the_six_services_queue_a_thousand_requests(node: Node) -> None:
     assert sorted(node.services) == [
         "node/describe_parameters",
         "node/get_parameter_types",
@@ -89,7 +89,7 @@ def test_there_are_six_services_deep_enough_for_a_thousand_requests(node: Node) 
     assert {qos.depth for _, _, qos in node.services.values()} == {1000}
 
 
-def test_values_are_got_all_or_none(node: Node) -> None:
+def test_values_are_returned_all_or_none(node: Node) -> None:
     def get(*names: str) -> list[ParameterValue]:
         values: list[ParameterValue] = node.call(GetParameters, "get_parameters", names=list(names)).values
         return values
@@ -101,7 +101,7 @@ def test_values_are_got_all_or_none(node: Node) -> None:
     assert get() == []
 
 
-def test_types_are_got_all_or_none(node: Node) -> None:
+def test_types_are_returned_all_or_none(node: Node) -> None:
     def types(names: list[str]) -> list[int]:
         return list(node.call(GetParameterTypes, "get_parameter_types", names=names).types)
 
@@ -109,7 +109,7 @@ def test_types_are_got_all_or_none(node: Node) -> None:
     assert types(["value", "missing"]) == []
 
 
-def test_the_type_of_a_parameter_that_need_not_be_declared_is_not_set() -> None:
+def test_an_allowed_undeclared_parameter_is_not_set() -> None:
     node = Node(allow_undeclared=True)
     service = ParameterService(node)  # type: ignore[arg-type]
     assert list(node.call(GetParameterTypes, "get_parameter_types", names=["missing"]).types) == [0]
@@ -117,7 +117,7 @@ def test_the_type_of_a_parameter_that_need_not_be_declared_is_not_set() -> None:
     del service
 
 
-def test_descriptors_are_got_all_or_none(node: Node) -> None:
+def test_descriptors_are_returned_all_or_none(node: Node) -> None:
     descriptors = node.call(DescribeParameters, "describe_parameters", names=["value"]).descriptors
     assert [(d.name, d.type, d.description) for d in descriptors] == [("value", 3, "a length [m]")]
     assert node.call(DescribeParameters, "describe_parameters", names=["value", "x"]).descriptors == []
@@ -130,7 +130,7 @@ def test_names_are_listed(node: Node) -> None:
     assert result.names == ["arm.name"]
 
 
-def test_parameters_are_set_one_by_one_with_a_reason_for_each_that_is_not(node: Node) -> None:
+def test_each_parameter_is_set_or_refused_with_a_reason(node: Node) -> None:
     parameters = [double("value", 2.5), integer("value", 1), integer("missing", 1)]
     results = node.call(SetParameters, "set_parameters", parameters=parameters).results
     assert [result.successful for result in results] == [True, False, False]
@@ -139,7 +139,7 @@ def test_parameters_are_set_one_by_one_with_a_reason_for_each_that_is_not(node: 
     assert node.get_parameter("value").value == 2.5
 
 
-def test_parameters_are_set_all_or_none(node: Node) -> None:
+def test_parameters_are_set_atomically(node: Node) -> None:
     def set_all(*parameters: ParameterMsg) -> Any:
         name = "set_parameters_atomically"
         return node.call(SetParametersAtomically, name, parameters=list(parameters)).result
@@ -150,11 +150,11 @@ def test_parameters_are_set_all_or_none(node: Node) -> None:
     assert node.get_parameter("unset").value == 1
 
 
-def test_a_parameter_of_a_type_that_is_none_is_refused(node: Node) -> None:
-    strange = ParameterMsg(name="value", value=ParameterValue(type=200))
-    results = node.call(SetParameters, "set_parameters", parameters=[strange]).results
+def test_a_parameter_with_an_unknown_type_is_refused(node: Node) -> None:
+    unknown = ParameterMsg(name="value", value=ParameterValue(type=200))
+    results = node.call(SetParameters, "set_parameters", parameters=[unknown]).results
     assert [(result.successful, "200" in result.reason) for result in results] == [(False, True)]
-    result = node.call(SetParametersAtomically, "set_parameters_atomically", parameters=[strange]).result
+    result = node.call(SetParametersAtomically, "set_parameters_atomically", parameters=[unknown]).result
     assert not result.successful
 
 
@@ -168,7 +168,7 @@ def test_the_services_do_not_keep_their_node_alive() -> None:
     del service
 
 
-def test_logger_levels_are_got_and_set() -> None:
+def test_logger_levels_are_read_and_set() -> None:
     node = Node()
     LoggingService(node)  # type: ignore[arg-type]
     try:

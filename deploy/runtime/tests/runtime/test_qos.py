@@ -1,4 +1,4 @@
-"""What of QoS is different from rclpy."""
+"""QoS functions of rclpy that the runtime does not implement."""
 
 from __future__ import annotations
 
@@ -7,6 +7,6 @@ import pytest
 from rclpy import qos
 
 
-def test_what_c_would_need_is_refused_by_name() -> None:
+def test_get_c_qos_profile_is_not_implemented() -> None:
     with pytest.raises(NotImplementedError, match="get_c_qos_profile"):
         qos.qos_profile_default.get_c_qos_profile()

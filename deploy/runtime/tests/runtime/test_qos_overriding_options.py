@@ -1,15 +1,15 @@
-"""QoS by configuration: what is declared, what it does, and what is refused."""
+"""QoS overrides: declared parameters, their effect, and refused values."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import pytest
 
 from rcl_interfaces.msg import SetParametersResult
-from rclpy._node_parameters import NodeParameters
-from rclpy.clock import ROSClock
 from rclpy.duration import Duration
+from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
 from rclpy.qos import (
@@ -27,36 +27,27 @@ from rclpy.qos_overriding_options import (
 )
 from rclpy.subscription import Subscription
 
+MakeNode = Callable[..., Node]
 
-class Node(NodeParameters):
-    """A node that is nothing but its parameters."""
 
-    def __init__(self, **overrides: Any) -> None:
-        self._rclpy_init_parameters(
-            {name: Parameter(name, value=value) for name, value in overrides.items()}, allow_undeclared=False
-        )
-
-    def get_fully_qualified_name(self) -> str:
-        return "/node"
-
-    def get_clock(self) -> ROSClock:
-        return ROSClock()
-
-    def _rclpy_publish_parameter_event(self, event: object) -> None:
-        pass
+def overrides(entity: str, **policies: Any) -> list[Parameter]:
+    """Overrides for an entity of ``/chatter``."""
+    return [
+        Parameter(f"qos_overrides./chatter.{entity}.{name}", value=value) for name, value in policies.items()
+    ]
 
 
 def declare(
     node: Node, qos: QoSProfile, options: QoSOverridingOptions, entity: Any = Publisher
 ) -> dict[str, Any]:
-    """Declare the parameters and return all there are by the rest of their names."""
-    _declare_qos_parameters(entity, node, "/chatter", qos, options)  # type: ignore[arg-type]
+    """Declare the parameters; return the values of all, by their names below the topic."""
+    _declare_qos_parameters(entity, node, "/chatter", qos, options)
     parameters = node.get_parameters_by_prefix("qos_overrides./chatter")
     return {name: parameter.value for name, parameter in parameters.items()}
 
 
-def test_the_default_policies_are_declared_with_the_profile_as_default() -> None:
-    node, qos = Node(), QoSProfile(depth=7)
+def test_default_policies_are_declared_with_the_values_of_the_profile(node: Node) -> None:
+    qos = QoSProfile(depth=7)
     assert declare(node, qos, QoSOverridingOptions.with_default_policies()) == {
         "publisher.history": "keep_last",
         "publisher.depth": 7,
@@ -68,17 +59,16 @@ def test_the_default_policies_are_declared_with_the_profile_as_default() -> None
     assert descriptor.description == "depth for publisher `/chatter` with id `None`"
 
 
-def test_overrides_change_the_profile() -> None:
-    prefix = "qos_overrides./chatter.subscription_left"
-    node = Node(
-        **{
-            f"{prefix}.history": "KEEP_ALL",
-            f"{prefix}.reliability": "best_effort",
-            f"{prefix}.liveliness": "manual_by_topic",
-            f"{prefix}.deadline": 5_000_000,
-            f"{prefix}.avoid_ros_namespace_conventions": True,
-        }
+def test_overrides_change_the_profile(make_node: MakeNode) -> None:
+    parameters = overrides(
+        "subscription_left",
+        history="KEEP_ALL",
+        reliability="best_effort",
+        liveliness="manual_by_topic",
+        deadline=5_000_000,
+        avoid_ros_namespace_conventions=True,
     )
+    node = make_node(parameter_overrides=parameters)
     qos = QoSProfile(depth=1)
     kinds = [kind for kind in QoSPolicyKind if kind is not QoSPolicyKind.INVALID]
     declared = declare(node, qos, QoSOverridingOptions(kinds, entity_id="left"), Subscription)
@@ -91,8 +81,8 @@ def test_overrides_change_the_profile() -> None:
     assert qos.avoid_ros_namespace_conventions
 
 
-def test_a_second_entity_of_the_same_name_shares_the_parameters() -> None:
-    node = Node(**{"qos_overrides./chatter.publisher.depth": 3})
+def test_a_second_entity_of_the_same_name_shares_the_parameters(make_node: MakeNode) -> None:
+    node = make_node(parameter_overrides=overrides("publisher", depth=3))
     options = QoSOverridingOptions.with_default_policies()
     for _ in range(2):
         qos = QoSProfile(depth=1)
@@ -100,18 +90,18 @@ def test_a_second_entity_of_the_same_name_shares_the_parameters() -> None:
         assert qos.depth == 3
 
 
-def test_a_value_that_a_policy_does_not_have_is_refused() -> None:
-    node = Node(**{"qos_overrides./chatter.publisher.reliability": "perfect"})
+def test_an_unknown_value_of_a_policy_is_refused(make_node: MakeNode) -> None:
+    node = make_node(parameter_overrides=overrides("publisher", reliability="perfect"))
     with pytest.raises(RuntimeError, match="`reliability`: `perfect`"):
         declare(node, QoSProfile(depth=1), QoSOverridingOptions.with_default_policies())
 
 
-def test_a_profile_that_is_unknown_is_refused() -> None:
+def test_an_unknown_profile_is_refused(node: Node) -> None:
     with pytest.raises(ValueError, match="invalid"):
-        declare(Node(), qos_profile_unknown._copy(), QoSOverridingOptions.with_default_policies())
+        declare(node, qos_profile_unknown._copy(), QoSOverridingOptions.with_default_policies())
 
 
-def test_the_callback_decides_about_the_whole_profile() -> None:
+def test_a_callback_accepts_or_refuses_the_whole_profile(make_node: MakeNode) -> None:
     seen = []
 
     def deep_enough(qos: QoSProfile) -> SetParametersResult:
@@ -119,12 +109,12 @@ def test_the_callback_decides_about_the_whole_profile() -> None:
         return SetParametersResult(successful=qos.depth > 5, reason="too shallow")
 
     options = QoSOverridingOptions.with_default_policies(callback=deep_enough, entity_id="x")
-    declare(Node(), QoSProfile(depth=10), options)
+    declare(make_node(), QoSProfile(depth=10), options)
     with pytest.raises(InvalidQosOverridesError, match="with id `x`, are not valid: too shallow"):
-        declare(Node(), QoSProfile(depth=1), options)
+        declare(make_node(), QoSProfile(depth=1), options)
     assert seen == [10, 1]
 
 
-def test_only_publishers_and_subscriptions_have_overrides() -> None:
+def test_only_publishers_and_subscriptions_have_overrides(node: Node) -> None:
     with pytest.raises(TypeError, match="entity_type"):
-        declare(Node(), QoSProfile(depth=1), QoSOverridingOptions.with_default_policies(), str)
+        declare(node, QoSProfile(depth=1), QoSOverridingOptions.with_default_policies(), str)

@@ -17,7 +17,7 @@ PROFILE = QoSProfile(depth=10)
 
 @pytest.fixture
 def writer(participant: Participant) -> Writer:
-    """A writer whose messages the test's reader gets."""
+    """A writer that is matched with the test's reader."""
     return participant.create_writer("rt/x", "Octets_", PROFILE, "")
 
 
@@ -28,14 +28,14 @@ def reader(participant: Participant) -> Reader:
 
 
 def wait(reader: Reader) -> None:
-    """Wait until there is something to take."""
+    """Wait until a sample can be taken."""
     waitset = WaitSet()
     waitset.attach(reader.condition, 0)
     waitset.wait(INFINITY)
     waitset.close()
 
 
-def test_whoever_takes_in_the_midst_of_taking_gets_the_next_message(
+def test_a_take_during_a_take_gets_the_next_message(
     reader: Reader, writer: Writer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     quick = entities.quick
@@ -43,7 +43,7 @@ def test_whoever_takes_in_the_midst_of_taking_gets_the_next_message(
 
     def take(*arguments: Any) -> int:
         count = int(quick.dds_takecdr(*arguments))
-        if not taken:  # here another thread may get its turn
+        if not taken:  # another thread may run here
             taken.append(b"")
             sample = reader.take()
             assert sample is not None
@@ -63,7 +63,7 @@ def test_whoever_takes_in_the_midst_of_taking_gets_the_next_message(
     assert reader.take() is None
 
 
-def test_nothing_stays_of_a_big_message(reader: Reader, writer: Writer) -> None:
+def test_a_big_message_leaves_no_memory_allocated(reader: Reader, writer: Writer) -> None:
     writer.write(HEADER + bytes(10_000_000))
     wait(reader)
     tracemalloc.start()

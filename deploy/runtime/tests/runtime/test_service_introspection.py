@@ -1,4 +1,4 @@
-"""How service events name the client."""
+"""The identifiers of clients in service events."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from rclpy.service_introspection import ServiceIntrospectionState
 from std_srvs.srv import SetBool
 
 
-def test_a_client_is_named_by_the_identifier_it_announces_and_in_a_server_by_its_requests(
+def test_events_name_a_client_by_its_announced_id_or_its_writer(
     spin_until: Callable[..., None], node: Node
 ) -> None:
     service = node.create_service(SetBool, "negate", lambda request, response: response)
@@ -35,5 +35,5 @@ def test_a_client_is_named_by_the_identifier_it_announces_and_in_a_server_by_its
     identifier = ".".join(f"{octet:x}" for octet in sent)
     assert announced.startswith(f"clientid= {identifier};")
     assert sent == done
-    # in one process, the client's handle and the handle of its requests are the same
+    # within one process, the instance handles of the client and of its requests are equal
     assert received == answered == 2 * client.handle.instance_handle.to_bytes(8, "little")

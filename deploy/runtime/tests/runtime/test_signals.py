@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM end whoever spins, at once and without a trace."""
+"""Ctrl-C and SIGTERM end spinning at once, without an error."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ node.destroy_node()
 rclpy.try_shutdown()
 """
 
-ANOTHER_THREAD_HAS_SHUT_DOWN = """
+SHUTDOWN_ON_ANOTHER_THREAD = """
 thread = threading.Thread(target=rclpy.shutdown)
 thread.start()
 thread.join()
 """
-BEGUN_ANEW = ANOTHER_THREAD_HAS_SHUT_DOWN + "rclpy.init(args=[])"
-ASYNCIO_HAS_HANDLED_A_SIGNAL = """
+SECOND_INIT = SHUTDOWN_ON_ANOTHER_THREAD + "rclpy.init(args=[])"
+ASYNCIO_SIGNAL_HANDLER = """
 async def handle():
     loop = asyncio.get_running_loop()
     loop.add_signal_handler(signal.SIGUSR1, print)
@@ -52,8 +52,8 @@ def is_asleep(pid: int) -> bool:
     "before",
     [
         pytest.param("", id="plain"),
-        pytest.param(BEGUN_ANEW, id="begun anew"),
-        pytest.param(ASYNCIO_HAS_HANDLED_A_SIGNAL, id="after asyncio"),
+        pytest.param(SECOND_INIT, id="second init"),
+        pytest.param(ASYNCIO_SIGNAL_HANDLER, id="after asyncio"),
     ],
 )
 def test_a_signal_ends_spinning_and_shuts_the_context_down(
@@ -72,7 +72,7 @@ def test_a_signal_ends_spinning_and_shuts_the_context_down(
         assert process.stderr is not None
         try:
             assert process.stdout.readline() == "spinning\n"
-            while not is_asleep(process.pid):  # in DDS, where no signal ends the wait by itself
+            while not is_asleep(process.pid):  # in DDS, whose wait no signal interrupts
                 time.sleep(0.001)
             process.send_signal(number)
             assert process.wait(10) == 0
@@ -82,12 +82,12 @@ def test_a_signal_ends_spinning_and_shuts_the_context_down(
             process.kill()
 
 
-def test_after_a_shutdown_on_another_thread_a_signal_does_what_it_did_before(domain_id: int) -> None:
+def test_shutdown_on_another_thread_restores_the_signal_handlers(domain_id: int) -> None:
     code = f"""
 import signal, threading
 import rclpy
 rclpy.init(args=[])
-{ANOTHER_THREAD_HAS_SHUT_DOWN}
+{SHUTDOWN_ON_ANOTHER_THREAD}
 try:
     signal.raise_signal(signal.SIGINT)
 except KeyboardInterrupt:
@@ -107,7 +107,7 @@ print("survived")
     assert done.returncode == -signal.SIGTERM
 
 
-FOREIGN = """
+BLOCKED_MAIN_THREAD = """
 import ctypes, threading
 import rclpy
 from rclpy.executors import ExternalShutdownException
@@ -127,10 +127,12 @@ libc.pthread_mutex_lock(mutex)  # for ever
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_ends_spinning_on_another_thread_though_the_main_one_never_runs_python(
+def test_a_signal_ends_a_spinning_thread_while_the_main_thread_blocks(
     number: signal.Signals, domain_id: int
 ) -> None:
-    with subprocess.Popen([sys.executable, "-c", FOREIGN], stdout=subprocess.PIPE, text=True) as process:
+    with subprocess.Popen(
+        [sys.executable, "-c", BLOCKED_MAIN_THREAD], stdout=subprocess.PIPE, text=True
+    ) as process:
         try:
             assert process.stdout is not None
             assert process.stdout.readline() == "spinning\n"
@@ -140,7 +142,7 @@ def test_a_signal_ends_spinning_on_another_thread_though_the_main_one_never_runs
             process.kill()
 
 
-ANEW = f"""
+SPIN_AND_INIT_AGAIN = f"""
 import time
 {SPIN.format("")}
 rclpy.init(args=[])
@@ -151,8 +153,10 @@ print(rclpy.ok(), flush=True)
 """
 
 
-def test_a_signal_that_was_handled_leaves_what_begins_thereafter_alone(domain_id: int) -> None:
-    with subprocess.Popen([sys.executable, "-c", ANEW], stdout=subprocess.PIPE, text=True) as process:
+def test_a_handled_signal_does_not_end_the_next_context(domain_id: int) -> None:
+    with subprocess.Popen(
+        [sys.executable, "-c", SPIN_AND_INIT_AGAIN], stdout=subprocess.PIPE, text=True
+    ) as process:
         try:
             assert process.stdout is not None
             assert process.stdout.readline() == "spinning\n"

@@ -1,4 +1,4 @@
-"""Everything comes and goes a thousand times under traffic, on several threads, and nothing stays behind."""
+"""Thousands of entities are created and destroyed under traffic, on several threads, without leaks."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from pathlib import Path
 
 import pytest
 
-import rclpy
 from rclpy._dds.library import blocking
 from rclpy.context import Context
 from rclpy.executors import Executor, MultiThreadedExecutor, SingleThreadedExecutor
@@ -23,7 +22,7 @@ from std_srvs.srv import SetBool
 
 CYCLES = 1000
 THREADS = 4
-MEMORY = 8.0  # MB by which a process may grow; a lost reader or writer a cycle would cost some 20
+MEMORY = 8.0  # MB that a process may grow; a leaked reader or writer per cycle costs about 20
 SECONDS = 30.0
 
 
@@ -39,12 +38,13 @@ def answer(request: SetBool.Request, response: SetBool.Response) -> SetBool.Resp
 
 
 def endpoints(node: Node) -> tuple[int, int, int]:
-    """How many publishers and subscriptions of the flood there are, and how many topics of any kind."""
+    """Numbers of publishers and subscriptions of the flood, and of topics of any kind."""
     topics = node.get_topic_names_and_types(no_demangle=True)
     return node.count_publishers("flood"), node.count_subscribers("flood"), len(topics)
 
 
 def churn(node: Node, cycles: int, failures: list[BaseException]) -> None:
+    """Create and destroy an entity of each kind, again and again."""
     try:
         for number in range(cycles):
             name = f"s{threading.get_ident()}"
@@ -68,7 +68,7 @@ def churn(node: Node, cycles: int, failures: list[BaseException]) -> None:
 
 @dataclass
 class Flood:
-    """A node under traffic: another participant publishes on ``flood`` all the time."""
+    """A node under traffic: another participant publishes on ``flood`` continuously."""
 
     node: Node
     other: Node
@@ -77,14 +77,11 @@ class Flood:
 
 
 @pytest.fixture
-def other(domain_id: int) -> Iterator[Node]:
+def other(other_context: Context) -> Iterator[Node]:
     """A node of another participant."""
-    context = Context()
-    rclpy.init(args=[], context=context, domain_id=domain_id)
-    node = Node("flooding", context=context)
+    node = Node("flooding", context=other_context)
     yield node
     node.destroy_node()
-    context.shutdown()
 
 
 @pytest.fixture(params=[SingleThreadedExecutor, partial(MultiThreadedExecutor, 2)], ids=["single", "multi"])
@@ -122,11 +119,11 @@ def flood(
 
 
 @pytest.mark.timeout(180)
-def test_a_thousand_of_everything_leave_nothing_behind(flood: Flood, context: Context) -> None:
+def test_a_thousand_entities_of_each_kind_leave_nothing_behind(flood: Flood, context: Context) -> None:
     node, other = flood.node, flood.other
 
-    def come_to(condition: Callable[[], object]) -> None:
-        """Wait for discovery, which takes its own time."""
+    def wait_for(condition: Callable[[], object]) -> None:
+        """Wait for discovery."""
         assert node._rclpy_graph.wait_for(lambda: bool(condition()), SECONDS, context.ok)
 
     def run(cycles: int) -> None:
@@ -139,20 +136,20 @@ def test_a_thousand_of_everything_leave_nothing_behind(flood: Flood, context: Co
         for thread in threads:
             thread.join()
 
-    come_to(lambda: node.count_publishers("flood"))
-    come_to(lambda: endpoints(other) == endpoints(node))
+    wait_for(lambda: node.count_publishers("flood"))
+    wait_for(lambda: endpoints(other) == endpoints(node))
     before = endpoints(node)
-    run(CYCLES)  # until everything has grown to its size
-    come_to(lambda: endpoints(node) == endpoints(other) == before)
+    run(CYCLES)  # warm-up: every pool reaches its size
+    wait_for(lambda: endpoints(node) == endpoints(other) == before)
     size, threads = memory(), threading.active_count()
     run(CYCLES)
     assert not flood.failures
     assert threading.active_count() <= threads
-    come_to(lambda: endpoints(node) == endpoints(other) == before)
+    wait_for(lambda: endpoints(node) == endpoints(other) == before)
     assert memory() - size < MEMORY
     assert [*node.subscriptions, *node.timers, *node.clients] == []
 
-    # Whoever waits is still woken.
+    # Waiting threads are still woken.
     received = threading.Event()
     node.create_subscription(Float64, "flood", lambda message: received.set(), 10)
     assert received.wait(SECONDS)
@@ -162,12 +159,12 @@ def test_a_thousand_of_everything_leave_nothing_behind(flood: Flood, context: Co
     assert client.call(SetBool.Request(data=True), SECONDS) == SetBool.Response(success=True)
 
 
-@pytest.mark.parametrize("asks", [False, True])
-def test_who_never_spins_keeps_nothing_of_what_peers_announced(
-    make_node: Callable[..., Node], other: Node, asks: bool
+@pytest.mark.parametrize("queries", [False, True])
+def test_a_node_that_never_spins_keeps_no_announcements_of_peers(
+    make_node: Callable[..., Node], other: Node, queries: bool
 ) -> None:
     node = make_node("deaf")
-    if asks:
+    if queries:
         assert node.wait_for_node("flooding", SECONDS)
     for _ in range(CYCLES):
         other.destroy_publisher(other.create_publisher(Float64, "flood", 10))
@@ -175,11 +172,11 @@ def test_who_never_spins_keeps_nothing_of_what_peers_announced(
     held = [graph._reader.condition, *(graph._discovery.gone if graph._discovery else ())]
     deadline = time.monotonic() + SECONDS
     while any(blocking.dds_triggered(condition) for condition in held):
-        assert time.monotonic() < deadline, "DDS still holds what nobody has taken"
+        assert time.monotonic() < deadline, "DDS still holds samples that were never taken"
         time.sleep(0.01)
 
 
-def test_a_context_ends_while_others_begin_to_wait_for_its_end() -> None:
+def test_shutdown_wakes_threads_that_begin_to_wait_meanwhile() -> None:
     def begin(context: Context, events: list[threading.Event], under_way: threading.Event) -> None:
         for number in range(2000):
             events.append(threading.Event())

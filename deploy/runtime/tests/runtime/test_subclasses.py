@@ -1,4 +1,4 @@
-"""What a subclass of Node may call its own is the same as with rclpy's Node."""
+"""Node has the private names of rclpy's Node and no others: subclasses may use the rest."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 from rclpy.node import Node
 
-# All that Node of rclpy 7.1.3 (rclpy/node.py) has, with the names that Python makes of those in `__`.
-RCLPYS_PRIVATE_NAMES = {
+# The private names of Node in rclpy 7.1.3 (rclpy/node.py); those with `__` as Python mangles them.
+RCLPY_PRIVATE_NAMES = {
     "_Node__executor_weakref",
     "_Node__handle",
     "_Node__node",
@@ -55,10 +55,10 @@ RCLPYS_PRIVATE_NAMES = {
 }
 
 
-def test_private_names_that_rclpys_node_does_not_have_are_left_to_users(
+def test_node_has_no_private_names_beyond_those_of_rclpy(
     make_node: Callable[..., Node],
 ) -> None:
     node = make_node(enable_logger_service=True)
     private = {name for name in {*dir(node), *vars(node)} if name.startswith("_")}
     own = {name for name in private if not name.startswith(("__", "_rclpy_"))}
-    assert own <= RCLPYS_PRIVATE_NAMES
+    assert own <= RCLPY_PRIVATE_NAMES

@@ -1,4 +1,4 @@
-"""Coroutines that are cancelled or interrupted: they end, where rclpy's go on or wait."""
+"""Cancelled and interrupted coroutines: they end, where those of rclpy continue or wait."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 from rclpy.task import Future, Task
 
 
-def test_a_coroutine_that_awaits_a_future_which_is_cancelled_gets_none() -> None:
+def test_awaiting_a_cancelled_future_returns_none() -> None:
     future = Future()
 
     async def coroutine() -> Any:
@@ -24,14 +24,14 @@ def test_a_coroutine_that_awaits_a_future_which_is_cancelled_gets_none() -> None
     assert task.result() is None
 
 
-def test_a_cancelled_coroutine_runs_its_finally_clauses_and_nothing_else() -> None:
+def test_a_cancelled_coroutine_runs_only_its_finally_clauses() -> None:
     events: list[str] = []
     future = Future()
 
     async def coroutine() -> None:
         try:
             await future
-            events.append("went on")
+            events.append("continued")
         finally:
             events.append("cleaned up")
 
@@ -44,7 +44,7 @@ def test_a_cancelled_coroutine_runs_its_finally_clauses_and_nothing_else() -> No
     assert task.cancelled()
 
 
-def test_a_keyboard_interrupt_in_a_task_passes_through_and_the_task_is_not_run_again() -> None:
+def test_a_keyboard_interrupt_ends_its_task_and_propagates() -> None:
     calls: list[int] = []
 
     def function() -> None:

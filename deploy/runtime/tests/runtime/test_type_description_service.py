@@ -1,4 +1,4 @@
-"""What ``~/get_type_description`` tells of a type whose definition a user changes or removes meanwhile."""
+"""``~/get_type_description`` for a type whose definition file has changed or is gone."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from rosidl_runtime_embedded import message_class
 from type_description_interfaces.srv import GetTypeDescription
 
 
-def test_a_type_in_use_is_described_as_it_was_when_it_was_loaded(
+def test_a_type_in_use_keeps_the_description_it_was_loaded_with(
     make_node: Callable[..., Node],
     executor: SingleThreadedExecutor,
     spin_until: Callable[..., None],

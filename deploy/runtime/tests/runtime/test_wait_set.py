@@ -7,7 +7,7 @@ import threading
 from rclpy._dds import INFINITY, GuardCondition, WaitSet
 
 
-def test_a_wait_set_that_grows_while_a_thread_waits_still_tells_what_was_triggered() -> None:
+def test_a_wait_set_may_grow_during_a_wait() -> None:
     guards = [GuardCondition() for _ in range(50)]
     waitset = WaitSet()
     waitset.attach(guards[0].handle, 7)
