@@ -21,6 +21,7 @@ from std_msgs.msg import Bool, Float64, Header, String
 
 TURN_ON, TURN_OFF = "turn_on", "turn_off"
 ON, OFF = "on", "off"
+ALIVE, MISSED, INCAPACITATED = "alive", "missed", "incapacitated"
 DRIVE = 0.4  # s for which the engines' drive takes an `on`
 FRAME = "base"
 
@@ -120,6 +121,15 @@ OPERATOR_PRESENCE = Topic(
     ("operator_watchdog",),
     "the operator was seen alive; `stamp` is the source time of that heartbeat. At most 2 Hz",
 )
+OPERATOR_ACTIVITY = Topic(
+    "operator_activity",
+    String,
+    _EVENTS,
+    "",
+    ("operator_watchdog",),
+    f"`{ALIVE}`, `{MISSED}`, `{INCAPACITATED}`: the watchdog's conclusions, for display only",
+    _not_one_of(ALIVE, MISSED, INCAPACITATED),
+)
 ENGINES = Topic(
     "engines",
     String,
@@ -156,6 +166,7 @@ CONTRACT = (
     EFFECTOR_SPEED,
     OPERATOR_HEARTBEAT,
     OPERATOR_PRESENCE,
+    OPERATOR_ACTIVITY,
     ENGINES,
     ENGINES_STATE,
     DIAGNOSTICS,

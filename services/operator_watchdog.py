@@ -17,7 +17,16 @@ from std_msgs.msg import Header, String
 
 from interfaces import service
 from interfaces.service import ServiceNode, parameter
-from interfaces.topics import ENGINES, OPERATOR_HEARTBEAT, OPERATOR_PRESENCE, TURN_OFF
+from interfaces.topics import (
+    ALIVE,
+    ENGINES,
+    INCAPACITATED,
+    MISSED,
+    OPERATOR_ACTIVITY,
+    OPERATOR_HEARTBEAT,
+    OPERATOR_PRESENCE,
+    TURN_OFF,
+)
 from reactive_node import stamps
 from reactive_node.stamps import Timestamp
 
@@ -48,7 +57,11 @@ def operator_activity(
 
 
 def operator_incapacitated(
-    heartbeats: Observable[Heartbeat], *, repeat: float = 0.5, **activity: Any
+    heartbeats: Observable[Heartbeat],
+    *,
+    repeat: float = 0.5,
+    incapacitated: Callable[[], None] = lambda: None,
+    **activity: Any,
 ) -> Observable[str]:
     """
     Emit ``turn_off`` when the operator is incapacitated (Listing 5.8), and again every ``repeat`` [s].
@@ -60,7 +73,12 @@ def operator_incapacitated(
         back = heartbeats.do_action(activity.get("alive"))
         offs = rx.timer(0.0, repeat).map(lambda _: TURN_OFF)
         away = offs.publish(lambda it: it.take_until(back.skip_until(it)))
-        return operator_activity(heartbeats, **activity).catch(lambda *_: away).repeat()
+
+        def asleep(*_: Any) -> Observable[str]:
+            incapacitated()
+            return away
+
+        return operator_activity(heartbeats, **activity).catch(asleep).repeat()
 
     return heartbeats.concat(rx.never()).publish(watch)  # a source that ends is silent for ever
 
@@ -81,6 +99,12 @@ def wire(node: ServiceNode) -> None:
     parameters = node.declare(Parameters)
     node.declare_origin()
     presences: Subject[Heartbeat] = Subject()
+    activity: Subject[str] = Subject()
+
+    def missed(_: Exception) -> None:
+        node.get_logger().warning("Not received signal from operator...")
+        activity.on_next(MISSED)
+
     commands = operator_incapacitated(
         stamps.fresh(
             node.observe(OPERATOR_HEARTBEAT, timestamped=True),
@@ -88,7 +112,8 @@ def wire(node: ServiceNode) -> None:
             dropped=lambda why: node.drop(OPERATOR_HEARTBEAT.name, why),
         ),
         alive=presences.on_next,
-        missed=lambda _: node.get_logger().warning("Not received signal from operator..."),
+        missed=missed,
+        incapacitated=lambda: activity.on_next(INCAPACITATED),
         sampling=parameters.sampling,
         first=min(AT_ONCE, parameters.sampling) if node.resumes else parameters.sampling,
         silence=parameters.silence,
@@ -96,6 +121,8 @@ def wire(node: ServiceNode) -> None:
         repeat=parameters.repeat,
     )
     node.publish(OPERATOR_PRESENCE, presences.map(lambda it: Header(stamp=stamps.to_message(it.timestamp))))
+    conclusions = rx.merge(presences.map(lambda _: ALIVE), activity)
+    node.publish(OPERATOR_ACTIVITY, conclusions.map(lambda conclusion: String(data=conclusion)))
     # Before a scenario begins nobody is expected: no silence counts yet.
     node.publish(ENGINES, node.from_origin(commands).map(lambda command: String(data=command)))
 

@@ -102,6 +102,7 @@ GOOD_AND_BAD = [
     (topics.EFFECTOR_SPEED, [number(0.0)], [number(math.nan), number(-1.0)]),
     (topics.OPERATOR_HEARTBEAT, [Bool(data=True)], [Bool(data=False)]),
     (topics.OPERATOR_PRESENCE, [Header()], []),
+    (topics.OPERATOR_ACTIVITY, [String(data="missed")], [String(data="asleep")]),
     (
         topics.ENGINES,
         [String(data="turn_on"), String(data="turn_off")],
