@@ -2,7 +2,7 @@
 
 Names are relative, so a whole arm lives under a namespace (``__ns:=/arm1``); units are SI and radians (REP
 103). A service takes name, type and QoS of its topics from these rows, the README shows :func:`markdown`, and
-:attr:`Topic.fault` says which messages are none: they are dropped at the edge of a service, counted and
+:attr:`Topic.problem` says which messages are none: they are dropped at the edge of a service, counted and
 reported.
 """
 
@@ -22,7 +22,7 @@ from std_msgs.msg import Bool, Float64, Header, String
 TURN_ON, TURN_OFF = "turn_on", "turn_off"
 ON, OFF = "on", "off"
 ALIVE, MISSED, INCAPACITATED = "alive", "missed", "incapacitated"
-DRIVE = 0.4  # s for which the engines' drive takes an `on`
+DRIVE_TIMEOUT = 0.4  # s for which the engines' drive takes an `on`
 FRAME = "base"
 
 
@@ -37,7 +37,7 @@ class Topic:
     publishers: tuple[str, ...]
     """The nodes that publish it."""
     meaning: str
-    fault: Callable[[Any], str] = lambda message: ""
+    problem: Callable[[Any], str] = lambda message: ""
     """What is wrong with a message, in words; empty for a good one."""
 
     @property
@@ -142,10 +142,10 @@ ENGINES = Topic(
 ENGINES_STATE = Topic(
     "engines/state",
     String,
-    _qos(1, latched=True, lifespan=DRIVE),
+    _qos(1, latched=True, lifespan=DRIVE_TIMEOUT),
     "",
     ("engine_controller",),
-    f"`{ON}` or `{OFF}`, on every change and at 10 Hz: the drive takes an `{ON}` for {1000 * DRIVE:.0f} ms",
+    f"`{ON}` or `{OFF}`, on every change and at 10 Hz: the drive takes an `{ON}` for {1000 * DRIVE_TIMEOUT:.0f} ms",
     _not_one_of(ON, OFF),
 )
 DIAGNOSTICS = Topic(

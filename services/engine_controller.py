@@ -16,7 +16,16 @@ from std_msgs.msg import String
 
 from interfaces import service
 from interfaces.service import ServiceNode, parameter
-from interfaces.topics import DRIVE, ENGINES, ENGINES_STATE, OFF, ON, OPERATOR_PRESENCE, TURN_OFF, TURN_ON
+from interfaces.topics import (
+    DRIVE_TIMEOUT,
+    ENGINES,
+    ENGINES_STATE,
+    OFF,
+    ON,
+    OPERATOR_PRESENCE,
+    TURN_OFF,
+    TURN_ON,
+)
 from reactive_node import stamps
 from reactive_node.stamps import Timestamp
 
@@ -28,7 +37,7 @@ def engine_state(
     presence: float = 1.0,
     absence: float = 10.0,
     repeat: float = 0.1,
-    drive: float = DRIVE,
+    drive: float = DRIVE_TIMEOUT,
     now: Callable[[], datetime] = stamps.now,
     refused: Callable[[str], None] = lambda why: None,
 ) -> Observable[str]:

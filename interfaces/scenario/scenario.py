@@ -213,8 +213,8 @@ def _values(item: _Item, topic: topics.Topic, repeat: float | None) -> Timeline[
 
     def value(given: _Item) -> float:
         number = given.number()
-        if fault := topic.fault(topic.type(data=number)):
-            raise given.error(fault)
+        if problem := topic.problem(topic.type(data=number)):
+            raise given.error(problem)
         return number
 
     def event(given: _Item) -> tuple[float, float]:
@@ -234,8 +234,8 @@ def _values(item: _Item, topic: topics.Topic, repeat: float | None) -> Timeline[
         item["phase"].number() if "phase" in item else Sweep.phase,
         item["delay"].number(0.0) if "delay" in item else Sweep.delay,
     )
-    if fault := topic.fault(topic.type(data=sweep.center - sweep.amplitude)):
-        raise item["amplitude"].error(f"at its lowest, {fault}")
+    if problem := topic.problem(topic.type(data=sweep.center - sweep.amplitude)):
+        raise item["amplitude"].error(f"at its lowest, {problem}")
     return sweep
 
 

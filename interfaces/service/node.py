@@ -234,7 +234,7 @@ class ServiceNode(ReactiveNode):
         self.publish_observable(sound, topic.type, topic.name, topic.qos)
 
     def _is_sound(self, topic: Topic, message: Any) -> bool:
-        fault = topic.fault(message)
+        fault = topic.problem(message)
         if fault:
             self.drop(topic.name, fault)
         return not fault

@@ -141,7 +141,7 @@ def test_bad_input_is_dropped_and_reported(
     assert report["level"] == (DiagnosticStatus.WARN if bad else DiagnosticStatus.OK)
     if bad:
         told = report["message"].split("; ")
-        assert told[0].startswith(f"{topic.name}: {topic.fault(bad[0])}")
+        assert told[0].startswith(f"{topic.name}: {topic.problem(bad[0])}")
         assert all(len(remark) < 200 for remark in told)
     following = health()
     assert (following["level"], following["message"]) == (DiagnosticStatus.OK, "running")
