@@ -145,7 +145,8 @@ ENGINES_STATE = Topic(
     _qos(1, latched=True, lifespan=DRIVE_TIMEOUT),
     "",
     ("engine_controller",),
-    f"`{ON}` or `{OFF}`, on every change and at 10 Hz: the drive takes an `{ON}` for {1000 * DRIVE_TIMEOUT:.0f} ms",
+    f"`{ON}` or `{OFF}`, on every change and at 10 Hz: the drive takes an `{ON}` for "
+    f"{1000 * DRIVE_TIMEOUT:.0f} ms",
     _not_one_of(ON, OFF),
 )
 DIAGNOSTICS = Topic(
