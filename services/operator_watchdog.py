@@ -16,6 +16,7 @@ from reactivex.subject import Subject
 from std_msgs.msg import Header, String
 
 from interfaces import service
+from interfaces.scenario.origin import Origin
 from interfaces.service import ServiceNode, parameter
 from interfaces.topics import (
     ALIVE,
@@ -97,7 +98,7 @@ class Parameters:
 def wire(node: ServiceNode) -> None:
     """Connect the recipe with its topics."""
     parameters = node.declare(Parameters)
-    node.declare_origin()
+    origin = Origin(node)
     presences: Subject[Heartbeat] = Subject()
     activity: Subject[str] = Subject()
 
@@ -115,7 +116,7 @@ def wire(node: ServiceNode) -> None:
         missed=missed,
         incapacitated=lambda: activity.on_next(INCAPACITATED),
         sampling=parameters.sampling,
-        first=min(AT_ONCE, parameters.sampling) if node.resumes else parameters.sampling,
+        first=min(AT_ONCE, parameters.sampling) if origin.is_past else parameters.sampling,
         silence=parameters.silence,
         strikes=parameters.strikes,
         repeat=parameters.repeat,
@@ -124,7 +125,7 @@ def wire(node: ServiceNode) -> None:
     conclusions = rx.merge(presences.map(lambda _: ALIVE), activity)
     node.publish(OPERATOR_ACTIVITY, conclusions.map(lambda conclusion: String(data=conclusion)))
     # Before a scenario begins nobody is expected: no silence counts yet.
-    node.publish(ENGINES, node.from_origin(commands).map(lambda command: String(data=command)))
+    node.publish(ENGINES, origin.delay_subscription(commands).map(lambda command: String(data=command)))
 
 
 def main() -> None:

@@ -30,7 +30,6 @@ from datetime import datetime
 from typing import Any, NoReturn, TypeVar
 
 import rclpy
-import reactivex as rx
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rcl_interfaces.msg import (
     FloatingPointRange,
@@ -47,9 +46,8 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from reactivex import Observable, abc
 from reactivex.disposable import CompositeDisposable
 
-from interfaces.scenario import Scenario, ScenarioError, Timeline, follow, load, play
-from interfaces.scenario.settings import Settings, SettingsError
 from interfaces.service import stopping
+from interfaces.service.errors import UserError
 from interfaces.service.parameters import Declaration, declarations
 from interfaces.topics import DIAGNOSTICS, Topic, is_latched
 from reactive_node import ReactiveNode
@@ -57,7 +55,7 @@ from reactive_node.stamps import Timestamp
 
 T = TypeVar("T")
 _HEALTH_PERIOD = 1.0  # [s]
-_MISTAKES = (NameValidationException, ParameterException, ScenarioError, SettingsError)  # of who started it
+_MISTAKES = (NameValidationException, ParameterException, UserError)  # of who started it
 _REASONS, _OTHER_REASONS = 4, "other reasons"  # that a report tells of a topic
 _RECENT = 16  # messages of which a second reader may bring a copy
 
@@ -104,75 +102,6 @@ class ServiceNode(ReactiveNode):
         elif within is not None:
             descriptor.integer_range = [IntegerRange(from_value=within[0], to_value=within[1])]
         return self.declare_parameter(name, default, descriptor).value
-
-    def declare_scenario(self) -> Scenario:
-        """
-        Declare the parameters of a virtual source and load the scenario that they name.
-
-        :raises ScenarioError: if there is a mistake in it.
-        """
-        path = self._declare(Declaration("scenario", "", None, "", "file of the scenario, or empty", False))
-        kept = "folder that keeps what was set by hand, or empty"
-        directory = self._declare(Declaration("settings", "", None, "", kept, False))
-        self._settings = Settings(directory, self.get_name())
-        self.declare_origin()
-        return load(path) if path else Scenario()
-
-    def declare_origin(self) -> None:
-        """Declare the parameter that says when the scenario begins, for all processes at once."""
-        origin = "origin of the scenario by CLOCK_MONOTONIC of this host; 0 is the start of this process"
-        self._scenario_epoch = self._declare(
-            Declaration("scenario_epoch", 0.0, (0.0, 1e12), "s", origin, False)
-        )
-
-    def _elapsed(self) -> float:
-        return time.monotonic() - self._scenario_epoch if self._scenario_epoch else 0.0
-
-    def play(self, timeline: Timeline[T] | None, *, resume: bool = True) -> Observable[T] | None:
-        """Return a timeline from where the scenario is now; see :func:`interfaces.scenario.play`."""
-        if timeline is None:
-            return None
-        return rx.defer(lambda _: play(timeline, self._elapsed(), resume=resume))
-
-    def follow(self, name: str, timeline: Observable[T] | None = None) -> Observable[T]:
-        """
-        Return what a virtual source does: see :func:`interfaces.scenario.follow`.
-
-        What was set by hand holds beyond the end of this process.
-
-        :raises SettingsError: if what was set can no longer be set, or read.
-        """
-        kept = self._settings.read()
-        if name in kept:
-            (result,) = self.set_parameters([Parameter(name, value=kept[name])])
-            if not result.successful:
-                raise SettingsError(f"{name} was set to {kept[name]!r}: {result.reason}")
-            timeline = None
-
-        def keep(parameters: list[Parameter]) -> None:
-            if any(parameter.name == name for parameter in parameters):
-                try:
-                    self._settings.keep(name, self.get_parameter(name).value)
-                except SettingsError as error:
-                    self.remark(name, f"would be forgotten by a restart: {error}")
-
-        self.add_post_set_parameters_callback(keep)
-        return follow(self.create_parameter_observable(name), timeline)
-
-    def until_set(self, name: str, items: Observable[T]) -> Observable[T]:
-        """Emit items until a parameter is set by hand; none if it was, before the end of the last process."""
-        if name in self._settings.read():
-            return rx.empty()
-        return items.take_until(self.create_parameter_observable(name).skip(1))
-
-    @property
-    def resumes(self) -> bool:
-        """Whether the scenario has begun without this process, which takes the place of one that died."""
-        return self._elapsed() > 0.0
-
-    def from_origin(self, items: Observable[T]) -> Observable[T]:
-        """Subscribe to an observable when the scenario begins, or at once if it has begun."""
-        return rx.defer(lambda _: items.delay_subscription(max(0.0, -self._elapsed())))
 
     def observe(self, topic: Topic, *, timestamped: bool = False) -> Observable[Any]:
         """

@@ -16,7 +16,8 @@ from reactivex.testing import TestScheduler
 from std_msgs.msg import Bool, Float64, Header, String
 
 from deploy.console import view
-from interfaces import scenario, topics
+from interfaces import topics
+from interfaces.scenario import playback, scenario_file
 from reactive_node import stamps
 from reactive_node.stamps import Timestamp
 from services.engine_controller import engine_state
@@ -80,15 +81,15 @@ class Arm:
         self.scheduler = TestScheduler()
         self.topics: dict[str, Subject[Any]] = {topic.name: Subject() for topic in topics.CONTRACT}
         self.lines: list[str] = []
-        played = scenario.load(path)
+        played = scenario_file.load(path)
         view.view(self.seen, WATCH_BEGINS).subscribe(self.print, scheduler=self.scheduler)
         self.scheduler.advance_to(START)
         self.wire()
         for name, timeline in played.configuration.items():
-            self.publish(name, scenario.play(timeline, START).map(lambda value: Float64(data=value)))
+            self.publish(name, playback.play(timeline, START).map(lambda value: Float64(data=value)))
         assert played.heartbeats is not None
         self.publish(
-            "operator_heartbeat", scenario.play(played.heartbeats, START).map(lambda beat: Bool(data=beat))
+            "operator_heartbeat", playback.play(played.heartbeats, START).map(lambda beat: Bool(data=beat))
         )
 
     def seen(self, topic: topics.Topic) -> Observable[Any]:

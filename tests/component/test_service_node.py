@@ -23,9 +23,9 @@ from reactivex.subject import Subject
 from std_msgs.msg import Bool, Float64, Header, String
 
 from interfaces import topics
-from interfaces.scenario import ScenarioError
-from interfaces.scenario.settings import SettingsError
-from interfaces.service import ServiceNode, parameter
+from interfaces.scenario.origin import Origin
+from interfaces.scenario.source import VirtualSource
+from interfaces.service import ServiceNode, UserError, parameter
 
 Make = Callable[..., Any]
 SpinUntil = Callable[..., None]
@@ -293,8 +293,10 @@ def test_only_what_is_settable_can_be_set_while_it_runs(service: ServiceNode) ->
 
 
 def test_without_a_scenario_nothing_is_driven(service: ServiceNode) -> None:
-    assert service.declare_scenario().configuration == {}
-    assert service.play(None) is None
+    source = VirtualSource(service)
+
+    assert source.scenario.configuration == {}
+    assert source.play(None) is None
 
 
 def test_a_scenario_is_played_from_where_it_is_now(
@@ -305,7 +307,8 @@ def test_a_scenario_is_played_from_where_it_is_now(
     node = overridden(make_node, scenario=str(path), scenario_epoch=time.monotonic() - 100.1)
     values: list[float] = []
 
-    node.play(node.declare_scenario().configuration["l1"]).subscribe(values.append, scheduler=node.scheduler)
+    source = VirtualSource(node)
+    source.play(source.scenario.configuration["l1"]).subscribe(values.append, scheduler=node.scheduler)
 
     assert values == [2.0]
     spin_until(lambda: values == [2.0, 3.0])
@@ -326,8 +329,9 @@ def test_what_was_set_by_hand_holds_beyond_a_restart(
         )
         node.declare(one("value", 1.0, (0.0, 9.0), "length [m]", settable=True))
         values: list[float] = []
-        timeline = node.play(node.declare_scenario().configuration["l1"])
-        node.follow("value", timeline).subscribe(values.append, scheduler=node.scheduler)
+        source = VirtualSource(node)
+        timeline = source.play(source.scenario.configuration["l1"])
+        source.follow("value", timeline).subscribe(values.append, scheduler=node.scheduler)
         return node, values
 
     first, values = source()
@@ -349,10 +353,10 @@ def test_what_a_scenario_does_besides_ends_for_good_when_a_parameter_is_set_by_h
     def source() -> tuple[ServiceNode, list[int]]:
         node = overridden(make_node, settings=str(tmp_path / "settings"))
         node.declare(one("pressed", False, None, "whether it is held", settable=True))
-        node.declare_scenario()
-        node.follow("pressed").subscribe(scheduler=node.scheduler)
+        source = VirtualSource(node)
+        source.follow("pressed").subscribe(scheduler=node.scheduler)
         received: list[int] = []
-        node.until_set("pressed", items).subscribe(received.append, scheduler=node.scheduler)
+        source.until_set("pressed", items).subscribe(received.append, scheduler=node.scheduler)
         return node, received
 
     node, received = source()
@@ -375,9 +379,8 @@ def test_it_is_told_when_a_setting_would_be_forgotten(
     (tmp_path / "file").touch()
     node = overridden(make_node, settings=str(tmp_path / "file" / "settings"))
     node.declare(one("value", 1.0, (0.0, 9.0), "length [m]", settable=True))
-    node.declare_scenario()
     values: list[float] = []
-    node.follow("value").subscribe(values.append, scheduler=node.scheduler)
+    VirtualSource(node).follow("value").subscribe(values.append, scheduler=node.scheduler)
     spin_until(lambda: heard)
     node.set_parameters([Parameter("value", value=5.0)])
     assert values == [1.0, 5.0]
@@ -392,9 +395,8 @@ def test_a_setting_that_cannot_be_used_is_a_mistake_and_not_forgotten(
     node = overridden(make_node, settings=str(tmp_path))
     (tmp_path / f"{node.get_name()}.yaml").write_text(text)
     node.declare(one("value", 1.0, (0.0, 9.0), "length [m]", settable=True))
-    node.declare_scenario()
-    with pytest.raises(SettingsError, match=r"value was set to|\.yaml: "):
-        node.follow("value")
+    with pytest.raises(UserError, match=r"value was set to|\.yaml: "):
+        VirtualSource(node).follow("value")
 
 
 def test_what_waits_for_the_origin_begins_there_or_at_once(make_node: Make, spin_until: SpinUntil) -> None:
@@ -402,8 +404,7 @@ def test_what_waits_for_the_origin_begins_there_or_at_once(make_node: Make, spin
     origin = time.monotonic() + 0.2
     for epoch in (origin, origin - 100.0):
         node = overridden(make_node, scenario_epoch=epoch)
-        node.declare_origin()
-        node.from_origin(rx.defer(lambda _: rx.just(time.monotonic()))).subscribe(
+        Origin(node).delay_subscription(rx.defer(lambda _: rx.just(time.monotonic()))).subscribe(
             lambda at, epoch=epoch: begun.setdefault(epoch, at), scheduler=node.scheduler
         )
 
@@ -416,8 +417,8 @@ def test_what_waits_for_the_origin_begins_there_or_at_once(make_node: Make, spin
 def test_a_mistake_in_a_scenario_is_an_error(make_node: Make) -> None:
     node = overridden(make_node, scenario="/nowhere.yaml")
 
-    with pytest.raises(ScenarioError, match=r"/nowhere\.yaml"):
-        node.declare_scenario()
+    with pytest.raises(UserError, match=r"/nowhere\.yaml"):
+        VirtualSource(node)
 
 
 def test_health_is_reported_once_a_second(make_node: Make, peer: Node, spin_until: SpinUntil) -> None:
