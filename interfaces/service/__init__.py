@@ -1,7 +1,8 @@
 """The life of a service: turns a recipe into a process."""
 
 from interfaces.service.errors import UserError
-from interfaces.service.node import ServiceNode, refuse, run
+from interfaces.service.node import Rejected, ServiceNode
 from interfaces.service.parameters import parameter
+from interfaces.service.process import refuse, run
 
-__all__ = ["ServiceNode", "UserError", "parameter", "refuse", "run"]
+__all__ = ["Rejected", "ServiceNode", "UserError", "parameter", "refuse", "run"]

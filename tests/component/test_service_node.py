@@ -1,4 +1,4 @@
-"""What all services have: the edge that keeps bad input out, parameters, scenarios and health."""
+"""The node of a service: bad messages, health, parameters, scenarios."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import math
 import os
 import time
 from collections.abc import Callable
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +26,7 @@ from std_msgs.msg import Bool, Float64, Header, String
 from interfaces import topics
 from interfaces.scenario.origin import Origin
 from interfaces.scenario.source import VirtualSource
-from interfaces.service import ServiceNode, UserError, parameter
+from interfaces.service import Rejected, ServiceNode, UserError, parameter
 
 Make = Callable[..., Any]
 SpinUntil = Callable[..., None]
@@ -40,8 +41,8 @@ def one(name: str, default: Any, within: Any, meaning: str, settable: bool = Fal
 
 @pytest.fixture
 def service(make_node: Make, monkeypatch: pytest.MonkeyPatch) -> ServiceNode:
-    """A service that reports its health when it is told to."""
-    monkeypatch.setattr("interfaces.service.node._HEALTH_PERIOD", 3600.0)
+    """A service that reports its health on demand."""
+    monkeypatch.setattr("interfaces.service.health.PERIOD", 3600.0)
     node: ServiceNode = make_node("service", kind=ServiceNode)
     return node
 
@@ -54,19 +55,19 @@ def peer(make_node: Make) -> Node:
 
 @pytest.fixture
 def health(service: ServiceNode, peer: Node, spin_until: SpinUntil) -> Callable[[], dict[str, Any]]:
-    """Gives the health message that the service would send now."""
+    """Requests and returns a health report."""
     heard: list[Any] = []
     topic = topics.DIAGNOSTICS
     peer.create_subscription(topic.type, topic.name, heard.append, topic.qos)
 
     spin_until(lambda: service.count_subscribers(topic.name) == 1)
     spin_until(lambda: peer.count_publishers(topic.name) == 1)
-    spin_until(lambda: heard)  # the greeting: later, it would take along what is to be told then
+    spin_until(lambda: heard)  # the report to a new subscriber, which would clear later remarks
 
     def following() -> dict[str, Any]:
         before = service.get_clock().now()
-        service.report_health()
-        # What was said before, to greet us, may come later.
+        service.health.report()
+        # An earlier report, to a new subscriber, may arrive later.
         spin_until(lambda: heard and Time.from_msg(heard[-1].header.stamp) >= before)
         (status,) = heard[-1].status
         return {
@@ -113,7 +114,7 @@ GOOD_AND_BAD = [
 
 
 @pytest.mark.parametrize(("topic", "good", "bad"), GOOD_AND_BAD, ids=lambda value: getattr(value, "name", ""))
-def test_bad_input_is_dropped_and_reported(
+def test_bad_messages_are_dropped_and_reported(
     service: ServiceNode,
     peer: Node,
     spin_until: SpinUntil,
@@ -128,9 +129,9 @@ def test_bad_input_is_dropped_and_reported(
     spin_until(lambda: publisher.get_subscription_count() == 1)
 
     for message in bad:
-        before = service._dropped_count
+        before = service.health._dropped
         publisher.publish(message)
-        spin_until(lambda before=before: service._dropped_count == before + 1)
+        spin_until(lambda before=before: service.health._dropped == before + 1)
     for message in good:
         publisher.publish(message)
         spin_until(lambda message=message: received[-1:] == [message])
@@ -148,7 +149,7 @@ def test_bad_input_is_dropped_and_reported(
     assert following["dropped"] == str(len(bad))
 
 
-def test_a_publisher_of_another_type_is_reported(
+def test_publisher_of_another_type_is_reported(
     service: ServiceNode, peer: Node, spin_until: SpinUntil, health: Callable[[], dict[str, Any]]
 ) -> None:
     service.observe(topics.L1).subscribe()
@@ -161,7 +162,7 @@ def test_a_publisher_of_another_type_is_reported(
     assert report["message"] == "l1: peer publishes std_msgs/msg/String"
 
 
-def test_a_latched_topic_also_hears_publishers_that_are_not(
+def test_latched_topic_receives_from_volatile_publishers_too(
     service: ServiceNode, peer: Node, spin_until: SpinUntil, spin_for: SpinFor
 ) -> None:
     received: list[float] = []
@@ -182,7 +183,7 @@ def test_a_latched_topic_also_hears_publishers_that_are_not(
     assert received == [1.0, 2.0, 3.0]
 
 
-def test_what_the_contract_forbids_is_not_published_either(
+def test_bad_messages_are_not_published(
     service: ServiceNode, peer: Node, spin_until: SpinUntil, health: Callable[[], dict[str, Any]]
 ) -> None:
     received: list[float] = []
@@ -207,7 +208,66 @@ def test_what_the_contract_forbids_is_not_published_either(
     assert 0 <= float(report["seconds_since_output"]) < 5
 
 
-def test_health_says_who_it_is_and_how_long_it_runs(
+def test_rejected_items_are_reported_instead_of_published(
+    service: ServiceNode, peer: Node, spin_until: SpinUntil, health: Callable[[], dict[str, Any]]
+) -> None:
+    received: list[float] = []
+    topic = topics.EFFECTOR_SPEED
+    peer.create_subscription(topic.type, topic.name, lambda message: received.append(message.data), topic.qos)
+    speeds: Subject[float | Rejected] = Subject()
+    service.publish(topic, speeds, number)
+    spin_until(
+        lambda: any(
+            p.get_subscription_count() for p in service.publishers if p.topic_name == "/effector/speed"
+        )
+    )
+
+    for item in (Rejected(topics.EFFECTOR_POSITION, "its time stands still"), 1.0):
+        speeds.on_next(item)
+    spin_until(lambda: received == [1.0])
+
+    report = health()
+    assert report["message"] == "effector/position: its time stands still"
+    assert (report["published"], report["dropped"]) == ("1", "1")
+
+
+@pytest.mark.parametrize(
+    ("age", "problem"),
+    [
+        (0.5, None),
+        (0.501, "it is 0.501 s old"),
+        (-0.5, None),
+        (-10.0, "its clock is 10.000 s ahead of ours"),
+    ],
+)
+def test_messages_that_are_not_fresh_are_dropped(
+    service: ServiceNode,
+    peer: Node,
+    spin_until: SpinUntil,
+    health: Callable[[], dict[str, Any]],
+    monkeypatch: pytest.MonkeyPatch,
+    age: float,
+    problem: str | None,
+) -> None:
+    received: list[Any] = []
+    topic = topics.OPERATOR_HEARTBEAT
+    service.observe(topic, timestamped=True, max_age=0.5).subscribe(received.append)
+    publisher = peer.create_publisher(topic.type, topic.name, topic.qos)
+    spin_until(lambda: publisher.get_subscription_count() == 1)
+    monkeypatch.setattr(service, "age", lambda stamp: age)
+
+    publisher.publish(Bool(data=True))
+    spin_until(lambda: received or service.health._dropped)
+
+    assert len(received) == (problem is None)
+    assert health()["message"] == (f"operator_heartbeat: {problem}" if problem else "running")
+
+
+def test_age_is_by_the_time_of_day(service: ServiceNode) -> None:
+    assert service.age(datetime.now(UTC) - timedelta(seconds=5)) == pytest.approx(5.0, abs=1.0)
+
+
+def test_health_names_the_node_its_pid_and_uptime(
     service: ServiceNode, health: Callable[[], dict[str, Any]]
 ) -> None:
     report = health()
@@ -217,7 +277,7 @@ def test_health_says_who_it_is_and_how_long_it_runs(
     assert 0 < float(report["uptime"]) < 60
 
 
-def test_a_remark_is_a_warning_but_not_bad_input(
+def test_remark_is_a_warning_without_a_dropped_message(
     service: ServiceNode, health: Callable[[], dict[str, Any]]
 ) -> None:
     service.remark("engines", "refused")
@@ -230,7 +290,7 @@ def test_a_remark_is_a_warning_but_not_bad_input(
     assert (report["level"], report["dropped"]) == (DiagnosticStatus.WARN, "0")
 
 
-def test_of_many_remarks_a_few_are_told_and_the_others_counted(
+def test_many_remarks_are_reported_as_four_reasons_and_a_count(
     service: ServiceNode, health: Callable[[], dict[str, Any]]
 ) -> None:
     for number in range(40):
@@ -250,7 +310,7 @@ def overridden(make_node: Make, **values: Any) -> ServiceNode:
     return node
 
 
-def test_a_parameter_is_described_and_has_a_range(service: ServiceNode) -> None:
+def test_parameter_has_a_description_and_a_range(service: ServiceNode) -> None:
     assert service.declare(one("rate", 20.0, (1.0, 100.0), "how often [Hz]")).rate == 20.0
     assert service.declare(one("strikes", 3, (1, 9), "how many")).strikes == 3
 
@@ -262,21 +322,21 @@ def test_a_parameter_is_described_and_has_a_range(service: ServiceNode) -> None:
 
 
 @pytest.mark.parametrize("value", [0.5, 100.5, math.nan, math.inf, -math.inf])
-def test_a_value_out_of_range_is_refused(make_node: Make, value: float) -> None:
+def test_value_out_of_range_is_refused(make_node: Make, value: float) -> None:
     node = overridden(make_node, rate=value)
 
     with pytest.raises(InvalidParameterValueException, match="rate"):
         node.declare(one("rate", 20.0, (1.0, 100.0), "how often [Hz]"))
 
 
-def test_a_value_of_another_type_is_refused(make_node: Make) -> None:
+def test_value_of_another_type_is_refused(make_node: Make) -> None:
     node = overridden(make_node, rate="fast")
 
     with pytest.raises(InvalidParameterTypeException, match="rate"):
         node.declare(one("rate", 20.0, (1.0, 100.0), "how often [Hz]"))
 
 
-def test_only_what_is_settable_can_be_set_while_it_runs(service: ServiceNode) -> None:
+def test_only_settable_parameters_can_be_set_at_run_time(service: ServiceNode) -> None:
     service.declare(one("fixed", 20.0, (1.0, 100.0), "fixed"))
     service.declare(one("value", 20.0, (1.0, 100.0), "value", settable=True))
 
@@ -421,22 +481,22 @@ def test_a_mistake_in_a_scenario_is_an_error(make_node: Make) -> None:
         VirtualSource(node)
 
 
-def test_health_is_reported_once_a_second(make_node: Make, peer: Node, spin_until: SpinUntil) -> None:
+def test_health_is_reported_every_second(make_node: Make, peer: Node, spin_until: SpinUntil) -> None:
     heard: list[float] = []
     topic = topics.DIAGNOSTICS
     peer.create_subscription(topic.type, topic.name, lambda _: heard.append(time.monotonic()), topic.qos)
     begin = time.monotonic()
     make_node("punctual", kind=ServiceNode)
 
-    spin_until(lambda: len(heard) == 3)  # who listens is greeted, before these two
+    spin_until(lambda: len(heard) == 3)  # the first one is for the new subscriber
 
     assert heard[2] - begin > 1.5
 
 
-def test_who_begins_to_listen_hears_of_the_health_at_once(
+def test_new_subscriber_receives_the_health_at_once(
     make_node: Make, spin_until: SpinUntil, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("interfaces.service.node._HEALTH_PERIOD", 3600.0)
+    monkeypatch.setattr("interfaces.service.health.PERIOD", 3600.0)
     make_node("polite", kind=ServiceNode)
     topic = topics.DIAGNOSTICS
 
