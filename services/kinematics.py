@@ -54,10 +54,5 @@ def wire(node: ServiceNode) -> None:
     node.publish(EFFECTOR_POSITION, effector_position(l1, l2, theta1, theta2).map(message))
 
 
-def main() -> None:
-    """Run the service."""
-    service.run("kinematics", wire)
-
-
 if __name__ == "__main__":
-    main()
+    service.run("kinematics", wire)

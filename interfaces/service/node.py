@@ -159,10 +159,6 @@ class ServiceNode(ReactiveNode):
         """
         return (stamps.now() - stamp).total_seconds()
 
-    def drop(self, subject: str, reason: str) -> None:
-        """Count a dropped message; the next health report is a warning with this reason."""
-        self.health.drop(subject, reason)
-
     def remark(self, subject: str, reason: str) -> None:
         """Make the next health report a warning with this reason."""
         self.health.remark(subject, reason)
