@@ -1,4 +1,4 @@
-"""Whether the engines run: a latch that fails safe.
+"""The engine controller: a latch that fails safe.
 
 User story (ours): as a robot operator, I find the engines off unless I turned them on and have been seen ever
 since, whatever dies.
@@ -27,22 +27,17 @@ class Event(NamedTuple):
     """A command, a ``presence`` or a ``tick``."""
 
     name: str
-    at: datetime
-    """Arrival, by the Rx clock, which nobody sets."""
-    age: float = 0.0
-    """Age of the stamp at arrival [s]."""
+    at: datetime  # of the arrival, on the Rx clock, which is never set
+    age: float = 0.0  # of the stamp at arrival [s]
 
 
 class State(NamedTuple):
-    """The latch."""
+    """The latch: the engines, when the operator was last seen, and when the state was last repeated."""
 
     engines: str = OFF
     seen: datetime = NEVER
-    """When the operator was seen last."""
     repeated: datetime = NEVER
-    """When the drive was last told the state, changes apart."""
-    rejected: Rejected | None = None
-    """Why the last event was rejected."""
+    rejected: Rejected | None = None  # the last event
 
 
 def step(
@@ -56,9 +51,9 @@ def step(
     """
     Return the state after an event.
 
-    :param max_presence_age: a `turn_on` must be younger, and the operator must have been seen since [s].
-    :param presence_timeout: the engines turn off when the operator was not seen for this time [s].
-    :param drive_timeout: the drive stops the engines when ``on`` is not repeated for this time [s].
+    :param max_presence_age: ``turn_on`` is obeyed if it and the last presence are younger [s].
+    :param presence_timeout: the engines stay on only while the last presence is younger [s].
+    :param drive_timeout: the drive stops the engines if ``on`` is not repeated within this time [s].
     """
 
     def reject(topic: topics.Topic, reason: str) -> State:
@@ -108,31 +103,27 @@ def engine_state(
 
 @dataclass(frozen=True)
 class Parameters:
-    """What a user may set."""
+    """Parameters that a user may set."""
 
-    max_presence_age: float = parameter(
-        1.0, (0.1, 1.0), "s", "`turn_on` needs an operator seen within this time"
-    )
+    max_presence_age: float = parameter(1.0, (0.1, 1.0), "s", "`turn_on` needs a younger presence")
     presence_timeout: float = parameter(
-        10.0, (1.0, 10.0), "s", "engines turn off after this time without operator"
+        10.0, (1.0, 10.0), "s", "engines stay on only with a younger presence"
     )
     repeat: float = parameter(0.1, (0.02, 0.2), "s", "period at which the state is repeated")
 
 
 def wire(node: ServiceNode) -> None:
     """Connect the recipe with its topics."""
-    # The arrival first: a pause between the two clocks makes a presence older, not younger.
-    commands = (
-        node.observe(topics.ENGINES, timestamped=True)
-        .timestamp()
-        .map(lambda it: Event(it.value.value.data, it.timestamp, node.age(it.value.timestamp)))
+    # The arrival before the age: a pause in between must make a presence older, not younger.
+    commands = node.observe(topics.ENGINES, timestamped=True).timestamp()
+    presences = node.observe(topics.OPERATOR_PRESENCE).timestamp()
+    states = engine_state(
+        commands.map(lambda it: Event(it.value.value.data, it.timestamp, node.age(it.value.timestamp))),
+        presences.map(
+            lambda it: Event("presence", it.timestamp, node.age(stamps.from_message(it.value.stamp)))
+        ),
+        **asdict(node.declare(Parameters)),
     )
-    presences = (
-        node.observe(topics.OPERATOR_PRESENCE)
-        .timestamp()
-        .map(lambda it: Event("presence", it.timestamp, node.age(stamps.from_message(it.value.stamp))))
-    )
-    states = engine_state(commands, presences, **asdict(node.declare(Parameters)))
     node.publish(topics.ENGINES_STATE, states, lambda state: String(data=state))
 
 

@@ -1,4 +1,4 @@
-"""Where the effector is.
+"""The position of the effector.
 
 User story (thesis 5.1): as a robot operator, I am able to observe the most recent position of the robot's
 effector, a pair of its x and y coordinates.

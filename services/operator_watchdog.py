@@ -1,4 +1,4 @@
-"""Whether the operator is alive.
+"""The operator watchdog: turns the engines off when the operator is incapacitated.
 
 User story (thesis 5.1): as a robot operator, I am able to turn off the engines when the operator becomes
 incapacitated, that is, releases the dead man's switch 3 times for longer than 3 seconds.
@@ -29,12 +29,10 @@ WARNINGS = {
 
 
 class Activity(NamedTuple):
-    """A conclusion of the watchdog."""
+    """A conclusion of the watchdog: ALIVE, with the source time of the heartbeat, MISSED or INCAPACITATED."""
 
     conclusion: str
-    """``ALIVE``, ``MISSED`` or ``INCAPACITATED``."""
     seen: datetime | None = None
-    """Source time of the heartbeat of an ``ALIVE``."""
 
 
 def operator_activity(
@@ -48,11 +46,11 @@ def operator_activity(
     """
     Emit whether the operator is alive, missed, incapacitated (Listings 5.7 and 5.8).
 
-    The strikes count until the operator is incapacitated: a return in between does not reset them. The first
-    heartbeat afterwards is ``ALIVE`` at once, and new strikes begin.
+    A return between the strikes does not reset them. The first heartbeat after the last strike is ALIVE at
+    once and begins new strikes.
 
     :param first: time from each subscription to its first sample [s].
-    :param sampling: period of the samples [s]; ``ALIVE`` is emitted at most this often.
+    :param sampling: period of the samples [s]; ALIVE is emitted at most this often.
     :param silence: time without a sample that is a strike [s].
     :param strikes: the strike at which the operator is incapacitated.
     """
@@ -73,14 +71,15 @@ def operator_activity(
 
 def engine_commands(activity: Observable[Activity], *, repeat: float = 0.5) -> Observable[str]:
     """
-    Emit ``turn_off`` when the operator is incapacitated, and again every ``repeat`` [s] until the return.
+    Emit ``turn_off`` when the operator is incapacitated, and again every ``repeat`` [s] until ALIVE.
 
-    A command that is sent before its subscriber is discovered is lost, hence the repetition.
+    The repetition reaches a subscriber that was discovered only after the first command.
     """
 
     def commands(activity: Observable[Activity]) -> Observable[str]:
         away = activity.map(lambda it: it.conclusion == INCAPACITATED)
         again = away.switch_map(lambda is_away: rx.interval(repeat) if is_away else rx.never())
+        # Not start_with, which emits a step later: a return in that step would prevent the first command.
         return rx.merge(away.filter(bool), again).map(lambda _: TURN_OFF)
 
     return activity.publish(commands)
@@ -88,7 +87,7 @@ def engine_commands(activity: Observable[Activity], *, repeat: float = 0.5) -> O
 
 @dataclass(frozen=True)
 class Parameters:
-    """What a user may set."""
+    """Parameters that a user may set."""
 
     lifespan: float = parameter(0.5, (0.01, 10.0), "s", "an older heartbeat is no sign of life")
     sampling: float = parameter(0.5, (0.01, 10.0), "s", "the operator is reported alive at most this often")

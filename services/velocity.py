@@ -1,4 +1,4 @@
-"""How fast the effector moves.
+"""The speed of the effector.
 
 User story (thesis 5.1): as a robot operator, I am able to observe the most recent speed of the robot's
 effector: the Euclidean distance between the last two observed positions, divided by the time of the movement.

@@ -1,4 +1,4 @@
-"""The life of a service: turns a recipe into a process."""
+"""The service framework: turns a recipe into a process."""
 
 from interfaces.service.errors import UserError
 from interfaces.service.node import Rejected, ServiceNode

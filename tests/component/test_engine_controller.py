@@ -1,4 +1,4 @@
-"""The latch of the engines."""
+"""The recipe of the engine controller."""
 
 from __future__ import annotations
 
@@ -155,7 +155,7 @@ def changes(states: list[tuple[float, str]]) -> list[tuple[float, str]]:
 
 
 def seen_until(end: float, begin: float = 0.5) -> list[tuple[float, float]]:
-    """The presences of an operator: two a second, each of 0.1 s before."""
+    """The presences of an operator: two a second, each 0.1 s old."""
     return [(step / 2, step / 2 - 0.1) for step in range(int(begin * 2), int(end * 2) + 1)]
 
 
