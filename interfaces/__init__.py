@@ -1,1 +1,1 @@
-"""What the services share: the contract, reactive nodes, time, and the life of a process."""
+"""Shared by the services: the contract, reactive nodes, the service framework, scenarios."""

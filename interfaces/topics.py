@@ -1,9 +1,8 @@
-"""The contract: every topic of the system, once.
+"""The contract: one table of all topics.
 
-Names are relative, so a whole arm lives under a namespace (``__ns:=/arm1``); units are SI and radians (REP
-103). A service takes name, type and QoS of its topics from these rows, the README shows :func:`markdown`, and
-:attr:`Topic.fault` says which messages are none: they are dropped at the edge of a service, counted and
-reported.
+Names are relative, so a whole arm fits under a namespace (``__ns:=/arm1``). Units are SI and radians (REP
+103). Services take name, type and QoS of their topics from these rows, and the README shows :func:`markdown`.
+Messages with a :attr:`Topic.problem` are dropped at the edge of a service, counted and reported.
 """
 
 from __future__ import annotations
@@ -21,7 +20,8 @@ from std_msgs.msg import Bool, Float64, Header, String
 
 TURN_ON, TURN_OFF = "turn_on", "turn_off"
 ON, OFF = "on", "off"
-DRIVE = 0.4  # s for which the engines' drive takes an `on`
+ALIVE, MISSED, INCAPACITATED = "alive", "missed", "incapacitated"
+DRIVE_TIMEOUT = 0.4  # s for which the engines' drive accepts an `on`
 FRAME = "base"
 
 
@@ -36,8 +36,8 @@ class Topic:
     publishers: tuple[str, ...]
     """The nodes that publish it."""
     meaning: str
-    fault: Callable[[Any], str] = lambda message: ""
-    """What is wrong with a message, in words; empty for a good one."""
+    problem: Callable[[Any], str] = lambda message: ""
+    """Return what is wrong with a message; empty for a good message."""
 
     @property
     def type_name(self) -> str:
@@ -96,7 +96,7 @@ EFFECTOR_POSITION = Topic(
     _STATE,
     "m",
     ("kinematics",),
-    f"x, y in frame `{FRAME}`; `header.stamp` is the time of emittance",
+    f"x, y in frame `{FRAME}`; `header.stamp` is the time of emission",
     _not_a_position,
 )
 EFFECTOR_SPEED = Topic(
@@ -108,8 +108,8 @@ OPERATOR_HEARTBEAT = Topic(
     _qos(1, reliable=False, lifespan=0.5),
     "",
     ("dead_mans_switch",),
-    "`true` while the switch is pressed, 20 Hz or much faster. `false`, or one that waited in a queue, "
-    "is no sign of life",
+    "`true` while the switch is pressed, at 20 Hz or much faster. Neither `false` nor a heartbeat that "
+    "waited in a queue is a sign of life",
     _not_pressed,
 )
 OPERATOR_PRESENCE = Topic(
@@ -119,6 +119,15 @@ OPERATOR_PRESENCE = Topic(
     "",
     ("operator_watchdog",),
     "the operator was seen alive; `stamp` is the source time of that heartbeat. At most 2 Hz",
+)
+OPERATOR_ACTIVITY = Topic(
+    "operator_activity",
+    String,
+    _EVENTS,
+    "",
+    ("operator_watchdog",),
+    f"`{ALIVE}`, `{MISSED}`, `{INCAPACITATED}`: the watchdog's conclusions, for display only",
+    _not_one_of(ALIVE, MISSED, INCAPACITATED),
 )
 ENGINES = Topic(
     "engines",
@@ -132,10 +141,11 @@ ENGINES = Topic(
 ENGINES_STATE = Topic(
     "engines/state",
     String,
-    _qos(1, latched=True, lifespan=DRIVE),
+    _qos(1, latched=True, lifespan=DRIVE_TIMEOUT),
     "",
     ("engine_controller",),
-    f"`{ON}` or `{OFF}`, on every change and at 10 Hz: the drive takes an `{ON}` for {1000 * DRIVE:.0f} ms",
+    f"`{ON}` or `{OFF}`, on every change and at 10 Hz: the drive accepts an `{ON}` for "
+    f"{1000 * DRIVE_TIMEOUT:.0f} ms",
     _not_one_of(ON, OFF),
 )
 DIAGNOSTICS = Topic(
@@ -144,7 +154,7 @@ DIAGNOSTICS = Topic(
     _EVENTS,
     "",
     ("every service",),
-    "health, at 1 Hz, and at once to who begins to listen",
+    "health, at 1 Hz, and at once to a new subscriber",
 )
 
 CONTRACT = (
@@ -156,6 +166,7 @@ CONTRACT = (
     EFFECTOR_SPEED,
     OPERATOR_HEARTBEAT,
     OPERATOR_PRESENCE,
+    OPERATOR_ACTIVITY,
     ENGINES,
     ENGINES_STATE,
     DIAGNOSTICS,

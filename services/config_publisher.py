@@ -12,6 +12,7 @@ import sys
 from dataclasses import dataclass
 
 from interfaces import service
+from interfaces.scenario.source import VirtualSource
 from interfaces.service import ServiceNode, parameter
 from interfaces.topics import CONFIGURATION, L1, L2, THETA1, THETA2, Topic
 
@@ -36,8 +37,9 @@ Parameters = {
 def wire(node: ServiceNode, topic: Topic) -> None:
     """Connect parameter and scenario with the topic."""
     node.declare(Parameters[topic.name])
-    timeline = node.declare_scenario().configuration.get(topic.name)
-    values = node.follow("value", node.play(timeline))
+    source = VirtualSource(node)
+    timeline = source.scenario.configuration.get(topic.name)
+    values = source.follow("value", source.play(timeline))
     node.publish(topic, values.map(lambda value: topic.type(data=value)))
 
 

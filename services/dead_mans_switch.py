@@ -13,6 +13,7 @@ from reactivex import Observable
 from std_msgs.msg import Bool, String
 
 from interfaces import service
+from interfaces.scenario.source import VirtualSource
 from interfaces.service import ServiceNode, parameter
 from interfaces.topics import ENGINES, ENGINES_STATE, OFF, ON, OPERATOR_HEARTBEAT, TURN_ON
 
@@ -58,15 +59,16 @@ class Parameters:
 def wire(node: ServiceNode) -> None:
     """Connect the recipes with their topics."""
     node.declare(Parameters)
-    scenario = node.declare_scenario()
+    source = VirtualSource(node)
+    scenario = source.scenario
     beats = heartbeats(
-        node.follow("pressed", node.play(scenario.pressed)),
-        node.follow("rate"),
-        node.until_set("pressed", node.play(scenario.heartbeats, resume=False) or rx.never()),
+        source.follow("pressed", source.play(scenario.pressed)),
+        source.follow("rate"),
+        source.until_set("pressed", source.play(scenario.heartbeats, resume=False) or rx.never()),
     )
     node.publish(OPERATOR_HEARTBEAT, beats.map(lambda beat: Bool(data=beat)))
 
-    commands = node.play(scenario.commands, resume=False)
+    commands = source.play(scenario.commands, resume=False)
     if commands is not None:
         states = node.observe(ENGINES_STATE).map(lambda state: state.data)
         node.publish(ENGINES, insisting(commands, states).map(lambda command: String(data=command)))

@@ -1,111 +1,131 @@
-"""Whether the engines run: a latch that fails safe.
+"""The engine controller: a latch that fails safe.
 
-User story (ours): as a robot operator, I find the engines off unless I was there and turned them on, and have
-been seen ever since, whatever dies.
+User story (ours): as a robot operator, I find the engines off unless I turned them on and have been seen ever
+since, whatever dies.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from datetime import datetime, timedelta
+from dataclasses import asdict, dataclass
+from datetime import UTC, datetime, timedelta
+from typing import NamedTuple
 
 import reactivex as rx
 from reactivex import Observable
 from std_msgs.msg import String
 
-from interfaces import service
-from interfaces.service import ServiceNode, parameter
-from interfaces.topics import DRIVE, ENGINES, ENGINES_STATE, OFF, ON, OPERATOR_PRESENCE, TURN_OFF, TURN_ON
+from interfaces import service, topics
+from interfaces.service import Rejected, ServiceNode, parameter
+from interfaces.topics import OFF, ON
 from reactive_node import stamps
-from reactive_node.stamps import Timestamp
+
+CLOCK_TOLERANCE = 0.05  # s between the clocks of two hosts (deploy/SAFETY.md, A3)
+NEVER = datetime.min.replace(tzinfo=UTC)
+
+
+class Event(NamedTuple):
+    """A command, a ``presence`` or a ``tick``."""
+
+    name: str
+    at: datetime  # of the arrival, on the Rx clock, which is never set
+    age: float = 0.0  # of the stamp at arrival [s]
+
+
+class State(NamedTuple):
+    """The latch: the engines, when the operator was last seen, and when the state was last repeated."""
+
+    engines: str = OFF
+    seen: datetime = NEVER
+    repeated: datetime = NEVER
+    rejected: Rejected | None = None  # the last event
+
+
+def step(
+    state: State,
+    event: Event,
+    *,
+    max_presence_age: float = 1.0,
+    presence_timeout: float = 10.0,
+    drive_timeout: float = topics.DRIVE_TIMEOUT,
+) -> State:
+    """
+    Return the state after an event.
+
+    :param max_presence_age: ``turn_on`` is obeyed if it and the last presence are younger [s].
+    :param presence_timeout: the engines stay on only while the last presence is younger [s].
+    :param drive_timeout: the drive stops the engines if ``on`` is not repeated within this time [s].
+    """
+
+    def reject(topic: topics.Topic, reason: str) -> State:
+        return state._replace(rejected=Rejected(topic, reason))
+
+    unseen = (event.at - state.seen).total_seconds()
+    paused = (event.at - state.repeated).total_seconds() > drive_timeout
+    if state.engines == ON and (paused or unseen >= presence_timeout):
+        state = state._replace(engines=OFF, repeated=event.at)
+    state = state._replace(rejected=None)
+    match event.name, event.age:
+        case "tick", _:
+            return state._replace(repeated=event.at)
+        case "presence", age if age < -CLOCK_TOLERANCE:
+            reason = f"it is stamped by a clock that is {-age:.3f} s ahead of ours"
+            return reject(topics.OPERATOR_PRESENCE, reason)
+        case "presence", age:
+            return state._replace(seen=max(state.seen, event.at - timedelta(seconds=max(age, 0.0))))
+        case topics.TURN_ON, age if abs(age) >= max_presence_age:
+            return reject(topics.ENGINES, f"turn_on refused: {age:.3f} s old")
+        case topics.TURN_ON, _ if unseen >= max_presence_age:
+            since = "yet" if state.seen == NEVER else f"for {unseen:.3f} s"
+            return reject(topics.ENGINES, f"turn_on refused: no operator seen {since}")
+        case command, _:
+            return state._replace(engines=ON if command == topics.TURN_ON else OFF)
 
 
 def engine_state(
-    commands: Observable[Timestamp[str]],
-    presences: Observable[datetime],
-    *,
-    presence: float = 1.0,
-    absence: float = 10.0,
-    repeat: float = 0.1,
-    drive: float = DRIVE,
-    now: Callable[[], datetime] = stamps.now,
-    refused: Callable[[str], None] = lambda why: None,
-) -> Observable[str]:
+    commands: Observable[Event], presences: Observable[Event], *, repeat: float = 0.1, **limits: float
+) -> Observable[str | Rejected]:
     """
-    Emit ``on`` or ``off``, on every change and every ``repeat`` [s]; the first is ``off``.
+    Emit ``on`` or ``off``, on every change and every ``repeat`` [s], and each input that is rejected.
 
-    :param commands: ``turn_on`` and ``turn_off``, with their source times.
-    :param presences: the stamps of the operator's presences.
-    :param presence: ``turn_on`` is obeyed if it and the last sight of the operator are younger [s].
-    :param absence: when nobody was seen for so long [s], the engines turn off; not less than ``presence``.
-    :param drive: the engines stop by themselves when ``on`` is not repeated for so long [s].
-    :param now: the clock of source times and stamps.
-    :param refused: is told why a ``turn_on`` is not obeyed, or a presence counts for nothing.
+    :param limits: those of :func:`step`.
     """
-    patience, hold = timedelta(seconds=absence), timedelta(seconds=drive)
+    ticks = rx.timer(0.0, repeat).timestamp().map(lambda it: Event("tick", it.timestamp))
+    events = rx.merge(commands, presences, ticks)
+    states = events.scan(lambda state, event: step(state, event, **limits), State())
 
-    def obey(request: tuple[Timestamp[Timestamp[str]], datetime | None]) -> str | None:
-        arrived, seen = request
-        command = arrived.value
-        if command.value == TURN_OFF:
-            return OFF
-        waited = abs(now() - command.timestamp).total_seconds()
-        unseen = arrived.timestamp - seen if seen else timedelta.max
-        if waited < presence and unseen < timedelta(seconds=presence):
-            return ON
-        since = f"for {unseen.total_seconds():.3f} s" if seen else "yet"
-        why = f"no operator seen {since}" if waited < presence else f"{waited:.3f} s old"
-        refused(f"{TURN_ON} refused: {why}")
-        return None
+    def emitted(states: Observable[State]) -> Observable[str | Rejected]:
+        rejections = states.map(lambda state: state.rejected).filter(bool)
+        news = states.distinct_until_changed(lambda state: (state.engines, state.repeated))
+        return rx.merge(rejections, news.map(lambda state: state.engines))
 
-    def is_late(renewal: tuple[tuple[Timestamp[int], Timestamp[int]], datetime | None]) -> bool:
-        (before, beat), seen = renewal
-        return beat.timestamp - before.timestamp > hold or bool(seen and beat.timestamp >= seen + patience)
-
-    def repeated(seen: Observable[datetime]) -> Observable[str]:
-        beats = rx.timer(0.0, repeat).timestamp().pairwise()
-        late = beats.with_latest_from(seen.start_with(None)).map(is_late).share()
-        obeyed = commands.timestamp().with_latest_from(seen.start_with(None)).map(obey).filter(bool)
-        abandoned = seen.switch_map(lambda at: rx.timer(at + patience)).map(lambda _: OFF)
-        # While this process was paused, the engines have stopped, or should have: `on` would start them.
-        stopped = late.filter(bool).map(lambda _: OFF)
-        states = rx.merge(stopped, obeyed, abandoned).start_with(OFF).distinct_until_changed().share()
-        renewals = late.with_latest_from(states).filter(lambda it: it != (True, ON))
-        return rx.merge(renewals.map(lambda it: it[1]), states)
-
-    return stamps.latest(presences, now=now, dropped=lambda why: refused(f"presence: {why}")).publish(
-        repeated
-    )
+    return states.publish(emitted)
 
 
 @dataclass(frozen=True)
 class Parameters:
-    """What a user may set."""
+    """Parameters that a user may set."""
 
-    presence: float = parameter(1.0, (0.1, 1.0), "s", "`turn_on` needs an operator seen within this time")
-    absence: float = parameter(10.0, (1.0, 10.0), "s", "engines turn off after this time without operator")
+    max_presence_age: float = parameter(1.0, (0.1, 1.0), "s", "`turn_on` needs a younger presence")
+    presence_timeout: float = parameter(
+        10.0, (1.0, 10.0), "s", "engines stay on only with a younger presence"
+    )
     repeat: float = parameter(0.1, (0.02, 0.2), "s", "period at which the state is repeated")
 
 
 def wire(node: ServiceNode) -> None:
     """Connect the recipe with its topics."""
-    parameters = node.declare(Parameters)
+    # The arrival before the age: a pause in between must make a presence older, not younger.
+    commands = node.observe(topics.ENGINES, timestamped=True).timestamp()
+    presences = node.observe(topics.OPERATOR_PRESENCE).timestamp()
     states = engine_state(
-        node.observe(ENGINES, timestamped=True).map(lambda item: Timestamp(item.value.data, item.timestamp)),
-        node.observe(OPERATOR_PRESENCE).map(lambda header: stamps.from_message(header.stamp)),
-        presence=parameters.presence,
-        absence=parameters.absence,
-        repeat=parameters.repeat,
-        refused=lambda why: node.remark(ENGINES.name, why),
+        commands.map(lambda it: Event(it.value.value.data, it.timestamp, node.age(it.value.timestamp))),
+        presences.map(
+            lambda it: Event("presence", it.timestamp, node.age(stamps.from_message(it.value.stamp)))
+        ),
+        **asdict(node.declare(Parameters)),
     )
-    node.publish(ENGINES_STATE, states.map(lambda state: String(data=state)))
-
-
-def main() -> None:
-    """Run the service."""
-    service.run("engine_controller", wire)
+    node.publish(topics.ENGINES_STATE, states, lambda state: String(data=state))
 
 
 if __name__ == "__main__":
-    main()
+    service.run("engine_controller", wire)

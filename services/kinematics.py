@@ -1,4 +1,4 @@
-"""Where the effector is.
+"""The position of the effector.
 
 User story (thesis 5.1): as a robot operator, I am able to observe the most recent position of the robot's
 effector, a pair of its x and y coordinates.
@@ -54,10 +54,5 @@ def wire(node: ServiceNode) -> None:
     node.publish(EFFECTOR_POSITION, effector_position(l1, l2, theta1, theta2).map(message))
 
 
-def main() -> None:
-    """Run the service."""
-    service.run("kinematics", wire)
-
-
 if __name__ == "__main__":
-    main()
+    service.run("kinematics", wire)

@@ -1,4 +1,4 @@
-"""Whether the operator is alive.
+"""The operator watchdog: turns the engines off when the operator is incapacitated.
 
 User story (thesis 5.1): as a robot operator, I am able to turn off the engines when the operator becomes
 incapacitated, that is, releases the dead man's switch 3 times for longer than 3 seconds.
@@ -6,68 +6,88 @@ incapacitated, that is, releases the dead man's switch 3 times for longer than 3
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from datetime import datetime
+from typing import Any, NamedTuple
 
 import reactivex as rx
 from reactivex import Observable
-from reactivex.subject import Subject
 from std_msgs.msg import Header, String
 
-from interfaces import service
+from interfaces import service, topics
+from interfaces.scenario.origin import Origin
 from interfaces.service import ServiceNode, parameter
-from interfaces.topics import ENGINES, OPERATOR_HEARTBEAT, OPERATOR_PRESENCE, TURN_OFF
+from interfaces.topics import ALIVE, INCAPACITATED, MISSED, TURN_OFF
 from reactive_node import stamps
 from reactive_node.stamps import Timestamp
 
-AT_ONCE = 0.1  # s after which a successor says whether it sees the operator
-Heartbeat = Timestamp[Any]  # with its source time
+FIRST_SAMPLE_AFTER_RESTART = 0.1  # s, so that a successor soon reports the operator
+WARNINGS = {
+    MISSED: "Not received signal from operator...",
+    INCAPACITATED: "Operator is sleeping !!! Turning off engines...",
+}
+
+
+class Activity(NamedTuple):
+    """A conclusion of the watchdog: ALIVE, with the source time of the heartbeat, MISSED or INCAPACITATED."""
+
+    conclusion: str
+    seen: datetime | None = None
 
 
 def operator_activity(
-    heartbeats: Observable[Heartbeat],
+    heartbeats: Observable[Timestamp[Any]],
     *,
-    received: Callable[[Heartbeat], None] = lambda heartbeat: None,
-    alive: Callable[[Heartbeat], None] = lambda heartbeat: None,
-    missed: Callable[[Exception], None] = lambda error: None,
-    first: float = 0.5,  # [s] until the first sample, of which one is taken every so often
+    first: float = 0.5,
     sampling: float = 0.5,
     silence: float = 3.0,
     strikes: int = 3,
-) -> Observable[Any]:
-    """Emit nothing; end in an error at the last of ``strikes`` silences of ``silence`` [s] (Listing 5.7)."""
-    return (
-        heartbeats.do_action(received)  # Received signal from operator
-        .sample(rx.timer(first, sampling))
-        .timeout(silence)
-        .do_action(alive, missed)  # Operator is alive; Not received signal from operator...
-        .ignore_elements()
-        .retry(strikes)
-    )
-
-
-def operator_incapacitated(
-    heartbeats: Observable[Heartbeat], *, repeat: float = 0.5, **activity: Any
-) -> Observable[str]:
+) -> Observable[Activity]:
     """
-    Emit ``turn_off`` when the operator is incapacitated (Listing 5.8), and again every ``repeat`` [s].
+    Emit whether the operator is alive, missed, incapacitated (Listings 5.7 and 5.8).
 
-    A heartbeat after the first ends that: "Operator is alive", and new strikes begin (Listing 5.7, above).
+    A return between the strikes does not reset them. The first heartbeat after the last strike is ALIVE at
+    once and begins new strikes.
+
+    :param first: time from each subscription to its first sample [s].
+    :param sampling: period of the samples [s]; ALIVE is emitted at most this often.
+    :param silence: time without a sample that is a strike [s].
+    :param strikes: the strike at which the operator is incapacitated.
     """
 
-    def watch(heartbeats: Observable[Heartbeat]) -> Observable[str]:
-        back = heartbeats.do_action(activity.get("alive"))
-        offs = rx.timer(0.0, repeat).map(lambda _: TURN_OFF)
-        away = offs.publish(lambda it: it.take_until(back.skip_until(it)))
-        return operator_activity(heartbeats, **activity).catch(lambda *_: away).repeat()
+    def watch(heartbeats: Observable[Timestamp[Any]]) -> Observable[Activity]:
+        alive = heartbeats.map(lambda heartbeat: Activity(ALIVE, heartbeat.timestamp))
+        return (
+            alive.sample(rx.timer(first, sampling))
+            .timeout(silence)
+            .catch(lambda error, _: rx.throw(error).start_with(Activity(MISSED)))
+            .retry(strikes)
+            .catch(lambda error, _: alive.take(1).start_with(Activity(INCAPACITATED)))
+            .repeat()
+        )
 
-    return heartbeats.concat(rx.never()).publish(watch)  # a source that ends is silent for ever
+    return heartbeats.concat(rx.never()).publish(watch)  # the end of a source is a silence
+
+
+def engine_commands(activity: Observable[Activity], *, repeat: float = 0.5) -> Observable[str]:
+    """
+    Emit ``turn_off`` when the operator is incapacitated, and again every ``repeat`` [s] until ALIVE.
+
+    The repetition reaches a subscriber that was discovered only after the first command.
+    """
+
+    def commands(activity: Observable[Activity]) -> Observable[str]:
+        away = activity.map(lambda it: it.conclusion == INCAPACITATED)
+        again = away.switch_map(lambda is_away: rx.interval(repeat) if is_away else rx.never())
+        # Not start_with, which emits a step later: a return in that step would prevent the first command.
+        return rx.merge(away.filter(bool), again).map(lambda _: TURN_OFF)
+
+    return activity.publish(commands)
 
 
 @dataclass(frozen=True)
 class Parameters:
-    """What a user may set."""
+    """Parameters that a user may set."""
 
     lifespan: float = parameter(0.5, (0.01, 10.0), "s", "an older heartbeat is no sign of life")
     sampling: float = parameter(0.5, (0.01, 10.0), "s", "the operator is reported alive at most this often")
@@ -77,33 +97,29 @@ class Parameters:
 
 
 def wire(node: ServiceNode) -> None:
-    """Connect the recipe with its topics."""
+    """Connect the recipes with their topics."""
     parameters = node.declare(Parameters)
-    node.declare_origin()
-    presences: Subject[Heartbeat] = Subject()
-    commands = operator_incapacitated(
-        stamps.fresh(
-            node.observe(OPERATOR_HEARTBEAT, timestamped=True),
-            lifespan=parameters.lifespan,
-            dropped=lambda why: node.drop(OPERATOR_HEARTBEAT.name, why),
-        ),
-        alive=presences.on_next,
-        missed=lambda _: node.get_logger().warning("Not received signal from operator..."),
+    origin = Origin(node)
+
+    def log(activity: Activity) -> None:
+        if activity.conclusion in WARNINGS:
+            node.get_logger().warning(WARNINGS[activity.conclusion])
+
+    recipe = operator_activity(
+        node.observe(topics.OPERATOR_HEARTBEAT, timestamped=True, max_age=parameters.lifespan),
+        first=min(FIRST_SAMPLE_AFTER_RESTART, parameters.sampling) if origin.is_past else parameters.sampling,
         sampling=parameters.sampling,
-        first=min(AT_ONCE, parameters.sampling) if node.resumes else parameters.sampling,
         silence=parameters.silence,
         strikes=parameters.strikes,
-        repeat=parameters.repeat,
     )
-    node.publish(OPERATOR_PRESENCE, presences.map(lambda it: Header(stamp=stamps.to_message(it.timestamp))))
-    # Before a scenario begins nobody is expected: no silence counts yet.
-    node.publish(ENGINES, node.from_origin(commands).map(lambda command: String(data=command)))
-
-
-def main() -> None:
-    """Run the service."""
-    service.run("operator_watchdog", wire)
+    # Silences count from the origin of the scenario: before it, no operator is expected.
+    activity = origin.delay_subscription(recipe).do_action(log).share()
+    presence = activity.filter(lambda it: it.conclusion == ALIVE)
+    node.publish(topics.OPERATOR_PRESENCE, presence, lambda it: Header(stamp=stamps.to_message(it.seen)))
+    node.publish(topics.OPERATOR_ACTIVITY, activity, lambda it: String(data=it.conclusion))
+    commands = engine_commands(activity, repeat=parameters.repeat)
+    node.publish(topics.ENGINES, commands, lambda command: String(data=command))
 
 
 if __name__ == "__main__":
-    main()
+    service.run("operator_watchdog", wire)

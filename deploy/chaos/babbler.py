@@ -19,7 +19,7 @@ from geometry_msgs.msg import Point, PointStamped
 from rclpy.node import Node
 from rclpy.serialization import serialize_message
 from rclpy.signals import SignalHandlerOptions
-from std_msgs.msg import Bool, Float64, Header
+from std_msgs.msg import Bool, Float64, Header, String
 
 from deploy.chaos.marks import GARBAGE, TEXT, nan
 from interfaces import topics
@@ -43,7 +43,7 @@ def nonsense(topic: topics.Topic, rng: random.Random) -> Any:
         return Bool(data=False)
     if topic is topics.DIAGNOSTICS:
         return topic.type()
-    return topic.type(data=TEXT if topic in (topics.ENGINES, topics.ENGINES_STATE) else nan(topic))
+    return topic.type(data=TEXT if topic.type is String else nan(topic))
 
 
 def flood(node: Node) -> None:

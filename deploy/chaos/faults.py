@@ -33,7 +33,7 @@ PARAMETERS = {
     "config_theta2": "value",
     "dead_mans_switch": "rate",
     "operator_watchdog": "strikes",
-    "engine_controller": "absence",
+    "engine_controller": "presence_timeout",
     "sentinel": "look",
 }
 """A parameter of each program that has one; each is a number."""

@@ -111,7 +111,7 @@ class History:
 OUTPUTS = {
     publisher: topic
     for topic in topics.CONTRACT
-    if topic not in (topics.ENGINES, topics.DIAGNOSTICS)
+    if topic not in (topics.ENGINES, topics.OPERATOR_ACTIVITY, topics.DIAGNOSTICS)
     for publisher in topic.publishers
 }
 """The topic by which one sees that a service works; the sentinel's is its health."""

@@ -11,7 +11,7 @@ from operator import itemgetter
 from deploy.chaos.findings import Evidence, Finding
 from deploy.chaos.history import ALL, BLINDING, History, Life, Sample, between, gaps
 from interfaces import topics
-from interfaces.topics import DRIVE, OFF, ON, TURN_OFF, TURN_ON
+from interfaces.topics import DRIVE_TIMEOUT, OFF, ON, TURN_OFF, TURN_ON
 
 OFF_WITHIN = 10.5  # s, S1
 ABSENCE = 10.0  # s without a presence after which the controller turns the engines off
@@ -199,7 +199,7 @@ def running(history: History) -> Iterator[tuple[float, float]]:
     states = history.stream(topics.ENGINES_STATE)
     for state, following in itertools.zip_longest(states, states[1:]):
         if state.value == ON:
-            yield state.sent, min(following.sent if following else history.end, state.sent + DRIVE)
+            yield state.sent, min(following.sent if following else history.end, state.sent + DRIVE_TIMEOUT)
 
 
 def _starts(history: History) -> Iterator[tuple[float, Sample]]:
@@ -227,7 +227,7 @@ def _controller_was_away(history: History, on: Sample, off: Sample) -> bool:
         and fault.overlaps(on.sent, off.sent)
         for fault in history.faults
     )
-    return died or (paused and off.sent - on.sent > DRIVE)
+    return died or (paused and off.sent - on.sent > DRIVE_TIMEOUT)
 
 
 def _signs_of_life(history: History) -> list[Sample]:

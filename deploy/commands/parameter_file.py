@@ -16,15 +16,13 @@ import json
 import os
 import sys
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
-
-import yaml
 
 from deploy.commands.parameters import ALL, KEY, program_of
 from deploy.supervision import manifest
 from deploy.supervision.system import namespace_of
-from interfaces.scenario import unique_yaml
+from interfaces.scenario import yaml_file
+from interfaces.service import UserError
 from interfaces.service.parameters import Declaration, declarations
 
 USE_SIM_TIME = Declaration("use_sim_time", False, None, "", "whether time is simulated", False)
@@ -75,11 +73,9 @@ def _fault(name: str, value: object, services: list[dict[str, Declaration]]) -> 
 def main(path: str) -> str | None:
     """Print what a good file says, as JSON; the first mistake of another, with file, key and reason."""
     try:
-        document = unique_yaml.load(Path(path).read_text(encoding="utf-8"))
-    except OSError as error:
-        return f"{path}: {error.strerror}"
-    except (ValueError, yaml.YAMLError) as error:  # the former also of a date that does not exist
-        return f"{path}: {' '.join(str(error).split())}"
+        document = yaml_file.load(path)
+    except UserError as error:
+        return str(error)
     for key, fault in faults(document, namespace_of(os.environ)):
         return f"{path}: {key}: {fault}"
     print(json.dumps(document))

@@ -17,7 +17,8 @@ from rclpy.validate_namespace import validate_namespace
 
 from deploy.supervision.processes import ROOT
 from deploy.supervision.system import NAMESPACE, SETTINGS, Check, DeploymentError, System, namespace_of
-from interfaces import scenario
+from interfaces.scenario import scenario_file
+from interfaces.service import UserError
 
 SCENARIOS = ROOT / "deploy" / "scenarios"
 PROCESSES = 10  # that start at the same time
@@ -38,8 +39,8 @@ def of_system(scenario_name: str, user_file: str, loading: float, check: Check) 
     """
     path = _scenario_file(scenario_name)
     try:
-        scenario.load(path)
-    except scenario.ScenarioError as error:
+        scenario_file.load(path)
+    except UserError as error:
         raise DeploymentError(str(error)) from error
     given = _checked(user_file, namespace_of(os.environ), check) if user_file else {}
     origin = time.monotonic() + SETTLING + loading * PROCESSES / (os.cpu_count() or 1)

@@ -11,9 +11,8 @@ from typing import Any
 
 import yaml
 
-
-class SettingsError(Exception):
-    """Why something could not be kept, or what was kept cannot be used: file and reason."""
+from interfaces.scenario import yaml_file
+from interfaces.service.errors import UserError
 
 
 class Settings:
@@ -24,19 +23,16 @@ class Settings:
         self._path = Path(directory) / f"{service}.yaml" if directory else None
 
     def read(self) -> dict[str, Any]:
-        """Return what was set, by name. Raises SettingsError: to forget it would not be safe."""
+        """Return what was set, by name. Raises UserError: to forget it would not be safe."""
         if self._path is None or not self._path.exists():
             return {}
-        try:
-            settings = yaml.safe_load(self._path.read_text(encoding="utf-8"))
-        except (OSError, ValueError, yaml.YAMLError) as error:
-            raise SettingsError(f"{self._path}: {error}") from error
+        settings = yaml_file.load(self._path)
         if not isinstance(settings, dict):
-            raise SettingsError(f"{self._path}: holds no settings; remove it to begin anew")
+            raise UserError(f"{self._path}: holds no settings; remove it to begin anew")
         return settings
 
     def keep(self, name: str, value: Any) -> None:
-        """Keep a value, all of it or nothing. Raises SettingsError if that is not possible."""
+        """Keep a value, all of it or nothing. Raises UserError if that is not possible."""
         if self._path is None:
             return
         settings = self.read() | {name: value}
@@ -46,4 +42,4 @@ class Settings:
             new.write_text(yaml.safe_dump(settings), encoding="utf-8")
             os.replace(new, self._path)
         except OSError as error:
-            raise SettingsError(f"{self._path}: {error.strerror}") from error
+            raise UserError(f"{self._path}: {error.strerror}") from error

@@ -1,28 +1,118 @@
-"""The health of the services as they report it on /diagnostics, 1 Hz each."""
+"""The health of services: each service reports it on /diagnostics, at 1 Hz.
+
+This module writes and reads the format of these reports.
+"""
 
 from __future__ import annotations
 
+import os
+import socket
 import time
+from collections import Counter
+from collections.abc import Callable
 from contextlib import suppress
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.clock import Clock, ClockType
+from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.node import Node
 
-from interfaces import topics
+from interfaces.topics import DIAGNOSTICS
+
+PERIOD = 1.0  # [s]
+_PID, _PUBLISHED, _SINCE_OUTPUT = "pid", "published", "seconds_since_output"
+_REASONS, _OTHER_REASONS = 4, "other reasons"  # in a report, for each subject
+
+
+class HealthReporter:
+    """Reports the health of a node: every second, and at once to each new subscriber."""
+
+    def __init__(self, node: Node, before_report: Callable[[], None] = lambda: None) -> None:
+        """
+        Start to report.
+
+        :param before_report: called before each report; it may add remarks.
+        """
+        self._node = node
+        self._before_report = before_report
+        self._started = time.monotonic()
+        self._published = 0
+        self._dropped = 0
+        self._last_output: float | None = None
+        self._remarks: dict[str, Counter[str]] = {}  # since the last report: subject, reason, how often
+        self._logged: set[str] = set()  # the remarks of the last report
+        self._publisher = node.create_publisher(
+            DIAGNOSTICS.type,
+            DIAGNOSTICS.name,
+            DIAGNOSTICS.qos,
+            # The launcher at its start and the sentinel after a restart need not wait for the next report.
+            event_callbacks=PublisherEventCallbacks(matched=self._on_matched),
+        )
+        # On the steady clock: a paused simulation must not look like a hung service.
+        node.create_timer(PERIOD, self.report, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    def count_output(self) -> None:
+        """Count a published message."""
+        self._published += 1
+        self._last_output = time.monotonic()
+
+    def drop(self, subject: str, reason: str) -> None:
+        """Count a dropped message and remark the reason."""
+        self._dropped += 1
+        self.remark(subject, reason)
+
+    def remark(self, subject: str, reason: str) -> None:
+        """Make the next report a warning with this reason."""
+        reasons = self._remarks.setdefault(subject, Counter())
+        reasons[reason if reason in reasons or len(reasons) < _REASONS else _OTHER_REASONS] += 1
+
+    def report(self) -> None:
+        """Publish the health, with all remarks since the last report."""
+        self._before_report()
+        remarks, self._remarks = self._remarks, {}
+        counts = {
+            f"{subject}: {why}": n for subject, reasons in remarks.items() for why, n in reasons.items()
+        }
+        if counts.keys() - self._logged:
+            self._node.get_logger().warning("; ".join(sorted(counts)))
+        self._logged = set(counts)
+        warnings = [remark + (f" ({n} times)" if n > 1 else "") for remark, n in counts.items()]
+        now = time.monotonic()
+        values = {
+            _PID: os.getpid(),
+            "uptime": f"{now - self._started:.3f}",
+            _PUBLISHED: self._published,
+            "dropped": self._dropped,
+            _SINCE_OUTPUT: "" if self._last_output is None else f"{now - self._last_output:.3f}",
+        }
+        status = DiagnosticStatus(
+            level=DiagnosticStatus.WARN if warnings else DiagnosticStatus.OK,
+            name=self._node.get_fully_qualified_name(),
+            message="; ".join(warnings) or "running",
+            hardware_id=socket.gethostname(),
+            values=[KeyValue(key=key, value=str(value)) for key, value in values.items()],
+        )
+        message = DiagnosticArray(status=[status])
+        message.header.stamp = self._node.get_clock().now().to_msg()
+        self._publisher.publish(message)
+
+    def _on_matched(self, subscribers: Any) -> None:
+        if subscribers.current_count_change > 0:
+            self.report()
 
 
 class Health(NamedTuple):
-    """What a service said of itself last."""
+    """The last report of a service."""
 
     heard: float
-    """when, on the monotonic clock [s]"""
+    """When it arrived, on the monotonic clock [s]."""
     pid: int
     ok: bool
     reason: str
-    """in words, where it is not"""
+    """Why the service is not ok."""
     since_output: float | None
-    """[s] that its last output was old then; None before the first"""
+    """Age of the service's last output [s]; ``None`` before the first."""
 
 
 class HealthMonitor:
@@ -31,30 +121,29 @@ class HealthMonitor:
     def __init__(self, node: Node) -> None:
         self.latest: dict[str, Health] = {}
         self._namespace = node.get_namespace().rstrip("/")
-        topic = topics.DIAGNOSTICS
-        node.create_subscription(topic.type, topic.name, self._on_message, topic.qos)
+        node.create_subscription(DIAGNOSTICS.type, DIAGNOSTICS.name, self._on_message, DIAGNOSTICS.qos)
 
     def _on_message(self, message: DiagnosticArray) -> None:
         self.latest.update(healths(message, self._namespace))
 
 
-def healths(message: DiagnosticArray, prefix: str) -> dict[str, Health]:
-    """The healths of services in a message, by program; what others say there is none."""
+def healths(message: DiagnosticArray, namespace: str) -> dict[str, Health]:
+    """Return the reports of the services of a namespace in a message, by program; ignore other statuses."""
     found = {}
     for status in message.status:
         values = {pair.key: pair.value for pair in status.values}
-        namespace, _, program = status.name.rpartition("/")
-        if namespace == prefix and "published" in values:
-            with suppress(KeyError, ValueError):  # of somebody who says something similar
+        prefix, _, program = status.name.rpartition("/")
+        if prefix == namespace and _PUBLISHED in values:
+            with suppress(KeyError, ValueError):  # not a report of ours
                 found[program] = _health(status, values)
     return found
 
 
 def _health(status: DiagnosticStatus, values: dict[str, str]) -> Health:
-    since_output = values["seconds_since_output"]
+    since_output = values[_SINCE_OUTPUT]
     return Health(
         heard=time.monotonic(),
-        pid=int(values["pid"]),
+        pid=int(values[_PID]),
         ok=status.level == DiagnosticStatus.OK,
         reason=status.message,
         since_output=float(since_output) if since_output else None,

@@ -1,90 +1,58 @@
-"""The life of a service: one process that holds one recipe.
-
-A service's module ends with ::
-
-    def wire(node: ServiceNode) -> None:
-        node.publish(EFFECTOR_SPEED, effector_speed(node.observe(EFFECTOR_POSITION)))
-
-    def main() -> None:
-        service.run("velocity", wire)
-
-and :func:`run` does the rest: it starts, refuses to be a second instance, spins, reports its health,
-and ends with one of these exit codes: 0 on SIGTERM or Ctrl-C, 1 after an error of the recipe or as a second
-instance, 2 after a mistake in its parameters, scenario or command line. Errors take one line, or one log
-message.
-"""
+"""A node that speaks the contract (:mod:`interfaces.topics`)."""
 
 from __future__ import annotations
 
-import hashlib
 import math
-import os
-import socket
-import struct
-import sys
-import time
-import traceback
-from collections import Counter, deque
+from collections import deque
 from collections.abc import Callable
+from dataclasses import dataclass
 from datetime import datetime
-from typing import Any, NoReturn, TypeVar
+from typing import Any, TypeVar
 
-import rclpy
-import reactivex as rx
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rcl_interfaces.msg import (
     FloatingPointRange,
     IntegerRange,
     ParameterDescriptor,
     SetParametersResult,
 )
-from rclpy.clock import Clock, ClockType
-from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
-from rclpy.exceptions import NameValidationException, ParameterException
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from reactivex import Observable, abc
 from reactivex.disposable import CompositeDisposable
 
-from interfaces.scenario import Scenario, ScenarioError, Timeline, follow, load, play
-from interfaces.scenario.settings import Settings, SettingsError
-from interfaces.service import stopping
+from interfaces.service.health import HealthReporter
 from interfaces.service.parameters import Declaration, declarations
-from interfaces.topics import DIAGNOSTICS, Topic, is_latched
-from reactive_node import ReactiveNode
+from interfaces.topics import Topic, is_latched
+from reactive_node import ReactiveNode, stamps
 from reactive_node.stamps import Timestamp
 
 T = TypeVar("T")
-_HEALTH_PERIOD = 1.0  # [s]
-_MISTAKES = (NameValidationException, ParameterException, ScenarioError, SettingsError)  # of who started it
-_REASONS, _OTHER_REASONS = 4, "other reasons"  # that a report tells of a topic
-_RECENT = 16  # messages of which a second reader may bring a copy
+_RECENT = 16  # messages of which a second reader may deliver a copy
+
+
+@dataclass(frozen=True, eq=False)
+class Rejected:
+    """
+    An input that a recipe rejects: the recipe emits this, and :meth:`ServiceNode.publish` reports it.
+
+    No two are equal, so that ``distinct_until_changed`` keeps each of them.
+    """
+
+    topic: Topic
+    """The topic of the input."""
+    reason: str
 
 
 class ServiceNode(ReactiveNode):
-    """A node that speaks the contract, keeps bad input out, and reports its health."""
+    """A node that speaks the contract, drops bad messages, and reports its health."""
 
     def __init__(self, node_name: str, **options: Any) -> None:
         """Create the node of a service; the options are those of :class:`rclpy.node.Node`."""
         super().__init__(node_name, **options)
-        self._started = time.monotonic()
         self._observed: list[Topic] = []
-        self._published_count = 0
-        self._last_output: float | None = None
-        self._dropped_count = 0
-        self._remarks: dict[str, Counter[str]] = {}  # since the last report: about what, why, how often
-        self._logged: set[str] = set()  # those of the last report
+        self.health = HealthReporter(self, before_report=self._remark_other_types)
         self.add_on_set_parameters_callback(_only_finite)
-        self._health = self.create_publisher(
-            DIAGNOSTICS.type,
-            DIAGNOSTICS.name,
-            DIAGNOSTICS.qos,
-            # Who has just come need not wait: the launcher for a start, the sentinel after its own.
-            event_callbacks=PublisherEventCallbacks(matched=self._greet),
-        )
-        # By the steady clock even while ROS time is simulated: a simulation that pauses is no hung service.
-        self.create_timer(_HEALTH_PERIOD, self.report_health, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def declare(self, parameters: type[T]) -> T:
         """
@@ -105,94 +73,32 @@ class ServiceNode(ReactiveNode):
             descriptor.integer_range = [IntegerRange(from_value=within[0], to_value=within[1])]
         return self.declare_parameter(name, default, descriptor).value
 
-    def declare_scenario(self) -> Scenario:
-        """
-        Declare the parameters of a virtual source and load the scenario that they name.
-
-        :raises ScenarioError: if there is a mistake in it.
-        """
-        path = self._declare(Declaration("scenario", "", None, "", "file of the scenario, or empty", False))
-        kept = "folder that keeps what was set by hand, or empty"
-        directory = self._declare(Declaration("settings", "", None, "", kept, False))
-        self._settings = Settings(directory, self.get_name())
-        self.declare_origin()
-        return load(path) if path else Scenario()
-
-    def declare_origin(self) -> None:
-        """Declare the parameter that says when the scenario begins, for all processes at once."""
-        origin = "origin of the scenario by CLOCK_MONOTONIC of this host; 0 is the start of this process"
-        self._scenario_epoch = self._declare(
-            Declaration("scenario_epoch", 0.0, (0.0, 1e12), "s", origin, False)
-        )
-
-    def _elapsed(self) -> float:
-        return time.monotonic() - self._scenario_epoch if self._scenario_epoch else 0.0
-
-    def play(self, timeline: Timeline[T] | None, *, resume: bool = True) -> Observable[T] | None:
-        """Return a timeline from where the scenario is now; see :func:`interfaces.scenario.play`."""
-        if timeline is None:
-            return None
-        return rx.defer(lambda _: play(timeline, self._elapsed(), resume=resume))
-
-    def follow(self, name: str, timeline: Observable[T] | None = None) -> Observable[T]:
-        """
-        Return what a virtual source does: see :func:`interfaces.scenario.follow`.
-
-        What was set by hand holds beyond the end of this process.
-
-        :raises SettingsError: if what was set can no longer be set, or read.
-        """
-        kept = self._settings.read()
-        if name in kept:
-            (result,) = self.set_parameters([Parameter(name, value=kept[name])])
-            if not result.successful:
-                raise SettingsError(f"{name} was set to {kept[name]!r}: {result.reason}")
-            timeline = None
-
-        def keep(parameters: list[Parameter]) -> None:
-            if any(parameter.name == name for parameter in parameters):
-                try:
-                    self._settings.keep(name, self.get_parameter(name).value)
-                except SettingsError as error:
-                    self.remark(name, f"would be forgotten by a restart: {error}")
-
-        self.add_post_set_parameters_callback(keep)
-        return follow(self.create_parameter_observable(name), timeline)
-
-    def until_set(self, name: str, items: Observable[T]) -> Observable[T]:
-        """Emit items until a parameter is set by hand; none if it was, before the end of the last process."""
-        if name in self._settings.read():
-            return rx.empty()
-        return items.take_until(self.create_parameter_observable(name).skip(1))
-
-    @property
-    def resumes(self) -> bool:
-        """Whether the scenario has begun without this process, which takes the place of one that died."""
-        return self._elapsed() > 0.0
-
-    def from_origin(self, items: Observable[T]) -> Observable[T]:
-        """Subscribe to an observable when the scenario begins, or at once if it has begun."""
-        return rx.defer(lambda _: items.delay_subscription(max(0.0, -self._elapsed())))
-
-    def observe(self, topic: Topic, *, timestamped: bool = False) -> Observable[Any]:
+    def observe(
+        self, topic: Topic, *, timestamped: bool = False, max_age: float | None = None
+    ) -> Observable[Any]:
         """
         Return the good messages of a topic; the others are dropped and reported.
 
         :param timestamped: see :meth:`ReactiveNode.create_observable`.
+        :param max_age: a message that is older [s], or this much ahead of the local clock, is not good.
         """
         self._observed.append(topic)
         if is_latched(topic.qos):
             items = self._from_every_publisher(topic)
         else:
             items = self.create_observable(topic.type, topic.name, topic.qos, timestamped=True)
-        sound = items.filter(lambda item: self._is_sound(topic, item.value))
-        return sound if timestamped else sound.map(lambda item: item.value)
+
+        def is_good(item: Timestamp[Any]) -> bool:
+            return self._is_good(topic, item.value) and self._is_fresh(topic, item.timestamp, max_age)
+
+        good = items.filter(is_good)
+        return good if timestamped else good.map(lambda item: item.value)
 
     def _from_every_publisher(self, topic: Topic) -> Observable[Timestamp[Any]]:
         """
         Return the messages of a latched topic, also those of publishers that are not latched.
 
-        A transient-local reader gets nothing from a volatile publisher, such as ``ros2 topic pub``; when
+        A transient-local reader receives nothing from a volatile publisher, such as ``ros2 topic pub``; if
         there is one, a volatile reader listens as well.
         """
 
@@ -201,7 +107,7 @@ class ServiceNode(ReactiveNode):
         ) -> abc.DisposableBase:
             readers = CompositeDisposable()
             recent: deque[datetime] = deque(maxlen=_RECENT)
-            listens = False  # to volatile publishers, too
+            has_volatile_reader = False
 
             def forward(item: Timestamp[Any]) -> None:
                 if item.timestamp not in recent:
@@ -212,80 +118,72 @@ class ServiceNode(ReactiveNode):
                 messages = self.create_observable(topic.type, topic.name, qos, timestamped=True, **options)
                 readers.add(messages.subscribe(forward, observer.on_error, observer.on_completed))
 
-            def incompatible(_: Any) -> None:
-                nonlocal listens
-                if not listens:
-                    listens = True
+            def on_incompatible_qos(_: Any) -> None:
+                nonlocal has_volatile_reader
+                if not has_volatile_reader:
+                    has_volatile_reader = True
                     add(QoSProfile(depth=topic.qos.depth, durability=DurabilityPolicy.VOLATILE))
 
-            add(topic.qos, event_callbacks=SubscriptionEventCallbacks(incompatible_qos=incompatible))
+            add(topic.qos, event_callbacks=SubscriptionEventCallbacks(incompatible_qos=on_incompatible_qos))
             return readers
 
         return Observable(subscribe)
 
-    def publish(self, topic: Topic, messages: Observable[Any]) -> None:
-        """Publish on a topic; a message that the contract does not know is dropped and reported instead."""
+    def publish(
+        self,
+        topic: Topic,
+        items: Observable[Any],
+        message: Callable[[Any], Any] = lambda item: item,
+    ) -> None:
+        """
+        Publish items on a topic. Bad messages and items that are :class:`Rejected` are dropped and reported.
 
-        def count(_: Any) -> None:
-            self._published_count += 1
-            self._last_output = time.monotonic()
+        :param message: makes a message of an item.
+        """
 
-        sound = messages.filter(lambda message: self._is_sound(topic, message)).do_action(count)
-        self.publish_observable(sound, topic.type, topic.name, topic.qos)
+        def accept(item: Any) -> bool:
+            if isinstance(item, Rejected):
+                self.health.drop(item.topic.name, item.reason)
+            return not isinstance(item, Rejected)
 
-    def _is_sound(self, topic: Topic, message: Any) -> bool:
-        fault = topic.fault(message)
-        if fault:
-            self.drop(topic.name, fault)
-        return not fault
+        good = items.filter(accept).map(message).filter(lambda message: self._is_good(topic, message))
+        counted = good.do_action(lambda _: self.health.count_output())
+        self.publish_observable(counted, topic.type, topic.name, topic.qos)
 
-    # Health
+    def age(self, stamp: datetime) -> float:
+        """
+        Return how long ago a source time or stamp is [s]; negative if its clock is ahead of the local one.
 
-    def drop(self, what: str, why: str) -> None:
-        """Count bad input; the next health message reports it."""
-        self._dropped_count += 1
-        self.remark(what, why)
+        Stamps are in the time of day, even while ROS time is simulated. This clock may be set, and differs
+        between hosts: safety takes only the age at arrival from it, and counts on by the Rx clock.
+        """
+        return (stamps.now() - stamp).total_seconds()
 
-    def remark(self, what: str, why: str) -> None:
-        """Let the next health message be a warning that says this."""
-        reasons = self._remarks.setdefault(what, Counter())
-        reasons[why if why in reasons or len(reasons) < _REASONS else _OTHER_REASONS] += 1
+    def remark(self, subject: str, reason: str) -> None:
+        """Make the next health report a warning with this reason."""
+        self.health.remark(subject, reason)
 
-    def _greet(self, readers: Any) -> None:
-        if readers.current_count_change > 0:
-            self.report_health()
+    def _is_good(self, topic: Topic, message: Any) -> bool:
+        problem = topic.problem(message)
+        if problem:
+            self.health.drop(topic.name, problem)
+        return not problem
 
-    def report_health(self) -> None:
-        """Publish the health, with all remarks since the last time; this happens at 1 Hz anyway."""
+    def _is_fresh(self, topic: Topic, stamp: datetime, max_age: float | None) -> bool:
+        if max_age is None:
+            return True
+        age = self.age(stamp)
+        if abs(age) > max_age:
+            problem = f"it is {age:.3f} s old" if age > 0 else f"its clock is {-age:.3f} s ahead of ours"
+            self.health.drop(topic.name, problem)
+        return abs(age) <= max_age
+
+    def _remark_other_types(self) -> None:
+        """Remark publishers that use an observed topic with another type: nothing arrives from them."""
         for topic in self._observed:
             for publisher in self.get_publishers_info_by_topic(self.resolve_topic_name(topic.name)):
                 if publisher.topic_type != topic.type_name:
                     self.remark(topic.name, f"{publisher.node_name} publishes {publisher.topic_type}")
-        remarks, self._remarks = self._remarks, {}
-        counts = {f"{what}: {why}": n for what, reasons in remarks.items() for why, n in reasons.items()}
-        if counts.keys() - self._logged:
-            self.get_logger().warning("; ".join(sorted(counts)))
-        self._logged = set(counts)
-        told = [remark + (f" ({n} times)" if n > 1 else "") for remark, n in counts.items()]
-        now = time.monotonic()
-        silence = "" if self._last_output is None else f"{now - self._last_output:.3f}"
-        values = {
-            "pid": os.getpid(),
-            "uptime": f"{now - self._started:.3f}",
-            "published": self._published_count,
-            "dropped": self._dropped_count,
-            "seconds_since_output": silence,
-        }
-        status = DiagnosticStatus(
-            level=DiagnosticStatus.WARN if told else DiagnosticStatus.OK,
-            name=self.get_fully_qualified_name(),
-            message="; ".join(told) or "running",
-            hardware_id=socket.gethostname(),
-            values=[KeyValue(key=key, value=str(value)) for key, value in values.items()],
-        )
-        health = DiagnosticArray(status=[status])
-        health.header.stamp = self.get_clock().now().to_msg()
-        self._health.publish(health)
 
 
 def _only_finite(parameters: list[Parameter]) -> SetParametersResult:
@@ -293,101 +191,3 @@ def _only_finite(parameters: list[Parameter]) -> SetParametersResult:
         if isinstance(parameter.value, float) and not math.isfinite(parameter.value):
             return SetParametersResult(successful=False, reason=f"{parameter.value} is not finite")
     return SetParametersResult(successful=True)
-
-
-class _AlreadyRunning(Exception):
-    """There is a live instance of this service on this host and domain."""
-
-
-def _claim(node: ServiceNode) -> socket.socket:
-    """
-    Claim the name of a node on this host and domain, for as long as the returned socket lives.
-
-    An abstract unix socket holds the claim: the kernel ends it with the process, however that dies.
-
-    :raises _AlreadyRunning: if a live process holds it.
-    """
-    name = node.get_fully_qualified_name()
-    domain = node.context.get_domain_id()
-    digest = hashlib.sha256(name.encode()).hexdigest()[:32]  # such an address has 107 bytes at most
-    address = f"\0reactive-arm/{domain}/{digest}"
-    claim = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-    try:
-        claim.bind(address)
-    except OSError:
-        with claim:
-            raise _AlreadyRunning(f"{name} runs already in domain {domain}: {_holder(address)}") from None
-    claim.listen()
-    return claim
-
-
-def _holder(address: str) -> str:
-    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as question:
-        question.setblocking(False)
-        try:
-            question.connect(address)
-            credentials = question.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, struct.calcsize("3i"))
-            return f"process {struct.unpack('3i', credentials)[0]}"
-        except OSError:  # it ended just now, or so many have asked that the kernel does not let us
-            return "process unknown"
-
-
-def run(name: str, wire: Callable[[ServiceNode], None]) -> NoReturn:
-    """
-    Be a service until the process ends.
-
-    :param name: name of the node, unless remapped.
-    :param wire: declares the parameters, builds the recipe and connects it with topics.
-    """
-    stopping.prepare()
-    code = _live(name, wire)
-    stopping.ending()
-    sys.exit(code)
-
-
-def refuse(name: str, reason: str) -> NoReturn:
-    """End after a mistake on the command line, saying it in one line."""
-    sys.exit(_refuse(name, reason, 2))
-
-
-def _live(name: str, wire: Callable[[ServiceNode], None]) -> int:
-    """Return the exit code."""
-    try:
-        rclpy.init()
-        node = ServiceNode(name)
-    except (*_MISTAKES, RuntimeError) as error:  # the latter of the environment: domain, discovery, DDS
-        rclpy.try_shutdown()
-        return _refuse(name, error, 2)
-    try:
-        return _spin(node, wire)
-    except _MISTAKES as error:
-        return _refuse(name, error, 2)
-    except _AlreadyRunning as error:
-        return _refuse(name, error, 1)
-    finally:
-        node.destroy_node()
-        rclpy.try_shutdown()
-
-
-def _spin(node: ServiceNode, wire: Callable[[ServiceNode], None]) -> int:
-    with _claim(node), SingleThreadedExecutor() as executor:
-        try:
-            wire(node)
-            executor.add_node(node)
-            stopping.spinning()
-            executor.spin()
-        except ExternalShutdownException:
-            pass
-        except _MISTAKES:
-            raise
-        except Exception:
-            if not node.context.ok():  # a signal came while it was about to publish, which is no error
-                return 0
-            node.get_logger().fatal(traceback.format_exc())
-            return 1
-    return 0
-
-
-def _refuse(name: str, reason: object, code: int) -> int:
-    print(f"{name}: {' '.join(str(reason).split())}", file=sys.stderr, flush=True)
-    return code

@@ -28,7 +28,7 @@ def test_nothing_that_the_babbler_says_is_good_and_all_is_marked(topic: topics.T
             read = deserialize_message(data, topic.type)
         except Exception:  # unreadable, as it should be
             continue
-        assert topic.fault(read) or topic is topics.OPERATOR_PRESENCE
+        assert topic.problem(read) or topic is topics.OPERATOR_PRESENCE
 
 
 def test_what_services_say_is_not_taken_for_babble() -> None:

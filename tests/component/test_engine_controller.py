@@ -1,4 +1,4 @@
-"""The latch of the engines."""
+"""The recipe of the engine controller."""
 
 from __future__ import annotations
 
@@ -10,11 +10,79 @@ from hypothesis import given
 from hypothesis import strategies as st
 from reactivex.testing import ReactiveTest, TestScheduler
 
-from interfaces.topics import OFF, ON, TURN_OFF, TURN_ON
+from interfaces.service import Rejected
+from interfaces.topics import DRIVE_TIMEOUT, OFF, ON, TURN_OFF, TURN_ON
 from reactive_node.stamps import Timestamp
-from services.engine_controller import engine_state
+from services.engine_controller import CLOCK_TOLERANCE, NEVER, Event, State, engine_state, step
 
 on_next, subscribe = ReactiveTest.on_next, ReactiveTest.subscribe
+
+
+def at_time(seconds: float) -> datetime:
+    return datetime.fromtimestamp(seconds, UTC)
+
+
+def latch(engines: str, seen: float | None, repeated: float) -> State:
+    return State(engines, NEVER if seen is None else at_time(seen), at_time(repeated))
+
+
+NOW = 100.0
+OFF_AND_SEEN = latch(OFF, 99.5, 99.9)
+ON_AND_SEEN = latch(ON, 99.5, 99.9)
+
+
+@pytest.mark.parametrize(
+    ("state", "event", "after"),
+    [
+        (OFF_AND_SEEN, ("tick",), latch(OFF, 99.5, NOW)),
+        (ON_AND_SEEN, ("tick",), latch(ON, 99.5, NOW)),
+        (ON_AND_SEEN, (TURN_OFF, 0.0), latch(OFF, 99.5, 99.9)),
+        (ON_AND_SEEN, (TURN_OFF, 99.0), latch(OFF, 99.5, 99.9)),
+        (OFF_AND_SEEN, (TURN_ON, 0.0), latch(ON, 99.5, 99.9)),
+        (OFF_AND_SEEN, (TURN_ON, 0.999), latch(ON, 99.5, 99.9)),
+        (latch(OFF, 99.001, 99.9), (TURN_ON, 0.0), latch(ON, 99.001, 99.9)),
+        (OFF_AND_SEEN, ("presence", 0.125), latch(OFF, 99.875, 99.9)),
+        (OFF_AND_SEEN, ("presence", 0.75), OFF_AND_SEEN),  # an older one than the last
+        (OFF_AND_SEEN, ("presence", -0.049), latch(OFF, NOW, 99.9)),
+        (latch(ON, 90.001, 99.9), ("tick",), latch(ON, 90.001, NOW)),
+        (latch(ON, 90.0, 99.9), ("tick",), latch(OFF, 90.0, NOW)),
+        (latch(ON, 90.0, 99.9), ("presence", 0.0), latch(OFF, NOW, NOW)),
+        (latch(ON, 99.5, 99.601), ("tick",), latch(ON, 99.5, NOW)),
+        (latch(ON, 99.5, 99.599), ("tick",), latch(OFF, 99.5, NOW)),
+        (latch(ON, 99.5, 99.599), ("presence", 0.0), latch(OFF, NOW, NOW)),
+        (latch(ON, 99.5, 99.599), (TURN_ON, 0.0), latch(ON, 99.5, NOW)),  # a new start
+    ],
+)
+def test_step(state: State, event: tuple[Any, ...], after: State) -> None:
+    name, *age = event
+
+    assert step(state, Event(name, at_time(NOW), *age)) == after
+
+
+@pytest.mark.parametrize(
+    ("state", "event", "topic", "reason"),
+    [
+        (OFF_AND_SEEN, (TURN_ON, 1.0), "engines", "turn_on refused: 1.000 s old"),
+        (OFF_AND_SEEN, (TURN_ON, -1.0), "engines", "turn_on refused: -1.000 s old"),
+        (latch(OFF, None, 99.9), (TURN_ON, 0.0), "engines", "turn_on refused: no operator seen yet"),
+        (latch(OFF, 99.0, 99.9), (TURN_ON, 0.0), "engines", "turn_on refused: no operator seen for 1.000 s"),
+        (
+            ON_AND_SEEN,
+            ("presence", -0.051),
+            "operator_presence",
+            "it is stamped by a clock that is 0.051 s ahead of ours",
+        ),
+    ],
+)
+def test_step_rejects(state: State, event: tuple[str, float], topic: str, reason: str) -> None:
+    name, age = event
+
+    after = step(state, Event(name, at_time(NOW), age))
+
+    assert after.rejected is not None
+    assert (after.rejected.topic.name, after.rejected.reason) == (topic, reason)
+    assert after._replace(rejected=None) == state
+    assert step(after, Event("tick", at_time(NOW))).rejected is None
 
 
 class Engines:
@@ -23,10 +91,7 @@ class Engines:
     def __init__(self) -> None:
         self.scheduler = TestScheduler()
         self.clock_is_ahead = timedelta(0)
-        self.refusals: list[str] = []
-
-    def now(self) -> datetime:
-        return self.scheduler.now + self.clock_is_ahead
+        self.rejections: list[str] = []
 
     def set_clock(self, at: float, by: float) -> None:
         def action(*_: Any) -> None:
@@ -43,38 +108,44 @@ class Engines:
         """
         Return the states and when they change.
 
-        :param commands: when they arrive, what they say, and their source time.
+        :param commands: when they arrive, their names, and their source times.
         :param presences: when they arrive, and their stamps.
         """
         return changes(self.states(commands, presences, until))
 
     def states(
-        self, commands: list[tuple[float, str, float]], presences: list[tuple[float, float]], until: float
+        self,
+        commands: list[tuple[float, str, float]],
+        presences: list[tuple[float, float]],
+        until: float,
+        *,
+        repeat: float = 1.0,
+        drive_timeout: float = 4.0,
     ) -> list[tuple[float, str]]:
         self.commands = self.scheduler.create_hot_observable(
             *(on_next(at, Timestamp(command, at_time(source))) for at, command, source in commands)
         )
         self.presences = self.scheduler.create_hot_observable(
-            *(on_next(at, at_time(stamp)) for at, stamp in presences)
+            *(on_next(at, Timestamp("presence", at_time(stamp))) for at, stamp in presences)
         )
         results = self.scheduler.start(
             lambda: engine_state(
-                self.commands,
-                self.presences,
-                repeat=1.0,
-                drive=4.0,
-                now=self.now,
-                refused=self.refusals.append,
+                self.commands.map(self._event),
+                self.presences.map(self._event),
+                repeat=repeat,
+                drive_timeout=drive_timeout,
             ),
             created=0.001,
             subscribed=0.002,
             disposed=until,
         )
-        return [(message.time, message.value.value) for message in results.messages]
+        emitted = [(message.time, message.value.value) for message in results.messages]
+        self.rejections = [item.reason for _, item in emitted if isinstance(item, Rejected)]
+        return [(time, item) for time, item in emitted if not isinstance(item, Rejected)]
 
-
-def at_time(seconds: float) -> datetime:
-    return datetime.fromtimestamp(seconds, UTC)
+    def _event(self, item: Timestamp[str]) -> Event:
+        age = self.scheduler.now + self.clock_is_ahead - item.timestamp
+        return Event(item.value, self.scheduler.now, age.total_seconds())
 
 
 def changes(states: list[tuple[float, str]]) -> list[tuple[float, str]]:
@@ -84,7 +155,7 @@ def changes(states: list[tuple[float, str]]) -> list[tuple[float, str]]:
 
 
 def seen_until(end: float, begin: float = 0.5) -> list[tuple[float, float]]:
-    """The presences of an operator: two a second, each of 0.1 s before."""
+    """The presences of an operator: two a second, each 0.1 s old."""
     return [(step / 2, step / 2 - 0.1) for step in range(int(begin * 2), int(end * 2) + 1)]
 
 
@@ -93,71 +164,71 @@ def engines() -> Engines:
     return Engines()
 
 
-def test_they_start_off_and_the_state_is_repeated(engines: Engines) -> None:
+def test_engines_start_off_and_the_state_is_repeated(engines: Engines) -> None:
     assert engines.states([], [], 3.5) == [(0.002, OFF), (1.002, OFF), (2.002, OFF), (3.002, OFF)]
     assert engines.commands.subscriptions == [subscribe(0.002, 3.5)]
     assert engines.presences.subscriptions == [subscribe(0.002, 3.5)]
 
 
-def test_they_go_on_with_the_operator_present_and_off_by_command_at_once(engines: Engines) -> None:
+def test_commands_are_obeyed_at_once_with_the_operator_present(engines: Engines) -> None:
     states = engines.run([(2.2, TURN_ON, 2.2), (5.7, TURN_OFF, 5.7)], seen_until(9))
 
     assert states == [(0.002, OFF), (2.2, ON), (5.7, OFF)]
-    assert engines.refusals == []
+    assert engines.rejections == []
 
 
-def test_a_command_that_changes_nothing_is_no_news(engines: Engines) -> None:
+def test_command_without_effect_emits_nothing(engines: Engines) -> None:
     commands = [(at, TURN_OFF, at) for at in (0.1, 0.2, 0.3)]
 
     assert engines.states(commands, seen_until(2), 1.5) == [(0.002, OFF), (1.002, OFF)]
 
 
-def test_they_do_not_go_on_while_nobody_was_seen(engines: Engines) -> None:
+def test_turn_on_is_refused_before_the_operator_was_seen(engines: Engines) -> None:
     assert engines.run([(2.2, TURN_ON, 2.2)], []) == [(0.002, OFF)]
-    assert engines.refusals == ["turn_on refused: no operator seen yet"]
+    assert engines.rejections == ["turn_on refused: no operator seen yet"]
 
 
-def test_they_do_not_go_on_when_the_operator_was_seen_more_than_a_second_ago(engines: Engines) -> None:
+def test_turn_on_is_refused_if_the_operator_was_seen_too_long_ago(engines: Engines) -> None:
     assert engines.run([(4.0, TURN_ON, 4.0)], seen_until(3)) == [(0.002, OFF)]
-    assert engines.refusals == ["turn_on refused: no operator seen for 1.100 s"]
+    assert engines.rejections == ["turn_on refused: no operator seen for 1.100 s"]
 
 
-def test_a_command_to_turn_on_that_waited_in_a_queue_is_refused(engines: Engines) -> None:
+def test_turn_on_that_waited_in_a_queue_is_refused(engines: Engines) -> None:
     assert engines.run([(4.2, TURN_ON, 2.2)], seen_until(9)) == [(0.002, OFF)]
-    assert engines.refusals == ["turn_on refused: 2.000 s old"]
+    assert engines.rejections == ["turn_on refused: 2.000 s old"]
 
 
-def test_a_command_to_turn_off_is_obeyed_however_old_it_is(engines: Engines) -> None:
+def test_turn_off_is_obeyed_at_any_age(engines: Engines) -> None:
     assert engines.run([(2.2, TURN_ON, 2.2), (4.0, TURN_OFF, -99.0)], seen_until(9))[-1] == (4.0, OFF)
 
 
-def test_they_go_off_ten_seconds_after_the_last_sight_of_the_operator_and_stay_off(engines: Engines) -> None:
+def test_engines_turn_off_for_good_10_s_after_the_last_presence(engines: Engines) -> None:
     states = engines.run([(2.2, TURN_ON, 2.2)], [*seen_until(5), *seen_until(30, begin=16)])
 
-    assert states == [(0.002, OFF), (2.2, ON), (14.9, OFF)]
+    assert states == [(0.002, OFF), (2.2, ON), (15.002, OFF)]
 
 
-def test_an_old_presence_that_arrives_late_is_as_old_as_its_stamp(engines: Engines) -> None:
+def test_late_presence_is_as_old_as_its_stamp(engines: Engines) -> None:
     states = engines.run([(2.2, TURN_ON, 2.2)], [*seen_until(3), (11.0, 3.4)])
 
-    assert states == [(0.002, OFF), (2.2, ON), (13.4, OFF)]
+    assert states == [(0.002, OFF), (2.2, ON), (14.002, OFF)]
 
 
-def test_a_presence_from_the_future_or_of_before_the_last_one_counts_for_nothing(engines: Engines) -> None:
+def test_presence_from_the_future_or_the_past_counts_for_nothing(engines: Engines) -> None:
     states = engines.run([(2.2, TURN_ON, 2.2)], [*seen_until(3), (4.0, 5.0), (5.0, 2.9), (6.0, 2.5)])
 
-    assert states == [(0.002, OFF), (2.2, ON), (12.9, OFF)]
-    assert engines.refusals == ["presence: it is stamped by a clock that is 1.000 s ahead of ours"]
+    assert states == [(0.002, OFF), (2.2, ON), (13.002, OFF)]
+    assert engines.rejections == ["it is stamped by a clock that is 1.000 s ahead of ours"]
 
 
 @pytest.mark.parametrize("ahead", [0.003, 0.049])
-def test_an_operator_whose_clock_is_a_little_ahead_is_seen(engines: Engines, ahead: float) -> None:
+def test_operator_whose_clock_is_slightly_ahead_is_seen(engines: Engines, ahead: float) -> None:
     presences = [(at, at + ahead) for at, _ in seen_until(3)]
 
     states = engines.run([(2.2, TURN_ON, 2.2)], presences)
 
-    assert states == [(0.002, OFF), (2.2, ON), (13.0, OFF)]
-    assert engines.refusals == []
+    assert states == [(0.002, OFF), (2.2, ON), (13.002, OFF)]
+    assert engines.rejections == []
 
 
 @pytest.mark.parametrize("hours", [1.0, -1.0])
@@ -167,64 +238,89 @@ def test_setting_the_clock_changes_nothing(engines: Engines, hours: float) -> No
 
     states = engines.run([(2.2, TURN_ON, 2.2)], presences, until=45.0)
 
-    assert states == [(0.002, OFF), (2.2, ON), (29.9, OFF)]
+    assert states == [(0.002, OFF), (2.2, ON), (30.002, OFF)]
 
 
-def test_a_controller_that_was_paused_does_not_renew_what_has_ended_meanwhile(engines: Engines) -> None:
+def test_pause_across_timeout_turns_off(engines: Engines) -> None:
     engines.scheduler.schedule_absolute(10.1, lambda *_: engines.scheduler.sleep(5.0))
     states = engines.states([(1.2, TURN_ON, 1.2)], [(1.0, 1.0)], 20.0)
     assert ON in {state for time, state in states if time < 10.15}
     assert {state for time, state in states if time > 10.15} == {OFF}
 
 
-def test_a_controller_that_was_paused_does_not_start_engines_that_have_stopped_meanwhile(
-    engines: Engines,
-) -> None:
+def test_pause_longer_than_the_drive_timeout_turns_off(engines: Engines) -> None:
     engines.scheduler.schedule_absolute(5.1, lambda *_: engines.scheduler.sleep(4.0))
     states = engines.states([(1.2, TURN_ON, 1.2)], seen_until(20), 20.0)
     assert {state for time, state in states if 1.3 < time < 5.15} == {ON}
     assert {state for time, state in states if time > 5.15} == {OFF}
 
 
-def test_nor_one_that_was_paused_shortly_what_has_ended_in_the_pause(engines: Engines) -> None:
+def test_short_pause_across_timeout_turns_off(engines: Engines) -> None:
     engines.scheduler.schedule_absolute(9.9, lambda *_: engines.scheduler.sleep(2.0))
     states = engines.states([(1.2, TURN_ON, 1.2)], [(1.0, 1.0)], 20.0)
     assert ON in {state for time, state in states if time < 9.95}
     assert {state for time, state in states if time > 9.95} == {OFF}
 
 
-def test_a_pause_that_the_drive_does_not_notice_changes_nothing(engines: Engines) -> None:
+def test_pause_shorter_than_the_drive_timeout_changes_nothing(engines: Engines) -> None:
     engines.scheduler.schedule_absolute(5.1, lambda *_: engines.scheduler.sleep(2.0))
     assert engines.run([(1.2, TURN_ON, 1.2)], seen_until(12), 12.0) == [(0.002, OFF), (1.2, ON)]
 
 
-def test_after_a_restart_they_are_off_though_the_operator_is_there(engines: Engines) -> None:
+def test_engines_are_off_after_a_restart(engines: Engines) -> None:
     assert engines.run([], seen_until(30)) == [(0.002, OFF)]
 
 
+def test_presence_after_the_timeout_is_too_late(engines: Engines) -> None:
+    states = engines.run([(1.6, TURN_ON, 1.6)], [(1.5, 1.5), (11.7, 11.7)], 20.0)
+
+    assert states == [(0.002, OFF), (1.6, ON), (11.7, OFF)]
+
+
+@pytest.mark.parametrize("repeat", [0.02, 0.1, 0.2])
+@pytest.mark.parametrize("lag", [0.0, CLOCK_TOLERANCE])
+def test_drive_stops_within_10_45_s_whenever_the_controller_dies(repeat: float, lag: float) -> None:
+    sign_of_life = 1.0
+    arrival = sign_of_life + lag  # a presence that seems new, as the operator's clock is ahead by as much
+    stops = []
+    for death in (10.9 + n / 100 for n in range(40)):
+        states = Engines().states(
+            [(1.1, TURN_ON, 1.1)], [(arrival, arrival)], death, repeat=repeat, drive_timeout=DRIVE_TIMEOUT
+        )
+        (*_, (last_on, _)) = [state for state in states if state[1] == ON]
+        (*_, (last_time, last)) = states
+        stops.append(last_time if last == OFF else last_on + DRIVE_TIMEOUT)
+
+    assert max(stops) <= sign_of_life + 10.45
+    assert max(stops) > sign_of_life + 10.0
+
+
 times = st.floats(0.01, 50.0)
-IN_STEP = 0.05  # s
 
 
 @given(
     st.lists(st.tuples(times, st.sampled_from([TURN_ON, TURN_OFF]), st.floats(-20.0, 1.0)), max_size=8),
     st.lists(st.tuples(times, st.floats(-20.0, 1.0) | st.floats(-0.1, 0.1)), max_size=40),
 )
-def test_they_are_never_on_without_presence_nor_against_a_command(
+def test_engines_are_never_on_without_presence_or_against_a_command(
     commands: list[tuple[float, str, float]], presences: list[tuple[float, float]]
 ) -> None:
     arrived = [(at, at + lag) for at, lag in sorted(presences)]
     ordered = [(at, command, at + lag) for at, command, lag in sorted(commands)]
+    seen = [(at, min(at, stamp)) for at, stamp in arrived if stamp <= at + CLOCK_TOLERANCE + 1e-5]
 
-    states = Engines().run(ordered, arrived, until=70.0)
+    emitted = Engines().states(ordered, arrived, until=70.0)
 
+    for time, state in emitted:
+        if state == ON:
+            assert time - max(stamp for at, stamp in seen if at <= time) < 10.0 + 1e-5
+    states = changes(emitted)
     for (begin, state), (end, _) in zip(states, [*states[1:], (70.0, OFF)], strict=True):
         if state == ON:
             assert any(abs(begin - at) < 1e-6 and command == TURN_ON for at, command, _ in ordered)
-            seen = [(at, min(at, stamp)) for at, stamp in arrived if stamp <= at + IN_STEP + 1e-5]
             assert any(at <= begin and begin - 1.0 - 1e-5 <= stamp for at, stamp in seen)
             within = [command for at, command, _ in ordered if begin + 1e-6 < at < end - 1e-6]
             assert TURN_OFF not in within
             lasting = [stamp for at, stamp in seen if at < end]
-            assert end - max(lasting) <= 10.0 + 1e-5
+            assert end - max(lasting) <= 10.0 + 1.0 + 1e-5  # at the next tick
     assert states[0][1] == OFF

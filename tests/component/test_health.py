@@ -1,4 +1,4 @@
-"""What is taken for the health of a service."""
+"""Reading health reports."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def message(name: str, values: dict[str, Any]) -> DiagnosticArray:
     return DiagnosticArray(status=[DiagnosticStatus(name=name, message="running", values=pairs)])
 
 
-def test_a_service_of_the_namespace_tells_its_health() -> None:
+def test_report_of_a_service_in_the_namespace_is_read() -> None:
     health = healths(message("/arm1/velocity", GOOD), "/arm1")["velocity"]
     assert (health.pid, health.ok, health.reason, health.since_output) == (7, True, "running", 0.5)
     silent = healths(message("/velocity", GOOD | {"seconds_since_output": ""}), "")["velocity"]
@@ -35,5 +35,5 @@ def test_a_service_of_the_namespace_tells_its_health() -> None:
         ("", {}),
     ],
 )
-def test_what_others_say_is_none(name: str, values: dict[str, Any]) -> None:
+def test_other_statuses_are_ignored(name: str, values: dict[str, Any]) -> None:
     assert healths(message(name, values), "/arm1") == {}

@@ -18,9 +18,7 @@ lengths = st.floats(0, 1e300)
 angles = st.floats(-1e15, 1e15)
 
 
-def test_nothing_is_emitted_before_all_four_parameters_are_known_and_then_every_change_emits(
-    scheduler: TestScheduler,
-) -> None:
+def test_every_change_emits_once_all_four_parameters_are_known(scheduler: TestScheduler) -> None:
     l1 = scheduler.create_hot_observable(on_next(210, 2.0), on_next(250, 1.0))
     l2 = scheduler.create_hot_observable(on_next(220, 3.0))
     theta1 = scheduler.create_hot_observable(on_next(205, 9.0), on_next(230, 0.0))
@@ -33,7 +31,7 @@ def test_nothing_is_emitted_before_all_four_parameters_are_known_and_then_every_
         assert source.subscriptions == [subscribe(200, 1000)]
 
 
-def test_it_completes_when_all_parameters_do(scheduler: TestScheduler) -> None:
+def test_position_completes_when_all_parameters_do(scheduler: TestScheduler) -> None:
     sources = [scheduler.create_hot_observable(on_completed(time)) for time in (210, 240, 220, 230)]
 
     results = scheduler.start(lambda: effector_position(*sources))
@@ -45,9 +43,7 @@ def test_it_completes_when_all_parameters_do(scheduler: TestScheduler) -> None:
 
 
 @given(lengths, lengths, angles, angles)
-def test_the_position_is_that_of_complex_arithmetic(
-    l1: float, l2: float, theta1: float, theta2: float
-) -> None:
+def test_position_equals_complex_arithmetic(l1: float, l2: float, theta1: float, theta2: float) -> None:
     expected = l1 * cmath.exp(1j * theta1) + l2 * cmath.exp(1j * (theta1 + theta2))
 
     x, y = forward_kinematics(l1, l2, theta1, theta2)
@@ -56,9 +52,9 @@ def test_the_position_is_that_of_complex_arithmetic(
 
 
 @given(*[st.floats(allow_nan=False, allow_infinity=False)] * 4)
-def test_no_finite_parameters_end_the_recipe(l1: float, l2: float, theta1: float, theta2: float) -> None:
+def test_finite_parameters_never_raise(l1: float, l2: float, theta1: float, theta2: float) -> None:
     forward_kinematics(l1, l2, theta1, theta2)
 
 
-def test_a_sum_of_angles_beyond_all_numbers_is_no_position() -> None:
+def test_infinite_sum_of_angles_gives_nan() -> None:
     assert all(map(math.isnan, forward_kinematics(1.0, 1.0, 1.7e308, 1.7e308)))

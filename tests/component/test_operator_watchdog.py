@@ -1,150 +1,158 @@
-"""The recipe of the operator's activity (thesis 5.2.3)."""
+"""The recipes of the operator watchdog (thesis 5.2.3)."""
 
 from __future__ import annotations
 
-import itertools
-from typing import Any
+from datetime import UTC, datetime
+from typing import Any, NamedTuple
 
+import reactivex as rx
 from hypothesis import given
 from hypothesis import strategies as st
+from reactivex import Observable
 from reactivex.subject import Subject
 from reactivex.testing import ReactiveTest, TestScheduler
 
-from interfaces.topics import TURN_OFF
-from services.operator_watchdog import operator_activity, operator_incapacitated
+from interfaces.topics import ALIVE, INCAPACITATED, MISSED, TURN_OFF
+from reactive_node.stamps import Timestamp
+from services.operator_watchdog import Activity, engine_commands, operator_activity
 
 on_next, on_completed, subscribe = ReactiveTest.on_next, ReactiveTest.on_completed, ReactiveTest.subscribe
 
 BEGIN = 0.010  # when the thesis' application subscribes [s]
 
 
-def watch(
-    scheduler: TestScheduler, heartbeats: Any, until: float, **options: Any
-) -> tuple[list[tuple[float, str]], list[float], list[float]]:
-    """Return what the watchdog commands, and when the operator is alive and missed."""
-    alive: list[float] = []
-    missed: list[float] = []
+class Watch(NamedTuple):
+    """When the watchdog concludes what, and when it commands `turn_off` [s]."""
+
+    alive: list[float]
+    missed: list[float]
+    incapacitated: list[float]
+    turn_off: list[float]
+
+
+def watch(scheduler: TestScheduler, heartbeats: Any, until: float, **options: Any) -> Watch:
+    def everything(activity: Observable[Activity]) -> Observable[str]:
+        return rx.merge(activity.map(lambda it: it.conclusion), engine_commands(activity))
+
     results = scheduler.start(
-        lambda: operator_incapacitated(
-            heartbeats,
-            alive=lambda _: alive.append(scheduler.clock),
-            missed=lambda _: missed.append(scheduler.clock),
-            **options,
-        ),
+        lambda: operator_activity(heartbeats, **options).publish(everything),
         created=BEGIN / 2,
         subscribed=BEGIN,
         disposed=until,
     )
-    return [(message.time, message.value.value) for message in results.messages], alive, missed
+    emitted = [(message.value.value, message.time) for message in results.messages]
+    times = {kind: [at for what, at in emitted if what == kind] for kind, _ in emitted}
+    return Watch(*(times.get(kind, []) for kind in (ALIVE, MISSED, INCAPACITATED, TURN_OFF)))
+
+
+def heartbeat(time: float) -> Timestamp[bool]:
+    return Timestamp(True, datetime.fromtimestamp(time, UTC))
 
 
 def hot(scheduler: TestScheduler, *times: float) -> Any:
-    return scheduler.create_hot_observable(*(on_next(time, time) for time in times))
+    return scheduler.create_hot_observable(*(on_next(time, heartbeat(time)) for time in times))
 
 
-def test_three_silences_of_three_seconds_turn_the_engines_off_as_in_the_listing(
-    scheduler: TestScheduler,
-) -> None:
+def test_three_silences_turn_off_as_in_the_listing(scheduler: TestScheduler) -> None:
     heartbeats = hot(scheduler, 1.942, 1.991, 2.041, 2.091, 2.141, 2.192, 2.242, 2.292, 2.342, 2.392, 4.444)
 
-    commands, alive, missed = watch(scheduler, heartbeats, 14.6)
+    watched = watch(scheduler, heartbeats, 14.6)
 
-    assert alive == [2.01, 2.51, 4.51]
-    assert missed == [7.51, 10.51, 13.51]
-    assert commands == [(13.51, TURN_OFF), (14.01, TURN_OFF), (14.51, TURN_OFF)]
+    assert watched.alive == [2.01, 2.51, 4.51]
+    assert watched.missed == [7.51, 10.51, 13.51]
+    assert watched.incapacitated == [13.51]
+    assert watched.turn_off == [13.51, 14.01, 14.51]
     assert heartbeats.subscriptions == [subscribe(BEGIN, 14.6)]
 
 
-def test_the_recipe_of_the_thesis_is_three_subscriptions_in_all(scheduler: TestScheduler) -> None:
-    heartbeats = hot(scheduler, 1.0)
+def test_retry_subscribes_three_times_in_all(scheduler: TestScheduler) -> None:
+    watched = watch(scheduler, hot(scheduler, 1.0), 99.0)
+
+    assert watched.missed == [4.01, 7.01, 10.01]
+    assert watched.incapacitated == [10.01]
+
+
+def test_alive_has_the_source_time_of_the_sampled_heartbeat(scheduler: TestScheduler) -> None:
+    heartbeats = hot(scheduler, 0.1, 0.4)
 
     results = scheduler.start(
-        lambda: operator_activity(heartbeats), created=0.005, subscribed=BEGIN, disposed=99.0
+        lambda: operator_activity(heartbeats), created=BEGIN / 2, subscribed=BEGIN, disposed=1.0
     )
 
-    assert [(message.time, message.value.kind) for message in results.messages] == [(10.01, "E")]
-    assert heartbeats.subscriptions == [subscribe(0.01, 4.01), subscribe(4.01, 7.01), subscribe(7.01, 10.01)]
+    assert results.messages == [on_next(0.51, Activity(ALIVE, heartbeat(0.4).timestamp))]
 
 
-def test_strikes_do_not_reset_when_the_operator_comes_back_in_between(scheduler: TestScheduler) -> None:
-    heartbeats = hot(scheduler, 4.0, 8.0)
+def test_strikes_do_not_reset_when_the_operator_returns(scheduler: TestScheduler) -> None:
+    watched = watch(scheduler, hot(scheduler, 4.0, 8.0), 11.6)
 
-    commands, alive, missed = watch(scheduler, heartbeats, 11.6)
-
-    assert missed == [3.01, 7.01, 11.01]
-    assert alive == [4.01, 8.01]
-    assert commands == [(11.01, TURN_OFF), (11.51, TURN_OFF)]
+    assert watched.missed == [3.01, 7.01, 11.01]
+    assert watched.alive == [4.01, 8.01]
+    assert watched.turn_off == [11.01, 11.51]
 
 
-def test_who_comes_back_in_the_moment_of_the_third_strike_prevents_nothing(scheduler: TestScheduler) -> None:
-    heartbeats: Subject[float] = Subject()
-    silences = itertools.count(1)
+def test_return_at_the_third_strike_is_too_late(scheduler: TestScheduler) -> None:
+    heartbeats: Subject[Timestamp[bool]] = Subject()
 
-    def missed(_: Exception) -> None:
-        if next(silences) == 3:  # `retry` ends a step later: between that and what follows it
-            scheduler.schedule(lambda *_: scheduler.schedule(lambda *_: heartbeats.on_next(0.0)))
+    def beat_in_every_step(_: Any, steps: int) -> None:
+        heartbeats.on_next(heartbeat(scheduler.clock))
+        if steps:
+            scheduler.schedule(beat_in_every_step, steps - 1)
 
-    results = scheduler.start(
-        lambda: operator_incapacitated(heartbeats, missed=missed),
-        created=BEGIN / 2,
-        subscribed=BEGIN,
-        disposed=12.0,
-    )
+    scheduler.schedule_absolute(9.01, beat_in_every_step, 50)
 
-    assert [message.value.value for message in results.messages[:1]] == [TURN_OFF]
+    watched = watch(scheduler, heartbeats, 9.4)
 
-
-def test_a_return_is_seen_at_once_and_begins_three_new_strikes(scheduler: TestScheduler) -> None:
-    heartbeats = hot(scheduler, 10.2)
-
-    commands, alive, missed = watch(scheduler, heartbeats, 19.4)
-
-    assert missed == [3.01, 6.01, 9.01, 13.2, 16.2, 19.2]
-    assert alive == [10.2]
-    assert commands == [(9.01, TURN_OFF), (9.51, TURN_OFF), (10.01, TURN_OFF), (19.2, TURN_OFF)]
+    assert watched.incapacitated == [9.01]
+    assert watched.turn_off == [9.01]
+    assert watched.alive == [9.01]
 
 
-def test_however_many_heartbeats_come_the_operator_is_alive_twice_a_second(scheduler: TestScheduler) -> None:
+def test_return_is_alive_at_once_and_begins_new_strikes(scheduler: TestScheduler) -> None:
+    watched = watch(scheduler, hot(scheduler, 10.2), 19.4)
+
+    assert watched.missed == [3.01, 6.01, 9.01, 13.2, 16.2, 19.2]
+    assert watched.alive == [10.2]
+    assert watched.incapacitated == [9.01, 19.2]
+    assert watched.turn_off == [9.01, 9.51, 10.01, 19.2]
+
+
+def test_flood_of_heartbeats_is_alive_twice_a_second(scheduler: TestScheduler) -> None:
     heartbeats = hot(scheduler, *(0.011 + step / 1000 for step in range(5000)))
 
-    commands, alive, missed = watch(scheduler, heartbeats, 5.4)
+    watched = watch(scheduler, heartbeats, 5.4)
 
-    assert alive == [0.51, 1.01, 1.51, 2.01, 2.51, 3.01, 3.51, 4.01, 4.51, 5.01]
-    assert (commands, missed) == ([], [])
+    assert watched.alive == [0.51, 1.01, 1.51, 2.01, 2.51, 3.01, 3.51, 4.01, 4.51, 5.01]
+    assert watched[1:] == ([], [], [])
 
 
-def test_heartbeats_that_only_just_come_with_the_samples_are_signs_of_life(scheduler: TestScheduler) -> None:
+def test_heartbeats_at_the_moments_of_the_samples_count(scheduler: TestScheduler) -> None:
     heartbeats = hot(scheduler, *(BEGIN + step / 2 for step in range(1, 40)))
 
-    commands, alive, missed = watch(scheduler, heartbeats, 19.4)
+    watched = watch(scheduler, heartbeats, 19.4)
 
-    assert len(alive) == 38
-    assert (commands, missed) == ([], [])
+    assert len(watched.alive) == 38
+    assert watched[1:] == ([], [], [])
 
 
-def test_a_silence_of_almost_three_seconds_is_none(scheduler: TestScheduler) -> None:
+def test_silence_of_almost_three_seconds_is_no_strike(scheduler: TestScheduler) -> None:
     heartbeats = hot(scheduler, *(0.1 + step * 2.4 for step in range(40)))
 
-    commands, _, missed = watch(scheduler, heartbeats, 90.0)
-
-    assert (commands, missed) == ([], [])
+    assert watch(scheduler, heartbeats, 90.0)[1:] == ([], [], [])
 
 
-def test_the_end_of_the_heartbeats_is_a_silence(scheduler: TestScheduler) -> None:
-    heartbeats = scheduler.create_hot_observable(on_next(1.0, 1.0), on_completed(2.0))
+def test_end_of_the_heartbeats_is_a_silence(scheduler: TestScheduler) -> None:
+    heartbeats = scheduler.create_hot_observable(on_next(1.0, heartbeat(1.0)), on_completed(2.0))
 
-    commands, _, _ = watch(scheduler, heartbeats, 30.0)
+    watched = watch(scheduler, heartbeats, 30.0)
 
-    assert {command for _, command in commands} == {TURN_OFF}
-    assert 10.0 <= commands[0][0] <= 10.5
+    assert 10.0 <= watched.turn_off[0] <= 10.5
 
 
 def strikes(heartbeats: list[int], first: int, until: int) -> list[int]:
     """
-    Return when the operator is missed, in ms, by a model that knows no Rx.
+    Return when the operator is missed [ms], by a model without Rx.
 
-    A silence is one of the samples: of each half second, from the first sample on after where counting
-    began, whether there was a heartbeat in it.
+    A sample counts as a sign of life if a heartbeat came since the sample before it.
     """
     missed: list[int] = []
     begin = seen = 10
@@ -168,43 +176,58 @@ def strikes(heartbeats: list[int], first: int, until: int) -> list[int]:
 
 
 @given(st.lists(st.integers(11, 20_000), max_size=30), st.sampled_from([100, 500]))
-def test_the_watchdog_fires_if_and_only_if_there_were_three_silences(
-    heartbeats: list[int], sample: int
-) -> None:
+def test_watchdog_fires_if_and_only_if_there_were_three_silences(heartbeats: list[int], sample: int) -> None:
     until = 25_000
     expected = strikes(heartbeats, sample, until)
     scheduler = TestScheduler()
     times = [time / 1000 for time in sorted(heartbeats)]
 
-    commands, _, missed = watch(scheduler, hot(scheduler, *times), until / 1000, first=sample / 1000)
+    watched = watch(scheduler, hot(scheduler, *times), until / 1000, first=sample / 1000)
 
-    assert [round(time * 1000) for time in missed[:3]] == expected
-    first = round(commands[0][0] * 1000) if commands else None
-    assert first == (expected[2] if len(expected) == 3 else None)
+    assert [round(time * 1000) for time in watched.missed[:3]] == expected
+    first = [round(time * 1000) for time in watched.turn_off[:1]]
+    assert first == expected[2:]
+    assert first == [round(time * 1000) for time in watched.incapacitated[:1]]
 
 
 @given(st.lists(st.integers(1, 2499), min_size=1, max_size=20))
-def test_it_does_not_fire_while_no_gap_is_a_silence(gaps: list[int]) -> None:
+def test_watchdog_does_not_fire_without_a_silence(gaps: list[int]) -> None:
     times = [10.0]
     for gap in gaps:
         times.append(times[-1] + gap)
     scheduler = TestScheduler()
 
-    commands, _, missed = watch(scheduler, hot(scheduler, *(time / 1000 for time in times)), times[-1] / 1000)
+    watched = watch(scheduler, hot(scheduler, *(time / 1000 for time in times)), times[-1] / 1000)
 
-    assert (commands, missed) == ([], [])
+    assert watched[1:] == ([], [], [])
 
 
 @given(st.lists(st.integers(3500, 6000), min_size=3, max_size=3))
-def test_three_gaps_that_each_hold_a_silence_turn_the_engines_off(gaps: list[int]) -> None:
+def test_three_gaps_with_a_silence_each_turn_off(gaps: list[int]) -> None:
     times = [500.0]
     for gap in gaps:
         times.append(times[-1] + gap)
     scheduler = TestScheduler()
+    heartbeats = hot(scheduler, *(time / 1000 for time in times))
 
-    commands, _, _ = watch(
-        scheduler, hot(scheduler, *(time / 1000 for time in times)), times[-1] / 1000 + 0.001
+    assert watch(scheduler, heartbeats, times[-1] / 1000 + 0.001).turn_off
+
+
+def test_turn_off_repeats_until_the_operator_is_alive(scheduler: TestScheduler) -> None:
+    conclusions = [(300, ALIVE), (310, MISSED), (320, INCAPACITATED), (345, ALIVE), (400, INCAPACITATED)]
+    activity = scheduler.create_hot_observable(*(on_next(at, Activity(what)) for at, what in conclusions))
+
+    results = scheduler.start(lambda: engine_commands(activity, repeat=10), disposed=425)
+
+    assert results.messages == [on_next(at, TURN_OFF) for at in (320, 330, 340, 400, 410, 420)]
+    assert activity.subscriptions == [subscribe(200, 425)]
+
+
+def test_turn_off_is_sent_though_the_operator_returns_at_once(scheduler: TestScheduler) -> None:
+    activity = scheduler.create_hot_observable(
+        on_next(300, Activity(INCAPACITATED)), on_next(300, Activity(ALIVE))
     )
 
-    assert commands
-    assert commands[0][1] == TURN_OFF
+    results = scheduler.start(lambda: engine_commands(activity))
+
+    assert results.messages == [on_next(300, TURN_OFF)]

@@ -11,7 +11,10 @@ import pytest
 import reactivex as rx
 from reactivex.testing import ReactiveTest, TestScheduler
 
-from interfaces.scenario import Events, Scenario, ScenarioError, Sweep, follow, load, play
+from interfaces.scenario.playback import follow, play
+from interfaces.scenario.scenario_file import Scenario, load
+from interfaces.scenario.timeline import Events, Sweep
+from interfaces.service import UserError
 from interfaces.topics import TURN_ON
 
 on_next, on_completed, subscribe = ReactiveTest.on_next, ReactiveTest.on_completed, ReactiveTest.subscribe
@@ -115,12 +118,12 @@ def test_an_empty_scenario_drives_nothing(tmp_path: Path) -> None:
             "engines: lasts until 9 s, but all starts again after 5 s",
         ),
         ("repeat: 0", "repeat: must be more than 0, not 0"),
-        ("l1: [1", "while parsing a flow sequence"),
-        ("l1: 2\nl1: 3", "the key l1 is there twice"),
+        ("l1: [1", "line 1, column 7: expected ',' or ']', but got '<stream end>'"),
+        ("l1: 2\nl1: 3", "line 2, column 1: the key l1 appears twice"),
     ],
 )
 def test_a_mistake_is_one_line_with_file_key_and_reason(tmp_path: Path, text: str, reason: str) -> None:
-    with pytest.raises(ScenarioError) as raised:
+    with pytest.raises(UserError) as raised:
         loaded(tmp_path, text)
 
     message = str(raised.value)
@@ -129,7 +132,7 @@ def test_a_mistake_is_one_line_with_file_key_and_reason(tmp_path: Path, text: st
 
 
 def test_a_missing_file_is_named(tmp_path: Path) -> None:
-    with pytest.raises(ScenarioError, match=r"nowhere\.yaml: No such file or directory"):
+    with pytest.raises(UserError, match=r"nowhere\.yaml: No such file or directory"):
         load(tmp_path / "nowhere.yaml")
 
 

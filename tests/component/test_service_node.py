@@ -1,4 +1,4 @@
-"""What all services have: the edge that keeps bad input out, parameters, scenarios and health."""
+"""The node of a service: bad messages, health, parameters, scenarios."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import math
 import os
 import time
 from collections.abc import Callable
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
@@ -23,9 +24,9 @@ from reactivex.subject import Subject
 from std_msgs.msg import Bool, Float64, Header, String
 
 from interfaces import topics
-from interfaces.scenario import ScenarioError
-from interfaces.scenario.settings import SettingsError
-from interfaces.service import ServiceNode, parameter
+from interfaces.scenario.origin import Origin
+from interfaces.scenario.source import VirtualSource
+from interfaces.service import Rejected, ServiceNode, UserError, parameter
 
 Make = Callable[..., Any]
 SpinUntil = Callable[..., None]
@@ -40,8 +41,8 @@ def one(name: str, default: Any, within: Any, meaning: str, settable: bool = Fal
 
 @pytest.fixture
 def service(make_node: Make, monkeypatch: pytest.MonkeyPatch) -> ServiceNode:
-    """A service that reports its health when it is told to."""
-    monkeypatch.setattr("interfaces.service.node._HEALTH_PERIOD", 3600.0)
+    """A service that reports its health on demand."""
+    monkeypatch.setattr("interfaces.service.health.PERIOD", 3600.0)
     node: ServiceNode = make_node("service", kind=ServiceNode)
     return node
 
@@ -54,19 +55,19 @@ def peer(make_node: Make) -> Node:
 
 @pytest.fixture
 def health(service: ServiceNode, peer: Node, spin_until: SpinUntil) -> Callable[[], dict[str, Any]]:
-    """Gives the health message that the service would send now."""
+    """Requests and returns a health report."""
     heard: list[Any] = []
     topic = topics.DIAGNOSTICS
     peer.create_subscription(topic.type, topic.name, heard.append, topic.qos)
 
     spin_until(lambda: service.count_subscribers(topic.name) == 1)
     spin_until(lambda: peer.count_publishers(topic.name) == 1)
-    spin_until(lambda: heard)  # the greeting: later, it would take along what is to be told then
+    spin_until(lambda: heard)  # the report to a new subscriber, which would clear later remarks
 
     def following() -> dict[str, Any]:
         before = service.get_clock().now()
-        service.report_health()
-        # What was said before, to greet us, may come later.
+        service.health.report()
+        # An earlier report, to a new subscriber, may arrive later.
         spin_until(lambda: heard and Time.from_msg(heard[-1].header.stamp) >= before)
         (status,) = heard[-1].status
         return {
@@ -102,6 +103,7 @@ GOOD_AND_BAD = [
     (topics.EFFECTOR_SPEED, [number(0.0)], [number(math.nan), number(-1.0)]),
     (topics.OPERATOR_HEARTBEAT, [Bool(data=True)], [Bool(data=False)]),
     (topics.OPERATOR_PRESENCE, [Header()], []),
+    (topics.OPERATOR_ACTIVITY, [String(data="missed")], [String(data="asleep")]),
     (
         topics.ENGINES,
         [String(data="turn_on"), String(data="turn_off")],
@@ -112,7 +114,7 @@ GOOD_AND_BAD = [
 
 
 @pytest.mark.parametrize(("topic", "good", "bad"), GOOD_AND_BAD, ids=lambda value: getattr(value, "name", ""))
-def test_bad_input_is_dropped_and_reported(
+def test_bad_messages_are_dropped_and_reported(
     service: ServiceNode,
     peer: Node,
     spin_until: SpinUntil,
@@ -127,9 +129,9 @@ def test_bad_input_is_dropped_and_reported(
     spin_until(lambda: publisher.get_subscription_count() == 1)
 
     for message in bad:
-        before = service._dropped_count
+        before = service.health._dropped
         publisher.publish(message)
-        spin_until(lambda before=before: service._dropped_count == before + 1)
+        spin_until(lambda before=before: service.health._dropped == before + 1)
     for message in good:
         publisher.publish(message)
         spin_until(lambda message=message: received[-1:] == [message])
@@ -140,14 +142,14 @@ def test_bad_input_is_dropped_and_reported(
     assert report["level"] == (DiagnosticStatus.WARN if bad else DiagnosticStatus.OK)
     if bad:
         told = report["message"].split("; ")
-        assert told[0].startswith(f"{topic.name}: {topic.fault(bad[0])}")
+        assert told[0].startswith(f"{topic.name}: {topic.problem(bad[0])}")
         assert all(len(remark) < 200 for remark in told)
     following = health()
     assert (following["level"], following["message"]) == (DiagnosticStatus.OK, "running")
     assert following["dropped"] == str(len(bad))
 
 
-def test_a_publisher_of_another_type_is_reported(
+def test_publisher_of_another_type_is_reported(
     service: ServiceNode, peer: Node, spin_until: SpinUntil, health: Callable[[], dict[str, Any]]
 ) -> None:
     service.observe(topics.L1).subscribe()
@@ -160,7 +162,7 @@ def test_a_publisher_of_another_type_is_reported(
     assert report["message"] == "l1: peer publishes std_msgs/msg/String"
 
 
-def test_a_latched_topic_also_hears_publishers_that_are_not(
+def test_latched_topic_receives_from_volatile_publishers_too(
     service: ServiceNode, peer: Node, spin_until: SpinUntil, spin_for: SpinFor
 ) -> None:
     received: list[float] = []
@@ -181,7 +183,7 @@ def test_a_latched_topic_also_hears_publishers_that_are_not(
     assert received == [1.0, 2.0, 3.0]
 
 
-def test_what_the_contract_forbids_is_not_published_either(
+def test_bad_messages_are_not_published(
     service: ServiceNode, peer: Node, spin_until: SpinUntil, health: Callable[[], dict[str, Any]]
 ) -> None:
     received: list[float] = []
@@ -206,7 +208,66 @@ def test_what_the_contract_forbids_is_not_published_either(
     assert 0 <= float(report["seconds_since_output"]) < 5
 
 
-def test_health_says_who_it_is_and_how_long_it_runs(
+def test_rejected_items_are_reported_instead_of_published(
+    service: ServiceNode, peer: Node, spin_until: SpinUntil, health: Callable[[], dict[str, Any]]
+) -> None:
+    received: list[float] = []
+    topic = topics.EFFECTOR_SPEED
+    peer.create_subscription(topic.type, topic.name, lambda message: received.append(message.data), topic.qos)
+    speeds: Subject[float | Rejected] = Subject()
+    service.publish(topic, speeds, number)
+    spin_until(
+        lambda: any(
+            p.get_subscription_count() for p in service.publishers if p.topic_name == "/effector/speed"
+        )
+    )
+
+    for item in (Rejected(topics.EFFECTOR_POSITION, "its time stands still"), 1.0):
+        speeds.on_next(item)
+    spin_until(lambda: received == [1.0])
+
+    report = health()
+    assert report["message"] == "effector/position: its time stands still"
+    assert (report["published"], report["dropped"]) == ("1", "1")
+
+
+@pytest.mark.parametrize(
+    ("age", "problem"),
+    [
+        (0.5, None),
+        (0.501, "it is 0.501 s old"),
+        (-0.5, None),
+        (-10.0, "its clock is 10.000 s ahead of ours"),
+    ],
+)
+def test_messages_that_are_not_fresh_are_dropped(
+    service: ServiceNode,
+    peer: Node,
+    spin_until: SpinUntil,
+    health: Callable[[], dict[str, Any]],
+    monkeypatch: pytest.MonkeyPatch,
+    age: float,
+    problem: str | None,
+) -> None:
+    received: list[Any] = []
+    topic = topics.OPERATOR_HEARTBEAT
+    service.observe(topic, timestamped=True, max_age=0.5).subscribe(received.append)
+    publisher = peer.create_publisher(topic.type, topic.name, topic.qos)
+    spin_until(lambda: publisher.get_subscription_count() == 1)
+    monkeypatch.setattr(service, "age", lambda stamp: age)
+
+    publisher.publish(Bool(data=True))
+    spin_until(lambda: received or service.health._dropped)
+
+    assert len(received) == (problem is None)
+    assert health()["message"] == (f"operator_heartbeat: {problem}" if problem else "running")
+
+
+def test_age_is_by_the_time_of_day(service: ServiceNode) -> None:
+    assert service.age(datetime.now(UTC) - timedelta(seconds=5)) == pytest.approx(5.0, abs=1.0)
+
+
+def test_health_names_the_node_its_pid_and_uptime(
     service: ServiceNode, health: Callable[[], dict[str, Any]]
 ) -> None:
     report = health()
@@ -216,7 +277,7 @@ def test_health_says_who_it_is_and_how_long_it_runs(
     assert 0 < float(report["uptime"]) < 60
 
 
-def test_a_remark_is_a_warning_but_not_bad_input(
+def test_remark_is_a_warning_without_a_dropped_message(
     service: ServiceNode, health: Callable[[], dict[str, Any]]
 ) -> None:
     service.remark("engines", "refused")
@@ -229,7 +290,7 @@ def test_a_remark_is_a_warning_but_not_bad_input(
     assert (report["level"], report["dropped"]) == (DiagnosticStatus.WARN, "0")
 
 
-def test_of_many_remarks_a_few_are_told_and_the_others_counted(
+def test_many_remarks_are_reported_as_four_reasons_and_a_count(
     service: ServiceNode, health: Callable[[], dict[str, Any]]
 ) -> None:
     for number in range(40):
@@ -249,7 +310,7 @@ def overridden(make_node: Make, **values: Any) -> ServiceNode:
     return node
 
 
-def test_a_parameter_is_described_and_has_a_range(service: ServiceNode) -> None:
+def test_parameter_has_a_description_and_a_range(service: ServiceNode) -> None:
     assert service.declare(one("rate", 20.0, (1.0, 100.0), "how often [Hz]")).rate == 20.0
     assert service.declare(one("strikes", 3, (1, 9), "how many")).strikes == 3
 
@@ -261,21 +322,21 @@ def test_a_parameter_is_described_and_has_a_range(service: ServiceNode) -> None:
 
 
 @pytest.mark.parametrize("value", [0.5, 100.5, math.nan, math.inf, -math.inf])
-def test_a_value_out_of_range_is_refused(make_node: Make, value: float) -> None:
+def test_value_out_of_range_is_refused(make_node: Make, value: float) -> None:
     node = overridden(make_node, rate=value)
 
     with pytest.raises(InvalidParameterValueException, match="rate"):
         node.declare(one("rate", 20.0, (1.0, 100.0), "how often [Hz]"))
 
 
-def test_a_value_of_another_type_is_refused(make_node: Make) -> None:
+def test_value_of_another_type_is_refused(make_node: Make) -> None:
     node = overridden(make_node, rate="fast")
 
     with pytest.raises(InvalidParameterTypeException, match="rate"):
         node.declare(one("rate", 20.0, (1.0, 100.0), "how often [Hz]"))
 
 
-def test_only_what_is_settable_can_be_set_while_it_runs(service: ServiceNode) -> None:
+def test_only_settable_parameters_can_be_set_at_run_time(service: ServiceNode) -> None:
     service.declare(one("fixed", 20.0, (1.0, 100.0), "fixed"))
     service.declare(one("value", 20.0, (1.0, 100.0), "value", settable=True))
 
@@ -292,8 +353,10 @@ def test_only_what_is_settable_can_be_set_while_it_runs(service: ServiceNode) ->
 
 
 def test_without_a_scenario_nothing_is_driven(service: ServiceNode) -> None:
-    assert service.declare_scenario().configuration == {}
-    assert service.play(None) is None
+    source = VirtualSource(service)
+
+    assert source.scenario.configuration == {}
+    assert source.play(None) is None
 
 
 def test_a_scenario_is_played_from_where_it_is_now(
@@ -304,7 +367,8 @@ def test_a_scenario_is_played_from_where_it_is_now(
     node = overridden(make_node, scenario=str(path), scenario_epoch=time.monotonic() - 100.1)
     values: list[float] = []
 
-    node.play(node.declare_scenario().configuration["l1"]).subscribe(values.append, scheduler=node.scheduler)
+    source = VirtualSource(node)
+    source.play(source.scenario.configuration["l1"]).subscribe(values.append, scheduler=node.scheduler)
 
     assert values == [2.0]
     spin_until(lambda: values == [2.0, 3.0])
@@ -325,8 +389,9 @@ def test_what_was_set_by_hand_holds_beyond_a_restart(
         )
         node.declare(one("value", 1.0, (0.0, 9.0), "length [m]", settable=True))
         values: list[float] = []
-        timeline = node.play(node.declare_scenario().configuration["l1"])
-        node.follow("value", timeline).subscribe(values.append, scheduler=node.scheduler)
+        source = VirtualSource(node)
+        timeline = source.play(source.scenario.configuration["l1"])
+        source.follow("value", timeline).subscribe(values.append, scheduler=node.scheduler)
         return node, values
 
     first, values = source()
@@ -348,10 +413,10 @@ def test_what_a_scenario_does_besides_ends_for_good_when_a_parameter_is_set_by_h
     def source() -> tuple[ServiceNode, list[int]]:
         node = overridden(make_node, settings=str(tmp_path / "settings"))
         node.declare(one("pressed", False, None, "whether it is held", settable=True))
-        node.declare_scenario()
-        node.follow("pressed").subscribe(scheduler=node.scheduler)
+        source = VirtualSource(node)
+        source.follow("pressed").subscribe(scheduler=node.scheduler)
         received: list[int] = []
-        node.until_set("pressed", items).subscribe(received.append, scheduler=node.scheduler)
+        source.until_set("pressed", items).subscribe(received.append, scheduler=node.scheduler)
         return node, received
 
     node, received = source()
@@ -374,9 +439,8 @@ def test_it_is_told_when_a_setting_would_be_forgotten(
     (tmp_path / "file").touch()
     node = overridden(make_node, settings=str(tmp_path / "file" / "settings"))
     node.declare(one("value", 1.0, (0.0, 9.0), "length [m]", settable=True))
-    node.declare_scenario()
     values: list[float] = []
-    node.follow("value").subscribe(values.append, scheduler=node.scheduler)
+    VirtualSource(node).follow("value").subscribe(values.append, scheduler=node.scheduler)
     spin_until(lambda: heard)
     node.set_parameters([Parameter("value", value=5.0)])
     assert values == [1.0, 5.0]
@@ -391,9 +455,8 @@ def test_a_setting_that_cannot_be_used_is_a_mistake_and_not_forgotten(
     node = overridden(make_node, settings=str(tmp_path))
     (tmp_path / f"{node.get_name()}.yaml").write_text(text)
     node.declare(one("value", 1.0, (0.0, 9.0), "length [m]", settable=True))
-    node.declare_scenario()
-    with pytest.raises(SettingsError, match=r"value was set to|\.yaml: "):
-        node.follow("value")
+    with pytest.raises(UserError, match=r"value was set to|\.yaml: "):
+        VirtualSource(node).follow("value")
 
 
 def test_what_waits_for_the_origin_begins_there_or_at_once(make_node: Make, spin_until: SpinUntil) -> None:
@@ -401,8 +464,7 @@ def test_what_waits_for_the_origin_begins_there_or_at_once(make_node: Make, spin
     origin = time.monotonic() + 0.2
     for epoch in (origin, origin - 100.0):
         node = overridden(make_node, scenario_epoch=epoch)
-        node.declare_origin()
-        node.from_origin(rx.defer(lambda _: rx.just(time.monotonic()))).subscribe(
+        Origin(node).delay_subscription(rx.defer(lambda _: rx.just(time.monotonic()))).subscribe(
             lambda at, epoch=epoch: begun.setdefault(epoch, at), scheduler=node.scheduler
         )
 
@@ -415,26 +477,26 @@ def test_what_waits_for_the_origin_begins_there_or_at_once(make_node: Make, spin
 def test_a_mistake_in_a_scenario_is_an_error(make_node: Make) -> None:
     node = overridden(make_node, scenario="/nowhere.yaml")
 
-    with pytest.raises(ScenarioError, match=r"/nowhere\.yaml"):
-        node.declare_scenario()
+    with pytest.raises(UserError, match=r"/nowhere\.yaml"):
+        VirtualSource(node)
 
 
-def test_health_is_reported_once_a_second(make_node: Make, peer: Node, spin_until: SpinUntil) -> None:
+def test_health_is_reported_every_second(make_node: Make, peer: Node, spin_until: SpinUntil) -> None:
     heard: list[float] = []
     topic = topics.DIAGNOSTICS
     peer.create_subscription(topic.type, topic.name, lambda _: heard.append(time.monotonic()), topic.qos)
     begin = time.monotonic()
     make_node("punctual", kind=ServiceNode)
 
-    spin_until(lambda: len(heard) == 3)  # who listens is greeted, before these two
+    spin_until(lambda: len(heard) == 3)  # the first one is for the new subscriber
 
     assert heard[2] - begin > 1.5
 
 
-def test_who_begins_to_listen_hears_of_the_health_at_once(
+def test_new_subscriber_receives_the_health_at_once(
     make_node: Make, spin_until: SpinUntil, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("interfaces.service.node._HEALTH_PERIOD", 3600.0)
+    monkeypatch.setattr("interfaces.service.health.PERIOD", 3600.0)
     make_node("polite", kind=ServiceNode)
     topic = topics.DIAGNOSTICS
 

@@ -10,6 +10,8 @@ from hypothesis import strategies as st
 from reactivex import Subject
 from reactivex.testing import ReactiveTest, TestScheduler
 
+from interfaces.service import Rejected
+from interfaces.topics import EFFECTOR_POSITION
 from services.velocity import Position, effector_speed
 
 on_next, on_error, subscribe = ReactiveTest.on_next, ReactiveTest.on_error, ReactiveTest.subscribe
@@ -17,9 +19,7 @@ on_next, on_error, subscribe = ReactiveTest.on_next, ReactiveTest.on_error, Reac
 SECOND = 10**9
 
 
-def test_the_speed_is_the_distance_over_the_time_between_the_stamps_whenever_they_arrive(
-    scheduler: TestScheduler,
-) -> None:
+def test_speed_is_distance_over_time_between_the_stamps(scheduler: TestScheduler) -> None:
     positions = scheduler.create_hot_observable(
         on_next(210, Position(1 * SECOND, 0.0, 0.0)),
         on_next(900, Position(2 * SECOND, 3.0, 4.0)),
@@ -32,7 +32,7 @@ def test_the_speed_is_the_distance_over_the_time_between_the_stamps_whenever_the
     assert positions.subscriptions == [subscribe(200, 1000)]
 
 
-def test_a_speed_like_the_one_before_is_left_out(scheduler: TestScheduler) -> None:
+def test_speed_equal_to_the_one_before_is_omitted(scheduler: TestScheduler) -> None:
     positions = scheduler.create_hot_observable(
         *(
             on_next(200 + time, Position(time * SECOND, x, 0.0))
@@ -45,8 +45,7 @@ def test_a_speed_like_the_one_before_is_left_out(scheduler: TestScheduler) -> No
     assert results.messages == [on_next(220, 0.0), on_next(240, 0.5)]
 
 
-def test_positions_between_which_time_does_not_advance_have_no_speed(scheduler: TestScheduler) -> None:
-    dropped: list[str] = []
+def test_pair_without_advancing_time_is_rejected(scheduler: TestScheduler) -> None:
     positions = scheduler.create_hot_observable(
         on_next(210, Position(5 * SECOND, 0.0, 0.0)),
         on_next(220, Position(5 * SECOND, 1.0, 0.0)),
@@ -54,13 +53,25 @@ def test_positions_between_which_time_does_not_advance_have_no_speed(scheduler: 
         on_next(240, Position(4 * SECOND, 4.0, 0.0)),
     )
 
-    results = scheduler.start(lambda: effector_speed(positions, dropped.append))
+    results = scheduler.start(lambda: effector_speed(positions))
 
-    assert results.messages == [on_next(240, 2.0)]
-    assert dropped == ["its time stands still", "its time goes back by 2 s"]
+    *rejections, last = results.messages
+    assert last == on_next(240, 2.0)
+    assert [(it.time, it.value.value.topic, it.value.value.reason) for it in rejections] == [
+        (220, EFFECTOR_POSITION, "its time stands still"),
+        (230, EFFECTOR_POSITION, "its time goes back by 2 s"),
+    ]
 
 
-def test_an_error_is_passed_on(scheduler: TestScheduler) -> None:
+def test_each_rejection_is_emitted(scheduler: TestScheduler) -> None:
+    positions = scheduler.create_hot_observable(
+        *(on_next(time, Position(SECOND, 0.0, 0.0)) for time in (210, 220, 230, 240))
+    )
+
+    assert len(scheduler.start(lambda: effector_speed(positions)).messages) == 3
+
+
+def test_error_is_passed_on(scheduler: TestScheduler) -> None:
     error = ValueError("planted")
     positions = scheduler.create_hot_observable(on_error(210, error))
 
@@ -71,19 +82,19 @@ coordinates = st.floats(-1e6, 1e6)
 
 
 @given(st.lists(st.builds(Position, st.integers(0, 2**62), coordinates, coordinates)))
-def test_a_speed_is_never_negative_nor_infinite_whatever_the_stamps(positions: list[Position]) -> None:
-    speeds: list[float] = []
+def test_speed_is_finite_and_not_negative_for_all_stamps(positions: list[Position]) -> None:
+    speeds: list[float | Rejected] = []
     source: Subject[Position] = Subject()
     effector_speed(source).subscribe(speeds.append)
     for position in positions:
         source.on_next(position)
 
-    assert all(math.isfinite(speed) and speed >= 0 for speed in speeds)
+    assert all(isinstance(speed, Rejected) or (math.isfinite(speed) and speed >= 0) for speed in speeds)
 
 
 @given(st.integers(0, 2**62), st.integers(1, 10**12), coordinates, coordinates)
-def test_a_straight_movement_has_its_speed(begin: int, nanoseconds: int, x: float, y: float) -> None:
-    speeds: list[float] = []
+def test_straight_movement_has_its_speed(begin: int, nanoseconds: int, x: float, y: float) -> None:
+    speeds: list[float | Rejected] = []
     source: Subject[Position] = Subject()
     effector_speed(source).subscribe(speeds.append)
     source.on_next(Position(begin, 0.0, 0.0))

@@ -23,7 +23,7 @@ def test_the_parameters_of_every_service_are_known() -> None:
         "kinematics": set(),
         "velocity": set(),
         "operator_watchdog": {"lifespan", "sampling", "silence", "strikes", "repeat"},
-        "engine_controller": {"presence", "absence", "repeat"},
+        "engine_controller": {"max_presence_age", "presence_timeout", "repeat"},
         "sentinel": {"look", "silence", "start"},
     }
 

@@ -119,7 +119,7 @@ def test_a_second_instance_of_a_service_refuses_to_start_and_names_the_first(mod
     )
     assert second.returncode == 1
     assert second.stderr.count("\n") == 1
-    assert f"process {module_site.members['kinematics']}" in second.stderr
+    assert f"/kinematics already runs in domain {module_site.domain}" in second.stderr
 
 
 BAD = [

@@ -290,7 +290,7 @@ def test_a_second_system_in_the_same_domain_is_told_and_the_first_goes_on(site: 
         code, printed = second.do("start", STEADY)
         assert code == 1
         assert "does not start" in printed
-        assert "runs already in domain" in printed
+        assert "already runs in domain" in printed
         assert second.members == {}
     assert site.members == before
 

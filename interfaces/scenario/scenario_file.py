@@ -30,89 +30,15 @@ import itertools
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from datetime import timedelta
 from pathlib import Path
-from typing import Any, Generic, Protocol, TypeVar
-
-import reactivex as rx
-import yaml
-from reactivex import Observable, abc
-from reactivex.disposable import MultipleAssignmentDisposable
-from reactivex.scheduler import TimeoutScheduler
+from typing import Any, TypeVar
 
 from interfaces import topics
-from interfaces.scenario import unique_yaml
+from interfaces.scenario import yaml_file
+from interfaces.scenario.timeline import Events, Sweep, Timeline
+from interfaces.service.errors import UserError
 
 T = TypeVar("T")
-T_co = TypeVar("T_co", covariant=True)
-
-
-class ScenarioError(ValueError):
-    """A mistake in a scenario: one line that names the file, the key and the reason."""
-
-
-class Timeline(Protocol[T_co]):
-    """Values over time [s since the scenario's origin]."""
-
-    catches_up: bool
-    """Whether values whose time has passed unnoticed (a stopped process) are still worth something."""
-
-    def at(self, time: float) -> T_co | None:
-        """Return the value that holds at a time, ``None`` if there is none yet."""
-
-    def after(self, time: float) -> Iterator[tuple[float, T_co]]:
-        """Return the changes after a time, in order, each with its time."""
-
-
-@dataclass(frozen=True)
-class Events(Generic[T]):
-    """Single values, each from its time on."""
-
-    items: tuple[tuple[float, T], ...]
-    repeat: float | None = None
-    """All of them again and again, with this period [s]."""
-    catches_up = True
-
-    def at(self, time: float) -> T | None:
-        """Return the last value up to a time."""
-        value = None
-        for _, item in itertools.takewhile(lambda item: item[0] <= time, self._around(time)):
-            value = item
-        return value
-
-    def after(self, time: float) -> Iterator[tuple[float, T]]:
-        """Return the values after a time."""
-        return itertools.dropwhile(lambda item: item[0] <= time, self._around(time))
-
-    def _around(self, time: float) -> Iterator[tuple[float, T]]:
-        """Return the values since the beginning, or since a whole round before a time."""
-        if self.repeat is None:
-            return iter(self.items)
-        rounds = itertools.count(max(0, math.floor(time / self.repeat) - 1))
-        return ((at + round_ * self.repeat, item) for round_ in rounds for at, item in self.items)
-
-
-@dataclass(frozen=True)
-class Sweep:
-    """center + amplitude · sin(2π · t/period + phase) at t = ``delay`` + n / ``rate``, n = …, -1, 0, 1, …"""
-
-    center: float
-    amplitude: float
-    period: float
-    rate: float = 25.0
-    phase: float = 0.0
-    delay: float = 0.0
-    catches_up = False
-
-    def at(self, time: float) -> float:
-        """Return the value at a time."""
-        return self.center + self.amplitude * math.sin(math.tau * time / self.period + self.phase)
-
-    def after(self, time: float) -> Iterator[tuple[float, float]]:
-        """Return the values after a time."""
-        steps = itertools.count(math.floor((time - self.delay) * self.rate) + 1)
-        times = (self.delay + step / self.rate for step in steps)
-        return ((at, self.at(at)) for at in times)
 
 
 @dataclass(frozen=True)
@@ -126,66 +52,9 @@ class Scenario:
     commands: Timeline[str] | None = None
 
 
-def play(timeline: Timeline[T], elapsed: float, *, resume: bool = True) -> Observable[T]:
-    """
-    Return a timeline as an observable that does not drift.
-
-    :param elapsed: where in time it starts [s]; negative while the origin is still to come.
-    :param resume: whether the value that holds already is emitted first, at once. Right for a state, wrong
-    for
-        events: what a restarted source has said before its death it does not say again.
-    """
-
-    def subscribe(
-        observer: abc.ObserverBase[T], scheduler: abc.SchedulerBase | None = None
-    ) -> abc.DisposableBase:
-        clock = scheduler or TimeoutScheduler.singleton()
-        origin = clock.now - timedelta(seconds=elapsed)
-        upcoming = timeline.after(elapsed if resume else math.nextafter(elapsed, -math.inf))
-        pending = MultipleAssignmentDisposable()
-
-        def wait() -> None:
-            for at, value in upcoming:
-                due = origin + timedelta(seconds=at)
-                if timeline.catches_up or due >= clock.now:
-                    pending.disposable = clock.schedule_absolute(due, emit, value)
-                    return
-            observer.on_completed()
-
-        def emit(_: abc.SchedulerBase, value: Any) -> None:
-            observer.on_next(value)
-            wait()
-
-        present = timeline.at(elapsed) if resume else None
-        if present is not None:
-            observer.on_next(present)
-        wait()
-        return pending
-
-    return Observable(subscribe)
-
-
-def follow(parameter: Observable[T], timeline: Observable[T] | None) -> Observable[T]:
-    """
-    Return what a virtual source does that has a parameter and may have a timeline.
-
-    Without a timeline that is the parameter's value at once, then what is set. With one, it is the timeline,
-    and nothing before it begins; until somebody sets the parameter, who has taken over from then on.
-    """
-    if timeline is None:
-        return parameter
-    return parameter.skip(1).publish(lambda settings: rx.merge(timeline.take_until(settings), settings))
-
-
 def load(path: str | Path) -> Scenario:
-    """Read a scenario from a file. Raises ScenarioError for any mistake in it."""
-    try:
-        text = Path(path).read_text(encoding="utf-8")
-        document = unique_yaml.load(text)
-    except OSError as error:
-        raise ScenarioError(f"{path}: {error.strerror}") from error
-    except (yaml.YAMLError, ValueError) as error:
-        raise ScenarioError(f"{path}: {' '.join(str(error).split())}") from error
+    """Read a scenario from a file. Raises UserError: one line with file, key and reason."""
+    document = yaml_file.load(path)
     return _scenario(_Item({} if document is None else document, str(path), ""))
 
 
@@ -213,8 +82,8 @@ def _values(item: _Item, topic: topics.Topic, repeat: float | None) -> Timeline[
 
     def value(given: _Item) -> float:
         number = given.number()
-        if fault := topic.fault(topic.type(data=number)):
-            raise given.error(fault)
+        if problem := topic.problem(topic.type(data=number)):
+            raise given.error(problem)
         return number
 
     def event(given: _Item) -> tuple[float, float]:
@@ -234,8 +103,8 @@ def _values(item: _Item, topic: topics.Topic, repeat: float | None) -> Timeline[
         item["phase"].number() if "phase" in item else Sweep.phase,
         item["delay"].number(0.0) if "delay" in item else Sweep.delay,
     )
-    if fault := topic.fault(topic.type(data=sweep.center - sweep.amplitude)):
-        raise item["amplitude"].error(f"at its lowest, {fault}")
+    if problem := topic.problem(topic.type(data=sweep.center - sweep.amplitude)):
+        raise item["amplitude"].error(f"at its lowest, {problem}")
     return sweep
 
 
@@ -302,8 +171,8 @@ class _Item:
     path: str
     key: str
 
-    def error(self, reason: str) -> ScenarioError:
-        return ScenarioError(f"{self.path}: {self.key or 'scenario'}: {reason}")
+    def error(self, reason: str) -> UserError:
+        return UserError(f"{self.path}: {self.key or 'scenario'}: {reason}")
 
     def __contains__(self, key: str) -> bool:
         return key in self.value

@@ -1,0 +1,32 @@
+"""One live instance of a service per host, ROS domain and node name."""
+
+from __future__ import annotations
+
+import hashlib
+import socket
+
+from rclpy.node import Node
+
+
+class AlreadyRunning(Exception):
+    """A live instance of this service runs on this host and domain."""
+
+
+def claim(node: Node) -> socket.socket:
+    """
+    Claim the name of a node on this host and domain, for as long as the returned socket lives.
+
+    The claim is an abstract unix socket: the kernel frees it when the process ends, however it ends.
+
+    :raises AlreadyRunning: if a live process holds the claim.
+    """
+    name = node.get_fully_qualified_name()
+    domain = node.context.get_domain_id()
+    digest = hashlib.sha256(name.encode()).hexdigest()[:32]  # an address has at most 107 bytes
+    held = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+    try:
+        held.bind(f"\0reactive-arm/{domain}/{digest}")
+    except OSError:
+        held.close()
+        raise AlreadyRunning(f"{name} already runs in domain {domain}") from None
+    return held
