@@ -1,4 +1,4 @@
-# The commands of reactive-arm; `make` alone lists them. Each sets up .venv first where that is still to be done.
+# The commands of reactive-arm; `make` alone lists them. Most of them set up .venv first if it is missing or outdated.
 
 PYTHON ?=
 SCENARIO ?= demo
@@ -11,6 +11,9 @@ SHELL := /bin/sh
 MAKEFLAGS += --no-print-directory
 PY := .venv/bin/python
 STAMP := .venv/made-from
+# A Python that is still starting answers Ctrl-C with a traceback: SIGINT waits until the command is ready for it.
+HOLD := $(shell env --block-signal=INT echo env --block-signal=INT 2>/dev/null)
+export PYTHON SCENARIO PARAMETERS
 
 .PHONY: help setup run start stop status logs console chaos test check bench
 
@@ -28,17 +31,20 @@ help:
 	@echo "make setup    only set up .venv                   (PYTHON= chooses the interpreter, 3.11 to 3.13)"
 
 setup:
-	@deploy/commands/setup.sh '$(PYTHON)'
+	@exec $(HOLD) deploy/commands/python.sh deploy.commands.setup "$$PYTHON"
 
 run start: setup
-	@$(PY) -m deploy.commands.launcher $@ '$(SCENARIO)' '$(PARAMETERS)'
+	@exec $(HOLD) $(PY) -m deploy.commands.launcher $@ "$$SCENARIO" "$$PARAMETERS"
 
-# These do without a set-up: what they look at, or end, runs already. Nothing runs from half of one: it has no stamp.
-console status logs stop:
-	@if test -e $(STAMP); then exec $(PY) -m deploy.commands.launcher $@; else echo "Nothing runs: .venv is not set up (make setup)."; fi
+console status logs:
+	@test -e $(STAMP) || { echo ".venv is not set up: make setup (make stop works without it)" >&2; exit 1; }
+	@exec $(HOLD) $(PY) -m deploy.commands.launcher $@
+
+stop:
+	@exec $(HOLD) deploy/commands/python.sh deploy.commands.stop "$$PYTHON"
 
 chaos: setup
-	@$(PY) -m deploy.chaos --minutes $(MINUTES) $(if $(SEED),--seed $(SEED)) $(CHAOS)
+	@exec $(HOLD) $(PY) -m deploy.chaos --minutes $(MINUTES) $(if $(SEED),--seed $(SEED)) $(CHAOS)
 
 test: setup
 	@$(PY) -m pytest $(TESTS)
@@ -51,5 +57,5 @@ check: setup
 	@$(PY) -m ruff format --check --quiet .
 	@$(PY) -m mypy
 	@$(PY) -m mypy --config-file deploy/runtime/pyproject.toml
-	@.venv/bin/shellcheck deploy/commands/setup.sh .ci/run
+	@.venv/bin/shellcheck deploy/commands/python.sh .ci/run
 	@$(PY) -m yamllint --strict deploy

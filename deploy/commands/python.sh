@@ -1,21 +1,24 @@
 #!/bin/sh
-# Chooses the interpreter of .venv and lets deploy/commands/setup.py bring it up to date.
-# usage: setup.sh [INTERPRETER]    default: the one .venv has, else the first on the PATH that fits
+# Runs a module of the checkout with a bare interpreter: before .venv exists, and after it was removed.
+# usage: python.sh MODULE [INTERPRETER]    default: the one of .venv, else the first on the PATH that fits
 set -eu
 
-# Prints the interpreter itself, also where $1 belongs to a virtual environment: .venv cannot stand on another one.
+# Prints the base interpreter of $1: .venv cannot build on a virtual environment, nor on what is left of itself.
 base_of() {
-    "$1" -c 'import sys; (3, 11) <= sys.version_info[:2] <= (3, 13) or sys.exit(1); print(sys._base_executable)'
+    "$1" -c 'import os, sys
+(3, 11) <= sys.version_info[:2] <= (3, 13) or sys.exit(1)
+print(os.path.realpath(sys._base_executable))'
 }
 
+module=$1
 cd "$(dirname "$0")/../.."
-if [ -n "${1-}" ]; then
-    base=$(base_of "$1") && [ -n "$base" ] && exec "$base" -m deploy.commands.setup
-    echo "PYTHON=$1 is not a Python 3.11, 3.12 or 3.13" >&2
+if [ -n "${2-}" ]; then
+    base=$(base_of "$2") && [ -n "$base" ] && exec "$base" -m "$module"
+    echo "PYTHON=$2 is not a Python 3.11, 3.12 or 3.13" >&2
     exit 1
 fi
 for python in .venv/bin/python python3 python3.13 python3.12 python3.11; do
-    base=$(base_of "$python" 2>/dev/null) && exec "$base" -m deploy.commands.setup
+    base=$(base_of "$python" 2>/dev/null) && exec "$base" -m "$module"
 done
-echo "No Python 3.11, 3.12 or 3.13 found: install one, or name it: make setup PYTHON=/path/to/python3.12" >&2
+echo "No Python 3.11, 3.12 or 3.13 found: install one, or name it, for example PYTHON=/path/to/python3.12" >&2
 exit 1
