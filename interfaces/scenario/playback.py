@@ -26,8 +26,8 @@ def events(timeline: Events[T], elapsed: float, *, resume: bool = False) -> Obse
     """
     Emit single events, each once.
 
-    :param resume: whether the events up to now were emitted already, by a process that died. Otherwise those
-        that are overdue come at once.
+    :param resume: whether a process that died has emitted the events up to now; otherwise overdue events are
+        emitted at once.
     """
     return _items(timeline.after(elapsed if resume else -1.0), elapsed)
 
@@ -45,7 +45,7 @@ def _at(due: datetime, value: T) -> Observable[T]:
 
 
 def _samples(sweep: Sweep, elapsed: float) -> Observable[float]:
-    """Emit the value of the very moment, which a late timer makes no older; nothing while it rests."""
+    """Emit the value at the time of emission, so a late timer causes no error; nothing during a rest."""
 
     def begin(scheduler: abc.SchedulerBase) -> Observable[float]:
         origin = scheduler.now - timedelta(seconds=elapsed)
@@ -58,10 +58,10 @@ def _samples(sweep: Sweep, elapsed: float) -> Observable[float]:
 
 def follow(parameter: Observable[T], timeline: Observable[T] | None) -> Observable[T]:
     """
-    Emit what a virtual source does that has a parameter and may have a timeline.
+    Emit the values of a virtual source.
 
-    Without a timeline this is the parameter's value at once, and each value that is set. With a timeline it
-    is the timeline, until the parameter is set by hand; from then on it is the parameter.
+    Without a timeline, these are the parameter's present value and each value that is set. With a timeline,
+    they are the timeline's values until the parameter is set by hand, then the parameter's.
     """
     if timeline is None:
         return parameter

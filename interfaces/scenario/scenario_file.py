@@ -1,7 +1,7 @@
 """Reads scenarios: YAML files that state what the virtual sources do, and when (``deploy/scenarios/*.yaml``).
 
 Times are seconds since the scenario's origin, values are SI units. Every key is optional; a source without a
-key follows its parameters. ::
+key follows its parameters. Before the origin, the sources play nothing. ::
 
     l1: 2.0                                 # a constant
     l2:                                     # values, each from its time on
@@ -21,9 +21,10 @@ key follows its parameters. ::
     repeat: 60.0                            # everything except the sweeps starts again every 60 s
 
 Every sample of a moving joint gives a position (``combine_latest``). If both joints move, their samples
-alternate: a position shows a full step of one joint, but the last position was that of the other joint, a
-part of the step's time ago. The published speed is then about twice the true speed, and more when a process
-is late. In ``demo.yaml`` the joints take turns (``phase``, ``rest``), so its speeds are true.
+alternate: a position shows a full step of one joint, but its time since the last position, which is the other
+joint's, is only a part of the step's time. The published speed is then about twice the true speed. Any speed
+is also wrong by as much as `kinematics` is late, because positions are stamped there. In ``demo.yaml`` the
+joints take turns (``phase``, ``rest``), which leaves only the second error.
 """
 
 from __future__ import annotations
