@@ -39,7 +39,7 @@ def wire(node: ServiceNode, topic: Topic) -> None:
     node.declare(Parameters[topic.name])
     source = VirtualSource(node)
     values = source.follow("value", source.scenario.configuration.get(topic.name))
-    node.publish(topic, values.map(lambda value: topic.type(data=value)))
+    node.publish(topic, values, lambda value: topic.type(data=value))
 
 
 if __name__ == "__main__":

@@ -64,10 +64,10 @@ def wire(node: ServiceNode) -> None:
         source.follow("rate"),
         source.play(source.scenario.heartbeats, until_set="pressed"),
     )
-    node.publish(OPERATOR_HEARTBEAT, beats.map(lambda beat: Bool(data=beat)))
+    node.publish(OPERATOR_HEARTBEAT, beats, lambda beat: Bool(data=beat))
     states = node.observe(ENGINES_STATE).map(lambda state: state.data)
     commands = engine_commands(source.play(source.scenario.commands), states)
-    node.publish(ENGINES, commands.map(lambda command: String(data=command)))
+    node.publish(ENGINES, commands, lambda command: String(data=command))
 
 
 if __name__ == "__main__":
