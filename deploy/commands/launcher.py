@@ -108,7 +108,7 @@ def _started(system: System, scenario: str, parameter_file: str) -> Iterator[Mem
     from deploy.commands import parameters
     from deploy.commands.member import Member
 
-    parameters.check_environment()
+    parameters.check_environment(system)
     given = parameters.of_system(scenario, parameter_file)
     with Member() as member:
         log_sizes = {path.stem: path.stat().st_size for path in system.logs.glob("*.log")}

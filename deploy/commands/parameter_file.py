@@ -12,10 +12,7 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Iterator
-from contextlib import suppress
 from typing import Any
-
-import yaml
 
 from deploy.supervision import interruption, manifest
 from deploy.supervision.system import ALL, KEY
@@ -84,16 +81,7 @@ def _problems_of(
     for service, declaration in having.items():
         if problem := declaration.problem(value):
             key = f"{node}.{name} of {service}" if node == ALL else f"{node}.{name}"
-            yield key, problem + _hint(declaration, value)
-
-
-def _hint(declaration: Declaration, value: object) -> str:
-    """How to write a number that YAML reads as a string, such as 1e9."""
-    if isinstance(declaration.default, float) and isinstance(value, str):
-        with suppress(ValueError):
-            number = yaml.safe_dump(float(value)).splitlines()[0]
-            return f", which YAML reads as a string; write {number}"
-    return ""
+            yield key, problem
 
 
 def _program_of(node: str, namespace: str) -> str:

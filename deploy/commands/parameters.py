@@ -10,6 +10,7 @@ from rclpy.exceptions import InvalidNamespaceException
 from rclpy.validate_namespace import validate_namespace
 
 from deploy.commands import parameter_file
+from deploy.supervision import manifest, processes
 from deploy.supervision.processes import ROOT
 from deploy.supervision.system import (
     ALL,
@@ -17,11 +18,12 @@ from deploy.supervision.system import (
     NAMESPACE,
     NOT_YET,
     DeploymentError,
+    System,
     namespace_of,
     scenario_parameters,
 )
 from interfaces.scenario import scenario_file
-from interfaces.service import UserError
+from interfaces.service import UserError, instance
 
 SCENARIOS = ROOT / "deploy" / "scenarios"
 
@@ -54,8 +56,8 @@ def _scenario_file(name: str) -> Path:
     raise DeploymentError(f"SCENARIO={name} is neither a file nor one of: {known}")
 
 
-def check_environment() -> None:
-    """Raise DeploymentError for an environment in which no node can live."""
+def check_environment(system: System) -> None:
+    """Raise DeploymentError for an environment in which the services of a system cannot live."""
     domain = os.environ.get("ROS_DOMAIN_ID") or "0"
     if not domain.isdecimal() or int(domain) > 232:
         raise DeploymentError(f"ROS_DOMAIN_ID={domain} is not a number from 0 to 232")
@@ -65,3 +67,20 @@ def check_environment() -> None:
     except InvalidNamespaceException as error:
         reason = str(error).splitlines()[0].rstrip(":")
         raise DeploymentError(f"{NAMESPACE}={namespace} is no namespace such as /arm1: {reason}") from None
+    if not system.members():  # the start reports a running system, and replaces orphans
+        for program in manifest.programs():
+            _check_claim(f"{namespace.rstrip('/')}/{program.name}", int(domain), namespace)
+
+
+def _check_claim(node: str, domain: int, namespace: str) -> None:
+    if not instance.is_claimed(node, domain):
+        return
+    users = (
+        f"the system in {run} has {node}"
+        for run, environment in processes.systems().items()
+        if int(environment.get("ROS_DOMAIN_ID") or 0) == domain and namespace_of(environment) == namespace
+    )
+    raise DeploymentError(
+        f"ROS domain {domain} is in use: {next(users, f'{node} already runs on this host')}."
+        f" Set ROS_DOMAIN_ID to another domain (0 to 101), or {NAMESPACE}, for example to /arm2."
+    )

@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 from deploy.supervision import manifest
+from interfaces.service import instance
 from tests.system import pauses
 from tests.system.sites import Command, Site
 
@@ -316,10 +317,38 @@ def test_a_second_system_in_the_same_domain_is_refused(site: Site, tmp_path: Pat
     with closing(Site(tmp_path / "second", site.domain)) as second:
         code, printed = second.do("start", STEADY)
         assert code == 1
-        assert "does not start" in printed
-        assert "already runs in domain" in printed
+        assert printed == (
+            f"ROS domain {site.domain} is in use: the system in {site.run} has /config_l1. Set ROS_DOMAIN_ID"
+            " to another domain (0 to 101), or REACTIVE_ARM_NAMESPACE, for example to /arm2."
+        )
         assert second.members == {}
+        assert not second.run.exists()
     assert site.members == before
+
+
+def test_a_service_in_the_same_domain_is_reported(site: Site) -> None:
+    service = site.begin_command(sys.executable, "-m", "services.velocity")
+    while not instance.is_claimed("/velocity", site.domain):
+        assert service.is_alive, service.output
+        time.sleep(0.02)
+    code, printed = site.do("start", STEADY)
+    assert code == 1
+    assert printed.startswith(f"ROS domain {site.domain} is in use: /velocity already runs on this host. Set")
+
+
+def test_a_service_that_does_not_start_shows_its_last_words(
+    site: Site, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    crash = "import os, sys\nif 'services.velocity' in sys.orig_argv: print('crash', flush=True); os._exit(1)"
+    (tmp_path / "sitecustomize.py").write_text(crash)
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    (site.run / "logs").mkdir(parents=True)
+    (site.run / "logs" / "velocity.log").write_text("a line of an earlier start\n")
+    code, printed = site.do("start", STEADY)
+    assert code == 1
+    lines = printed.splitlines()
+    assert set(lines[lines.index("velocity does not start:") + 1 :]) == {"crash"}
+    assert site.members == {}
 
 
 def test_an_error_in_a_parameter_file_is_reported_before_the_start(site: Site, tmp_path: Path) -> None:
