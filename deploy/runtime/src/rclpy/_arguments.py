@@ -10,13 +10,17 @@ from __future__ import annotations
 import re
 import sys
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
-from rclpy._parameter_values import NodeParameters, parse_value
+from rclpy._parameter_values import parse_value
 from rclpy.exceptions import RCLInvalidROSArgsError, UnknownROSArgsError
 from rclpy.expand_topic_name import expand_topic_name
 from rclpy.impl.logging_severity import LoggingSeverity
 from rclpy.logging import get_logger
 from rclpy.parameter import Parameter
+
+if TYPE_CHECKING:
+    from rclpy._parameter_files import ParametersOfNodes
 
 _TOKEN = "[A-Za-z_][A-Za-z0-9_]*"
 _NAME = rf"(?:~/|/)?{_TOKEN}(?:/{_TOKEN})*"
@@ -57,7 +61,7 @@ class RosArguments:
     """
 
     remaps: tuple[RemapRule, ...] = ()
-    parameters: tuple[NodeParameters, ...] = ()
+    parameters: tuple[ParametersOfNodes, ...] = ()
     log_level: LoggingSeverity | None = None
     log_levels: dict[str, LoggingSeverity] = field(default_factory=dict)
     stdout_logs: bool = True
@@ -144,7 +148,7 @@ class _Parser:
     def __init__(self, argv: list[str]) -> None:
         self._argv = argv
         self._remaps: list[RemapRule] = []
-        self._parameters: NodeParameters = {}
+        self._parameters: ParametersOfNodes = {}
         self._log_level: LoggingSeverity | None = None
         self._log_levels: dict[str, LoggingSeverity] = {}
         self._switches = {"stdout": True, "rosout": True, "external-lib": True}

@@ -7,13 +7,16 @@ A file maps names of nodes, which may be nested in namespaces and contain the wi
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, TypeAlias
 
 import yaml
 
 from rclpy import validate_node_name
-from rclpy._parameter_values import NodeParameters, plain_scalar
+from rclpy._parameter_scalars import plain_scalar
 from rclpy.parameter import PARAMETER_SEPARATOR_STRING, Parameter
+
+ParametersOfNodes: TypeAlias = dict[str, dict[str, Parameter]]
+"""Node name or pattern -> parameter name -> parameter, in the order of their first appearance."""
 
 _PARAMETERS_KEY = "ros__parameters"
 _STRING_TAG = "tag:yaml.org,2002:str"
@@ -27,7 +30,7 @@ class ParameterFileError(ValueError):
     """Raised for a parameter file that cannot be used; the message is one line with file, key and reason."""
 
 
-def read_parameter_file(path: str) -> NodeParameters:
+def read_parameter_file(path: str) -> ParametersOfNodes:
     """
     Read a parameter file.
 
@@ -45,7 +48,7 @@ def read_parameter_file(path: str) -> NodeParameters:
     except RecursionError:
         raise ParameterFileError(f"{path}: {_TOO_DEEP}") from None
 
-    nodes: NodeParameters = {}
+    nodes: ParametersOfNodes = {}
     try:
         if document is not None:
             _read_nodes(document, "", nodes)
@@ -95,7 +98,7 @@ class _Mistake(Exception):
         self.reason = reason
 
 
-def _read_nodes(mapping: yaml.Node, namespace: str, nodes: NodeParameters) -> None:
+def _read_nodes(mapping: yaml.Node, namespace: str, nodes: ParametersOfNodes) -> None:
     """Collect the parameters of the nodes in `namespace`."""
     for key_node, value_node in _items(mapping, namespace, "names of nodes"):
         name = key_node.value

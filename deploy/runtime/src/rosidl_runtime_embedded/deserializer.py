@@ -11,8 +11,9 @@ from __future__ import annotations
 from array import array
 from struct import Struct
 from struct import error as struct_error
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from .definition_files import message_definition
 from .fields import ARRAY_CODES, slot_of
 from .generator import Generator
 from .layout import (
@@ -25,21 +26,21 @@ from .layout import (
     run_format,
     smallest_size,
 )
-from .packages import message_class, message_definition
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from .definition import FieldType, MessageDefinition
-    from .message import Message
 
 
-def make_deserializer(cls: type[Message]) -> Callable[[bytes], Message]:
+def make_deserializer(
+    definition: MessageDefinition, message_class: Callable[[str], type]
+) -> Callable[[bytes], Any]:
     """Function from bytes to a message of the class; for all else it raises ValueError and nothing else."""
-    return _DeserializerGenerator(cls).compile()
+    return _DeserializerGenerator(definition, message_class).compile()
 
 
-def _malformed(cls: type[Message], data: bytes, reason: object) -> ValueError:
+def _malformed(cls: Any, data: bytes, reason: object) -> ValueError:
     return ValueError(f"{len(data)} bytes are no {cls._TYPE_NAME}: {reason}")
 
 
@@ -69,9 +70,10 @@ def _wide_text(data: bytes) -> str:
 class _DeserializerGenerator(Generator):
     """The variable ``p`` has the position where it is known at run time only."""
 
-    def __init__(self, cls: type[Message]) -> None:
+    def __init__(self, definition: MessageDefinition, message_class: Callable[[str], type]) -> None:
         super().__init__(
-            cls,
+            definition,
+            message_class,
             array=array,
             booleans=_bools,
             error=struct_error,
@@ -83,12 +85,12 @@ class _DeserializerGenerator(Generator):
         )
         self._after: list[str] = []  # what can be done once the run is read
 
-    def compile(self) -> Callable[[bytes], Message]:
+    def compile(self) -> Callable[[bytes], Any]:
         self._run.append(Item("H2x", HEADER_SIZE, 1, "h"))
         self._after.append(
             f"if h != {LITTLE_ENDIAN_CDR}: raise ValueError('its header is not that of little-endian CDR')"
         )
-        result = self._message(self._cls, self._cls._DEFINITION)
+        result = self._message(self._definition)
         self._flush()
         code = [
             "def deserialize(data):",
@@ -103,10 +105,10 @@ class _DeserializerGenerator(Generator):
             code.remove("  end = len(data)")
         return self._compiled("deserialize", code)
 
-    def _message(self, cls: type[Message], definition: MessageDefinition) -> str:
+    def _message(self, definition: MessageDefinition) -> str:
         """Read a message; the name of the variable that holds it."""
         message = self._variable()
-        self._emit(f"{message} = new({self._name(cls)})")
+        self._emit(f"{message} = new({self._name(self._message_class(definition.name))})")
         if not definition.fields:
             self._run.append(Item("x", 1))
         for field in definition.fields:
@@ -121,8 +123,7 @@ class _DeserializerGenerator(Generator):
 
     def _single(self, target: str, type_: FieldType) -> None:
         if type_.is_message:
-            nested = message_class(type_.base)
-            self._after.append(f"{target} = {self._message(nested, nested._DEFINITION)}")
+            self._after.append(f"{target} = {self._message(message_definition(type_.base))}")
         elif type_.base in ("string", "wstring"):
             self._text(target, type_.base)
         else:

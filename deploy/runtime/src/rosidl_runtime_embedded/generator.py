@@ -9,17 +9,20 @@ from . import generated
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from .definition import MessageDefinition
     from .layout import Item
-    from .message import Message
 
 
 class Generator:
     """Writes the code of a function for the messages of one class, and compiles it."""
 
-    def __init__(self, cls: type[Message], **names: object) -> None:
-        """Begin; ``names`` are global to the code."""
-        self._cls = cls
-        self._names: dict[str, Any] = {"cls": cls, **names}
+    def __init__(
+        self, definition: MessageDefinition, message_class: Callable[[str], type], **names: object
+    ) -> None:
+        """Begin; ``message_class`` gives a class by its full name, ``names`` are global to the code."""
+        self._definition = definition
+        self._message_class = message_class
+        self._names: dict[str, Any] = {"cls": message_class(definition.name), **names}
         self._lines: list[str] = []
         self._indent = 2
         self._variables = 0
@@ -44,5 +47,5 @@ class Generator:
         """The function ``name`` that the code defines."""
         generated.run("\n".join(code), self._names)
         function: Callable[[Any], Any] = self._names[name]
-        function.__qualname__ = f"{self._cls.__name__}._{name}"
+        function.__qualname__ = f"{self._definition.name.rpartition('/')[2]}._{name}"
         return function

@@ -10,8 +10,8 @@ from __future__ import annotations
 from struct import Struct
 from typing import TYPE_CHECKING, NamedTuple
 
+from .definition_files import message_definition
 from .fields import ARRAY_CODES
-from .packages import message_definition
 
 if TYPE_CHECKING:
     from .definition import Field, MessageDefinition

@@ -8,8 +8,8 @@ from functools import cache
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from . import generated
+from .definition_files import message_definition
 from .fields import converter, initial_value, is_numeric, numeric_field, python_value, slot_of
-from .packages import message_class
 from .validation import validate_assignment
 
 if TYPE_CHECKING:
@@ -112,17 +112,17 @@ def _make_constructor(cls: type[Message]) -> Callable[..., None]:
 def _make_serializer(cls: type[Message]) -> Any:
     from .serializer import make_serializer
 
-    return staticmethod(make_serializer(cls))
+    return staticmethod(make_serializer(cls._DEFINITION, message_class))
 
 
 def _make_deserializer(cls: type[Message]) -> Any:
     from .deserializer import make_deserializer
 
-    return staticmethod(make_deserializer(cls))
+    return staticmethod(make_deserializer(cls._DEFINITION, message_class))
 
 
 def _make_type_hash(cls: type[Message]) -> str:
-    from .type_description import type_hash
+    from .type_hash import type_hash
 
     return type_hash(cls._TYPE_NAME)
 
@@ -213,7 +213,18 @@ class Message:
     __hash__ = None  # type: ignore[assignment]
 
 
-def make_message_class(definition: MessageDefinition) -> type[Message]:
+_classes: dict[str, type[Message]] = {}
+
+
+def message_class(name: str) -> type[Message]:
+    """Class of a message or a service's part by full name. Raises LookupError or InvalidDefinition."""
+    if name not in _classes:
+        # setdefault: of two threads that get here at once, both must see one class
+        _classes.setdefault(name, _make_message_class(message_definition(name)))
+    return _classes[name]
+
+
+def _make_message_class(definition: MessageDefinition) -> type[Message]:
     """Make the class of a message type."""
     package, kind, name = definition.name.split("/")
     namespace: dict[str, Any] = {
@@ -238,7 +249,7 @@ def make_message_class(definition: MessageDefinition) -> type[Message]:
     slots = []
     for field in definition.fields:
         slot = f"_{field.name}"
-        if hasattr(cls, slot):  # messages need it themselves
+        if slot in vars(Message) or slot in namespace:  # messages need it themselves
             slot = field.name
         else:
             setattr(cls, slot, vars(cls)[field.name])

@@ -13,17 +13,16 @@ from struct import Struct
 from struct import error as struct_error
 from typing import TYPE_CHECKING, Any
 
+from .definition_files import message_definition
 from .fields import ARRAY_CODES, slot_of
 from .generator import Generator
 from .layout import CODES, HEADER_SIZE, SIZES, Item, run_alignment, run_format
-from .packages import message_class
 from .validation import elements, validate
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from .definition import Field, FieldType, MessageDefinition
-    from .message import Message
 
 _PYTHON_TYPES = {
     "boolean": "bool",
@@ -36,20 +35,24 @@ _PYTHON_TYPES = {
 _NUL = Item("x", 1)
 
 
-def make_serializer(cls: type[Message]) -> Callable[[Any], bytes]:
+def make_serializer(
+    definition: MessageDefinition, message_class: Callable[[str], type]
+) -> Callable[[Any], bytes]:
     """Function from a message to its bytes; raises TypeError or ValueError naming type, field and value."""
-    return _SerializerGenerator(cls).compile()
+    return _SerializerGenerator(definition, message_class).compile()
 
 
 class _SerializerGenerator(Generator):
-    def __init__(self, cls: type[Message]) -> None:
-        super().__init__(cls, array=array, elements=elements, validate=validate, error=struct_error)
+    def __init__(self, definition: MessageDefinition, message_class: Callable[[str], type]) -> None:
+        super().__init__(
+            definition, message_class, array=array, elements=elements, validate=validate, error=struct_error
+        )
         self._checks: list[str] = []  # what must not be true of the values in the run
 
     def compile(self) -> Callable[[Any], bytes]:
         self._checks.append("type(m) is not cls")
         self._run.append(Item("xB2x", HEADER_SIZE, 1, "1"))
-        self._message("m", self._cls._DEFINITION)
+        self._message("m", self._definition)
         self._flush()
         has_loop = any(line.lstrip().startswith("for ") for line in self._lines)
         # a bytearray grows in place, bytes are faster while there are few parts
@@ -88,9 +91,8 @@ class _SerializerGenerator(Generator):
 
     def _single(self, value: str, type_: FieldType) -> None:
         if type_.is_message:
-            nested = message_class(type_.base)
-            self._checks.append(f"type({value}) is not {self._name(nested)}")
-            self._message(value, nested._DEFINITION)
+            self._checks.append(f"type({value}) is not {self._name(self._message_class(type_.base))}")
+            self._message(value, message_definition(type_.base))
             return
         self._checks.append(f"type({value}) is not {_PYTHON_TYPES.get(type_.base, 'int')}")
         if type_.string_bound:

@@ -13,8 +13,8 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from .definition_files import interface_names, message_definition, service_definition
 from .fields import ARRAY_CODES, python_value
-from .packages import interface_names, message_definition, service_definition
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -11,18 +11,16 @@ from typing import TYPE_CHECKING, Any
 
 from .definition import integer_range
 from .fields import ARRAY_CODES, is_numeric, shown
-from .packages import message_class
 
 if TYPE_CHECKING:
     from .definition import Field, FieldType
-    from .message import Message
 
 
-def validate(message: object, cls: type[Message]) -> None:
-    """Raise TypeError or ValueError, naming type, field and value, if it is no valid message of the class."""
+def validate(message: object, cls: Any) -> None:
+    """Raise TypeError or ValueError, naming type, field and value, if it is no valid message of a class."""
     if not isinstance(message, cls):
         raise TypeError(f"a {cls._TYPE_NAME} is expected, not {shown(message)}")
-    _message(message, cls, cls._TYPE_NAME, "")
+    _message(message, cls._TYPE_NAME, "")
 
 
 def validate_assignment(value: object, field: Field, top: str) -> None:
@@ -49,8 +47,8 @@ def _is_array(value: object, type_: FieldType, top: str, where: str) -> bool:
     return isinstance(value, array)
 
 
-def _message(message: Message, cls: type[Message], top: str, path: str) -> None:
-    for field in cls._DEFINITION.fields:
+def _message(message: Any, top: str, path: str) -> None:
+    for field in message._DEFINITION.fields:
         where = f"{path}{field.name}"
         try:
             value = getattr(message, field.name)
@@ -103,11 +101,10 @@ def _list(given: Any, type_: FieldType, top: str, where: str, nested: bool = Tru
 def _single(value: Any, type_: FieldType, top: str, where: str, nested: bool = True) -> None:
     base = type_.base
     if type_.is_message:
-        cls = message_class(base)
-        if not isinstance(value, cls):
+        if getattr(type(value), "_TYPE_NAME", None) != base:
             raise _wrong(TypeError, top, where, type_, value)
         if nested:
-            _message(value, cls, top, f"{where}.")
+            _message(value, top, f"{where}.")
     elif base in ("string", "wstring"):
         _string(value, type_, top, where)
     elif base == "boolean":

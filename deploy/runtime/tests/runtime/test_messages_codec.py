@@ -25,8 +25,8 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 import rosidl_runtime_embedded
 from rosidl_runtime_embedded import message_class
 from rosidl_runtime_embedded.definition import FieldType, integer_range
+from rosidl_runtime_embedded.definition_files import interface_names, message_definition
 from rosidl_runtime_embedded.fields import ARRAY_CODES
-from rosidl_runtime_embedded.packages import interface_names, message_definition
 
 SOURCE = Path(rosidl_runtime_embedded.__file__).parents[1]
 PACKAGES = sorted({path.parents[1].name for path in SOURCE.glob("*/msg/*.msg")})

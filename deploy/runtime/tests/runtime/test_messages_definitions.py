@@ -17,7 +17,7 @@ from rosbags.typesys import Stores, get_typestore
 import rosidl_runtime_embedded
 from rosidl_runtime_embedded import InvalidDefinition, message_class, service_class, stubs
 from rosidl_runtime_embedded.definition import FieldType
-from rosidl_runtime_embedded.packages import interface_names, message_definition
+from rosidl_runtime_embedded.definition_files import interface_names, message_definition
 from rosidl_runtime_embedded.type_description import type_description
 
 SOURCE = Path(rosidl_runtime_embedded.__file__).parents[1]

@@ -9,7 +9,7 @@ import pytest
 
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from rosidl_runtime_embedded.packages import message_class
+from rosidl_runtime_embedded import message_class
 from type_description_interfaces.srv import GetTypeDescription
 
 
