@@ -27,7 +27,7 @@ help:
 	@echo "make chaos    let a monkey break a system of its own, and judge  (MINUTES=5 SEED= CHAOS=--help for more)"
 	@echo "make test     run the tests                       (TESTS=tests/component for a part)"
 	@echo "make bench    measure what rclpy costs on this machine"
-	@echo "make check    ruff, mypy, shellcheck, yamllint"
+	@echo "make check    ruff, mypy, import rules, shellcheck, yamllint"
 	@echo "make setup    only set up .venv                   (PYTHON= chooses the interpreter, 3.11 to 3.13)"
 
 setup:
@@ -57,5 +57,6 @@ check: setup
 	@$(PY) -m ruff format --check --quiet .
 	@$(PY) -m mypy
 	@$(PY) -m mypy --config-file deploy/runtime/pyproject.toml
+	@PYTHONPATH="interfaces/reactive_node/src:deploy/runtime/src:$$PYTHONPATH" .venv/bin/lint-imports --no-logo --no-cache
 	@.venv/bin/shellcheck deploy/commands/python.sh .ci/run
 	@$(PY) -m yamllint --strict deploy
