@@ -18,11 +18,12 @@ from deploy.supervision.system import DeploymentError, System, scenario_paramete
 __all__ = ["make_interface"]
 
 SCENARIO = processes.ROOT / "deploy" / "scenarios" / "demo.yaml"  # as `make start`
+LEAD = 10.0  # s until the scenario begins: `make start` waits for the services instead
 
 
 def start_by_hand(arguments: list[str]) -> None:
     """Replace this process by a supervisord with the same arguments that runs the system."""
-    parameters = scenario_parameters(SCENARIO, time.monotonic())
+    parameters = scenario_parameters(SCENARIO, time.monotonic() + LEAD)
     try:
         System().become_supervisord(parameters, [_absolute(word) for word in arguments])
     except (DeploymentError, OSError) as error:

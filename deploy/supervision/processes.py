@@ -71,7 +71,7 @@ def of_system(run: Path) -> list[Process]:
 
 
 def systems() -> dict[Path, dict[str, str]]:
-    """The environments of this user's running systems, by run directory."""
+    """The environments of the running systems of this user, by run directory."""
     return {Path(environment[MARK]): environment for _, environment in _marked() if MARK in environment}
 
 
