@@ -9,24 +9,23 @@ import pytest
 import yaml
 
 from deploy.commands import parameter_file
+from deploy.supervision import manifest
 from interfaces.service import UserError
 
+PARAMETERS = {
+    "config_theta2": {"value"},
+    "dead_mans_switch": {"rate", "pressed"},
+    "kinematics": set(),
+    "operator_watchdog": {"lifespan", "sampling", "silence", "strikes", "repeat"},
+    "engine_controller": {"max_presence_age", "presence_timeout", "repeat"},
+    "sentinel": {"period", "health_timeout", "start_timeout"},
+}
 
-def test_the_parameters_of_every_service_are_known() -> None:
-    source = {"value"}
+
+def test_the_parameters_of_every_program_are_known() -> None:
     declared = parameter_file.declared()
-    assert {name: set(parameters) - {"use_sim_time"} for name, parameters in declared.items()} == {
-        "config_l1": source,
-        "config_l2": source,
-        "config_theta1": source,
-        "config_theta2": source,
-        "dead_mans_switch": {"rate", "pressed"},
-        "kinematics": set(),
-        "velocity": set(),
-        "operator_watchdog": {"lifespan", "sampling", "silence", "strikes", "repeat"},
-        "engine_controller": {"max_presence_age", "presence_timeout", "repeat"},
-        "sentinel": {"period", "health_timeout", "start_timeout"},
-    }
+    assert [*declared] == [program.name for program in manifest.programs()]
+    assert {name: set(declared[name]) - {"use_sim_time"} for name in PARAMETERS} == PARAMETERS
 
 
 @pytest.mark.parametrize(

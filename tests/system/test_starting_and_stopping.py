@@ -303,6 +303,36 @@ def test_a_run_directory_that_cannot_be_made_is_reported(site: Site, tmp_path: P
     site.run.parent.unlink()
 
 
+def test_a_full_disk_is_reported_with_the_file(site: Site) -> None:
+    site.run.mkdir()
+    (site.run / "parameters.new").symlink_to("/dev/full")
+    assert site.do("start", STEADY) == (1, f"{site.run / 'parameters.yaml'}: No space left on device")
+    assert site.members == {}
+
+
+def test_a_quote_in_scenario_is_no_shell_syntax(site: Site) -> None:
+    code, printed = site.do_command("make", "start", "SCENARIO=it's")
+    assert code != 0
+    assert printed.startswith("SCENARIO=it's is neither a file nor one of: demo, listing_5_9")
+
+
+def test_logs_follow_the_system_until_it_ends(site: Site) -> None:
+    code, printed = site.do("logs")
+    assert code == 1
+    assert printed == f"Nothing runs: make start. The logs of the last run are in {site.run / 'logs'}"
+    assert site.do("start", STEADY)[0] == 0
+    logs = site.begin("logs")
+    logs.await_line("logs/velocity.log")
+    assert site.do("stop")[0] == 0
+    logs.await_line("The system has ended")
+    assert logs.wait() == 0
+
+
+def test_the_sentinel_runs_only_under_supervisord(site: Site) -> None:
+    code, printed = site.do_command(sys.executable, "-m", "deploy.supervision.sentinel")
+    assert (code, printed) == (2, "sentinel: runs only under supervisord: make start")
+
+
 def test_an_impossible_namespace_is_reported(site: Site) -> None:
     site.namespace = "arm 1"
     code, printed = site.do("run", STEADY)

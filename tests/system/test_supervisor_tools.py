@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import shutil
+import sys
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 
 from deploy.supervision import manifest
-from tests.system.sites import Checkout
+from tests.system.sites import Checkout, Site
 
 CONF = ("-c", "deploy/supervisord.conf")
 PROGRAMS = {program.name for program in manifest.programs()}
@@ -59,6 +61,14 @@ def test_a_start_by_hand_serves_the_commands_of_make(checkout: Checkout) -> None
     console.await_line("The system has ended")
     assert console.wait() == 0
     checkout.await_members(lambda left: not left)
+
+
+def test_supervisorctl_reaches_another_run_directory(site: Site) -> None:
+    assert site.do("start", "demo")[0] == 0
+    ctl = str(Path(sys.executable).with_name("supervisorctl"))
+    code, table = site.do_command(ctl, "-s", f"unix://{site.run}/supervisor.sock", "status")
+    assert code in (0, 3)  # 3: a program is still STARTING
+    assert len(table.splitlines()) == len(PROGRAMS)
 
 
 def test_a_terminal_accepts_the_shutdown_of_supervisorctl(checkout: Checkout) -> None:
