@@ -1,4 +1,4 @@
-# The commands of reactive-arm; `make` alone lists them. Each sets up .venv first where that is still to be done.
+# The commands of reactive-arm; `make` alone lists them. Most of them set up .venv first if it is missing or outdated.
 
 PYTHON ?=
 SCENARIO ?= demo
@@ -11,6 +11,9 @@ SHELL := /bin/sh
 MAKEFLAGS += --no-print-directory
 PY := .venv/bin/python
 STAMP := .venv/made-from
+# A Python that is still starting answers Ctrl-C with a traceback: SIGINT waits until the command is ready for it.
+HOLD := $(shell env --block-signal=INT echo env --block-signal=INT 2>/dev/null)
+export PYTHON SCENARIO PARAMETERS
 
 .PHONY: help setup run start stop status logs console chaos test check bench
 
@@ -24,21 +27,24 @@ help:
 	@echo "make chaos    let a monkey break a system of its own, and judge  (MINUTES=5 SEED= CHAOS=--help for more)"
 	@echo "make test     run the tests                       (TESTS=tests/component for a part)"
 	@echo "make bench    measure what rclpy costs on this machine"
-	@echo "make check    ruff, mypy, shellcheck, yamllint"
+	@echo "make check    ruff, mypy, import rules, shellcheck, yamllint"
 	@echo "make setup    only set up .venv                   (PYTHON= chooses the interpreter, 3.11 to 3.13)"
 
 setup:
-	@deploy/commands/setup.sh '$(PYTHON)'
+	@exec $(HOLD) deploy/commands/python.sh deploy.commands.setup "$$PYTHON"
 
 run start: setup
-	@$(PY) -m deploy.commands.launcher $@ '$(SCENARIO)' '$(PARAMETERS)'
+	@exec $(HOLD) $(PY) -m deploy.commands.launcher $@ "$$SCENARIO" "$$PARAMETERS"
 
-# These do without a set-up: what they look at, or end, runs already. Nothing runs from half of one: it has no stamp.
-console status logs stop:
-	@if test -e $(STAMP); then exec $(PY) -m deploy.commands.launcher $@; else echo "Nothing runs: .venv is not set up (make setup)."; fi
+console status logs:
+	@test -e $(STAMP) || { echo ".venv is not set up: make setup (make stop works without it)" >&2; exit 1; }
+	@exec $(HOLD) $(PY) -m deploy.commands.launcher $@
+
+stop:
+	@exec $(HOLD) deploy/commands/python.sh deploy.commands.stop "$$PYTHON"
 
 chaos: setup
-	@$(PY) -m deploy.chaos --minutes $(MINUTES) $(if $(SEED),--seed $(SEED)) $(CHAOS)
+	@exec $(HOLD) $(PY) -m deploy.chaos --minutes $(MINUTES) $(if $(SEED),--seed $(SEED)) $(CHAOS)
 
 test: setup
 	@$(PY) -m pytest $(TESTS)
@@ -52,5 +58,6 @@ check: setup
 	@PYTHONPATH=deploy/runtime/src $(PY) -m rosidl_runtime_embedded.stubs --output deploy/runtime/build/stubs
 	@$(PY) -m mypy
 	@$(PY) -m mypy --config-file deploy/runtime/pyproject.toml
-	@.venv/bin/shellcheck deploy/commands/setup.sh .ci/run
+	@PYTHONPATH="interfaces/reactive_node/src:deploy/runtime/src:$$PYTHONPATH" .venv/bin/lint-imports --no-logo --no-cache
+	@.venv/bin/shellcheck deploy/commands/python.sh .ci/run
 	@$(PY) -m yamllint --strict deploy

@@ -1,7 +1,7 @@
-"""One parameter of the manipulator: a virtual source (thesis 5.2.1).
+"""Publishes one configuration value of the manipulator: a virtual source (thesis 5.2.1).
 
-User story (ours): as a developer, I am able to give the manipulator any configuration, by hand
-(``ros2 param set /config_l1 value 2.5``) or along a scenario. ::
+User story (ours): as a developer, I am able to set the manipulator's configuration by hand
+(``ros2 param set /config_l1 value 2.5``) or by a scenario. ::
 
     python -m services.config_publisher l1
 """
@@ -31,27 +31,20 @@ Parameters = {
     THETA1.name: _parameters(THETA1, 0.785398, (-1000.0, 1000.0)),
     THETA2.name: _parameters(THETA2, 0.785398, (-1000.0, 1000.0)),
 }
-"""What a user may set, by source; the defaults are the first values of Listing 5.9."""
+"""The parameters of each source; the defaults are the first values of Listing 5.9."""
 
 
 def wire(node: ServiceNode, topic: Topic) -> None:
-    """Connect parameter and scenario with the topic."""
+    """Publish the values of the parameter or the scenario."""
     node.declare(Parameters[topic.name])
     source = VirtualSource(node)
-    timeline = source.scenario.configuration.get(topic.name)
-    values = source.follow("value", source.play(timeline))
-    node.publish(topic, values.map(lambda value: topic.type(data=value)))
-
-
-def main() -> None:
-    """Run the service of the source that the first argument names."""
-    source = sys.argv[1] if len(sys.argv) > 1 else ""
-    if source not in CONFIGURATION:
-        service.refuse(
-            "config_publisher", f"the source must be one of {', '.join(CONFIGURATION)}, not {source!r}"
-        )
-    service.run(f"config_{source}", lambda node: wire(node, CONFIGURATION[source]))
+    values = source.follow("value", source.scenario.configuration.get(topic.name))
+    node.publish(topic, values, lambda value: topic.type(data=value))
 
 
 if __name__ == "__main__":
-    main()
+    source = sys.argv[1] if len(sys.argv) > 1 else ""
+    if source not in CONFIGURATION:
+        sources = ", ".join(CONFIGURATION)
+        service.refuse("config_publisher", f"the source must be one of {sources}, not {source!r}")
+    service.run(f"config_{source}", lambda node: wire(node, CONFIGURATION[source]))

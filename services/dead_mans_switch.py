@@ -1,7 +1,7 @@
-"""The dead man's switch: a virtual operator holds it (thesis 5.2.3).
+"""The dead man's switch, held by a virtual operator (thesis 5.2.3).
 
-User story (ours): as a developer, I am able to hold and release the switch, by hand
-(``ros2 param set /dead_mans_switch pressed true``) or along a scenario, which may also ask for the engines.
+User story (ours): as a developer, I am able to press and release the switch by hand
+(``ros2 param set /dead_mans_switch pressed true``) or by a scenario, which may also command the engines.
 """
 
 from __future__ import annotations
@@ -21,8 +21,7 @@ from interfaces.topics import ENGINES, ENGINES_STATE, OFF, ON, OPERATOR_HEARTBEA
 def heartbeats(
     pressed: Observable[bool], rate: Observable[float], single: Observable[bool]
 ) -> Observable[bool]:
-    """Emit ``True`` at ``rate`` [Hz] while the switch is pressed, and at every ``single`` press beside
-    that."""
+    """Emit ``True`` at ``rate`` [Hz] while the switch is pressed, and at each ``single`` heartbeat."""
 
     def beats(state: tuple[bool, float]) -> Observable[bool]:
         is_pressed, rate = state
@@ -31,26 +30,26 @@ def heartbeats(
     return rx.merge(rx.combine_latest(pressed, rate).switch_map(beats), single)
 
 
-def insisting(
-    commands: Observable[str], states: Observable[str], *, patience: float = 1.0, times: int = 10
+def engine_commands(
+    wanted: Observable[str], states: Observable[str], *, period: float = 1.0, times: int = 10
 ) -> Observable[str]:
     """
-    Emit each command, and again every ``patience`` [s] until the engines obey, ``times`` times in all.
+    Emit each wanted command, and repeat it every ``period`` [s] until the engines obey, ``times`` in all.
 
-    So does a person whose command was lost, or came before the system was ready for it.
+    A person also tries again when the system was not ready for a command.
     """
 
-    def insist(command: str) -> Observable[str]:
-        wanted = ON if command == TURN_ON else OFF
-        obeyed = states.filter(lambda state: state == wanted)
-        return rx.timer(0.0, patience).take(times).map(lambda _: command).take_until(obeyed)
+    def attempts(command: str) -> Observable[str]:
+        state = ON if command == TURN_ON else OFF
+        obeyed = states.filter(lambda it: it == state)
+        return rx.timer(0.0, period).take(times).map(lambda _: command).take_until(obeyed)
 
-    return commands.switch_map(insist)
+    return wanted.switch_map(attempts)
 
 
 @dataclass(frozen=True)
 class Parameters:
-    """What a user may set."""
+    """The parameters of the service."""
 
     rate: float = parameter(20.0, (1.0, 10_000.0), "Hz", "heartbeats while pressed", settable=True)
     pressed: bool = parameter(False, None, "", "whether the switch is pressed", settable=True)
@@ -60,24 +59,16 @@ def wire(node: ServiceNode) -> None:
     """Connect the recipes with their topics."""
     node.declare(Parameters)
     source = VirtualSource(node)
-    scenario = source.scenario
     beats = heartbeats(
-        source.follow("pressed", source.play(scenario.pressed)),
+        source.follow("pressed", source.scenario.pressed),
         source.follow("rate"),
-        source.until_set("pressed", source.play(scenario.heartbeats, resume=False) or rx.never()),
+        source.play(source.scenario.heartbeats, until_set="pressed"),
     )
-    node.publish(OPERATOR_HEARTBEAT, beats.map(lambda beat: Bool(data=beat)))
-
-    commands = source.play(scenario.commands, resume=False)
-    if commands is not None:
-        states = node.observe(ENGINES_STATE).map(lambda state: state.data)
-        node.publish(ENGINES, insisting(commands, states).map(lambda command: String(data=command)))
-
-
-def main() -> None:
-    """Run the service."""
-    service.run("dead_mans_switch", wire)
+    node.publish(OPERATOR_HEARTBEAT, beats, lambda beat: Bool(data=beat))
+    states = node.observe(ENGINES_STATE).map(lambda state: state.data)
+    commands = engine_commands(source.play(source.scenario.commands), states)
+    node.publish(ENGINES, commands, lambda command: String(data=command))
 
 
 if __name__ == "__main__":
-    main()
+    service.run("dead_mans_switch", wire)

@@ -7,8 +7,6 @@ usage: python -m deploy.chaos [--minutes 5] [--seed N] [--scenario NAME] [--ever
 
 from __future__ import annotations
 
-from deploy.commands import interruption  # isort: split
-
 import argparse
 import fcntl
 import math
@@ -31,7 +29,7 @@ from deploy.chaos.history import CIRCUMSTANCES, PROGRAMS, suffix
 from deploy.chaos.page import page
 from deploy.chaos.promises import CHECKERS
 from deploy.chaos.report import text
-from deploy.supervision import processes
+from deploy.supervision import interruption, processes
 from deploy.supervision.system import DeploymentError, System
 from interfaces import topics
 from reactive_node.domains import DOMAINS
@@ -42,6 +40,7 @@ KEPT = 10  # records
 
 def main(arguments: Sequence[str]) -> int:
     """Obey the command line; the exit code."""
+    interruption.install()
     options = _options(arguments)
     try:
         if options.replay:

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 
 from deploy.chaos.findings import UNKNOWN, VIOLATED, Finding, percentile
 from deploy.chaos.promises import meaning
-from deploy.commands.table import table
+from deploy.commands.status import table
 
 SHOWN = 5  # pieces of evidence of a promise
 HEADER = ("", "PROMISE", "VERDICT", "CASES", "UNKNOWN", "FIGURES")

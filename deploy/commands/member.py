@@ -1,14 +1,19 @@
-"""A node of ours beside the services, with its executor: it listens to their health."""
+"""A node beside the services: it listens to their health and sets their parameters."""
 
 from __future__ import annotations
 
 import os
+import time
 from types import TracebackType
 
 import rclpy
+from rcl_interfaces.srv import SetParameters
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
+from rclpy.task import Future
 
+from deploy.supervision import interruption, manifest
 from deploy.supervision.system import DeploymentError, namespace_of
 from interfaces.service.health import Health, HealthMonitor
 from reactive_node import ReactiveNode
@@ -18,7 +23,7 @@ class Member:
     """In a `with`, this process takes part in the system's communication; it handles no signals."""
 
     def __init__(self) -> None:
-        """Join. Raises DeploymentError if the environment does not let it."""
+        """Join. Raises DeploymentError if the environment does not allow it."""
         try:
             rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
             self.node = ReactiveNode(f"console_{os.getpid()}", namespace=namespace_of(os.environ))
@@ -35,8 +40,27 @@ class Member:
         return self._monitor.latest
 
     def spin_once(self) -> None:
-        """Run one callback; waits at most 0.1 s for it."""
+        """Run one callback; waits at most 0.1 s for it. Raises Interrupted after a signal."""
+        interruption.check()
         self._executor.spin_once(timeout_sec=0.1)
+
+    def set_everywhere(self, name: str, value: object, limit: float) -> None:
+        """Set a parameter on all services that have it; wait at most `limit` [s] for their answers."""
+        deadline = time.monotonic() + limit
+        request = SetParameters.Request(parameters=[Parameter(name, value=value).to_parameter_msg()])
+        waiting = [
+            self.node.create_client(SetParameters, f"{program.name}/set_parameters")
+            for program in manifest.programs()
+        ]
+        clients = list(waiting)
+        answers: list[Future] = []
+        while time.monotonic() < deadline and (waiting or not all(answer.done() for answer in answers)):
+            ready = [client for client in waiting if client.service_is_ready()]
+            answers += [client.call_async(request) for client in ready]
+            waiting = [client for client in waiting if client not in ready]
+            self.spin_once()
+        for client in clients:
+            self.node.destroy_client(client)
 
     def __enter__(self) -> Member:
         return self

@@ -1,31 +1,42 @@
-"""Checks a user's parameter file before anything starts. It has the form of ROS 2::
+"""Reads and checks a user's parameter file. It has the form of ROS 2::
 
     operator_watchdog:
       ros__parameters:
         silence: 2.0
 
-with `/**` for all services that have the parameter; an arm in a namespace may name its services with it, or
-without. This is done in a process of its own, which the launcher can end wherever it is: what the user names
-may be a pipe or a device that never says anything.
+with `/**` for all services that have the parameter. The services of an arm in a namespace may be named with
+the namespace or without.
 """
 
 from __future__ import annotations
 
 import importlib
-import json
-import os
-import sys
 from collections.abc import Iterator
 from typing import Any
 
-from deploy.commands.parameters import ALL, KEY, program_of
-from deploy.supervision import manifest
-from deploy.supervision.system import namespace_of
+from deploy.supervision import interruption, manifest
+from deploy.supervision.system import ALL, KEY
 from interfaces.scenario import yaml_file
 from interfaces.service import UserError
 from interfaces.service.parameters import Declaration, declarations
 
 USE_SIM_TIME = Declaration("use_sim_time", False, None, "", "whether time is simulated", False)
+
+
+def load(path: str, namespace: str) -> dict[str, Any]:
+    """
+    Return the content of a file, with the full name of each node: ROS applies no other in a namespace.
+
+    :raises UserError: for the first error, with file, key and reason.
+    """
+    with interruption.blocking():  # the file may be a pipe that nobody writes to
+        document = yaml_file.load(path)
+    for key, problem in problems(document, namespace):
+        raise UserError(f"{path}: {key}: {problem}")
+    prefix = namespace.rstrip("/") + "/"
+    return {
+        node if node == ALL else prefix + _program_of(node, namespace): document[node] for node in document
+    }
 
 
 def declared() -> dict[str, dict[str, Declaration]]:
@@ -41,46 +52,38 @@ def _declared_by(program: manifest.Program) -> dict[str, Declaration]:
     return {each.name: each for each in (*found, USE_SIM_TIME)}
 
 
-def faults(document: Any, namespace: str) -> Iterator[tuple[str, str]]:
-    """The mistakes in the parameter file of an arm: the key at which each stands, and the reason."""
+def problems(document: Any, namespace: str) -> Iterator[tuple[str, str]]:
+    """Yield the errors in the parameter file of an arm: the key and the reason of each."""
     services = declared()
     names = ", ".join([*services, ALL])
     if not isinstance(document, dict):
         yield "file", f"must name services, of {names}"
         return
     for node, content in document.items():
-        program = program_of(str(node), namespace)
+        program = _program_of(str(node), namespace)
         if program not in services and node != ALL:
-            yield node, f"is no service; those are {names}"
+            yield node, f"is no service; the services are {names}"
         elif not isinstance(content, dict) or [*content] != [KEY] or not isinstance(content[KEY], dict):
-            yield node, f"must hold {KEY}, and that its parameters"
+            yield node, f"must hold {KEY}, which holds the parameters"
         else:
+            concerned = services if node == ALL else {program: services[program]}
             for name, value in content[KEY].items():
-                concerned = [*services.values()] if node == ALL else [services[program]]
-                if fault := _fault(name, value, concerned):
-                    yield f"{node}.{name}", fault
+                yield from _problems_of(node, name, value, concerned)
 
 
-def _fault(name: str, value: object, services: list[dict[str, Declaration]]) -> str:
-    """What is wrong with a parameter for one of the services that have it, in words; '' for a good one."""
-    having = [parameters[name] for parameters in services if name in parameters]
+def _problems_of(
+    node: str, name: str, value: object, services: dict[str, dict[str, Declaration]]
+) -> Iterator[tuple[str, str]]:
+    having = {service: known[name] for service, known in services.items() if name in known}
     if not having:
-        known = dict.fromkeys(name for parameters in services for name in parameters)
-        return f"is no parameter; those are {', '.join(known)}"
-    return next(filter(None, (declaration.problem(value) for declaration in having)), "")
+        known = dict.fromkeys(name for parameters in services.values() for name in parameters)
+        yield f"{node}.{name}", f"is no parameter; the parameters are {', '.join(known)}"
+    for service, declaration in having.items():
+        if problem := declaration.problem(value):
+            key = f"{node}.{name} of {service}" if node == ALL else f"{node}.{name}"
+            yield key, problem
 
 
-def main(path: str) -> str | None:
-    """Print what a good file says, as JSON; the first mistake of another, with file, key and reason."""
-    try:
-        document = yaml_file.load(path)
-    except UserError as error:
-        return str(error)
-    for key, fault in faults(document, namespace_of(os.environ)):
-        return f"{path}: {key}: {fault}"
-    print(json.dumps(document))
-    return None
-
-
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1]))
+def _program_of(node: str, namespace: str) -> str:
+    """The program of a node that is named with the arm's namespace or without."""
+    return node.removeprefix(namespace.rstrip("/") + "/")

@@ -1,9 +1,9 @@
-"""Brings .venv up to date: what the system needs, what its tests need and, without ROS 2, deploy/runtime.
+"""Brings .venv up to date: the requirements of the system and its tests and, without ROS 2, deploy/runtime.
 
-Runs on the bare interpreter, before anything is installed. Stamps in .venv tell what it was made from; where
-the right one is missing (older requirements, another interpreter, ROS 2 sourced since, an interrupted set-up)
-it is made anew, so that half an installation never counts as one. deploy/runtime has a stamp of its own: who
-works on it waits a second.
+It runs on the bare interpreter, before anything is installed. Stamps in .venv record what it was made from.
+Where the right stamp is missing (older requirements, another interpreter, ROS 2 sourced since, an
+interrupted set-up) .venv is made anew: half an installation never counts as one. The distributions of this
+repository have stamps of their own, so a change in them takes only a second.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from functools import partial
 from pathlib import Path
 from types import FrameType
 
-from deploy.supervision.processes import ROOT, using
+from deploy.supervision.processes import ROOT, run_directory, using
 
 VENV = ROOT / ".venv"
 PYTHON = VENV / "bin" / "python"
@@ -36,15 +36,16 @@ RUNTIME = ROOT / "deploy" / "runtime"
 
 
 class SetupError(Exception):
-    """Why .venv could not be made, in words for the user."""
+    """Why .venv could not be made; a message for the user."""
 
 
 def main() -> int:
     """Make .venv unless it is up to date; the exit code."""
     signal.signal(signal.SIGTERM, _interrupt)
-    if signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:  # which is what nohup asks for
+    if signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:  # nohup asks for this
         signal.signal(signal.SIGHUP, _interrupt)
     try:
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})  # make blocks it until here
         with _alone():
             began = time.monotonic()
             ros = system_rclpy()
@@ -123,13 +124,15 @@ def make(ros: str) -> None:
                 " shell without ROS 2"
             )
     print(f"Setting up .venv with Python {version}, once; this takes about half a minute.", flush=True)
-    STAMP.unlink(missing_ok=True)  # no sooner: where it cannot be made anew, what there is goes on to count
+    STAMP.unlink(missing_ok=True)  # no sooner: a refused set-up leaves the old .venv usable
     venv = [sys.executable, "-m", "venv", "--clear", *(["--system-site-packages"] if ros else []), str(VENV)]
     _step("a virtual environment", venv, log=None)
     files = ["system.txt", "build.txt", "develop.txt", *([] if ros else ["runtime.txt"])]
     _step(
         "packages from PyPI", [*PIP, *(word for name in files for word in ("-r", str(REQUIREMENTS / name)))]
     )
+    for tool in ("supervisord", "supervisorctl"):  # pip's own scripts fail in a path with quotes
+        (VENV / "bin" / tool).write_text(f'#!/bin/sh\nexec "${{0%/*}}/python" -m supervisor.{tool} "$@"\n')
     if ros:
         print(f"  rclpy of ROS 2: {Path(ros).parent}")
 
@@ -145,8 +148,8 @@ def install(distribution: Path, stamp: Path) -> None:
 
 def _refuse_while_running() -> None:
     for run in using(PYTHON.parent):
-        stop = f"REACTIVE_ARM_RUN_DIR={shlex.quote(str(run))} make stop"
-        raise SetupError(f"A system runs from this .venv, which has to be changed: {stop}")
+        elsewhere = "" if run == run_directory() else f"REACTIVE_ARM_RUN_DIR={shlex.quote(str(run))} "
+        raise SetupError(f"A system runs from this .venv, which has to be changed: {elsewhere}make stop")
 
 
 def _step(title: str, command: list[str], log: Path | None = LOG) -> None:

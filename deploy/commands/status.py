@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 
-from deploy.commands.table import table
 from deploy.supervision.system import Program
 from interfaces.service.health import Health
 
@@ -13,15 +12,23 @@ HEADER = ("SERVICE", "STATE", "PID", "UPTIME", "RESTARTS", "LAST OUTPUT", "HEALT
 
 
 def of_services(programs: Iterable[Program], health: Mapping[str, Health]) -> str:
-    """The services, one a line; `health` is what was heard of them just now."""
+    """The services, one per line, with the latest health of each."""
     return table([HEADER, *(_row(program, health.get(program.name)) for program in programs)])
+
+
+def table(rows: Sequence[Sequence[str]]) -> str:
+    """Rows of cells in columns as wide as needed, one row per line."""
+    widths = [max(len(cell) for cell in column) for column in zip(*rows, strict=True)]
+    return "\n".join(
+        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows
+    )
 
 
 def _row(program: Program, health: Health | None) -> tuple[str, ...]:
     process = (str(program.pid), _duration(program.uptime)) if program.pid else ("-", "-")
     head = (program.name, program.state, *process, str(program.restarts))
     if health is None or health.pid != program.pid:
-        return (*head, "-", "not heard of" if program.pid else "-")
+        return (*head, "-", "no report" if program.pid else "-")
     since = "never" if health.since_output is None else f"{_age(health):.1f} s ago"
     return (*head, since, "ok" if health.ok else health.reason)
 

@@ -1,12 +1,13 @@
-"""What supervisord lacks for a robot, plugged in through its own extension point (supervisord.conf).
+"""Extends supervisord through its own extension point (plugin.py).
 
 - It counts how often it started each program: RPC `arm.starts`.
 - It tells the sentinel about them (RPC `arm.watch`), and kills a sentinel that has stopped asking.
-- It survives a full disk and a log that cannot be opened: what cannot be logged is lost, and nothing else.
+- It survives a full disk and a log that cannot be opened: only the affected lines are lost.
 - It looks after its children every 100 ms and at once after each change, instead of once a second: a killed
-  service is started again 1–2 s later otherwise.
+  service would start again only after 1-2 s otherwise.
+- It removes the parameter file at an orderly shutdown, so no terminal starts the system again.
 
-Runs inside supervisord, so it must not fail: it does nothing else.
+It runs inside supervisord, so it must not fail: it does nothing else.
 """
 
 from __future__ import annotations
@@ -20,46 +21,48 @@ from pathlib import Path
 from typing import Any
 
 from supervisor import events, loggers
-from supervisor.states import ProcessStates, getProcessStateDescription
+from supervisor.states import ProcessStates, SupervisorStates, getProcessStateDescription
+
+from deploy.supervision.manifest import SENTINEL
+from deploy.supervision.system import PARAMETERS
 
 LONGEST_WAIT = 0.1  # s
 _ENDS = (events.ProcessStateExitedEvent, events.ProcessStateBackoffEvent)
-SENTINEL = "sentinel"
-SENTINEL_START = 30.0  # s until it has to ask for the first time, on a machine that is just starting a fleet
-SENTINEL_PATIENCE = 3.0  # s that it may be silent then
+SENTINEL_START_TIMEOUT = 30.0  # s until its first call, also on a machine that is starting a fleet
+SENTINEL_TIMEOUT = 3.0  # s between its calls
 
 
 class LossyLog(loggers.RotatingFileHandler):  # type: ignore[misc]
     """
-    A log file that loses what it cannot take.
+    A log file that drops lines that it cannot write.
 
-    Its base raises where a file cannot be opened, and then the program does not start; it raises where one
-    cannot be rolled over, which ends supervisord; and it complains to standard error, on the same full disk.
+    Its base class raises where a file cannot be opened, and then the program does not start; it raises where
+    a file cannot be rolled over, which ends supervisord; and it logs errors to the same full disk.
     """
 
     def __init__(self, filename: str, *arguments: Any) -> None:
-        super().__init__(os.devnull, *arguments)  # which can be opened always
+        super().__init__(os.devnull, *arguments)  # opens always
         self.baseFilename = filename
         with suppress(OSError):
             self.reopen()
 
     def reopen(self) -> None:
-        """Open the file again, also where somebody has removed its directory. Raises OSError."""
+        """Open the file again; make its directory again if it was removed. Raises OSError."""
         self.close()
         Path(self.baseFilename).parent.mkdir(parents=True, exist_ok=True)
         super().reopen()
 
     def emit(self, record: Any) -> None:
-        """Log it, or lose it."""
+        """Write a line, or drop it."""
         try:
             if self.stream.closed:
                 self.reopen()
             super().emit(record)
         except OSError:
-            self.closed = self.stream.closed  # by a rollover, which does not say so
+            self.closed = self.stream.closed  # a failed rollover leaves it closed
 
     def handleError(self) -> None:
-        """Complain to nobody."""
+        """Report nothing."""
 
 
 class ArmInterface:
@@ -70,23 +73,24 @@ class ArmInterface:
         self._starts: Counter[str] = Counter()
         self._changed = False
         self._exits: dict[str, str] = {}
-        self._guarded = (0, 0.0)  # the sentinel's pid, and until when it has to ask
-        self._clock = 0.0  # [s]; stands still while supervisord is kept from running, as the sentinel may be
+        self._guarded = (0, 0.0)  # the sentinel's pid, and the deadline of its next call
+        self._clock = 0.0  # [s]; stands still while supervisord is kept from running
         self._polled = time.monotonic()
         self._poll = supervisord.options.poller.poll
         supervisord.options.poller.poll = self._poll_briefly
         events.subscribe(events.ProcessStateEvent, self._on_change)
+        events.subscribe(events.SupervisorStoppingEvent, self._on_stopping)
 
     def starts(self) -> dict[str, int]:
         """How often each program was started since supervisord runs."""
         return dict(self._starts)
 
     def watch(self) -> list[dict[str, Any]]:
-        """What the sentinel has to know of each program; it has to ask again and again."""
+        """The programs for the sentinel; each call is its sign of life."""
         rows = []
         for name, process in self._processes().items():
             if name == SENTINEL:
-                self._guarded = (process.pid, self._clock + SENTINEL_PATIENCE)
+                self._guarded = (process.pid, self._clock + SENTINEL_TIMEOUT)
             rows.append(
                 {
                     "name": name,
@@ -111,9 +115,9 @@ class ArmInterface:
             return
         pid, deadline = self._guarded
         if pid != sentinel.pid:
-            self._guarded = (sentinel.pid, self._clock + SENTINEL_START)
+            self._guarded = (sentinel.pid, self._clock + SENTINEL_START_TIMEOUT)
         elif self._clock > deadline:
-            self._guarded = (sentinel.pid, self._clock + SENTINEL_START)
+            self._guarded = (sentinel.pid, self._clock + SENTINEL_START_TIMEOUT)
             with suppress(ProcessLookupError):
                 os.kill(sentinel.pid, signal.SIGKILL)
 
@@ -127,6 +131,11 @@ class ArmInterface:
             code = event.process.exitstatus
             early = isinstance(event, events.ProcessStateBackoffEvent)
             self._exits[name] = "early" if early else "killed by a signal" if code == -1 else f"code {code}"
+
+    def _on_stopping(self, event: Any) -> None:
+        if self._supervisord.options.mood == SupervisorStates.SHUTDOWN:  # not at a reload
+            with suppress(OSError):
+                os.remove(PARAMETERS)
 
     def _poll_briefly(self, timeout: float) -> Any:
         # supervisord acts on a change only after its next poll: a change must not wait for one to time out.

@@ -1,4 +1,4 @@
-"""The manifest: the supervised programs, as ``deploy/supervisord.conf`` lists them."""
+"""The supervised programs, as ``deploy/supervisord.conf`` lists them."""
 
 from __future__ import annotations
 
@@ -7,9 +7,11 @@ import shlex
 from pathlib import Path
 from typing import NamedTuple
 
-PATH = Path(__file__).parents[1] / "supervisord.conf"
+PATH = Path(__file__).resolve().parents[1] / "supervisord.conf"
 GROUP = "arm"
 """The supervisor group of all programs."""
+SENTINEL = "sentinel"
+"""The program that supervises the others together with supervisord."""
 
 
 class Program(NamedTuple):

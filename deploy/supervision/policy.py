@@ -1,181 +1,186 @@
-"""What the sentinel decides: pure, from sight to sight; no clock, no process, no network."""
+"""The sentinel's policy: from observations to actions, without clock, process or network."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 from deploy.supervision import processes
+from deploy.supervision.manifest import SENTINEL
 from deploy.supervision.system import Watched
 
-NAME = "sentinel"
-MEMORY = 60.0  # s that a restart counts as a recent one
+RECENT = 60.0  # s for which a restart counts as recent
 
 
 @dataclass(frozen=True)
-class Sight:
-    """All that the sentinel sees at one look."""
+class Observation:
+    """The state of all processes at one time."""
 
     time: float
     """[s, monotonic clock]"""
-    programs: Iterable[Watched]
-    heard: Mapping[tuple[str, int], float] = field(default_factory=dict)
-    """when a program's process, by its pid, reported its health last [s, monotonic clock]"""
+    programs: list[Watched]
+    last_health: Mapping[tuple[str, int], float] = field(default_factory=dict)
+    """time of the last health report of a process, by program and pid [s, monotonic clock]"""
     stopped: frozenset[int] = frozenset()
     """pids of supervised processes that are stopped (SIGSTOP)"""
-    doubles: frozenset[processes.Process] = frozenset()
-    """live processes of programs that are not those which supervisord has started"""
+    duplicates: frozenset[processes.Process] = frozenset()
+    """live processes of programs that supervisord has not started"""
 
 
 class Action(NamedTuple):
-    """What is to be done, and why."""
+    """An action on a program, with its reason."""
 
     verb: str
-    """kill, end or revive"""
+    """kill or revive"""
     program: str
     pid: int
-    why: str
+    reason: str
 
 
 @dataclass(frozen=True)
-class Patience:
-    """How long the sentinel looks on [s]."""
+class Timeouts:
+    """The times of the policy [s]."""
 
-    look: float = 0.25
-    """between two looks"""
-    silence: float = 2.7
-    """for a service, which has to report its health once a second"""
+    period: float = 0.25
+    """between two observations"""
+    health: float = 2.7
+    """without health of a service, which reports once a second"""
     start: float = 10.0
-    """for a new process, until its first report"""
-    double: float = 1.0
-    """for a double, which has to notice itself that it is one"""
-    revival: float = 1.0
+    """of a new process until its first health"""
+    duplicate: float = 1.0
+    """of a duplicate, which has to end itself"""
+    first_revival: float = 1.0
     """before the first revival; twice as long before each further one"""
     longest_revival: float = 60.0
 
 
-class Judge:
-    """Decides what is to be done."""
+class Policy:
+    """Decides on actions."""
 
-    def __init__(self, patience: Patience | None = None) -> None:
-        self.confused = ""
-        """why nothing is killed for its silence, in words; '' where the sentinel trusts what it hears"""
+    def __init__(self, timeouts: Timeouts | None = None) -> None:
+        self.kill_inhibited_by = ""
+        """why silent services are not killed; '' if they are"""
         self.reasons: dict[str, str] = {}
-        """why a program was acted on last"""
-        self.recent: dict[str, int] = {}
-        """how often a program was restarted within the last minute"""
-        self._patience = patience or Patience()
-        # pid, when it was seen first, and how long its first report may take from then on [s]
-        self._since: dict[str, tuple[int, float, float]] = {}
+        """the reason of the last action on each program"""
+        self.recent_restarts: dict[str, int] = {}
+        """restarts of each program within the last minute"""
+        self._timeouts = timeouts or Timeouts()
+        # Of each program: pid, time of its first observation, and how long its first health may take.
+        self._first_seen: dict[str, tuple[int, float, float]] = {}
         self._deaf_since = math.inf
         self._stopped_since: dict[int, float] = {}
-        self._double_since: dict[int, float] = {}
-        self._revivals: dict[str, tuple[int, float]] = {}  # how often, and when the next is due
-        self._restarts: dict[str, list[tuple[float, int]]] = {}  # when there were so many; the first is older
-        self._looked: float | None = None
-        self._lost = 0.0  # [s] that it was kept from looking
-        self._heard: dict[tuple[str, int], tuple[float, float]] = {}  # by the clocks of the sight and its own
+        self._duplicate_since: dict[int, float] = {}
+        self._revivals: dict[str, tuple[int, float]] = {}  # how many, and when the next is due
+        self._restarts: dict[str, list[tuple[float, int]]] = {}  # times and counts; the first is not recent
+        self._last_time: float | None = None
+        self._paused = 0.0  # [s] that the sentinel could not observe
+        self._last_health: dict[
+            tuple[str, int], tuple[float, float]
+        ] = {}  # by the monotonic and the own clock
 
-    def judge(self, sight: Sight) -> list[Action]:
-        """What is to be done now."""
-        sight = self._in_own_time(sight)
-        self._count_restarts(sight)
-        running = [program for program in sight.programs if program.state in ("STARTING", "RUNNING")]
-        actions = self._kill_stopped(sight, running)
-        actions += self._kill_silent(sight, [p for p in running if p.pid not in sight.stopped])
-        actions += self._end_doubles(sight)
-        actions += self._revive(sight)
+    def decide(self, observation: Observation) -> list[Action]:
+        """Return the actions that are due."""
+        observation = self._in_own_time(observation)
+        self._count_restarts(observation)
+        running = [program for program in observation.programs if program.state in ("STARTING", "RUNNING")]
+        actions = self._kill_stopped(observation, running)
+        actions += self._kill_silent(observation, [p for p in running if p.pid not in observation.stopped])
+        actions += self._kill_duplicates(observation)
+        actions += self._revive(observation)
         for action in actions:
-            self.reasons[action.program] = action.why
+            self.reasons[action.program] = action.reason
         return actions
 
-    def _in_own_time(self, sight: Sight) -> Sight:
+    def _in_own_time(self, observation: Observation) -> Observation:
         """
-        The sight by a clock that stands still while the sentinel is kept from looking.
+        Return the observation on a clock that stands still while the sentinel cannot observe.
 
-        A paused or overloaded machine keeps the services from reporting, too: that makes none of them silent.
+        A paused or overloaded machine delays the services' reports as well: they are not silent.
         """
-        if self._looked is not None:
-            self._lost += max(0.0, sight.time - self._looked - 2 * self._patience.look)
-        self._looked = sight.time
-        before, self._heard = self._heard, {}
-        for process, when in sight.heard.items():
+        if self._last_time is not None:
+            self._paused += max(0.0, observation.time - self._last_time - 2 * self._timeouts.period)
+        self._last_time = observation.time
+        before, self._last_health = self._last_health, {}
+        for process, when in observation.last_health.items():
             known = before.get(process)
-            self._heard[process] = known if known and known[0] == when else (when, when - self._lost)
-        heard = {process: when for process, (_, when) in self._heard.items()}
-        return replace(sight, time=sight.time - self._lost, heard=heard)
+            self._last_health[process] = known if known and known[0] == when else (when, when - self._paused)
+        last_health = {process: when for process, (_, when) in self._last_health.items()}
+        return replace(observation, time=observation.time - self._paused, last_health=last_health)
 
-    def _count_restarts(self, sight: Sight) -> None:
-        """What dies again and again, but runs for a while each time, never gets FATAL."""
-        for program in sight.programs:
-            counts = self._restarts.setdefault(program.name, [(sight.time, program.restarts)])
+    def _count_restarts(self, observation: Observation) -> None:
+        """Count: a program that dies again and again after running for a while never becomes FATAL."""
+        for program in observation.programs:
+            counts = self._restarts.setdefault(program.name, [(observation.time, program.restarts)])
             if program.restarts != counts[-1][1]:
-                counts.append((sight.time, program.restarts))
-            while len(counts) > 1 and sight.time - counts[1][0] >= MEMORY:
+                counts.append((observation.time, program.restarts))
+            while len(counts) > 1 and observation.time - counts[1][0] >= RECENT:
                 del counts[0]
-            self.recent[program.name] = max(0, program.restarts - counts[0][1])
+            self.recent_restarts[program.name] = max(0, program.restarts - counts[0][1])
 
-    def _kill_stopped(self, sight: Sight, running: list[Watched]) -> list[Action]:
-        """The kernel says that they are stopped: no network can err about that."""
-        since = {pid: self._stopped_since.get(pid, sight.time) for pid in sight.stopped}
+    def _kill_stopped(self, observation: Observation, running: list[Watched]) -> list[Action]:
+        """Kill stopped processes: the kernel reports them, so a failing network cannot mislead the policy."""
+        now = observation.time
+        since = {pid: self._stopped_since.get(pid, now) for pid in observation.stopped}
         self._stopped_since = since
         return [
-            Action("kill", program.name, program.pid, f"stopped for {sight.time - since[program.pid]:.1f} s")
+            Action("kill", program.name, program.pid, f"stopped for {now - since[program.pid]:.1f} s")
             for program in running
-            if program.pid in since and sight.time - since[program.pid] >= self._patience.silence
+            if program.pid in since and now - since[program.pid] >= self._timeouts.health
         ]
 
-    def _kill_silent(self, sight: Sight, running: list[Watched]) -> list[Action]:
+    def _kill_silent(self, observation: Observation, running: list[Watched]) -> list[Action]:
         silent = []
-        awaited = 0
+        expected = 0  # services whose health is due
         for program in running:
-            pid, since, patience = self._since.get(program.name, (0, 0.0, 0.0))
+            pid, since, start = self._first_seen.get(program.name, (0, 0.0, 0.0))
             if pid != program.pid:
-                # A new sentinel does not wait anew for what has had its time to start.
-                pid, since = program.pid, sight.time
-                patience = max(2 * self._patience.silence, self._patience.start - program.age)
-                self._since[program.name] = (pid, since, patience)
-            heard = sight.heard.get((program.name, pid))
-            awaited += heard is not None or sight.time - since >= patience
-            limit = patience if heard is None else self._patience.silence
-            last = since if heard is None else heard
-            if sight.time - last >= limit:
-                silent.append(Action("kill", program.name, pid, f"no health for {sight.time - last:.1f} s"))
-        self.confused = ""
-        if itself := [action for action in silent if action.program == NAME]:
-            self.confused = "it does not hear itself"
-            self._deaf_since = min(self._deaf_since, sight.time)
-            # It can do nothing for anybody, but its successor may.
-            return itself if sight.time - self._deaf_since >= self._patience.start else []
+                # A new sentinel subtracts the time that the process has had already.
+                start = max(2 * self._timeouts.health, self._timeouts.start - program.age)
+                pid, since = program.pid, observation.time
+                self._first_seen[program.name] = (pid, since, start)
+            reported = observation.last_health.get((program.name, pid))
+            expected += reported is not None or observation.time - since >= start
+            silence = observation.time - (since if reported is None else reported)
+            if silence >= (start if reported is None else self._timeouts.health):
+                silent.append(Action("kill", program.name, pid, f"no health for {silence:.1f} s"))
+        self.kill_inhibited_by = ""
+        if itself := [action for action in silent if action.program == SENTINEL]:
+            self.kill_inhibited_by = "the sentinel does not hear itself"
+            self._deaf_since = min(self._deaf_since, observation.time)
+            # A deaf sentinel helps nobody; its successor may hear.
+            return itself if observation.time - self._deaf_since >= self._timeouts.start else []
         self._deaf_since = math.inf
-        if len(silent) > 1 and 2 * len(silent) > awaited:
-            self.confused = f"{len(silent)} of {awaited} services are silent at once"
-        return [] if self.confused else silent
+        if len(silent) > 1 and 2 * len(silent) > expected:
+            self.kill_inhibited_by = f"{len(silent)} of {expected} services are silent at once"
+        return [] if self.kill_inhibited_by else silent
 
-    def _end_doubles(self, sight: Sight) -> list[Action]:
-        since = {double.pid: self._double_since.get(double.pid, sight.time) for double in sight.doubles}
-        self._double_since = since
+    def _kill_duplicates(self, observation: Observation) -> list[Action]:
+        now = observation.time
+        since = {
+            process.pid: self._duplicate_since.get(process.pid, now) for process in observation.duplicates
+        }
+        self._duplicate_since = since
         return [
-            Action("end", double.program, double.pid, f"process {double.pid} was its double")
-            for double in sorted(sight.doubles)
-            if sight.time - since[double.pid] >= self._patience.double
+            Action("kill", duplicate.program, duplicate.pid, f"process {duplicate.pid} was a duplicate")
+            for duplicate in sorted(observation.duplicates)
+            if now - since[duplicate.pid] >= self._timeouts.duplicate
         ]
 
-    def _revive(self, sight: Sight) -> list[Action]:
+    def _revive(self, observation: Observation) -> list[Action]:
         actions = []
-        for program in sight.programs:
-            times, due = self._revivals.get(program.name, (0, float("nan")))
-            delay = min(self._patience.revival * 2.0**times, self._patience.longest_revival)
+        for program in observation.programs:
+            times, due = self._revivals.get(program.name, (0, math.nan))
+            delay = min(self._timeouts.first_revival * 2.0**times, self._timeouts.longest_revival)
             if program.state != "FATAL":
                 if program.state == "RUNNING":
                     self._revivals.pop(program.name, None)
                 elif times:
-                    self._revivals[program.name] = (times, float("nan"))
-            elif due != due:
-                self._revivals[program.name] = (times, sight.time + delay)
-            elif sight.time >= due:
-                self._revivals[program.name] = (times + 1, float("nan"))
-                actions.append(Action("revive", program.name, 0, f"given up; revived after {delay:g} s"))
+                    self._revivals[program.name] = (times, math.nan)
+            elif math.isnan(due):
+                self._revivals[program.name] = (times, observation.time + delay)
+            elif observation.time >= due:
+                self._revivals[program.name] = (times + 1, math.nan)
+                actions.append(Action("revive", program.name, 0, f"FATAL; revived after {delay:g} s"))
         return actions

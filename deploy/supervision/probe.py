@@ -1,54 +1,50 @@
-"""What the sentinel sees of the processes of its system, and how it acts on them."""
+"""Observes the processes of the sentinel's system."""
 
 from __future__ import annotations
 
 import os
-import signal
 import time
 from collections.abc import Mapping
-from contextlib import suppress
 
 from deploy.supervision import processes
-from deploy.supervision.policy import Action, Sight
+from deploy.supervision.policy import Observation
 from deploy.supervision.system import DeploymentError, System, Watched
+from interfaces.service.health import Health
+
+DUPLICATES_PERIOD = 1.0  # s between two searches for duplicates, which read the whole process table
 
 
-class Eyes:
-    """Sees the processes of the system that this process belongs to, and acts on them."""
+class Probe:
+    """Observes the processes of a system; part of a process that supervisord has started."""
 
     def __init__(self, system: System, supervisor: int) -> None:
         self._system = system
         self._supervisor = supervisor
+        self._last_health: dict[tuple[str, int], float] = {}
         self._next_search = 0.0
-        self._doubles: frozenset[processes.Process] = frozenset()
+        self._duplicates: frozenset[processes.Process] = frozenset()
 
-    def see(self, heard: Mapping[tuple[str, int], float]) -> Sight:
-        """One look. Raises DeploymentError where supervisord does not answer."""
+    def hear(self, reports: Mapping[str, Health]) -> None:
+        """Note health reports, by program."""
+        for program, health in reports.items():
+            self._last_health[program, health.pid] = health.heard
+
+    def observe(self) -> Observation:
+        """Return an observation. Raises DeploymentError where supervisord is gone or does not answer."""
         if os.getppid() != self._supervisor:
-            raise DeploymentError("supervisord has died: nobody would replace what is killed")
+            raise DeploymentError("supervisord has died: nothing would replace what is killed")
         programs = self._system.watch(self._supervisor)
         now = time.monotonic()
         if now >= self._next_search:
-            self._next_search = now + 1.0
-            self._doubles = self._find_doubles(programs)
+            self._next_search = now + DUPLICATES_PERIOD
+            self._duplicates = self._find_duplicates(programs)
+        for gone in self._last_health.keys() - {(program.name, program.pid) for program in programs}:
+            del self._last_health[gone]  # of dead processes and of other hosts
         stopped = frozenset(p.pid for p in programs if p.pid and _state_of(p.pid)[0] == "T")
-        return Sight(now, programs, dict(heard), stopped, self._doubles)
+        return Observation(now, programs, dict(self._last_health), stopped, self._duplicates)
 
-    def act(self, action: Action) -> None:
-        """Do it, unless it is not so any more."""
-        if action.verb == "revive":
-            with suppress(DeploymentError):  # the next look tells whether it worked
-                self._system.revive(self._supervisor, action.program)
-            return
-        for handle in processes.open_handles(self._system.run, [action.pid]):
-            # Through the handle it hits this process, or none; and it is what it was taken for.
-            if processes.environment_of(action.pid).get("SUPERVISOR_PROCESS_NAME") == action.program:
-                with suppress(ProcessLookupError):
-                    signal.pidfd_send_signal(handle, signal.SIGKILL)
-            processes.close([handle])
-
-    def _find_doubles(self, programs: list[Watched]) -> frozenset[processes.Process]:
-        """What runs for a program, is not what supervisord has started, nor about to become it."""
+    def _find_duplicates(self, programs: list[Watched]) -> frozenset[processes.Process]:
+        """The processes of a program that supervisord has not started and is not about to start."""
         supervised = {program.name: program.pid for program in programs}
         return frozenset(
             process

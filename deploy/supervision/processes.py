@@ -1,9 +1,9 @@
-"""Which processes belong to a system: asked of the kernel's process table, not of files that may be stale.
+"""The processes of a system, from the kernel's process table: files may be stale.
 
 Every process of a system, from supervisord down, carries the mark of its run directory in its environment,
-and keeps it when supervisord dies. A process without the mark is never touched; one that has it is addressed
-through a pidfd, so that a pid that was given to somebody else meanwhile cannot be hit. Standard library only:
-the set-up uses it before anything is installed.
+also after supervisord has died. A process without the mark is never touched. Signals go through pidfds: they
+never reach another process that has the pid meanwhile. Standard library only: `make setup` and `make stop`
+work without .venv.
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ class Process(NamedTuple):
 
 
 def run_directory() -> Path:
-    """Where a system of this checkout keeps its runtime files: .run, or what REACTIVE_ARM_RUN_DIR says."""
+    """The directory of a system's runtime files: REACTIVE_ARM_RUN_DIR, or .run in this checkout."""
     return Path(os.environ.get("REACTIVE_ARM_RUN_DIR") or ROOT / ".run").resolve()
 
 
 def environment_of(pid: int) -> dict[str, str]:
-    """The environment that a process was started with; empty when it has ended or is somebody else's."""
+    """The environment that a process was started with; empty for a process that has ended or is not ours."""
     return _variables(_environ(pid))
 
 
@@ -53,7 +53,7 @@ def _environ(pid: int) -> bytes:
 
 
 def stat_of(pid: int) -> list[str]:
-    """State, parent and what else proc(5) has in `stat` after a process' name; empty when it has ended."""
+    """State, parent and the further fields of /proc/PID/stat (proc(5)); empty when the process has ended."""
     try:
         return Path(f"/proc/{pid}/stat").read_text().rpartition(") ")[2].split()
     except OSError:
@@ -70,24 +70,23 @@ def of_system(run: Path) -> list[Process]:
     return sorted(found, key=lambda process: (process.program, process.pid))
 
 
+def systems() -> dict[Path, dict[str, str]]:
+    """The environments of the running systems of this user, by run directory."""
+    return {Path(environment[MARK]): environment for _, environment in _marked() if MARK in environment}
+
+
 def using(directory: Path) -> list[Path]:
-    """The run directories of the systems whose programs are taken from a directory first of all."""
+    """The run directories of the systems that run the programs of a directory."""
     first = f"{directory}{os.pathsep}"
-    return sorted(
-        {
-            Path(environment[MARK])
-            for _, environment in _marked()
-            if MARK in environment and environment.get("PATH", "").startswith(first)
-        }
-    )
+    return sorted(run for run, environment in systems().items() if environment["PATH"].startswith(first))
 
 
 def _marked(begin: str = "") -> Iterator[tuple[int, dict[str, str]]]:
-    """Processes, with their environments, that may have a mark which begins so."""
+    """Processes that may have a mark with this beginning, with their environments."""
     mark = os.fsencode(f"{MARK}={begin}")
     for pid in (int(name) for name in os.listdir("/proc") if name.isdigit()):
         environ = _environ(pid)
-        if mark in environ:  # without a look at each variable of the others: a machine has many processes
+        if mark in environ:  # a machine has many processes: only these few environments are parsed
             yield pid, _variables(environ)
 
 
@@ -107,12 +106,12 @@ def end(run: Path, pids: Iterable[int], grace: float) -> None:
 
 
 def open_handles(run: Path, pids: Iterable[int]) -> list[int]:
-    """Pidfds of those of these processes that live and belong to the system; to be given to `close`."""
+    """Open pidfds of the processes that live and belong to the system; `close` them."""
     handles = []
     for pid in pids:
         with suppress(ProcessLookupError):
             handle = os.pidfd_open(pid)
-            # Asked once more: only now does the pid surely stand for the process that the pidfd holds.
+            # From here on the pid surely belongs to the process that the pidfd holds.
             if environment_of(pid).get(MARK) == str(run):
                 handles.append(handle)
             else:
@@ -121,7 +120,7 @@ def open_handles(run: Path, pids: Iterable[int]) -> list[int]:
 
 
 def await_end(handles: Iterable[int], wait: float) -> list[int]:
-    """Wait at most `wait` seconds until the processes behind these pidfds have ended; those that have not."""
+    """Wait at most `wait` seconds for the end of processes; the pidfds of those that live on."""
     left = list(handles)
     poll = select.poll()
     for handle in left:
@@ -135,6 +134,6 @@ def await_end(handles: Iterable[int], wait: float) -> list[int]:
 
 
 def close(handles: Iterable[int]) -> None:
-    """Give pidfds back."""
+    """Close pidfds."""
     for handle in handles:
         os.close(handle)

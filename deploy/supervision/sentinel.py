@@ -1,60 +1,68 @@
 """The sentinel: keeps the services alive where supervisord does not notice that they are not.
 
-User story (ours): as a robot operator, I find a service that hangs replaced within five seconds, and one that
-was given up tried again, without anybody's help; and I see on /diagnostics what happened to which process.
+User story (ours): as a robot operator, I find a hanging service replaced within five seconds, and a service
+that supervisord has given up started again, without help; and I see on /diagnostics what happened to which
+process.
 
-It is a service like the others, supervised like them. It kills what is stopped or reports no health, ends
-what lives beside its supervised double, and revives what supervisord has given up, ever more patiently.
-Whoever guards must not become the danger: where the network or the sentinel itself may be what fails, it
-kills nothing for its silence; where supervisord is gone or does not answer, it does nothing at all.
+It is a service like the others, and supervised like them. It kills processes that are stopped or report no
+health, kills duplicates of supervised processes, and revives programs that supervisord has given up, with
+growing delay. The sentinel fails passive: where the network or the sentinel itself may have failed, it kills
+no silent service; where supervisord is gone or does not answer, it does nothing at all.
 """
 
 from __future__ import annotations
 
 import os
+import signal
 import socket
-import time
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
 import reactivex as rx
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from reactivex import Observable
 
 from deploy.supervision import processes
-from deploy.supervision.policy import NAME, Judge, Patience
-from deploy.supervision.probe import Eyes
+from deploy.supervision.manifest import SENTINEL
+from deploy.supervision.policy import Action, Observation, Policy, Timeouts
+from deploy.supervision.probe import Probe
 from deploy.supervision.system import DeploymentError, System, Watched
 from interfaces import service
 from interfaces.service import ServiceNode, parameter
+from interfaces.service.health import healths
 from interfaces.topics import DIAGNOSTICS
 
-OFTEN = 3  # restarts within a minute are a warning
-MEETING = 0.3  # s after its start until it is discovered: what it says before may be lost
+MANY_RESTARTS = 3  # within a minute: a warning
+DISCOVERY = 0.3  # s until other nodes have discovered this one; earlier messages may be lost
 
 
 def states(
-    programs: Iterable[Watched], reasons: Mapping[str, str], recent: Mapping[str, int], node: str
+    programs: Iterable[Watched], reasons: Mapping[str, str], recent_restarts: Mapping[str, int], node: str
 ) -> list[DiagnosticStatus]:
-    """The states of the processes, as they are published; ``recent``: restarts within the last minute."""
-    return [_state(each, reasons.get(each.name, ""), recent.get(each.name, 0), node) for each in programs]
+    """The states of the processes as a node publishes them on /diagnostics."""
+    return [
+        _state(each, reasons.get(each.name, ""), recent_restarts.get(each.name, 0), node) for each in programs
+    ]
 
 
-def _state(program: Watched, why: str, recent: int, node: str) -> DiagnosticStatus:
+def _state(program: Watched, reason: str, recent_restarts: int, node: str) -> DiagnosticStatus:
     good = program.state in ("STARTING", "RUNNING")
     level, message = DiagnosticStatus.OK, program.state
     if not good:
         level = DiagnosticStatus.ERROR
         message = f"{program.state} after {program.restarts} restarts {program.error}".strip()
-    elif recent >= OFTEN:
-        level, message = DiagnosticStatus.WARN, f"{program.state}, restarted {recent} times within a minute"
+    elif recent_restarts >= MANY_RESTARTS:
+        level = DiagnosticStatus.WARN
+        message = f"{program.state}, restarted {recent_restarts} times within a minute"
     values = {
         "process": program.name,
         "state": program.state,
         "pid": program.pid,
         "restarts": program.restarts,
         "last exit": program.exit,
-        "why": why or ("" if good else program.error),
+        "why": reason or ("" if good else program.error),
     }
     return DiagnosticStatus(
         level=level,
@@ -65,66 +73,71 @@ def _state(program: Watched, why: str, recent: int, node: str) -> DiagnosticStat
     )
 
 
+def carry_out(action: Action, system: System, supervisor: int) -> None:
+    """Carry out an action, unless its process has changed meanwhile."""
+    if action.verb == "revive":
+        with suppress(DeploymentError):  # the next observation shows whether it worked
+            system.revive(supervisor, action.program)
+        return
+    for handle in processes.open_handles(system.run, [action.pid]):
+        # The handle reaches this very process or none.
+        if processes.environment_of(action.pid).get("SUPERVISOR_PROCESS_NAME") == action.program:
+            with suppress(ProcessLookupError):
+                signal.pidfd_send_signal(handle, signal.SIGKILL)
+        processes.close([handle])
+
+
 @dataclass(frozen=True)
 class Parameters:
     """What a user may set."""
 
-    look: float = parameter(0.25, (0.05, 1.0), "s", "period at which the processes are observed")
-    silence: float = parameter(2.7, (1.5, 60.0), "s", "a service without health for this long is killed")
-    start: float = parameter(10.0, (1.0, 300.0), "s", "time of a new process until its first health")
+    period: float = parameter(0.25, (0.05, 1.0), "s", "period at which the processes are observed")
+    health_timeout: float = parameter(
+        2.7, (1.5, 60.0), "s", "a service without health for this long is killed"
+    )
+    start_timeout: float = parameter(10.0, (1.0, 300.0), "s", "time of a new process until its first health")
 
 
 def wire(node: ServiceNode) -> None:
-    """Connect the judge with what it sees and does."""
+    """Connect probe, policy and actions: observe, decide, act, publish."""
     parameters = node.declare(Parameters)
-    patience = Patience(parameters.look, parameters.silence, parameters.start)
-    own = node.get_fully_qualified_name()
+    timeouts = Timeouts(parameters.period, parameters.health_timeout, parameters.start_timeout)
+    system, supervisor = System(Path(os.environ[processes.MARK])), os.getppid()
+    probe, policy = Probe(system, supervisor), Policy(timeouts)
+    own_name = node.get_fully_qualified_name()
     namespace = node.get_namespace().rstrip("/")
-    eyes = Eyes(System(Path(os.environ[processes.MARK])), os.getppid())
-    judge = Judge(patience)
-    heard: dict[tuple[str, int], float] = {}
-    known: list[Watched] = []
 
-    def listen(array: DiagnosticArray) -> None:
-        for status in array.status:
-            path, _, name = status.name.rpartition("/")
-            pid = next((pair.value for pair in status.values if pair.key == "pid"), "")
-            if path == namespace and pid.isdecimal():
-                heard[name, int(pid)] = time.monotonic()
-
-    def look(_: int) -> bool:
-        """Look, and act; whether there is something new to tell."""
-        nonlocal known
+    def observe(_: int) -> Observable[Observation]:
         try:
-            sight = eyes.see(heard)
+            return rx.of(probe.observe())
         except DeploymentError as error:
-            node.remark(NAME, str(error))
-            return False
-        for action in judge.judge(sight):
-            node.remark(action.program, f"{action.verb}: {action.why}")
-            eyes.act(action)
-        if judge.confused:
-            node.remark(NAME, f"kills nothing for its silence: {judge.confused}")
-        # But for its age, which is another one at each look.
-        before, known = known, [program._replace(age=0.0) for program in sight.programs]
-        for gone in heard.keys() - {(program.name, program.pid) for program in known}:
-            del heard[gone]  # also what is of other hosts
-        return known != before
+            node.remark(SENTINEL, str(error))
+            return rx.empty()
 
-    def message(_: object) -> DiagnosticArray:
-        array = DiagnosticArray(status=states(known, judge.reasons, judge.recent, own))
+    def act(actions: list[Action]) -> None:
+        for action in actions:
+            node.remark(action.program, f"{action.verb}: {action.reason}")
+            carry_out(action, system, supervisor)
+        if policy.kill_inhibited_by:
+            node.remark(SENTINEL, f"kills no silent service: {policy.kill_inhibited_by}")
+
+    def message(programs: list[Watched]) -> DiagnosticArray:
+        array = DiagnosticArray(status=states(programs, policy.reasons, policy.recent_restarts, own_name))
         array.header.stamp = node.get_clock().now().to_msg()
         return array
 
-    node.observe(DIAGNOSTICS).subscribe(listen, scheduler=node.scheduler)
-    changes = rx.timer(0.0, patience.look).map(look).filter(bool)
-    node.publish(DIAGNOSTICS, rx.merge(changes, rx.timer(MEETING, 1.0)).map(message))
+    reports = node.observe(DIAGNOSTICS).map(lambda array: healths(array, namespace))
+    observations = rx.timer(0.0, timeouts.period).flat_map(observe).share()
+    programs = observations.map(lambda observation: observation.programs)
+    changed = programs.distinct_until_changed(lambda each: [program._replace(age=0.0) for program in each])
+    repeated = rx.timer(DISCOVERY, 1.0).with_latest_from(programs).map(lambda pair: pair[1])
 
-
-def main() -> None:
-    """Run the service."""
-    service.run(NAME, wire)
+    reports.subscribe(probe.hear, scheduler=node.scheduler)
+    observations.map(policy.decide).subscribe(act, scheduler=node.scheduler)
+    node.publish(DIAGNOSTICS, rx.merge(changed, repeated).map(message))
 
 
 if __name__ == "__main__":
-    main()
+    if processes.MARK not in os.environ:
+        service.refuse(SENTINEL, "runs only under supervisord: make start")
+    service.run(SENTINEL, wire)

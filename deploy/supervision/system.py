@@ -1,43 +1,36 @@
-"""The running system of a checkout: supervisord, its programs and their runtime files under .run/."""
+"""The running system of a checkout: supervisord, its programs and their runtime files."""
 
 from __future__ import annotations
 
 import fcntl
-import http.client
 import os
 import shutil
-import socket
 import subprocess
 import sys
 import time
-import xmlrpc.client
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple, NoReturn
 
-import yaml
+from deploy.supervision import interruption, manifest, processes, rpc
 
-from deploy.console.output import say
-from deploy.supervision import processes
+# `make stop` runs without .venv: PyYAML is imported where it is needed.
 
-CONFIGURATION = processes.ROOT / "deploy" / "supervisord.conf"
 SERVICE_GRACE = 1.0  # s from SIGTERM to SIGKILL of a service, as in supervisord.conf
 SUPERVISOR_GRACE = 1.4  # s that supervisord has to stop all of them
-OBEY_LIMIT = 0.4  # s that it has to say that it will; all of it ends within 2 s
-ANSWER_LIMIT = 1.5  # s that it has to answer the sentinel
-NAMESPACE = "REACTIVE_ARM_NAMESPACE"  # the environment variable that tells of an arm's ROS namespace
-SETTINGS = "settings"  # the directory, in that of the system, in which services keep what was set by hand
-GROUP = "arm"  # of all programs, in supervisord.conf
-READY_GRACE = 20.0  # s that supervisord has to answer its first call
-LOCK_INTERVAL = 0.05  # s between two looks whether another start or stop is over
-
-Check = Callable[[], None]
-"""Is called often while something is awaited, and raises what is to end that."""
+OBEY_LIMIT = 0.4  # s that supervisord has to accept a shutdown; all of it ends within 2 s
+ANSWER_LIMIT = 1.5  # s that supervisord has to answer the sentinel
+READY_LIMIT = 20.0  # s that supervisord has to answer its first call
+NAMESPACE = "REACTIVE_ARM_NAMESPACE"  # environment variable: the ROS namespace of an arm
+SETTINGS = "settings"  # in the run directory: where services keep the values that were set by hand
+PARAMETERS = "parameters.yaml"  # in the run directory: the ROS parameter file of all services
+ALL, KEY = "/**", "ros__parameters"  # the form of ROS 2's parameter files
+NOT_YET = -1.0  # scenario_epoch: the scenario waits until this parameter is set
 
 
 class DeploymentError(Exception):
-    """Why the system cannot be started, stopped or asked, in words for the user."""
+    """Why the system cannot be started, stopped or asked; one line for the user."""
 
 
 class Program(NamedTuple):
@@ -83,24 +76,24 @@ class System:
 
     @property
     def logs(self) -> Path:
-        """Where each program and supervisord write their logs."""
+        """The directory of the programs' logs."""
         return self.run / "logs"
 
     @property
     def parameters(self) -> Path:
-        """The ROS parameter file of all services, written at each start."""
-        return self.run / "parameters.yaml"
+        """The ROS parameter file of all services; written at each start, removed by an orderly end."""
+        return self.run / PARAMETERS
 
     @property
     def is_wanted(self) -> bool:
-        """Whether it was started, and nobody has stopped it since."""
+        """Whether the system was started and not stopped since."""
         return self.parameters.exists()
 
     def unattended(self) -> str:
-        """What is told of services that live without supervisord."""
+        """The message about services that live without supervisord."""
         return (
             f"supervisord has died; {len(self.members())} services go on without it in {self.run}.\n"
-            "make start begins anew with them, make stop ends them."
+            "make start replaces them, make stop ends them."
         )
 
     def members(self) -> list[processes.Process]:
@@ -115,36 +108,42 @@ class System:
         """The environment that the running system was started with; empty when none runs."""
         return next((processes.environment_of(process.pid) for process in self.members()), {})
 
-    def start(self, parameters: Mapping[str, object], check: Check = lambda: None) -> None:
+    # Start and stop
+
+    def start(self, parameters: Mapping[str, object]) -> None:
         """Start supervisord with its programs, all with these parameters (content of a ROS parameter file).
 
-        What a killed supervisord left behind is ended first: no service ever lives twice. Returns as soon as
+        A service never lives twice: what a killed supervisord left behind is ended first. Returns as soon as
         supervisord answers. Raises DeploymentError when a system runs already.
-
-        :param check: is called while another start or stop is awaited
         """
-        with self._alone(check):
-            if pid := self.supervisor():
-                raise DeploymentError(f"Already running: supervisord has pid {pid} and works in {self.run}")
+        with self._alone():
             self._environment = dict(os.environ)  # also for `start_again`
-            self.logs.mkdir(exist_ok=True)
-            shutil.rmtree(self.run / SETTINGS, ignore_errors=True)
-            self.parameters.write_text(yaml.safe_dump(dict(parameters), sort_keys=False))
+            self._prepare(parameters)
             self._start_supervisor()
 
-    def start_again(self, check: Check = lambda: None) -> bool:
-        """Start it as it was, after supervisord died; whether that was right: its end may have been meant."""
-        with self._alone(check):
+    def start_again(self) -> bool:
+        """Start the system as it was after supervisord died; False if it was stopped on purpose."""
+        with self._alone():
             if not self.is_wanted:
                 return False
             if self.supervisor():
-                self._supervisor = None  # somebody else has started it meanwhile
+                self._supervisor = None  # another terminal has started it meanwhile
             else:
                 self._start_supervisor()
             return True
 
+    def become_supervisord(self, parameters: Mapping[str, object], arguments: Sequence[str]) -> NoReturn:
+        """Start as `start` does, but replace this process by supervisord with these arguments."""
+        with self._alone():
+            self._prepare(parameters)
+            self._end_members()
+            os.chdir(self.run)
+            os.umask(0o077)
+            command = [sys.executable, "-m", "supervisor.supervisord", *arguments]
+            os.execve(sys.executable, command, self._supervisor_environment())
+
     def supervisor_has_ended(self) -> bool:
-        """Whether the supervisord has ended that was started here, or that ran when this was first asked."""
+        """Whether the supervisord has ended that was started here, or that ran at the first call."""
         if self._supervisor is None:
             pid = self.supervisor()
             if pid is None:
@@ -152,38 +151,37 @@ class System:
             self._supervisor = os.pidfd_open(pid)
         return not processes.await_end([self._supervisor], 0.0)
 
-    def stop(self, check: Check = lambda: None, tell: Callable[[int], None] = lambda count: None) -> int:
+    def stop(self, tell: Callable[[int], None] = lambda count: None) -> int:
         """End every process of the system, with supervisord's help or without.
 
-        :param tell: is given their number before they are ended
+        :param tell: is called with their number before they are ended
         :return: their number
         """
-        with self._alone(check):
+        if not self.run.exists() and not self.members():
+            tell(0)
+            return 0
+        with self._alone():
             count = len(self.members())
             tell(count)
-            self.parameters.unlink(missing_ok=True)  # from here on it is not wanted
+            with suppress(OSError):  # a read-only checkout
+                self.parameters.unlink()  # a terminal that guards the system does not start it again
             if pid := self.supervisor():
                 handles = processes.open_handles(self.run, [p.pid for p in self.members()])
-                try:
-                    self._call(pid, "supervisor.shutdown", timeout=OBEY_LIMIT)
+                with suppress(rpc.NoAnswer):  # it hangs or dies just now
+                    rpc.call(pid, "supervisor.shutdown", timeout=OBEY_LIMIT)
                     processes.await_end(handles, SUPERVISOR_GRACE)
-                except (OSError, http.client.HTTPException, xmlrpc.client.Error):
-                    pass  # hung or just dying: then without its help
-                finally:
-                    processes.close(handles)
+                processes.close(handles)
             self._end_members()
         return count
+
+    # Questions to supervisord
 
     def programs(self) -> list[Program]:
         """All programs as supervisord sees them. Raises DeploymentError when it does not answer."""
         pid = self.supervisor()
         if pid is None:
             raise DeploymentError(self.unattended())
-        try:
-            rows = cast(list[dict[str, Any]], self._call(pid, "supervisor.getAllProcessInfo"))
-            starts = cast(dict[str, int], self._call(pid, "arm.starts"))
-        except (OSError, http.client.HTTPException, xmlrpc.client.Error) as error:
-            raise DeploymentError(f"supervisord (pid {pid}) does not answer: {error}") from error
+        starts: dict[str, int] = self._ask(pid, "arm.starts")
         return [
             Program(
                 name=row["name"],
@@ -193,31 +191,67 @@ class System:
                 restarts=max(starts.get(row["name"], 0) - 1, 0),
                 description=row["spawnerr"] or row["description"],
             )
-            for row in rows
+            for row in self._ask(pid, "supervisor.getAllProcessInfo")
         ]
 
     def watch(self, supervisor: int) -> list[Watched]:
-        """What the sentinel has to know of each program; its asking is its sign of life."""
-        rows = cast(list[dict[str, Any]], self._ask(supervisor, "arm.watch"))
-        return [Watched(**row) for row in rows]
+        """The programs for the sentinel; this call is the sentinel's sign of life."""
+        return [Watched(**row) for row in self._ask(supervisor, "arm.watch", timeout=ANSWER_LIMIT)]
 
     def revive(self, supervisor: int, program: str) -> None:
         """Start a program that supervisord has given up. Raises DeploymentError."""
-        self._ask(supervisor, "supervisor.startProcess", f"{GROUP}:{program}", False)
+        name = f"{manifest.GROUP}:{program}"
+        self._ask(supervisor, "supervisor.startProcess", name, False, timeout=ANSWER_LIMIT)
 
     def halt(self, program: str) -> None:
         """Stop a program until the system starts anew. Raises DeploymentError."""
-        self._ask(self.supervisor() or 0, "supervisor.stopProcess", f"{GROUP}:{program}")
+        self._ask(self.supervisor() or 0, "supervisor.stopProcess", f"{manifest.GROUP}:{program}")
 
-    def _ask(self, supervisor: int, method: str, *arguments: object) -> object:
+    def _ask(self, supervisor: int, method: str, *arguments: object, timeout: float = 5.0) -> Any:
         try:
-            return self._call(supervisor, method, *arguments, timeout=ANSWER_LIMIT)
-        except (OSError, http.client.HTTPException, xmlrpc.client.Error) as error:
-            raise DeploymentError(f"supervisord (pid {supervisor}) does not answer: {error}") from error
+            return rpc.call(supervisor, method, *arguments, timeout=timeout)
+        except rpc.NoAnswer as error:
+            raise DeploymentError(str(error)) from error
+
+    # The scenario
+
+    def origin(self) -> float:
+        """The origin of the running system's scenario [s, monotonic clock]; NOT_YET before it begins."""
+        import yaml
+
+        return float(yaml.safe_load(self.parameters.read_text())[ALL][KEY]["scenario_epoch"])
+
+    def keep_origin(self, origin: float) -> None:
+        """Write the origin of the scenario [s, monotonic clock] for services that start from now on."""
+        import yaml
+
+        document = yaml.safe_load(self.parameters.read_text())
+        document[ALL][KEY]["scenario_epoch"] = origin
+        self._write_parameters(document)
+
+    # The steps of start and stop
+
+    def _prepare(self, parameters: Mapping[str, object]) -> None:
+        if pid := self.supervisor():
+            raise DeploymentError(f"Already running: supervisord has pid {pid} and works in {self.run}")
+        self.logs.mkdir(exist_ok=True)
+        shutil.rmtree(self.run / SETTINGS, ignore_errors=True)
+        self._write_parameters(parameters)
+
+    def _write_parameters(self, parameters: Mapping[str, object]) -> None:
+        """Write the parameter file; services read the old one or the new one."""
+        import yaml
+
+        new = self.parameters.with_suffix(".new")
+        try:
+            new.write_text(yaml.safe_dump(dict(parameters), sort_keys=False))
+            os.replace(new, self.parameters)
+        except OSError as error:  # which names no file on a full disk
+            raise DeploymentError(f"{self.parameters}: {error.strerror}") from error
 
     def _end_members(self) -> None:
-        """End what lives, without supervisord's help."""
-        for _ in range(3):  # what is just being forked shows only in the next round
+        """End the live processes without supervisord's help."""
+        for _ in range(3):  # a process that is being forked shows only in the next round
             left = self.members()
             if not left:
                 return
@@ -228,99 +262,75 @@ class System:
 
     def _start_supervisor(self) -> None:
         self._end_members()
-        environment = dict(self._environment)
-        environment[processes.MARK] = str(self.run)
-        environment[NAMESPACE] = namespace_of(environment)
-        environment["PYTHONUNBUFFERED"] = "1"
-        _prepend(environment, "PATH", str(Path(sys.executable).parent))
-        _prepend(environment, "PYTHONPATH", str(processes.ROOT))
         output = self.logs / "supervisord.out"
+        supervisord = [sys.executable, "-m", "supervisor.supervisord", "--nodaemon", "--silent"]
         with output.open("wb") as file:
             process = subprocess.Popen(
-                [*self._within, sys.executable, "-m", "supervisor.supervisord", "-c", str(CONFIGURATION)],
+                [*self._within, *supervisord, "-c", str(manifest.PATH)],
                 cwd=self.run,
-                env=environment,
+                env=self._supervisor_environment(),
                 stdin=subprocess.DEVNULL,
                 stdout=file,
                 stderr=subprocess.STDOUT,
                 start_new_session=True,  # Ctrl-C at the terminal is for the launcher, which stops it in order
                 umask=0o077,
             )
-        deadline = time.monotonic() + READY_GRACE
-        while process.poll() is None and time.monotonic() < deadline:
-            try:
-                self._call(process.pid, "supervisor.getState")
-                self._supervisor = os.pidfd_open(process.pid)
-                return
-            except (OSError, http.client.HTTPException, xmlrpc.client.Error):
+        deadline = time.monotonic() + READY_LIMIT
+        try:
+            while process.poll() is None and time.monotonic() < deadline:
+                interruption.check()
+                with suppress(rpc.NoAnswer):
+                    rpc.call(process.pid, "supervisor.getState")
+                    self._supervisor = os.pidfd_open(process.pid)
+                    return
                 time.sleep(0.02)
-        process.kill()
-        process.wait()
-        self._end_members()  # what it may have started already
-        raise DeploymentError(f"supervisord does not start:\n{output.read_text(errors='replace').strip()}")
+            reason = output.read_text(errors="replace").strip()
+            raise DeploymentError(f"supervisord does not start:\n{reason}")
+        except BaseException:
+            process.kill()
+            process.wait()
+            self._end_members()  # what it may have started already
+            raise
 
-    def _call(self, pid: int, method: str, *arguments: object, timeout: float = 5.0) -> object:
-        """Call supervisord's XML-RPC through its directory: the socket's own path may be too long."""
-        transport = _UnixTransport(f"/proc/{pid}/cwd/supervisor.sock", timeout)
-        with xmlrpc.client.ServerProxy("http://localhost", transport=transport) as server:
-            return cast(object, getattr(server, method)(*arguments))
+    def _supervisor_environment(self) -> dict[str, str]:
+        environment = dict(self._environment)
+        environment[processes.MARK] = str(self.run)
+        environment[NAMESPACE] = namespace_of(environment)
+        environment.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+        environment["PYTHONUNBUFFERED"] = "1"
+        _prepend(environment, "PATH", str(Path(sys.executable).parent))
+        _prepend(environment, "PYTHONPATH", str(processes.ROOT))
+        return environment
 
     @contextmanager
-    def _alone(self, check: Check) -> Iterator[None]:
+    def _alone(self) -> Iterator[None]:
         """Hold the run directory: only one start or stop at a time."""
         self.run.mkdir(mode=0o700, parents=True, exist_ok=True)
         directory = os.open(self.run, os.O_RDONLY)
         try:
-            if not _locked(directory):
-                with suppress(OSError):  # perhaps nobody reads it any more
-                    say("Waiting for another make to end its start or stop.")
-                while not _locked(directory):
-                    check()
-                    time.sleep(LOCK_INTERVAL)
+            try:
+                fcntl.flock(directory, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                with suppress(OSError):  # a closed terminal
+                    print("Waiting for another make to end its start or stop.", flush=True)
+                with interruption.blocking():
+                    fcntl.flock(directory, fcntl.LOCK_EX)
             yield
         finally:
             os.close(directory)
 
 
-class _UnixConnection(http.client.HTTPConnection):
-    """HTTP over a unix socket."""
+def scenario_parameters(scenario: Path, origin: float) -> dict[str, object]:
+    """The parameters that all services share, as the content of a ROS parameter file.
 
-    def __init__(self, path: str, timeout: float) -> None:
-        super().__init__("localhost")
-        self._path = path
-        self._limit = timeout
-
-    def connect(self) -> None:
-        self.sock = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-        self.sock.settimeout(self._limit)
-        self.sock.connect(self._path)
-
-
-class _UnixTransport(xmlrpc.client.Transport):
-    """XML-RPC over a unix socket, with a time limit for a hung supervisord."""
-
-    def __init__(self, path: str, timeout: float) -> None:
-        super().__init__()
-        self._unix_connection = _UnixConnection(path, timeout)
-
-    def make_connection(self, host: Any) -> http.client.HTTPConnection:
-        return self._unix_connection
-
-    def close(self) -> None:
-        self._unix_connection.close()
-
-
-def _locked(descriptor: int) -> bool:
-    """Lock a file or directory unless somebody else has; whether that has worked."""
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return False
-    return True
+    :param origin: of the scenario [s, monotonic clock], or NOT_YET.
+    """
+    shared = {"scenario": str(scenario), "scenario_epoch": origin, "settings": SETTINGS}
+    return {ALL: {KEY: shared}}
 
 
 def namespace_of(environment: Mapping[str, str]) -> str:
-    """The ROS namespace that the arm of an environment lives in."""
+    """The ROS namespace of the arm in an environment."""
     return environment.get(NAMESPACE) or "/"
 
 

@@ -1,4 +1,4 @@
-"""When the scenario begins: the parameter ``scenario_epoch``, the same for all processes."""
+"""The origin of the scenario's time: the parameter ``scenario_epoch``, the same for all processes."""
 
 from __future__ import annotations
 
@@ -6,40 +6,53 @@ import time
 from dataclasses import dataclass
 from typing import TypeVar
 
-import reactivex as rx
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.parameter import Parameter
 from reactivex import Observable
+from reactivex.subject import BehaviorSubject
 
 from interfaces.service import ServiceNode, parameter
 
 T = TypeVar("T")
+EPOCH = "scenario_epoch"
 
 
 @dataclass(frozen=True)
 class _Parameters:
     scenario_epoch: float = parameter(
         0.0,
-        (0.0, 1e12),
+        (-1.0, 1e12),
         "s",
-        "origin of the scenario by CLOCK_MONOTONIC of this host; 0 is the start of this process",
+        "origin of the scenario by CLOCK_MONOTONIC of this host; 0 is the start of this process, "
+        "-1 waits until the parameter is set",
+        settable=True,
     )
 
 
 class Origin:
-    """The origin of the scenario's time."""
+    """Tells a process when the scenario begins; the first origin is final."""
 
     def __init__(self, node: ServiceNode) -> None:
         """Declare the parameter on a node."""
-        self._epoch = node.declare(_Parameters).scenario_epoch
+        start = time.monotonic()
+        epoch = node.declare(_Parameters).scenario_epoch
+        self.is_past = 0.0 < epoch < start
+        """Whether this process resumes a running scenario, in the place of a process that died."""
+        self._epochs = BehaviorSubject(-1.0)
+        node.add_on_set_parameters_callback(self._check)
+        node.create_parameter_observable(EPOCH).map(lambda it: it or start).subscribe(self._epochs)
+
+    def _check(self, parameters: list[Parameter]) -> SetParametersResult:
+        epoch = self._epochs.value
+        if epoch >= 0.0 and any(each.name == EPOCH and each.value != epoch for each in parameters):
+            return SetParametersResult(successful=False, reason="the scenario has an origin already")
+        return SetParametersResult(successful=True)
 
     def elapsed(self) -> float:
-        """Return the time since the origin [s]; negative before it."""
-        return time.monotonic() - self._epoch if self._epoch else 0.0
-
-    @property
-    def is_past(self) -> bool:
-        """Whether this process resumes a running scenario, in the place of a process that died."""
-        return self.elapsed() > 0.0
+        """Return the time since the origin [s]; negative before it. The origin must be known."""
+        return time.monotonic() - self._epochs.value
 
     def delay_subscription(self, items: Observable[T]) -> Observable[T]:
         """Subscribe to an observable when the scenario begins, at once if it has begun."""
-        return rx.defer(lambda _: items.delay_subscription(max(0.0, -self.elapsed())))
+        known = self._epochs.filter(lambda epoch: epoch >= 0.0).take(1)
+        return known.flat_map(lambda _: items.delay_subscription(max(0.0, -self.elapsed())))

@@ -1,67 +1,69 @@
-"""Plays timelines as observables."""
+"""Plays timelines as observables, from a time of the scenario on [s since its origin]."""
 
 from __future__ import annotations
 
-import math
-from datetime import timedelta
+from collections.abc import Iterator
+from datetime import datetime, timedelta
 from typing import Any, TypeVar
 
 import reactivex as rx
 from reactivex import Observable, abc
-from reactivex.disposable import MultipleAssignmentDisposable
-from reactivex.scheduler import TimeoutScheduler
+from reactivex.scheduler import ImmediateScheduler
 
-from interfaces.scenario.timeline import Timeline
+from interfaces.scenario.timeline import Events, Sweep
 
 T = TypeVar("T")
 
 
-def play(timeline: Timeline[T], elapsed: float, *, resume: bool = True) -> Observable[T]:
+def state(timeline: Events[T] | Sweep, elapsed: float) -> Observable[Any]:
+    """Emit the value that holds, then every change."""
+    if isinstance(timeline, Sweep):
+        return _samples(timeline, elapsed)
+    return _items(timeline.since(elapsed), elapsed)
+
+
+def events(timeline: Events[T], elapsed: float, *, resume: bool = False) -> Observable[T]:
     """
-    Return a timeline as an observable that does not drift.
+    Emit single events, each once.
 
-    :param elapsed: where in time it starts [s]; negative while the origin is still to come.
-    :param resume: whether the value that holds already is emitted first, at once. Right for a state, wrong
-    for
-        events: what a restarted source has said before its death it does not say again.
+    :param resume: whether a process that died has emitted the events up to now; otherwise overdue events are
+        emitted at once.
     """
+    return _items(timeline.after(elapsed if resume else -1.0), elapsed)
 
-    def subscribe(
-        observer: abc.ObserverBase[T], scheduler: abc.SchedulerBase | None = None
-    ) -> abc.DisposableBase:
-        clock = scheduler or TimeoutScheduler.singleton()
-        origin = clock.now - timedelta(seconds=elapsed)
-        upcoming = timeline.after(elapsed if resume else math.nextafter(elapsed, -math.inf))
-        pending = MultipleAssignmentDisposable()
 
-        def wait() -> None:
-            for at, value in upcoming:
-                due = origin + timedelta(seconds=at)
-                if timeline.catches_up or due >= clock.now:
-                    pending.disposable = clock.schedule_absolute(due, emit, value)
-                    return
-            observer.on_completed()
+def _items(items: Iterator[tuple[float, T]], elapsed: float) -> Observable[T]:
+    def begin(scheduler: abc.SchedulerBase) -> Observable[T]:
+        origin = scheduler.now - timedelta(seconds=elapsed)
+        return rx.concat_with_iterable(_at(origin + timedelta(seconds=at), value) for at, value in items)
 
-        def emit(_: abc.SchedulerBase, value: Any) -> None:
-            observer.on_next(value)
-            wait()
+    return rx.defer(begin)
 
-        present = timeline.at(elapsed) if resume else None
-        if present is not None:
-            observer.on_next(present)
-        wait()
-        return pending
 
-    return Observable(subscribe)
+def _at(due: datetime, value: T) -> Observable[T]:
+    return rx.timer(due).map(lambda _: value)
+
+
+def _samples(sweep: Sweep, elapsed: float) -> Observable[float]:
+    """Emit the value at the time of emission, so a late timer causes no error; nothing during a rest."""
+
+    def begin(scheduler: abc.SchedulerBase) -> Observable[float]:
+        origin = scheduler.now - timedelta(seconds=elapsed)
+        ticks = rx.timer(0.0, 1.0 / sweep.rate)
+        values = ticks.map(lambda _: sweep.at((scheduler.now - origin).total_seconds()))
+        return values.distinct_until_changed()
+
+    return rx.defer(begin)
 
 
 def follow(parameter: Observable[T], timeline: Observable[T] | None) -> Observable[T]:
     """
-    Return what a virtual source does that has a parameter and may have a timeline.
+    Emit the values of a virtual source.
 
-    Without a timeline that is the parameter's value at once, then what is set. With one, it is the timeline,
-    and nothing before it begins; until somebody sets the parameter, who has taken over from then on.
+    Without a timeline, these are the parameter's present value and each value that is set. With a timeline,
+    they are the timeline's values until the parameter is set by hand, then the parameter's.
     """
     if timeline is None:
         return parameter
-    return parameter.skip(1).publish(lambda settings: rx.merge(timeline.take_until(settings), settings))
+    at_once = ImmediateScheduler.singleton()
+    return parameter.switch_map_indexed(lambda value, index: rx.just(value, at_once) if index else timeline)

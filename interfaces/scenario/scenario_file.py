@@ -1,41 +1,44 @@
-"""Scenarios: what the virtual sources do, and when (``deploy/scenarios/*.yaml``).
+"""Reads scenarios: YAML files that state what the virtual sources do, and when (``deploy/scenarios/*.yaml``).
 
-Times are seconds since the scenario's origin, which all sources share; values are SI units. Every key may be
-left out; a source that no scenario drives follows its parameters. ::
+Times are seconds since the scenario's origin, values are SI units. Every key is optional; a source without a
+key follows its parameters. Before the origin, the sources play nothing. ::
 
-    l1: 2.0                                 # a value, from the origin on
-    l2: 3.0
-    theta1: {center: 0.8, amplitude: 0.5, period: 12.0, rate: 25.0, phase: 0.0, delay: 0.0}
-                                            # center + amplitude · sin(2π · t/period + phase), `rate` times a
-                                            # second: at `delay` + n / `rate`, before the origin, too
-    theta2:                                 # values, each from its time on
-      - {at: 1.5, value: 0.8}
-      - {at: 4.0, value: 1.8}
+    l1: 2.0                                 # a constant
+    l2:                                     # values, each from its time on
+      - {at: 1.5, value: 3.0}
+      - {at: 4.0, value: 2.5}
+    theta1: {center: 0.8, amplitude: 0.5, period: 12.0}
+                                            # a sweep: center + amplitude · sin(2π · t/period)
+    theta2: {center: 0.8, amplitude: 0.5, period: 12.0, rate: 25.0, phase: 1.57, rest: 3.5}
+                                            # its samples per second, what it is ahead [rad], and how long it
+                                            # stays at each end [s]; without them 25, 0 and 0
     operator:
-      pressed:                              # the switch is held: from, and until; without `to` for ever
+      pressed:                              # when the switch is pressed; without `to`: for ever
         - {from: 0.0, to: 40.0}
-      let_go: {every: 20.0, for: 1.0}       # the last second of every 20 s the switch is not held after all
-      heartbeats: [1.942, 1.991]            # single signals of the switch, beside those while it is held
-    engines:                                # what the virtual operator wants of the engines
+      heartbeats: [41.942, 42.991]          # single heartbeats, in addition
+    engines:                                # the commands of the virtual operator
       - {at: 5.0, command: turn_on}
-    repeat: 60.0                            # all but the sweeps and `let_go` starts again every 60 s
+    repeat: 60.0                            # everything except the sweeps starts again every 60 s
 
-``rate`` (25 Hz), ``phase`` (0 rad) and ``delay`` (0 s) have these defaults.
+Every sample of a moving joint gives a position (``combine_latest``). If both joints move, their samples
+alternate: a position shows a full step of one joint, but its time since the last position, which is the other
+joint's, is only a part of the step's time. The published speed is then about twice the true speed. Any speed
+is also wrong by as much as `kinematics` is late, because positions are stamped there. In ``demo.yaml`` the
+joints take turns (``phase``, ``rest``), which leaves only the second error. Both errors concern single
+speeds: a speed guard should act on two speeds in a row above its limit.
 """
 
 from __future__ import annotations
 
-import heapq
-import itertools
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping, Set
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
 from interfaces import topics
 from interfaces.scenario import yaml_file
-from interfaces.scenario.timeline import Events, Sweep, Timeline
+from interfaces.scenario.timeline import Events, Sweep
 from interfaces.service.errors import UserError
 
 T = TypeVar("T")
@@ -43,23 +46,20 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Scenario:
-    """What the virtual sources do; ``None`` where the scenario leaves it to their parameters."""
+    """The timelines of the virtual sources; a source without a timeline follows its parameters."""
 
-    configuration: Mapping[str, Timeline[float]] = field(default_factory=dict)
-    """Of the sources named in :data:`interfaces.topics.CONFIGURATION`, those that the scenario drives."""
-    pressed: Timeline[bool] | None = None
-    heartbeats: Timeline[bool] | None = None
-    commands: Timeline[str] | None = None
+    configuration: Mapping[str, Events[float] | Sweep] = field(default_factory=dict)
+    """By the names in :data:`interfaces.topics.CONFIGURATION`."""
+    pressed: Events[bool] | None = None
+    heartbeats: Events[bool] | None = None
+    commands: Events[str] | None = None
 
 
 def load(path: str | Path) -> Scenario:
     """Read a scenario from a file. Raises UserError: one line with file, key and reason."""
     document = yaml_file.load(path)
-    return _scenario(_Item({} if document is None else document, str(path), ""))
-
-
-def _scenario(root: _Item) -> Scenario:
-    root.allow({*topics.CONFIGURATION, "operator", "engines", "repeat"})
+    root = _Item({} if document is None else document, str(path), "")
+    root.require(optional={*topics.CONFIGURATION, "operator", "engines", "repeat"})
     repeat = root["repeat"].number(above=0.0) if "repeat" in root else None
     configuration = {
         name: _values(root[name], topic, repeat)
@@ -67,105 +67,18 @@ def _scenario(root: _Item) -> Scenario:
         if name in root
     }
     operator = root["operator"] if "operator" in root else _Item({}, root.path, "operator")
-    operator.allow({"pressed", "let_go", "heartbeats"})
-    heartbeats = (
-        operator["heartbeats"].events(lambda item: (item.number(0.0), True), repeat)
-        if ("heartbeats" in operator)
-        else None
+    operator.require(optional={"pressed", "heartbeats"})
+    return Scenario(
+        configuration,
+        pressed=_pressed(operator["pressed"], repeat) if "pressed" in operator else None,
+        heartbeats=operator["heartbeats"].events(_heartbeat, repeat) if "heartbeats" in operator else None,
+        commands=root["engines"].events(_command, repeat) if "engines" in root else None,
     )
-    commands = root["engines"].events(_command, repeat) if "engines" in root else None
-    return Scenario(configuration, _presses(operator, repeat), heartbeats, commands)
-
-
-def _values(item: _Item, topic: topics.Topic, repeat: float | None) -> Timeline[float]:
-    """Understand the timeline of a manipulator parameter, whose values the contract must allow."""
-
-    def value(given: _Item) -> float:
-        number = given.number()
-        if problem := topic.problem(topic.type(data=number)):
-            raise given.error(problem)
-        return number
-
-    def event(given: _Item) -> tuple[float, float]:
-        given.require({"at", "value"})
-        return given["at"].number(0.0), value(given["value"])
-
-    if isinstance(item.value, list):
-        return item.events(event, repeat)
-    if not isinstance(item.value, dict):
-        return Events(((0.0, value(item)),))
-    item.require({"center", "amplitude", "period"}, {"rate", "phase", "delay"})
-    sweep = Sweep(
-        item["center"].number(),
-        item["amplitude"].number(0.0),
-        item["period"].number(above=0.0),
-        item["rate"].number(above=0.0, most=1000.0) if "rate" in item else Sweep.rate,
-        item["phase"].number() if "phase" in item else Sweep.phase,
-        item["delay"].number(0.0) if "delay" in item else Sweep.delay,
-    )
-    if problem := topic.problem(topic.type(data=sweep.center - sweep.amplitude)):
-        raise item["amplitude"].error(f"at its lowest, {problem}")
-    return sweep
-
-
-def _command(item: _Item) -> tuple[float, str]:
-    item.require({"at", "command"})
-    command = item["command"]
-    if command.value not in (topics.TURN_ON, topics.TURN_OFF):
-        raise command.error(f"must be {topics.TURN_ON} or {topics.TURN_OFF}, not {command.value!r}")
-    return item["at"].number(0.0), command.value
-
-
-def _presses(operator: _Item, repeat: float | None) -> Timeline[bool] | None:
-    if "pressed" not in operator:
-        if "let_go" in operator:
-            raise operator["let_go"].error("needs `pressed`: there is nothing to let go of")
-        return None
-    changes: list[tuple[float, bool]] = []
-    for item in operator["pressed"].items():
-        item.require({"from"}, {"to"})
-        begin = item["from"].number(changes[-1][0] if changes else 0.0)
-        if changes and changes[-1][1]:
-            raise item.error("comes after one that lasts for ever")
-        changes.append((begin, True))
-        if "to" in item:
-            changes.append((item["to"].number(above=begin), False))
-    operator["pressed"].within(repeat, changes)
-    held = Events(tuple(changes) or ((0.0, False),), repeat)
-    if "let_go" not in operator:
-        return held
-    let_go = operator["let_go"]
-    let_go.require({"every", "for"})
-    every = let_go["every"].number(above=0.0)
-    pause = let_go["for"].number(above=0.0)
-    if pause >= every:
-        raise let_go["for"].error(f"must be less than `every`, {every:g} s")
-    return _LetGo(held, Events(((0.0, True), (every - pause, False)), every))
-
-
-@dataclass(frozen=True)
-class _LetGo:
-    """Pressed while both hold: the operator means to press, and does not let go just now."""
-
-    held: Timeline[bool]
-    grip: Timeline[bool]
-    catches_up = True
-
-    def at(self, time: float) -> bool:
-        return bool(self.held.at(time)) and bool(self.grip.at(time))
-
-    def after(self, time: float) -> Iterator[tuple[float, bool]]:
-        now = {"held": bool(self.held.at(time)), "grip": bool(self.grip.at(time))}
-        held = ((at, "held", value) for at, value in self.held.after(time))
-        grip = ((at, "grip", value) for at, value in self.grip.after(time))
-        for at, changes in itertools.groupby(heapq.merge(held, grip), key=lambda change: change[0]):
-            now.update((which, value) for _, which, value in changes)
-            yield at, all(now.values())
 
 
 @dataclass(frozen=True)
 class _Item:
-    """A value in the file, which knows where it stands."""
+    """A value in the file, with its place for error messages."""
 
     value: Any
     path: str
@@ -180,17 +93,16 @@ class _Item:
     def __getitem__(self, key: str) -> _Item:
         return _Item(self.value[key], self.path, f"{self.key}.{key}" if self.key else key)
 
-    def allow(self, keys: set[str]) -> None:
+    def require(self, required: Set[str] = frozenset(), optional: Set[str] = frozenset()) -> None:
+        """Require a mapping with these keys."""
+        keys = ", ".join(sorted(required | optional))
         if not isinstance(self.value, dict):
-            raise self.error(f"must be a mapping with {_listed(keys)}, not {self.value!r}")
+            raise self.error(f"must be a mapping with {keys}, not {self.value!r}")
         for key in self.value:
-            if key not in keys:
-                raise self.error(f"unknown key {key!r}, must be one of {_listed(keys)}")
-
-    def require(self, keys: set[str], optional: set[str] = frozenset()) -> None:  # type: ignore[assignment]
-        self.allow(keys | optional)
-        for key in sorted(keys - self.value.keys()):
-            raise self.error(f"lacks {key!r}")
+            if key not in required | optional:
+                raise self.error(f"unknown key {key!r}, must be one of {keys}")
+        for key in sorted(required - self.value.keys()):
+            raise self.error(f"missing key {key!r}")
 
     def number(self, least: float = -math.inf, *, above: float = -math.inf, most: float = math.inf) -> float:
         if isinstance(self.value, bool) or not isinstance(self.value, int | float):
@@ -210,22 +122,81 @@ class _Item:
             raise self.error(f"must be a list, not {self.value!r}")
         return [_Item(value, self.path, f"{self.key}[{index}]") for index, value in enumerate(self.value)]
 
-    def events(self, understand: Callable[[_Item], tuple[float, T]], repeat: float | None) -> Events[T]:
-        items: list[tuple[float, T]] = []
+    def events(self, parse: Callable[[_Item], tuple[float, T]], repeat: float | None) -> Events[T]:
+        events: list[tuple[float, T]] = []
         for item in self.items():
-            event = understand(item)
-            if items and event[0] < items[-1][0]:
-                raise item.error(f"comes at {event[0]:g} s, before the one in front of it")
-            items.append(event)
-        if not items:
+            event = parse(item)
+            if events and event[0] < events[-1][0]:
+                raise item.error(f"is at {event[0]:g} s, before the previous entry")
+            events.append(event)
+        if not events:
             raise self.error("is empty")
-        self.within(repeat, items)
-        return Events(tuple(items), repeat)
+        return self.repeated(events, repeat)
 
-    def within(self, repeat: float | None, items: list[tuple[float, Any]]) -> None:
-        if repeat is not None and items and items[-1][0] >= repeat:
-            raise self.error(f"lasts until {items[-1][0]:g} s, but all starts again after {repeat:g} s")
+    def repeated(self, events: list[tuple[float, T]], repeat: float | None) -> Events[T]:
+        if repeat is not None and events[-1][0] >= repeat:
+            raise self.error(f"ends at {events[-1][0]:g} s, but everything starts again after {repeat:g} s")
+        return Events(tuple(events), repeat)
 
 
-def _listed(keys: set[str]) -> str:
-    return ", ".join(sorted(keys))
+def _values(item: _Item, topic: topics.Topic, repeat: float | None) -> Events[float] | Sweep:
+    """Parse the timeline of a configuration topic; the contract must allow its values."""
+
+    def value(given: _Item) -> float:
+        number = given.number()
+        if problem := topic.problem(topic.type(data=number)):
+            raise given.error(problem)
+        return number
+
+    def event(given: _Item) -> tuple[float, float]:
+        given.require({"at", "value"})
+        return given["at"].number(0.0), value(given["value"])
+
+    if isinstance(item.value, list):
+        return item.events(event, repeat)
+    if not isinstance(item.value, dict):
+        return Events(((0.0, value(item)),))
+    sweep = _sweep(item)
+    if problem := topic.problem(topic.type(data=sweep.center - sweep.amplitude)):
+        raise item["amplitude"].error(f"at its lowest, {problem}")
+    return sweep
+
+
+def _sweep(item: _Item) -> Sweep:
+    item.require({"center", "amplitude", "period"}, {"rate", "phase", "rest"})
+    sweep = Sweep(
+        item["center"].number(),
+        item["amplitude"].number(0.0),
+        item["period"].number(above=0.0),
+        rate=item["rate"].number(above=0.0, most=1000.0) if "rate" in item else Sweep.rate,
+        phase=item["phase"].number() if "phase" in item else Sweep.phase,
+        rest=item["rest"].number(0.0) if "rest" in item else Sweep.rest,
+    )
+    if sweep.rest >= sweep.period / 2:
+        raise item["rest"].error(f"must be less than half the period, {sweep.period / 2:g} s")
+    return sweep
+
+
+def _pressed(item: _Item, repeat: float | None) -> Events[bool]:
+    changes: list[tuple[float, bool]] = []
+    for entry in item.items():
+        entry.require({"from"}, {"to"})
+        if changes and changes[-1][1]:
+            raise entry.error("comes after an entry without `to`")
+        begin = entry["from"].number(changes[-1][0] if changes else 0.0)
+        changes.append((begin, True))
+        if "to" in entry:
+            changes.append((entry["to"].number(above=begin), False))
+    return item.repeated(changes or [(0.0, False)], repeat)
+
+
+def _heartbeat(item: _Item) -> tuple[float, bool]:
+    return item.number(0.0), True
+
+
+def _command(item: _Item) -> tuple[float, str]:
+    item.require({"at", "command"})
+    command = item["command"]
+    if command.value not in (topics.TURN_ON, topics.TURN_OFF):
+        raise command.error(f"must be {topics.TURN_ON} or {topics.TURN_OFF}, not {command.value!r}")
+    return item["at"].number(0.0), command.value

@@ -1,6 +1,6 @@
-"""What was set by hand, kept for the process that comes after a service's death.
+"""The settings of a service: parameters set by hand, which survive a restart.
 
-Who has released the switch must not find it pressed again because its process was restarted.
+An operator who released the switch must not find it pressed because its process was restarted.
 """
 
 from __future__ import annotations
@@ -16,23 +16,23 @@ from interfaces.service.errors import UserError
 
 
 class Settings:
-    """The parameters of one service that were set by hand, in a file of its own."""
+    """The settings of one service, in one file."""
 
     def __init__(self, directory: str, service: str) -> None:
-        """:param directory: where the files lie, empty where nothing is to be kept."""
+        """:param directory: the folder of the files; empty keeps nothing."""
         self._path = Path(directory) / f"{service}.yaml" if directory else None
 
     def read(self) -> dict[str, Any]:
-        """Return what was set, by name. Raises UserError: to forget it would not be safe."""
+        """Return the settings by name. Raises UserError for a bad file: forgetting it would not be safe."""
         if self._path is None or not self._path.exists():
             return {}
         settings = yaml_file.load(self._path)
         if not isinstance(settings, dict):
-            raise UserError(f"{self._path}: holds no settings; remove it to begin anew")
+            raise UserError(f"{self._path}: contains no settings; remove it to start afresh")
         return settings
 
     def keep(self, name: str, value: Any) -> None:
-        """Keep a value, all of it or nothing. Raises UserError if that is not possible."""
+        """Write a setting atomically. Raises UserError if that fails."""
         if self._path is None:
             return
         settings = self.read() | {name: value}

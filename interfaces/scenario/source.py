@@ -1,4 +1,4 @@
-"""A virtual source: what a service needs that follows its parameters or a scenario."""
+"""A virtual source: follows its scenario until its parameter is set by hand."""
 
 from __future__ import annotations
 
@@ -8,12 +8,13 @@ from typing import TypeVar
 import reactivex as rx
 from rclpy.parameter import Parameter
 from reactivex import Observable
+from reactivex.subject import Subject
 
 from interfaces.scenario import playback
 from interfaces.scenario.origin import Origin
 from interfaces.scenario.scenario_file import Scenario, load
 from interfaces.scenario.settings import Settings
-from interfaces.scenario.timeline import Timeline
+from interfaces.scenario.timeline import Events, Sweep
 from interfaces.service import ServiceNode, UserError, parameter
 
 T = TypeVar("T")
@@ -22,11 +23,11 @@ T = TypeVar("T")
 @dataclass(frozen=True)
 class _Parameters:
     scenario: str = parameter("", None, "", "file of the scenario, or empty")
-    settings: str = parameter("", None, "", "folder that keeps what was set by hand, or empty")
+    settings: str = parameter("", None, "", "folder of the parameters that were set by hand, or empty")
 
 
 class VirtualSource:
-    """The scenario and the parameters of a node that plays a part of it."""
+    """The part that a node plays in a scenario."""
 
     def __init__(self, node: ServiceNode) -> None:
         """
@@ -38,41 +39,52 @@ class VirtualSource:
         self._node = node
         self._origin = Origin(node)
         self._settings = Settings(parameters.settings, node.get_name())
+        self._followed: set[str] = set()
+        self._set_by_hand: Subject[str] = Subject()
+        node.add_post_set_parameters_callback(self._keep)
         self.scenario = load(parameters.scenario) if parameters.scenario else Scenario()
 
-    def play(self, timeline: Timeline[T] | None, *, resume: bool = True) -> Observable[T] | None:
-        """Return a timeline from where the scenario is now; see :func:`interfaces.scenario.playback.play`."""
-        if timeline is None:
-            return None
-        return rx.defer(lambda _: playback.play(timeline, self._origin.elapsed(), resume=resume))
-
-    def follow(self, name: str, timeline: Observable[T] | None = None) -> Observable[T]:
+    def follow(self, name: str, timeline: Events[T] | Sweep | None = None) -> Observable[T]:
         """
-        Return what a virtual source does: see :func:`interfaces.scenario.playback.follow`.
+        Return the values of a parameter, or those of a timeline until the parameter is set by hand.
 
-        What was set by hand holds beyond the end of this process.
+        A restarted process goes on with the parameter that was set. See :func:`playback.follow`.
 
-        :raises UserError: if what was set can no longer be set, or read.
+        :raises UserError: if the setting of the last process is bad.
         """
-        kept = self._settings.read()
-        if name in kept:
-            (result,) = self._node.set_parameters([Parameter(name, value=kept[name])])
+        settings = self._settings.read()
+        if name in settings:
+            (result,) = self._node.set_parameters([Parameter(name, value=settings[name])])
             if not result.successful:
-                raise UserError(f"{name} was set to {kept[name]!r}: {result.reason}")
-            timeline = None
+                raise UserError(f"{name} was set to {settings[name]!r}: {result.reason}")
 
-        def keep(parameters: list[Parameter]) -> None:
-            if any(parameter.name == name for parameter in parameters):
-                try:
-                    self._settings.keep(name, self._node.get_parameter(name).value)
-                except UserError as error:
-                    self._node.remark(name, f"would be forgotten by a restart: {error}")
+        self._followed.add(name)
+        values: Observable[T] = self._node.create_parameter_observable(name)
+        if timeline is None or name in settings:
+            return values
+        played = rx.defer(lambda _: playback.state(timeline, self._origin.elapsed()))
+        return playback.follow(values, self._origin.delay_subscription(played))
 
-        self._node.add_post_set_parameters_callback(keep)
-        return playback.follow(self._node.create_parameter_observable(name), timeline)
+    def play(self, timeline: Events[T] | None, *, until_set: str = "") -> Observable[T]:
+        """
+        Return the single events of a timeline; a restarted process does not repeat them.
 
-    def until_set(self, name: str, items: Observable[T]) -> Observable[T]:
-        """Emit items until a parameter is set by hand; none if it was, before the end of the last process."""
-        if name in self._settings.read():
-            return rx.empty()
-        return items.take_until(self._node.create_parameter_observable(name).skip(1))
+        :param until_set: a parameter that ends the events when it is set by hand.
+        """
+        if timeline is None or until_set in self._settings.read():
+            return rx.never()
+        played = rx.defer(
+            lambda _: playback.events(timeline, self._origin.elapsed(), resume=self._origin.is_past)
+        )
+        items = self._origin.delay_subscription(played)
+        if not until_set:
+            return items
+        return items.take_until(self._set_by_hand.filter(lambda name: name == until_set))
+
+    def _keep(self, parameters: list[Parameter]) -> None:
+        for name in self._followed.intersection(each.name for each in parameters):
+            try:
+                self._settings.keep(name, self._node.get_parameter(name).value)
+            except UserError as error:
+                self._node.remark(name, f"a restart would forget the setting: {error}")
+            self._set_by_hand.on_next(name)

@@ -1,4 +1,4 @@
-"""Values over time: what a virtual source does, and when."""
+"""Timelines: values over the time of a scenario [s since its origin]."""
 
 from __future__ import annotations
 
@@ -6,47 +6,30 @@ import itertools
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Generic, Protocol, TypeVar
+from typing import Generic, TypeVar
 
 T = TypeVar("T")
-T_co = TypeVar("T_co", covariant=True)
-
-
-class Timeline(Protocol[T_co]):
-    """Values over time [s since the scenario's origin]."""
-
-    catches_up: bool
-    """Whether values whose time has passed unnoticed (a stopped process) are still worth something."""
-
-    def at(self, time: float) -> T_co | None:
-        """Return the value that holds at a time, ``None`` if there is none yet."""
-
-    def after(self, time: float) -> Iterator[tuple[float, T_co]]:
-        """Return the changes after a time, in order, each with its time."""
 
 
 @dataclass(frozen=True)
 class Events(Generic[T]):
-    """Single values, each from its time on."""
+    """Values, each with its time; as a state, a value holds until the next one."""
 
     items: tuple[tuple[float, T], ...]
     repeat: float | None = None
-    """All of them again and again, with this period [s]."""
-    catches_up = True
+    """The period [s] with which all items come again."""
 
-    def at(self, time: float) -> T | None:
-        """Return the last value up to a time."""
-        value = None
-        for _, item in itertools.takewhile(lambda item: item[0] <= time, self._around(time)):
-            value = item
-        return value
+    def since(self, time: float) -> Iterator[tuple[float, T]]:
+        """Yield the item that holds at a time, if there is one, then the items after that time."""
+        until = list(itertools.takewhile(lambda item: item[0] <= time, self._around(time)))
+        return itertools.chain(until[-1:], self.after(time))
 
     def after(self, time: float) -> Iterator[tuple[float, T]]:
-        """Return the values after a time."""
+        """Yield the items after a time."""
         return itertools.dropwhile(lambda item: item[0] <= time, self._around(time))
 
     def _around(self, time: float) -> Iterator[tuple[float, T]]:
-        """Return the values since the beginning, or since a whole round before a time."""
+        """Yield all items, or those from a whole round before a time."""
         if self.repeat is None:
             return iter(self.items)
         rounds = itertools.count(max(0, math.floor(time / self.repeat) - 1))
@@ -55,22 +38,27 @@ class Events(Generic[T]):
 
 @dataclass(frozen=True)
 class Sweep:
-    """center + amplitude · sin(2π · t/period + phase) at t = ``delay`` + n / ``rate``, n = …, -1, 0, 1, …"""
+    """
+    A smooth movement between two ends, sampled at a rate.
+
+    Without a rest it is center + amplitude · sin(2π · t/period + phase).
+    """
 
     center: float
     amplitude: float
     period: float
+    """From one low end to the next [s], including the rests."""
     rate: float = 25.0
+    """Samples per second [Hz]."""
     phase: float = 0.0
-    delay: float = 0.0
-    catches_up = False
+    """The part of the period [rad] by which the sweep is ahead."""
+    rest: float = 0.0
+    """How long it stays at each end [s]; less than half the period."""
 
     def at(self, time: float) -> float:
         """Return the value at a time."""
-        return self.center + self.amplitude * math.sin(math.tau * time / self.period + self.phase)
-
-    def after(self, time: float) -> Iterator[tuple[float, float]]:
-        """Return the values after a time."""
-        steps = itertools.count(math.floor((time - self.delay) * self.rate) + 1)
-        times = (self.delay + step / self.rate for step in steps)
-        return ((at, self.at(at)) for at in times)
+        half = self.period / 2
+        movement = half - self.rest
+        since_low_end = time + self.period * self.phase / math.tau + movement / 2
+        ends, since_end = divmod(since_low_end, half)
+        return self.center - self.amplitude * math.cos(math.pi * (ends + min(since_end / movement, 1.0)))

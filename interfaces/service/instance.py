@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import socket
+from pathlib import Path
 
 from rclpy.node import Node
 
@@ -22,11 +23,20 @@ def claim(node: Node) -> socket.socket:
     """
     name = node.get_fully_qualified_name()
     domain = node.context.get_domain_id()
-    digest = hashlib.sha256(name.encode()).hexdigest()[:32]  # an address has at most 107 bytes
     held = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     try:
-        held.bind(f"\0reactive-arm/{domain}/{digest}")
+        held.bind(f"\0{_address(name, domain)}")
     except OSError:
         held.close()
         raise AlreadyRunning(f"{name} already runs in domain {domain}") from None
     return held
+
+
+def is_claimed(name: str, domain: int) -> bool:
+    """Return whether a live process of this host holds the claim on a fully qualified node name."""
+    return f"@{_address(name, domain)}\n" in Path("/proc/net/unix").read_text()
+
+
+def _address(name: str, domain: int) -> str:
+    digest = hashlib.sha256(name.encode()).hexdigest()[:32]  # an address has at most 107 bytes
+    return f"reactive-arm/{domain}/{digest}"

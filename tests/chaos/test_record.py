@@ -73,7 +73,8 @@ def test_ctrl_c_ends_the_judging(tmp_path: Path) -> None:
     path = tmp_path / "record.mcap"
     recorded(path, ONE)
     script = (
-        "import deploy.commands.interruption, os, signal, sys; os.kill(os.getpid(), signal.SIGINT);"
+        "import os, signal, sys; signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT});"
+        "os.kill(os.getpid(), signal.SIGINT);"
         f"import deploy.chaos.__main__ as monkey; sys.exit(monkey.main(['--replay', {str(path)!r}]))"
     )
     end = subprocess.run(

@@ -5,12 +5,12 @@ from __future__ import annotations
 from reactivex.testing import ReactiveTest, TestScheduler
 
 from interfaces.topics import OFF, ON, TURN_OFF, TURN_ON
-from services.dead_mans_switch import heartbeats, insisting
+from services.dead_mans_switch import engine_commands, heartbeats
 
 on_next, subscribe = ReactiveTest.on_next, ReactiveTest.subscribe
 
 
-def test_it_beats_at_its_rate_while_it_is_pressed_and_says_nothing_when_it_is_released(
+def test_switch_beats_at_its_rate_while_it_is_pressed(
     scheduler: TestScheduler,
 ) -> None:
     pressed = scheduler.create_hot_observable(on_next(300, True), on_next(345, False), on_next(800, True))
@@ -24,13 +24,13 @@ def test_it_beats_at_its_rate_while_it_is_pressed_and_says_nothing_when_it_is_re
     assert [source.subscriptions for source in (pressed, rate, single)] == [[subscribe(200, 1000)]] * 3
 
 
-def test_a_command_is_repeated_until_the_engines_obey(scheduler: TestScheduler) -> None:
+def test_command_is_repeated_until_the_engines_obey(scheduler: TestScheduler) -> None:
     commands = scheduler.create_hot_observable(on_next(210, TURN_ON), on_next(300, TURN_OFF))
     states = scheduler.create_hot_observable(
         *(on_next(time, state) for time, state in [(215, OFF), (242, ON), (250, ON), (305, OFF)])
     )
 
-    results = scheduler.start(lambda: insisting(commands, states, patience=10))
+    results = scheduler.start(lambda: engine_commands(commands, states, period=10))
 
     assert results.messages == [
         *(on_next(time, TURN_ON) for time in (210, 220, 230, 240)),
@@ -39,10 +39,10 @@ def test_a_command_is_repeated_until_the_engines_obey(scheduler: TestScheduler) 
     assert states.subscriptions == [subscribe(210, 242), subscribe(300, 305)]
 
 
-def test_it_gives_up_after_a_while(scheduler: TestScheduler) -> None:
+def test_command_is_repeated_a_limited_number_of_times(scheduler: TestScheduler) -> None:
     commands = scheduler.create_hot_observable(on_next(210, TURN_ON))
     states = scheduler.create_hot_observable(on_next(215, OFF))
 
-    results = scheduler.start(lambda: insisting(commands, states, patience=10, times=3))
+    results = scheduler.start(lambda: engine_commands(commands, states, period=10, times=3))
 
     assert results.messages == [on_next(time, TURN_ON) for time in (210, 220, 230)]

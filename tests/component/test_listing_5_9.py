@@ -85,10 +85,10 @@ class Arm:
         self.scheduler.advance_to(START)
         self.wire()
         for name, timeline in played.configuration.items():
-            self.publish(name, playback.play(timeline, START).map(lambda value: Float64(data=value)))
+            self.publish(name, playback.state(timeline, START).map(lambda value: Float64(data=value)))
         assert played.heartbeats is not None
         self.publish(
-            "operator_heartbeat", playback.play(played.heartbeats, START).map(lambda beat: Bool(data=beat))
+            "operator_heartbeat", playback.events(played.heartbeats, START).map(lambda beat: Bool(data=beat))
         )
 
     def seen(self, topic: topics.Topic) -> Observable[Any]:

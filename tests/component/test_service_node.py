@@ -1,4 +1,4 @@
-"""The node of a service: bad messages, health, parameters, scenarios."""
+"""The node of a service: bad messages, health, parameters."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ import os
 import time
 from collections.abc import Callable
 from datetime import UTC, datetime, timedelta
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -24,9 +23,7 @@ from reactivex.subject import Subject
 from std_msgs.msg import Bool, Float64, Header, String
 
 from interfaces import topics
-from interfaces.scenario.origin import Origin
-from interfaces.scenario.source import VirtualSource
-from interfaces.service import Rejected, ServiceNode, UserError, parameter
+from interfaces.service import Rejected, ServiceNode, parameter
 
 Make = Callable[..., Any]
 SpinUntil = Callable[..., None]
@@ -347,138 +344,6 @@ def test_only_settable_parameters_can_be_set_at_run_time(service: ServiceNode) -
     assert set_to("value", 21.0)
     assert not set_to("value", math.nan)
     assert service.get_parameter("value").value == 21.0
-
-
-# Scenarios
-
-
-def test_without_a_scenario_nothing_is_driven(service: ServiceNode) -> None:
-    source = VirtualSource(service)
-
-    assert source.scenario.configuration == {}
-    assert source.play(None) is None
-
-
-def test_a_scenario_is_played_from_where_it_is_now(
-    make_node: Make, tmp_path: Path, spin_until: SpinUntil
-) -> None:
-    path = tmp_path / "scenario.yaml"
-    path.write_text("l1: [{at: 0, value: 1}, {at: 100, value: 2}, {at: 102, value: 3}, {at: 999, value: 4}]")
-    node = overridden(make_node, scenario=str(path), scenario_epoch=time.monotonic() - 100.1)
-    values: list[float] = []
-
-    source = VirtualSource(node)
-    source.play(source.scenario.configuration["l1"]).subscribe(values.append, scheduler=node.scheduler)
-
-    assert values == [2.0]
-    spin_until(lambda: values == [2.0, 3.0])
-
-
-def test_what_was_set_by_hand_holds_beyond_a_restart(
-    make_node: Make, spin_until: SpinUntil, tmp_path: Path
-) -> None:
-    scenario = tmp_path / "scenario.yaml"
-    scenario.write_text("l1: 2.0")
-
-    def source() -> tuple[ServiceNode, list[float]]:
-        node = overridden(
-            make_node,
-            scenario=str(scenario),
-            scenario_epoch=time.monotonic() - 1.0,
-            settings=str(tmp_path / "settings"),
-        )
-        node.declare(one("value", 1.0, (0.0, 9.0), "length [m]", settable=True))
-        values: list[float] = []
-        source = VirtualSource(node)
-        timeline = source.play(source.scenario.configuration["l1"])
-        source.follow("value", timeline).subscribe(values.append, scheduler=node.scheduler)
-        return node, values
-
-    first, values = source()
-    spin_until(lambda: values == [2.0])
-    first.set_parameters([Parameter("value", value=-1.0)])  # refused
-    first.set_parameters([Parameter("value", value=5.0)])
-    assert values == [2.0, 5.0]
-    first.destroy_node()
-    second, values = source()
-    assert values == [5.0]
-    assert second.get_parameter("value").value == 5.0
-
-
-def test_what_a_scenario_does_besides_ends_for_good_when_a_parameter_is_set_by_hand(
-    make_node: Make, tmp_path: Path
-) -> None:
-    items: Subject[int] = Subject()
-
-    def source() -> tuple[ServiceNode, list[int]]:
-        node = overridden(make_node, settings=str(tmp_path / "settings"))
-        node.declare(one("pressed", False, None, "whether it is held", settable=True))
-        source = VirtualSource(node)
-        source.follow("pressed").subscribe(scheduler=node.scheduler)
-        received: list[int] = []
-        source.until_set("pressed", items).subscribe(received.append, scheduler=node.scheduler)
-        return node, received
-
-    node, received = source()
-    items.on_next(1)
-    node.set_parameters([Parameter("pressed", value=False)])
-    items.on_next(2)
-    assert received == [1]
-    node.destroy_node()
-    _, received = source()
-    items.on_next(3)
-    assert received == []
-
-
-def test_it_is_told_when_a_setting_would_be_forgotten(
-    make_node: Make, peer: Node, spin_until: SpinUntil, tmp_path: Path
-) -> None:
-    heard: list[str] = []
-    topic = topics.DIAGNOSTICS
-    peer.create_subscription(topic.type, topic.name, lambda it: heard.append(it.status[0].message), topic.qos)
-    (tmp_path / "file").touch()
-    node = overridden(make_node, settings=str(tmp_path / "file" / "settings"))
-    node.declare(one("value", 1.0, (0.0, 9.0), "length [m]", settable=True))
-    values: list[float] = []
-    VirtualSource(node).follow("value").subscribe(values.append, scheduler=node.scheduler)
-    spin_until(lambda: heard)
-    node.set_parameters([Parameter("value", value=5.0)])
-    assert values == [1.0, 5.0]
-    spin_until(lambda: heard[-1].startswith("value: would be forgotten by a restart: "))
-    assert heard[-1].endswith("settings/service.yaml: Not a directory")
-
-
-@pytest.mark.parametrize("text", ["", "- 1", "value: [", "value: -1.0", "value: long"])
-def test_a_setting_that_cannot_be_used_is_a_mistake_and_not_forgotten(
-    make_node: Make, tmp_path: Path, text: str
-) -> None:
-    node = overridden(make_node, settings=str(tmp_path))
-    (tmp_path / f"{node.get_name()}.yaml").write_text(text)
-    node.declare(one("value", 1.0, (0.0, 9.0), "length [m]", settable=True))
-    with pytest.raises(UserError, match=r"value was set to|\.yaml: "):
-        VirtualSource(node).follow("value")
-
-
-def test_what_waits_for_the_origin_begins_there_or_at_once(make_node: Make, spin_until: SpinUntil) -> None:
-    begun: dict[float, float] = {}
-    origin = time.monotonic() + 0.2
-    for epoch in (origin, origin - 100.0):
-        node = overridden(make_node, scenario_epoch=epoch)
-        Origin(node).delay_subscription(rx.defer(lambda _: rx.just(time.monotonic()))).subscribe(
-            lambda at, epoch=epoch: begun.setdefault(epoch, at), scheduler=node.scheduler
-        )
-
-    spin_until(lambda: len(begun) == 2)
-
-    # The other one begins within the test, so at once.
-    assert origin <= begun[origin] + 1e-3
-
-
-def test_a_mistake_in_a_scenario_is_an_error(make_node: Make) -> None:
-    node = overridden(make_node, scenario="/nowhere.yaml")
-
-    with pytest.raises(UserError, match=r"/nowhere\.yaml"):
-        VirtualSource(node)
 
 
 def test_health_is_reported_every_second(make_node: Make, peer: Node, spin_until: SpinUntil) -> None:

@@ -1,4 +1,4 @@
-"""Logs of which supervisord loses lines, and nothing else."""
+"""Logs of supervisord that drop lines instead of raising."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def log_to(file: Path) -> closing[loggers.Logger]:
     return closing(loggers.Logger(handlers=[LossyLog(str(file), "a", LIMIT, 1)]))
 
 
-def test_a_full_disk_costs_only_what_is_logged_meanwhile(tmp_path: Path) -> None:
+def test_a_full_disk_costs_only_the_lines_meanwhile(tmp_path: Path) -> None:
     file = tmp_path / "velocity.log"
     file.symlink_to("/dev/full")
     with log_to(file) as log:
@@ -40,7 +40,7 @@ def test_a_log_that_cannot_be_rolled_over_goes_on(tmp_path: Path) -> None:
     assert obstacle.read_bytes() == b"too long a line\nshort\n"
 
 
-def test_a_log_that_cannot_be_opened_is_opened_later_and_its_directory_made_again(tmp_path: Path) -> None:
+def test_a_log_that_cannot_be_opened_is_opened_later(tmp_path: Path) -> None:
     directory = tmp_path / "logs"
     directory.touch()
     file = directory / "velocity.log"
@@ -51,7 +51,7 @@ def test_a_log_that_cannot_be_opened_is_opened_later_and_its_directory_made_agai
     assert file.read_bytes() == b"short\n"
 
 
-def test_a_log_that_is_there_is_continued_and_rolled_over(tmp_path: Path) -> None:
+def test_an_existing_log_is_continued_and_rolled_over(tmp_path: Path) -> None:
     file = tmp_path / "velocity.log"
     file.write_bytes(b"first\n")
     with log_to(file) as log:
@@ -61,8 +61,8 @@ def test_a_log_that_is_there_is_continued_and_rolled_over(tmp_path: Path) -> Non
     assert file.read_bytes() == b"third\n"
 
 
-def test_it_is_what_supervisord_logs_to_from_then_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(loggers, "RotatingFileHandler", loggers.RotatingFileHandler)  # to be put back
+def test_supervisord_uses_it_from_then_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(loggers, "RotatingFileHandler", loggers.RotatingFileHandler)  # restored at the end
     monkeypatch.setattr(events, "callbacks", [])
     file = tmp_path / "supervisord.log"
     with closing(loggers.Logger()) as own, closing(loggers.Logger()) as program:

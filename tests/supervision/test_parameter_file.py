@@ -1,4 +1,4 @@
-"""Mistakes in a user's parameter file."""
+"""Errors in a user's parameter file."""
 
 from __future__ import annotations
 
@@ -9,23 +9,23 @@ import pytest
 import yaml
 
 from deploy.commands import parameter_file
+from deploy.supervision import manifest
+from interfaces.service import UserError
+
+PARAMETERS = {
+    "config_theta2": {"value"},
+    "dead_mans_switch": {"rate", "pressed"},
+    "kinematics": set(),
+    "operator_watchdog": {"lifespan", "sampling", "silence", "strikes", "repeat"},
+    "engine_controller": {"max_presence_age", "presence_timeout", "repeat"},
+    "sentinel": {"period", "health_timeout", "start_timeout"},
+}
 
 
-def test_the_parameters_of_every_service_are_known() -> None:
-    source = {"value"}
+def test_the_parameters_of_every_program_are_known() -> None:
     declared = parameter_file.declared()
-    assert {name: set(parameters) - {"use_sim_time"} for name, parameters in declared.items()} == {
-        "config_l1": source,
-        "config_l2": source,
-        "config_theta1": source,
-        "config_theta2": source,
-        "dead_mans_switch": {"rate", "pressed"},
-        "kinematics": set(),
-        "velocity": set(),
-        "operator_watchdog": {"lifespan", "sampling", "silence", "strikes", "repeat"},
-        "engine_controller": {"max_presence_age", "presence_timeout", "repeat"},
-        "sentinel": {"look", "silence", "start"},
-    }
+    assert [*declared] == [program.name for program in manifest.programs()]
+    assert {name: set(declared[name]) - {"use_sim_time"} for name in PARAMETERS} == PARAMETERS
 
 
 @pytest.mark.parametrize(
@@ -37,14 +37,14 @@ def test_the_parameters_of_every_service_are_known() -> None:
         "{}",
     ],
 )
-def test_a_good_file_has_no_faults(text: str) -> None:
-    assert list(parameter_file.faults(yaml.safe_load(text), "/")) == []
+def test_a_good_file_has_no_errors(text: str) -> None:
+    assert list(parameter_file.problems(yaml.safe_load(text), "/")) == []
 
 
-MISTAKES = """
-pilot: {ros__parameters: {}}                            pilot: is no service; those are config_l1
+ERRORS = """
+pilot: {ros__parameters: {}}                            pilot: is no service; the services are
 operator_watchdog: {silence: 2.0}                       operator_watchdog: must hold ros__parameters
-operator_watchdog: {ros__parameters: {silense: 2.0}}    operator_watchdog.silense: is no parameter; those are
+operator_watchdog: {ros__parameters: {silense: 2.0}}    operator_watchdog.silense: is no parameter; the
 operator_watchdog: {ros__parameters: {silence: 2}}      operator_watchdog.silence: must be a number with a
 operator_watchdog: {ros__parameters: {strikes: 2.0}}    operator_watchdog.strikes: must be an integer, not 2.0
 operator_watchdog: {ros__parameters: {strikes: 0}}      operator_watchdog.strikes: must be from 1 to 100
@@ -52,29 +52,46 @@ config_l1: {ros__parameters: {value: .nan}}             config_l1.value: must be
 dead_mans_switch: {ros__parameters: {pressed: 1}}       dead_mans_switch.pressed: must be true or false, not 1
 dead_mans_switch: {ros__parameters: {scenario: x}}      dead_mans_switch.scenario: is no parameter
 /**: {ros__parameters: {silense: 2.0}}                  /**.silense: is no parameter
-/**: {ros__parameters: {repeat: 0.03}}                  /**.repeat: must be from 0.05 to 10, not 0.03
-/**: {ros__parameters: {value: -1.0}}                   /**.value: must be from 0 to 1000, not -1.0
+/**: {ros__parameters: {repeat: 0.03}}                  /**.repeat of operator_watchdog: must be from
+/**: {ros__parameters: {repeat: 0.5}}                   /**.repeat of engine_controller: must be from
+dead_mans_switch: {ros__parameters: {rate: fast}}       dead_mans_switch.rate: must be a number
+/**: {ros__parameters: {value: -1.0}}                   /**.value of config_l1: must be from 0 to 1000
 [1]                                                     file: must name services
 """
 
 
-@pytest.mark.parametrize("mistake", MISTAKES.strip().splitlines())
-def test_a_mistake_is_told_with_its_key_and_the_reason(mistake: str) -> None:
-    text, told = re.split("   +", mistake)
-    ((key, fault),) = parameter_file.faults(yaml.safe_load(text), "/")
-    assert f"{key}: {fault}".startswith(told)
+@pytest.mark.parametrize("error", ERRORS.strip().splitlines())
+def test_an_error_has_its_key_and_reason(error: str) -> None:
+    text, reported = re.split("   +", error)
+    (key, problem), *_ = parameter_file.problems(yaml.safe_load(text), "/")
+    assert f"{key}: {problem}".startswith(reported)
 
 
 @pytest.mark.parametrize(
     ("node", "good"),
     [("velocity", True), ("/arm1/velocity", True), ("/velocity", False), ("/arm2/velocity", False)],
 )
-def test_an_arm_in_a_namespace_names_its_services_with_it_or_without(node: str, good: bool) -> None:
+def test_services_are_named_with_the_namespace_or_without(node: str, good: bool) -> None:
     document = {node: {"ros__parameters": {}}}
-    assert [key for key, _ in parameter_file.faults(document, "/arm1")] == ([] if good else [node])
+    assert [key for key, _ in parameter_file.problems(document, "/arm1")] == ([] if good else [node])
 
 
-def test_a_file_that_yaml_cannot_read_is_a_mistake_of_one_line(tmp_path: Path) -> None:
+def test_an_error_of_yaml_is_one_line_with_the_file(tmp_path: Path) -> None:
     file = tmp_path / "mine.yaml"
     file.write_text("config_l1: {ros__parameters: {value: 2024-13-45}}")
-    assert str(parameter_file.main(str(file))).startswith(f"{file}: month must be in")
+    with pytest.raises(UserError, match=f"^{file}: month must be in"):
+        parameter_file.load(str(file), "/")
+
+
+def test_1e3_is_a_number(tmp_path: Path) -> None:
+    file = tmp_path / "mine.yaml"
+    file.write_text("dead_mans_switch: {ros__parameters: {rate: 1e3}}")
+    loaded = parameter_file.load(str(file), "/")
+    assert loaded["/dead_mans_switch"]["ros__parameters"]["rate"] == 1000.0
+
+
+def test_a_file_gets_the_full_names_of_the_nodes(tmp_path: Path) -> None:
+    file = tmp_path / "mine.yaml"
+    parameters = {"ros__parameters": {"value": 1.0}}
+    file.write_text(yaml.safe_dump({"config_l1": parameters, "/arm1/config_l2": parameters}))
+    assert parameter_file.load(str(file), "/arm1").keys() == {"/arm1/config_l1", "/arm1/config_l2"}

@@ -1,4 +1,4 @@
-"""Whom the end of a system reaches, and whom not."""
+"""The processes of a system, and their end."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ READY = "print(flush=True); "
 
 @pytest.fixture
 def spawn() -> Iterator[Spawn]:
-    """Starts Python code in a process with more in its environment; returns when the code runs."""
+    """A function that starts Python code in a process with more variables, and returns when it runs."""
     with ExitStack() as stack:
 
         def spawn(code: str = READY + "signal.pause()", **environment: str) -> subprocess.Popen[bytes]:
@@ -38,7 +38,7 @@ def spawn() -> Iterator[Spawn]:
         yield spawn
 
 
-def test_members_are_found_by_their_mark_and_know_their_program(spawn: Spawn, tmp_path: Path) -> None:
+def test_members_are_found_by_their_mark(spawn: Spawn, tmp_path: Path) -> None:
     marked = {processes.MARK: str(tmp_path)}
     supervisor = spawn(**marked)
     service = spawn(**marked, SUPERVISOR_PROCESS_NAME="velocity")
@@ -47,7 +47,7 @@ def test_members_are_found_by_their_mark_and_know_their_program(spawn: Spawn, tm
     assert processes.of_system(tmp_path) == [(supervisor.pid, ""), (service.pid, "velocity")]
 
 
-def test_who_uses_a_directory_of_programs_is_found_wherever_it_runs(spawn: Spawn, tmp_path: Path) -> None:
+def test_systems_that_use_a_directory_of_programs_are_found(spawn: Spawn, tmp_path: Path) -> None:
     programs, elsewhere = tmp_path / "bin", os.environ["PATH"]
     marked = {processes.MARK: str(tmp_path / "run")}
     spawn(**marked, PATH=f"{programs}:{elsewhere}")
@@ -57,13 +57,13 @@ def test_who_uses_a_directory_of_programs_is_found_wherever_it_runs(spawn: Spawn
     assert processes.using(programs) == [tmp_path / "run"]
 
 
-def test_a_member_that_heeds_sigterm_ends_by_it(spawn: Spawn, tmp_path: Path) -> None:
+def test_a_member_ends_by_sigterm(spawn: Spawn, tmp_path: Path) -> None:
     process = spawn(**{processes.MARK: str(tmp_path)})
     processes.end(tmp_path, [process.pid], grace=10.0)
     assert process.wait() == -signal.SIGTERM
 
 
-def test_a_member_that_does_not_is_killed_after_its_grace(spawn: Spawn, tmp_path: Path) -> None:
+def test_a_member_that_ignores_sigterm_is_killed(spawn: Spawn, tmp_path: Path) -> None:
     deaf = "signal.signal(signal.SIGTERM, signal.SIG_IGN); " + READY + "\nwhile True: signal.pause()"
     process = spawn(deaf, **{processes.MARK: str(tmp_path)})
     processes.end(tmp_path, [process.pid], grace=0.1)
@@ -77,13 +77,13 @@ def test_a_stopped_member_ends_as_well(spawn: Spawn, tmp_path: Path) -> None:
     assert process.wait() in (-signal.SIGTERM, -signal.SIGKILL)
 
 
-def test_a_process_without_the_mark_is_spared_although_its_pid_is_given(spawn: Spawn, tmp_path: Path) -> None:
+def test_a_process_without_the_mark_is_spared(spawn: Spawn, tmp_path: Path) -> None:
     stranger = spawn()
     processes.end(tmp_path, [stranger.pid], grace=0.1)
     assert stranger.poll() is None
 
 
-def test_a_pid_that_nobody_has_any_more_is_no_mistake(spawn: Spawn, tmp_path: Path) -> None:
+def test_a_pid_of_no_process_is_ignored(spawn: Spawn, tmp_path: Path) -> None:
     process = spawn(READY)
     process.wait()
     processes.end(tmp_path, [process.pid], grace=0.1)

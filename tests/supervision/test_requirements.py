@@ -20,16 +20,16 @@ def pins(*names: str) -> dict[str, str]:
 
 def unmet(declared: list[str], pinned: dict[str, str]) -> list[str]:
     requirements = [Requirement(text) for text in declared]
-    return [str(one) for one in requirements if pinned.get(one.name.lower(), "none") not in one.specifier]
+    return [str(each) for each in requirements if pinned.get(each.name.lower(), "none") not in each.specifier]
 
 
-def test_what_the_project_needs_is_pinned_within_its_ranges() -> None:
+def test_the_projects_requirements_are_pinned_in_their_ranges() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())
     assert unmet(project["project"]["dependencies"], pins("system")) == []
     assert unmet(project["dependency-groups"]["develop"], pins("develop")) == []
 
 
-def test_what_the_embedded_runtime_needs_is_pinned_within_its_ranges() -> None:
+def test_the_runtimes_requirements_are_pinned_in_their_ranges() -> None:
     runtime = tomllib.loads((ROOT / "deploy/runtime/pyproject.toml").read_text())
     pinned = pins("system", "build", "runtime")
     assert unmet(runtime["project"]["dependencies"], pinned) == []

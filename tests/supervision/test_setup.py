@@ -1,4 +1,4 @@
-"""What the set-up makes of a .venv, and says, where it cannot make one; in a checkout of the test's own."""
+"""The set-up of .venv where it fails, in a checkout of its own."""
 
 from __future__ import annotations
 
@@ -23,26 +23,17 @@ STAMP = ".venv/made-from"
 
 @pytest.fixture
 def checkout(tmp_path: Path) -> Path:
-    """What of a checkout the set-up consists of."""
+    """A checkout with the files of the set-up and of `make stop`."""
     checkout = tmp_path / "checkout"
-    (checkout / "deploy" / "supervision").mkdir(parents=True)
-    (checkout / "deploy" / "commands").mkdir()
-    shutil.copytree(ROOT / "deploy" / "requirements", checkout / "deploy" / "requirements")
-    for name in (
-        "Makefile",
-        "deploy/__init__.py",
-        "deploy/supervision/__init__.py",
-        "deploy/supervision/processes.py",
-        "deploy/commands/__init__.py",
-        "deploy/commands/setup.py",
-        "deploy/commands/setup.sh",
-    ):
+    for name in ("requirements", "supervision", "commands", "console"):
+        shutil.copytree(ROOT / "deploy" / name, checkout / "deploy" / name)
+    for name in ("Makefile", "deploy/__init__.py", "deploy/supervisord.conf"):
         shutil.copyfile(ROOT / name, checkout / name)
     return checkout
 
 
 def set_up(checkout: Path, **environment: str) -> tuple[int, str]:
-    """Set it up: the exit code, and what was said of errors."""
+    """Set a checkout up: the exit code and the errors."""
     done = subprocess.run(
         [sys._base_executable, "-m", "deploy.commands.setup"],
         cwd=checkout,
@@ -54,14 +45,15 @@ def set_up(checkout: Path, **environment: str) -> tuple[int, str]:
     return done.returncode, done.stderr
 
 
-def make(checkout: Path, command: str) -> str:
-    """What a command of make says, which ends well."""
-    return subprocess.run(
-        ["make", command], cwd=checkout, check=True, stdout=subprocess.PIPE, text=True
-    ).stdout.strip()
+def make(checkout: Path, command: str) -> tuple[int, str]:
+    """Do a command of make: the exit code and the first line of its output."""
+    done = subprocess.run(
+        ["make", command], cwd=checkout, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+    )
+    return done.returncode, done.stdout.splitlines()[0]
 
 
-def test_what_tools_leave_behind_is_no_part_of_the_runtime(
+def test_files_of_tools_are_no_part_of_a_distribution(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(setup, "ROOT", tmp_path)
@@ -78,7 +70,7 @@ def test_what_tools_leave_behind_is_no_part_of_the_runtime(
     assert setup.fingerprint_of(tmp_path) != before
 
 
-def test_a_set_up_that_is_refused_leaves_what_there_is(checkout: Path, tmp_path: Path) -> None:
+def test_a_refused_set_up_leaves_the_old_one(checkout: Path, tmp_path: Path) -> None:
     stamp = checkout / STAMP
     stamp.parent.mkdir()
     stamp.write_text("another shell's environment")
@@ -90,22 +82,58 @@ def test_a_set_up_that_is_refused_leaves_what_there_is(checkout: Path, tmp_path:
     assert stamp.read_text() == "another shell's environment"
 
 
-def test_an_error_of_the_file_system_is_told_in_a_line(checkout: Path) -> None:
+def test_the_interpreter_is_none_of_an_interrupted_set_up(checkout: Path) -> None:
+    python = checkout / ".venv/bin/python"
+    python.parent.mkdir(parents=True)
+    python.symlink_to(os.path.realpath(sys._base_executable))  # there is no pyvenv.cfg
+    (checkout / "show.py").write_text("import sys; print(sys.executable)")
+    shown = subprocess.run(
+        ["deploy/commands/python.sh", "show"], cwd=checkout, capture_output=True, text=True
+    )
+    assert shown.stdout == f"{python.readlink()}\n"
+
+
+def test_an_error_of_the_file_system_is_one_line(checkout: Path) -> None:
     (checkout / ".venv").touch()
     code, said = set_up(checkout)
     assert code == 1
     assert said == f"Set-up failed: [Errno 20] Not a directory: '{checkout / STAMP}'\n"
 
 
-@pytest.mark.parametrize("command", ["console", "status", "logs", "stop"])
-def test_half_a_set_up_runs_nothing(checkout: Path, command: str) -> None:
+@pytest.mark.parametrize("command", ["console", "status", "logs"])
+def test_half_a_set_up_runs_no_command(checkout: Path, command: str) -> None:
     python = checkout / ".venv/bin/python"
     python.parent.mkdir(parents=True)
     python.write_text("#!/bin/sh\necho runs $*\n")
     python.chmod(0o755)
-    assert make(checkout, command) == "Nothing runs: .venv is not set up (make setup)."
+    code, printed = make(checkout, command)
+    assert code != 0
+    assert printed == ".venv is not set up: make setup (make stop works without it)"
     (checkout / STAMP).touch()
-    assert make(checkout, command) == f"runs -m deploy.commands.launcher {command}"
+    assert make(checkout, command) == (0, f"runs -m deploy.commands.launcher {command}")
+
+
+def test_make_stop_works_without_a_set_up_and_leaves_no_files(checkout: Path) -> None:
+    assert make(checkout, "stop") == (0, "Nothing runs.")
+    assert not (checkout / ".run").exists()
+
+
+def test_make_stop_works_in_a_read_only_checkout(checkout: Path) -> None:
+    (checkout / ".run").mkdir()
+    (checkout / ".run" / "parameters.yaml").touch()
+    read_only = ["unshare", "--mount", "--map-root-user", "sh", "-c"]
+    script = (
+        'mount --bind "$PWD" "$PWD" && mount -o remount,bind,ro "$PWD" && cd "$PWD" && ! touch x && make stop'
+    )
+    done = subprocess.run([*read_only, script], cwd=checkout, capture_output=True, text=True)
+    if "unshare" in done.stderr or "mount" in done.stderr:
+        pytest.skip(f"platform: {done.stderr}")
+    assert (done.returncode, done.stdout) == (0, "Nothing runs.\n")
+
+
+def test_a_quote_in_a_variable_of_make_is_no_shell_syntax(checkout: Path) -> None:
+    done = subprocess.run(["make", "stop", "PYTHON=it's"], cwd=checkout, capture_output=True, text=True)
+    assert done.stderr.splitlines()[-2:-1] == ["PYTHON=it's is not a Python 3.11, 3.12 or 3.13"]
 
 
 def test_an_interrupted_step_ends_with_all_its_children(tmp_path: Path) -> None:
@@ -125,7 +153,7 @@ def test_an_interrupted_step_ends_with_all_its_children(tmp_path: Path) -> None:
             log=None,
         )
     interrupter.join()
-    with suppress(ProcessLookupError):  # whoever has adopted it has seen its end already
+    with suppress(ProcessLookupError):  # its new parent has seen its end already
         child = os.pidfd_open(int(begun.read_text()))
         try:
             assert select.select([child], [], [], 10)[0]

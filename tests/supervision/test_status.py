@@ -15,7 +15,7 @@ def health(pid: int, *, since_output: float | None = 0.0, reason: str = "") -> H
     return Health(time.monotonic(), pid, ok=not reason, reason=reason, since_output=since_output)
 
 
-def test_the_table_says_how_each_service_is(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_table_shows_each_service(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(time, "monotonic", lambda: 100.0)
     programs = [
         Program("kinematics", "RUNNING", 101, 3725.9, 2, ""),
@@ -23,16 +23,16 @@ def test_the_table_says_how_each_service_is(monkeypatch: pytest.MonkeyPatch) -> 
         Program("operator_watchdog", "RUNNING", 103, 1.0, 1, ""),
         Program("engine_controller", "BACKOFF", 0, 0.0, 7, ""),
     ]
-    heard = {
+    reports = {
         "kinematics": health(101, since_output=0.2, reason="l1: nan is not finite"),
         "velocity": health(102, since_output=None),
-        "operator_watchdog": health(99),  # of the process before this one
+        "operator_watchdog": health(99),  # the previous process
         "engine_controller": health(104),
     }
-    assert of_services(programs, heard).splitlines() == [
+    assert of_services(programs, reports).splitlines() == [
         "SERVICE            STATE    PID  UPTIME   RESTARTS  LAST OUTPUT  HEALTH",
         "kinematics         RUNNING  101  1:02:05  2         0.2 s ago    l1: nan is not finite",
         "velocity           RUNNING  102  0:00:05  0         never        ok",
-        "operator_watchdog  RUNNING  103  0:00:01  1         -            not heard of",
+        "operator_watchdog  RUNNING  103  0:00:01  1         -            no report",
         "engine_controller  BACKOFF  -    -        7         -            -",
     ]

@@ -1,4 +1,4 @@
-"""Systems for the tests, each in a run directory and a DDS domain of its own."""
+"""Sites for systems under test, each with a run directory and a DDS domain."""
 
 from __future__ import annotations
 
@@ -8,21 +8,28 @@ from pathlib import Path
 
 import pytest
 
-from tests.system.sites import Peer, Site
+from tests.system.sites import Checkout, Peer, Site
 
 
 @pytest.fixture
 def site(tmp_path: Path, domain_id: int) -> Iterator[Site]:
-    """A place for a system of this test."""
+    """A site for a system of this test."""
     with closing(Site(tmp_path / "run", domain_id)) as site:
         yield site
 
 
 @pytest.fixture(scope="module")
 def module_site(tmp_path_factory: pytest.TempPathFactory, module_domain_id: int) -> Iterator[Site]:
-    """A place for a system that the tests of a module share; its path is as unpleasant as paths get."""
+    """A site for a system that the tests of a module share; its path is as unpleasant as paths get."""
     run = tmp_path_factory.mktemp("unpleasant") / 'it\'s 100 % "fine"' / ("deep" * 30) / "run"
     with closing(Site(run, module_domain_id)) as site:
+        yield site
+
+
+@pytest.fixture
+def checkout(tmp_path: Path, domain_id: int) -> Iterator[Checkout]:
+    """A site for a system of this test, in a checkout of its own."""
+    with closing(Checkout(tmp_path, domain_id)) as site:
         yield site
 
 

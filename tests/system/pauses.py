@@ -1,4 +1,4 @@
-"""How long the machine as a whole stood still, where something is promised within a time that it has."""
+"""Measures how long the whole machine stood still, for promises within a time."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 _INTERVAL = 0.01  # [s]
-_USUAL = 0.01  # [s] by which a thread that sleeps so long may be late on a machine that is only busy
+_USUAL = 0.01  # [s] by which a sleeping thread may be late on a busy machine
 
 
 class Pauses:
-    """What a thread that does nothing but sleep was late."""
+    """The time by which a sleeping thread was late."""
 
     def __init__(self) -> None:
         self.total = 0.0
@@ -20,7 +20,7 @@ class Pauses:
         self._end = threading.Event()
 
     def watch(self) -> None:
-        """Count, until told to end."""
+        """Count until :meth:`end`."""
         while not self._end.is_set():
             begin = time.monotonic()
             time.sleep(_INTERVAL)
@@ -29,7 +29,7 @@ class Pauses:
                 self.total += late
 
     def end(self) -> None:
-        """Count no longer."""
+        """Stop counting."""
         self._end.set()
 
 

@@ -1,9 +1,10 @@
-"""Whole systems as the user runs them: where they live, their commands and terminals, a node beside them."""
+"""Whole systems as a user runs them: run directories, commands and terminals, and a node beside them."""
 
 from __future__ import annotations
 
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -26,18 +27,18 @@ from deploy.supervision.system import System
 from interfaces import topics
 
 ROOT = Path(__file__).parents[2]
-LIMIT = 30.0  # s in which whatever is waited for has to happen, also on a busy machine
+LIMIT = 30.0  # s for each awaited event, also on a busy machine
 
 
 class Command:
-    """A command with its terminal, and what it has printed so far: lines, each with its time [s]."""
+    """A command with its input and its output so far: lines, each with its time [s]."""
 
-    def __init__(self, arguments: list[str], environment: dict[str, str]) -> None:
+    def __init__(self, arguments: list[str], environment: dict[str, str], directory: Path) -> None:
         self.lines: list[tuple[float, str]] = []
         self._changed = threading.Condition()
         self._process = subprocess.Popen(
             arguments,
-            cwd=ROOT,
+            cwd=directory,
             env=environment,
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
@@ -51,7 +52,7 @@ class Command:
 
     @property
     def pid(self) -> int:
-        """Its process."""
+        """Its process id."""
         return self._process.pid
 
     @property
@@ -61,11 +62,11 @@ class Command:
 
     @property
     def output(self) -> str:
-        """All that it has printed."""
+        """Its whole output."""
         return "\n".join(text for _, text in self.lines)
 
     def await_line(self, pattern: str, seconds: float = LIMIT, after: int = 0) -> re.Match[str]:
-        """The first line with this pattern, as soon as it is there; ``after`` so many that do not count."""
+        """The first line with this pattern, as soon as it appears; the first ``after`` lines do not count."""
         found = self._find(pattern, seconds, after)
         assert found is not None, f"no {pattern!r} within {seconds} s:\n{self.output}"
         return found
@@ -85,13 +86,13 @@ class Command:
         return found
 
     def type(self, text: str) -> None:
-        """Type at its terminal."""
+        """Write to its standard input."""
         assert self._process.stdin is not None
         self._process.stdin.write(text)
         self._process.stdin.flush()
 
     def insist(self, text: str, pattern: str) -> None:
-        """Type until a line shows that it was heard: who was met just now may not hear the first word."""
+        """Type until a line shows the effect: a node that was discovered just now may miss the first."""
         deadline = time.monotonic() + LIMIT
         self.type(text)
         while not self._find(pattern, 2.0):
@@ -99,11 +100,11 @@ class Command:
             self.type(text)
 
     def signal(self, number: int) -> None:
-        """Send a signal to it and whom it started beside the system, as a terminal does."""
+        """Send a signal to its process group, as a terminal does."""
         os.killpg(self._process.pid, number)
 
     def wait(self, seconds: float = LIMIT) -> int:
-        """Its exit code, when it has ended."""
+        """Wait until it ends; its exit code."""
         try:
             code = self._process.wait(seconds)
         except subprocess.TimeoutExpired:
@@ -119,7 +120,7 @@ class Command:
         self._reader.join()
         assert self._process.stdin is not None
         assert self._process.stdout is not None
-        with suppress(BrokenPipeError):  # where it has ended before it was told what was typed
+        with suppress(BrokenPipeError):  # it has ended without reading its input
             self._process.stdin.close()
         self._process.stdout.close()
 
@@ -134,6 +135,9 @@ class Command:
 class Site:
     """A run directory, a DDS domain and a ROS namespace for one system."""
 
+    directory = ROOT
+    python = sys.executable
+
     def __init__(self, run: Path, domain: int, namespace: str = "") -> None:
         self.run = run
         self.domain = domain
@@ -142,7 +146,7 @@ class Site:
 
     @property
     def environment(self) -> dict[str, str]:
-        """What a user would set to have a second system beside the usual one."""
+        """The variables that a user sets for a second system beside the usual one."""
         return os.environ | {
             "REACTIVE_ARM_RUN_DIR": str(self.run),
             "REACTIVE_ARM_NAMESPACE": self.namespace,
@@ -155,27 +159,37 @@ class Site:
         return self._begin([sys.executable, script, *arguments], PYTHONPATH=path)
 
     def begin(self, *arguments: str) -> Command:
-        """Begin a command of the launcher."""
-        return self._begin([sys.executable, "-m", "deploy.commands.launcher", *arguments])
+        """Begin a command of `make`, without make."""
+        return self._begin(self._command(arguments))
 
     def begin_command(self, *command: str) -> Command:
         """Begin any command."""
         return self._begin(list(command))
 
     def begin_in_terminal(self, *command: str) -> Command:
-        """Begin any command in a terminal of its own, which closes when what is returned is killed."""
+        """Begin any command in a terminal of its own, which closes when the returned command is killed."""
         return self._begin([sys.executable, "-c", "import pty, sys; pty.spawn(sys.argv[1:])", *command])
 
     def _begin(self, command: list[str], **environment: str) -> Command:
-        begun = Command(command, self.environment | environment)
+        begun = Command(command, self.environment | environment, self.directory)
         self._commands.callback(begun.close)
         return begun
 
     def do(self, *arguments: str) -> tuple[int, str]:
-        """A whole command of the launcher: its exit code, and what it has printed."""
+        """Do a command of `make`, without make: its exit code and its output."""
+        return self.do_command(*self._command(arguments))
+
+    def _command(self, arguments: tuple[str, ...]) -> list[str]:
+        """The command behind `make`; `make stop` needs no .venv."""
+        if arguments == ("stop",):
+            return [sys._base_executable, "-m", "deploy.commands.stop"]  # type: ignore[attr-defined]
+        return [self.python, "-m", "deploy.commands.launcher", *arguments]
+
+    def do_command(self, *command: str) -> tuple[int, str]:
+        """Do any command: its exit code and its output."""
         done = subprocess.run(
-            [sys.executable, "-m", "deploy.commands.launcher", *arguments],
-            cwd=ROOT,
+            command,
+            cwd=self.directory,
             env=self.environment,
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
@@ -191,18 +205,38 @@ class Site:
         return {process.program: process.pid for process in processes.of_system(self.run)}
 
     def await_members(self, condition: Callable[[dict[str, int]], bool]) -> None:
-        """Wait until the live processes are as they should be."""
+        """Wait until the live processes fulfil a condition."""
         deadline = time.monotonic() + LIMIT
         while not condition(self.members):
             assert time.monotonic() < deadline, f"{self.members} after {LIMIT} s"
             time.sleep(0.02)
 
     def close(self) -> None:
-        """Leave nothing behind."""
+        """End all commands and the system."""
         try:
             self._commands.close()
         finally:
             System(self.run).stop()
+
+
+class Checkout(Site):
+    """A site in a checkout of its own, whose path is as unpleasant as paths get; it shares our .venv."""
+
+    def __init__(self, parent: Path, domain: int) -> None:
+        self.directory = parent / 'it\'s 100 % "fine"' / ("deep" * 30)
+        super().__init__(self.directory / ".run", domain)
+        for name in ("deploy", "interfaces", "services"):
+            ignored = shutil.ignore_patterns("__pycache__", "runtime", "tests")
+            shutil.copytree(ROOT / name, self.directory / name, ignore=ignored)
+        shutil.copyfile(ROOT / "Makefile", self.directory / "Makefile")
+        (self.directory / ".venv").symlink_to(sys.prefix)
+        self.python = str(self.directory / ".venv" / "bin" / "python")
+
+    @property
+    def environment(self) -> dict[str, str]:
+        """The variables of a shell with .venv/bin on the PATH."""
+        path = f"{self.directory / '.venv' / 'bin'}{os.pathsep}{os.environ['PATH']}"
+        return os.environ | {"ROS_DOMAIN_ID": str(self.domain), "PATH": path}
 
 
 class Peer:
@@ -216,7 +250,7 @@ class Peer:
         self._executor.add_node(self.node)
 
     def collect(self, topic: topics.Topic) -> list[Any]:
-        """A list of what is published on a topic from now on, and of what is latched."""
+        """The list of messages on a topic from now on, and of latched ones."""
         messages: list[Any] = []
         self.node.create_subscription(topic.type, topic.name, messages.append, topic.qos)
         return messages
@@ -226,7 +260,7 @@ class Peer:
         return self.node.create_publisher(topic.type, topic.name, topic.qos)
 
     def spin_until(self, condition: Callable[[], object], seconds: float = LIMIT) -> None:
-        """Let things happen until a condition is true."""
+        """Run callbacks until a condition is true."""
         deadline = time.monotonic() + seconds
         while not condition():
             assert time.monotonic() < deadline, f"not within {seconds} s"

@@ -1,4 +1,4 @@
-"""Listing 5.9 of the thesis, end to end: real processes, and what the operator reads."""
+"""Listing 5.9 of the thesis, end to end: real processes, and the lines that the operator reads."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from tests.system.sites import Site
 
 LISTING = Path(__file__).with_name("listing_5_9.txt").read_text()
 NUMBER = r"-?\d+(?:\.\d+)?"
-SAME = 0.1  # s by which distances between lines may differ from the thesis'
+TOLERANCE = 0.1  # s by which the time between lines may differ from the thesis
 JITTER = 0.02  # s between the stamp of a position and its publication, on a busy machine
 
 
 def lines(output: str) -> Iterator[tuple[float, str, list[float]]]:
-    """The time [s], the words and the numbers of each line, in the order in which they are shown."""
+    """The time [s], the words and the numbers of each line, in order."""
     for time, text in re.findall(r"^\[(-?\d+)\] (.*)$", output, re.MULTILINE):
         numbers = [float(number) for number in re.findall(NUMBER, text)]
         yield int(time) / 1000, re.sub(NUMBER, "#", text), numbers
@@ -44,7 +44,7 @@ def test_the_operator_reads_what_the_thesis_shows(site: Site) -> None:
             assert command.wait() == 0
         try:
             assert_as_in_the_thesis(command.output, paused.total)
-        except AssertionError:  # where a machine pauses, lines may come twice, or not at all
+        except AssertionError:  # lines are lost or doubled where a machine pauses
             if attempt == 2:
                 raise
         else:
@@ -52,9 +52,9 @@ def test_the_operator_reads_what_the_thesis_shows(site: Site) -> None:
 
 
 def assert_as_in_the_thesis(output: str, paused: float) -> None:
-    """The same lines, with the same numbers, at the same times, but for what the machine has paused [s]."""
+    """Assert the same lines, numbers and times, except for the pauses of the machine [s]."""
     shown, listing = by_words(output), by_words(LISTING)
-    shown.pop("Engines are off")  # the thesis' engines say nothing
+    shown.pop("Engines are off")  # not in the thesis
     assert {words: len(some) for words, some in shown.items()} == {
         words: len(some) for words, some in listing.items()
     }
@@ -63,12 +63,12 @@ def assert_as_in_the_thesis(output: str, paused: float) -> None:
         for (time, numbers), (listed_time, listed_numbers) in zip(shown[words], expected, strict=True):
             deviations.append(time - listed_time)
             assert numbers == listed_numbers or words.startswith("Speed")
-    assert max(deviations) - min(deviations) <= SAME + paused
+    assert max(deviations) - min(deviations) <= TOLERANCE + paused
     speeds_fit_their_positions(output, JITTER + paused)
 
 
 def speeds_fit_their_positions(output: str, jitter: float) -> None:
-    """A speed is a distance by the time that has really passed, not by the thesis' time."""
+    """Assert that a speed is a distance by the time that has really passed."""
     positions: list[tuple[float, list[float]]] = []
     for time, words, numbers in lines(output):
         if words.startswith("Position"):

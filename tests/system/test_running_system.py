@@ -1,4 +1,4 @@
-"""A system in the background, as its user, its peers and its faults see it."""
+"""A system in the background: its commands, its peers and its faults."""
 
 from __future__ import annotations
 
@@ -18,22 +18,13 @@ import pytest
 from geometry_msgs.msg import Point, PointStamped
 from std_msgs.msg import Bool, Float64, String
 
+from deploy.supervision import manifest
 from interfaces import topics
 from tests.system import pauses
 from tests.system.sites import LIMIT, ROOT, Peer, Site
 
 STEADY = str(Path(__file__).with_name("steady.yaml"))
-SERVICES = {
-    "config_l1",
-    "config_l2",
-    "config_theta1",
-    "config_theta2",
-    "dead_mans_switch",
-    "kinematics",
-    "velocity",
-    "operator_watchdog",
-    "engine_controller",
-}
+SERVICES = {program.name for program in manifest.programs()}
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -51,7 +42,7 @@ def rows(table: str) -> dict[str, list[str]]:
 
 
 def status(site: Site, until: Callable[[list[str]], bool]) -> dict[str, list[str]]:
-    """The rows of `make status` once they are all so: a report may be a second away, or tell of a pause."""
+    """The rows of `make status` once all fulfil a condition: the next report may be a second away."""
     deadline = time.monotonic() + LIMIT
     while True:
         code, printed = site.do("status")
@@ -68,7 +59,7 @@ def test_status_shows_every_service_running(module_site: Site) -> None:
         assert (state, int(pid), restarts) == ("RUNNING", module_site.members[name], "0")
 
 
-def test_starting_twice_says_that_it_runs_and_where(module_site: Site) -> None:
+def test_a_second_start_reports_the_running_system(module_site: Site) -> None:
     for command in ("start", "run"):
         code, printed = module_site.do(command, STEADY)
         assert code == 1
@@ -76,13 +67,13 @@ def test_starting_twice_says_that_it_runs_and_where(module_site: Site) -> None:
         assert printed == f"Already running: {where}"
 
 
-def test_supervisord_is_reached_by_its_user_alone(module_site: Site) -> None:
+def test_only_its_user_reaches_supervisord(module_site: Site) -> None:
     socket = module_site.run / "supervisor.sock"
     assert stat.S_IMODE(socket.stat().st_mode) == 0o700
     assert stat.S_IMODE(module_site.run.stat().st_mode) == 0o700
     sockets = set()
     for link in Path(f"/proc/{module_site.members['']}/fd").iterdir():
-        with suppress(FileNotFoundError):  # a call of the sentinel that is over
+        with suppress(FileNotFoundError):  # of a finished call of the sentinel
             sockets.add(os.readlink(link))
     tables = [Path(f"/proc/net/{family}").read_text().splitlines()[1:] for family in ("tcp", "tcp6")]
     assert not [line for table in tables for line in table if f"socket:[{line.split()[9]}]" in sockets]
@@ -108,7 +99,7 @@ def test_a_late_joiner_gets_the_latched_configuration_and_position(peer: Peer) -
     assert (positions[-1].point.x, positions[-1].point.y) == (5.0, 0.0)
 
 
-def test_a_second_instance_of_a_service_refuses_to_start_and_names_the_first(module_site: Site) -> None:
+def test_a_second_instance_of_a_service_refuses_to_start(module_site: Site) -> None:
     second = subprocess.run(
         [sys.executable, "-m", "services.kinematics"],
         cwd=ROOT,
@@ -132,11 +123,11 @@ BAD = [
     (topics.OPERATOR_HEARTBEAT, Bool(data=False), "operator_watchdog"),
     (topics.ENGINES, String(data="explode"), "engine_controller"),
 ]
-"""What no service may swallow, and who has to report it."""
+"""Bad messages, each with the service that has to report it."""
 
 
 @pytest.mark.parametrize(("topic", "message", "reporter"), BAD)
-def test_a_bad_value_is_dropped_and_reported_and_everything_keeps_running(
+def test_a_bad_value_is_dropped_and_reported(
     module_site: Site, peer: Peer, topic: topics.Topic, message: object, reporter: str
 ) -> None:
     before = module_site.members
@@ -168,7 +159,7 @@ def test_a_killed_service_comes_back_and_is_counted(module_site: Site, peer: Pee
     assert int(pid) != killed
 
 
-def test_a_killed_service_comes_back_though_its_log_cannot_be_opened(module_site: Site) -> None:
+def test_a_killed_service_comes_back_though_its_log_does_not_open(module_site: Site) -> None:
     killed = module_site.members["velocity"]
     logs, away = module_site.run / "logs", module_site.run / "away"
     logs.rename(away)
@@ -196,7 +187,7 @@ def test_the_operator_commands_switch_and_engines_from_the_console(module_site: 
     assert module_site.members.keys() >= SERVICES
 
 
-def test_who_lets_go_of_the_switch_in_the_demo_has_the_engines_stopped(site: Site) -> None:
+def test_releasing_the_switch_in_the_demo_stops_the_engines(site: Site) -> None:
     command = site.begin("run", "demo")
     command.await_line("Engines are on")
     with pauses.watched() as paused:
@@ -219,9 +210,7 @@ def test_another_terminal_may_have_sourced_another_rclpy(
     assert {row[-1] for row in services.values()} == {"ok"}
 
 
-def test_a_second_arm_lives_in_the_same_domain_in_a_namespace_of_its_own(
-    module_site: Site, tmp_path: Path
-) -> None:
+def test_a_second_arm_runs_in_a_namespace_of_the_same_domain(module_site: Site, tmp_path: Path) -> None:
     first = module_site.members
     parameters = tmp_path / "mine.yaml"
     parameters.write_text("dead_mans_switch: {ros__parameters: {pressed: true}}")
@@ -230,7 +219,7 @@ def test_a_second_arm_lives_in_the_same_domain_in_a_namespace_of_its_own(
         command.await_line(f"ROS domain {second.domain}, namespace /second ...")
         command.await_line("Position x")
         command.await_line("Operator is alive")
-        second.namespace = ""  # another terminal, which does not know of it
+        second.namespace = ""  # as in another terminal
         services = status(second, until=lambda row: row[-1] == "ok")
         assert {row[-1] for row in services.values()} == {"ok"}
         command.type("quit\n")
@@ -245,7 +234,7 @@ def test_the_service_of_the_readme_works(module_site: Site, peer: Peer, tmp_path
     reports = peer.collect(topics.DIAGNOSTICS)
     guard = module_site.begin_python(str(tmp_path / "speed_guard.py"), "--ros-args", "-p", "limit:=3.0")
 
-    def it_has_commanded() -> bool:  # the operator watchdog may do so, too
+    def it_has_commanded() -> bool:  # the operator watchdog may command, too
         speed.publish(Float64(data=2.9))
         speed.publish(Float64(data=3.1))
         health = [status for report in reports for status in report.status if status.name == "/speed_guard"]

@@ -1,0 +1,24 @@
+#!/bin/sh
+# Runs a module of the checkout with a bare interpreter: before .venv exists, and after it was removed.
+# usage: python.sh MODULE [INTERPRETER]    default: the one of .venv, else the first on the PATH that fits
+set -eu
+
+# Prints the base interpreter of $1: .venv cannot build on a virtual environment, nor on what is left of itself.
+base_of() {
+    "$1" -c 'import os, sys
+(3, 11) <= sys.version_info[:2] <= (3, 13) or sys.exit(1)
+print(os.path.realpath(sys._base_executable))'
+}
+
+module=$1
+cd "$(dirname "$0")/../.."
+if [ -n "${2-}" ]; then
+    base=$(base_of "$2") && [ -n "$base" ] && exec "$base" -m "$module"
+    echo "PYTHON=$2 is not a Python 3.11, 3.12 or 3.13" >&2
+    exit 1
+fi
+for python in .venv/bin/python python3 python3.13 python3.12 python3.11; do
+    base=$(base_of "$python" 2>/dev/null) && exec "$base" -m "$module"
+done
+echo "No Python 3.11, 3.12 or 3.13 found: install one, or name it, for example PYTHON=/path/to/python3.12" >&2
+exit 1

@@ -1,0 +1,58 @@
+"""Calls of supervisord's XML-RPC interface."""
+
+from __future__ import annotations
+
+import http.client
+import socket
+import xmlrpc.client
+from typing import Any
+
+
+class NoAnswer(Exception):
+    """supervisord does not answer, or answers with an error."""
+
+
+def call(pid: int, method: str, *arguments: object, timeout: float = 5.0) -> Any:
+    """
+    Call a method of the supervisord with this pid.
+
+    The call goes through the directory in which supervisord works: the socket's own path may be longer than
+    the 107 bytes that a unix socket allows.
+
+    :param timeout: for a supervisord that hangs [s].
+    :raises NoAnswer: if there is no answer in time, or an error.
+    """
+    transport = _UnixTransport(f"/proc/{pid}/cwd/supervisor.sock", timeout)
+    try:
+        with xmlrpc.client.ServerProxy("http://localhost", transport=transport) as server:
+            return getattr(server, method)(*arguments)
+    except (OSError, http.client.HTTPException, xmlrpc.client.Error) as error:
+        raise NoAnswer(f"supervisord (pid {pid}) does not answer: {error}") from error
+
+
+class _UnixConnection(http.client.HTTPConnection):
+    """HTTP over a unix socket."""
+
+    def __init__(self, path: str, timeout: float) -> None:
+        super().__init__("localhost")
+        self._path = path
+        self._limit = timeout
+
+    def connect(self) -> None:
+        self.sock = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        self.sock.settimeout(self._limit)
+        self.sock.connect(self._path)
+
+
+class _UnixTransport(xmlrpc.client.Transport):
+    """XML-RPC over a unix socket."""
+
+    def __init__(self, path: str, timeout: float) -> None:
+        super().__init__()
+        self._unix_connection = _UnixConnection(path, timeout)
+
+    def make_connection(self, host: Any) -> http.client.HTTPConnection:
+        return self._unix_connection
+
+    def close(self) -> None:
+        self._unix_connection.close()

@@ -1,0 +1,274 @@
+"""Virtual sources as nodes: their scenario, its origin, and what was set by hand."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+import reactivex as rx
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from reactivex import Observable
+
+from interfaces import topics
+from interfaces.scenario.origin import EPOCH, Origin
+from interfaces.scenario.source import VirtualSource
+from interfaces.scenario.timeline import Events, Sweep
+from interfaces.service import ServiceNode, UserError, parameter
+
+Make = Callable[..., Any]
+SpinUntil = Callable[..., None]
+SpinFor = Callable[[float], None]
+
+SHORT = 0.1  # [s] in which nothing must happen
+
+
+@dataclass(frozen=True)
+class Parameters:
+    value: float = parameter(1.0, (0.0, 9.0), "m", "length", settable=True)
+    pressed: bool = parameter(False, None, "", "whether the switch is pressed", settable=True)
+
+
+@pytest.fixture
+def make_source(make_node: Make) -> Callable[..., ServiceNode]:
+    """Makes the node of a virtual source, with these parameters."""
+
+    def make(**values: Any) -> ServiceNode:
+        overrides = [Parameter(name, value=value) for name, value in values.items()]
+        node: ServiceNode = make_node("source", kind=ServiceNode, parameter_overrides=overrides)
+        node.declare(Parameters)
+        return node
+
+    return make
+
+
+def emitted(node: ServiceNode, items: Observable[Any]) -> list[Any]:
+    """Return a list that receives what an observable emits."""
+    received: list[Any] = []
+    items.subscribe(received.append, scheduler=node.scheduler)
+    return received
+
+
+def set_to(node: ServiceNode, name: str, value: Any) -> bool:
+    return bool(node.set_parameters([Parameter(name, value=value)])[0].successful)
+
+
+# The scenario
+
+
+def test_without_a_scenario_a_source_follows_its_parameter(make_source: Make, spin_for: SpinFor) -> None:
+    node = make_source(value=3.0)
+    source = VirtualSource(node)
+
+    values = emitted(node, source.follow("value", source.scenario.configuration.get("l1")))
+    events = emitted(node, source.play(source.scenario.commands))
+    set_to(node, "value", 4.0)
+    spin_for(SHORT)
+
+    assert (values, events) == ([3.0, 4.0], [])
+
+
+def test_error_in_a_scenario_is_a_user_error(make_source: Make) -> None:
+    node = make_source(scenario="/nowhere.yaml")
+
+    with pytest.raises(UserError, match=r"/nowhere\.yaml"):
+        VirtualSource(node)
+
+
+def test_restarted_source_resumes_its_scenario(
+    make_source: Make, tmp_path: Path, spin_until: SpinUntil
+) -> None:
+    path = tmp_path / "scenario.yaml"
+    path.write_text("l1: [{at: 0, value: 1}, {at: 100, value: 2}, {at: 101, value: 3}, {at: 999, value: 4}]")
+    node = make_source(scenario=str(path), scenario_epoch=time.monotonic() - 100.5)
+    source = VirtualSource(node)
+
+    values = emitted(node, source.follow("value", source.scenario.configuration["l1"]))
+
+    spin_until(lambda: values == [2.0, 3.0])
+
+
+def test_restarted_source_does_not_repeat_events(make_source: Make, spin_until: SpinUntil) -> None:
+    node = make_source(scenario_epoch=time.monotonic() - 100.5)
+    source = VirtualSource(node)
+
+    events = emitted(node, source.play(Events(((0.0, "a"), (100.0, "b"), (101.0, "c")))))
+
+    spin_until(lambda: events == ["c"])
+
+
+# The origin
+
+
+def test_source_without_an_origin_starts_its_scenario_at_once(
+    make_source: Make, spin_until: SpinUntil
+) -> None:
+    node = make_source()
+    source = VirtualSource(node)
+
+    values = emitted(node, source.follow("value", Events(((0.0, 2.0), (0.01, 3.0)))))
+    events = emitted(node, source.play(Events(((0.0, "a"),))))
+
+    spin_until(lambda: (values, events) == ([2.0, 3.0], ["a"]))
+
+
+@pytest.mark.parametrize("timeline", [Events(((0.0, 2.0),)), Sweep(2.0, 0.0, 1.0)])
+def test_source_emits_nothing_before_its_origin_is_set(
+    make_source: Make, spin_for: SpinFor, spin_until: SpinUntil, timeline: Events[float] | Sweep
+) -> None:
+    node = make_source(scenario_epoch=-1.0)
+    source = VirtualSource(node)
+    values = emitted(node, source.follow("value", timeline))
+    pressed = emitted(node, source.follow("pressed", Events(((0.0, True),))))
+    heartbeats = emitted(node, source.play(Events(((0.0, True),)), until_set="pressed"))
+
+    spin_for(SHORT)
+    assert (values, pressed, heartbeats) == ([], [], [])
+    assert set_to(node, EPOCH, time.monotonic())
+
+    spin_until(lambda: (values, pressed, heartbeats) == ([2.0], [True], [True]))
+
+
+def test_no_event_is_lost_when_the_origin_is_set_late(make_source: Make, spin_until: SpinUntil) -> None:
+    node = make_source(scenario_epoch=-1.0)
+    source = VirtualSource(node)
+    events = emitted(node, source.play(Events(((0.0, "a"), (0.3, "b"), (0.7, "c")))))
+
+    set_to(node, EPOCH, time.monotonic() - 0.5)
+
+    spin_until(lambda: events == ["a", "b", "c"])
+
+
+def test_source_waits_for_an_origin_to_come(
+    make_source: Make, spin_for: SpinFor, spin_until: SpinUntil
+) -> None:
+    node = make_source(scenario_epoch=-1.0)
+    source = VirtualSource(node)
+    values = emitted(node, source.follow("value", Sweep(2.0, 0.0, 1.0)))
+    origin = time.monotonic() + 2 * SHORT
+
+    set_to(node, EPOCH, origin)
+    spin_for(SHORT)
+    assert values == []
+
+    spin_until(lambda: values == [2.0])
+    assert time.monotonic() >= origin - 1e-3
+
+
+def test_first_origin_is_final(make_source: Make) -> None:
+    waiting, running = make_source(scenario_epoch=-1.0), make_source(scenario_epoch=7.0)
+    Origin(waiting)
+    Origin(running)
+
+    assert set_to(waiting, EPOCH, -1.0)
+    assert set_to(waiting, EPOCH, 7.0)
+    for node in (waiting, running):
+        assert set_to(node, EPOCH, 7.0)
+        assert not set_to(node, EPOCH, 8.0)
+        assert not set_to(node, EPOCH, -1.0)
+
+
+def test_only_a_source_that_starts_after_the_origin_resumes(make_source: Make) -> None:
+    now = time.monotonic()
+
+    past = [
+        Origin(make_source(scenario_epoch=epoch)).is_past for epoch in (-1.0, 0.0, now - 0.1, now + 100.0)
+    ]
+
+    assert past == [False, False, True, False]
+
+
+@pytest.mark.parametrize("ahead", [0.2, -100.0])
+def test_subscription_waits_for_the_origin(make_source: Make, spin_until: SpinUntil, ahead: float) -> None:
+    origin = time.monotonic() + ahead
+    node = make_source(scenario_epoch=origin)
+
+    begun = emitted(node, Origin(node).delay_subscription(rx.defer(lambda _: rx.just(time.monotonic()))))
+
+    spin_until(lambda: begun)
+    assert begun[0] >= origin - 1e-3
+
+
+# Settings: what was set by hand
+
+
+def test_setting_survives_a_restart(make_source: Make, spin_until: SpinUntil, tmp_path: Path) -> None:
+    def source() -> tuple[ServiceNode, list[float]]:
+        node = make_source(scenario_epoch=time.monotonic() - 1.0, settings=str(tmp_path / "settings"))
+        return node, emitted(node, VirtualSource(node).follow("value", Events(((0.0, 2.0),))))
+
+    first, values = source()
+    spin_until(lambda: values == [2.0])
+    assert not set_to(first, "value", -1.0)
+    assert set_to(first, "value", 5.0)
+    assert values == [2.0, 5.0]
+    first.destroy_node()
+    second, values = source()
+
+    spin_until(lambda: values == [5.0])
+    assert second.get_parameter("value").value == 5.0
+
+
+def test_setting_replaces_a_scenario_that_has_not_begun(make_source: Make, spin_for: SpinFor) -> None:
+    node = make_source(scenario_epoch=-1.0)
+    pressed = emitted(node, VirtualSource(node).follow("pressed", Events(((0.0, True),))))
+
+    set_to(node, "pressed", False)
+    set_to(node, EPOCH, time.monotonic())
+    spin_for(SHORT)
+
+    assert pressed == [False]
+
+
+def test_setting_ends_single_heartbeats_for_good(
+    make_source: Make, spin_until: SpinUntil, spin_for: SpinFor, tmp_path: Path
+) -> None:
+    def source() -> tuple[ServiceNode, list[int]]:
+        node = make_source(settings=str(tmp_path / "settings"))
+        source = VirtualSource(node)
+        emitted(node, source.follow("pressed"))
+        return node, emitted(node, source.play(Events(((0.0, 1), (SHORT, 2))), until_set="pressed"))
+
+    node, heartbeats = source()
+    spin_until(lambda: heartbeats == [1])
+    set_to(node, "pressed", False)
+    spin_for(2 * SHORT)
+    assert heartbeats == [1]
+    node.destroy_node()
+    _, heartbeats = source()
+    spin_for(2 * SHORT)
+
+    assert heartbeats == []
+
+
+def test_setting_that_cannot_be_kept_is_reported(
+    make_source: Make, make_node: Make, spin_until: SpinUntil, tmp_path: Path
+) -> None:
+    messages: list[str] = []
+    topic = topics.DIAGNOSTICS
+    make_node("peer", kind=Node).create_subscription(
+        topic.type, topic.name, lambda it: messages.append(it.status[0].message), topic.qos
+    )
+    (tmp_path / "file").touch()
+    node = make_source(settings=str(tmp_path / "file" / "settings"))
+    values = emitted(node, VirtualSource(node).follow("value"))
+    spin_until(lambda: messages)
+
+    set_to(node, "value", 5.0)
+
+    assert values == [1.0, 5.0]
+    spin_until(lambda: messages[-1].startswith("value: a restart would forget the setting: "))
+    assert messages[-1].endswith("settings/source.yaml: Not a directory")
+
+
+@pytest.mark.parametrize("text", ["", "- 1", "value: [", "value: -1.0", "value: long"])
+def test_bad_setting_is_an_error_and_not_forgotten(make_source: Make, tmp_path: Path, text: str) -> None:
+    node = make_source(settings=str(tmp_path))
+    (tmp_path / "source.yaml").write_text(text)
+
+    with pytest.raises(UserError, match=r"value was set to|\.yaml: "):
+        VirtualSource(node).follow("value")
