@@ -38,6 +38,11 @@ class Topic:
     meaning: str
     problem: Callable[[Any], str] = lambda message: ""
     """Return what is wrong with a message; empty for a good message."""
+    longest_gap: float = 0.25
+    """The longest time [s] between two messages while the arm moves and its operator is present; infinite for
+    a topic that reports single events."""
+    follows: str = ""
+    """The name of the topic without which this one falls silent; empty if there is none."""
 
     @property
     def type_name(self) -> str:
@@ -100,7 +105,14 @@ EFFECTOR_POSITION = Topic(
     _not_a_position,
 )
 EFFECTOR_SPEED = Topic(
-    "effector/speed", Float64, _EVENTS, "m/s", ("velocity",), "never negative", _not_a_length
+    "effector/speed",
+    Float64,
+    _EVENTS,
+    "m/s",
+    ("velocity",),
+    "never negative",
+    _not_a_length,
+    follows=EFFECTOR_POSITION.name,
 )
 OPERATOR_HEARTBEAT = Topic(
     "operator_heartbeat",
@@ -119,6 +131,8 @@ OPERATOR_PRESENCE = Topic(
     "",
     ("operator_watchdog",),
     "the operator was seen alive; `stamp` is the source time of that heartbeat. At most 2 Hz",
+    longest_gap=1.0,
+    follows=OPERATOR_HEARTBEAT.name,
 )
 OPERATOR_ACTIVITY = Topic(
     "operator_activity",
@@ -128,6 +142,7 @@ OPERATOR_ACTIVITY = Topic(
     ("operator_watchdog",),
     f"`{ALIVE}`, `{MISSED}`, `{INCAPACITATED}`: the watchdog's conclusions, for display only",
     _not_one_of(ALIVE, MISSED, INCAPACITATED),
+    longest_gap=math.inf,
 )
 ENGINES = Topic(
     "engines",
@@ -137,6 +152,7 @@ ENGINES = Topic(
     ("operator_watchdog", "dead_mans_switch", "console"),
     f"command `{TURN_OFF}` or `{TURN_ON}`",
     _not_one_of(TURN_OFF, TURN_ON),
+    longest_gap=math.inf,
 )
 ENGINES_STATE = Topic(
     "engines/state",
@@ -155,6 +171,7 @@ DIAGNOSTICS = Topic(
     "",
     ("every service",),
     "health, at 1 Hz, and at once to a new subscriber",
+    longest_gap=1.0,
 )
 
 CONTRACT = (
