@@ -1,4 +1,13 @@
-"""The chaos monkey: breaks a running system, records what an outsider sees, and checks the promises on that.
+"""The chaos monkey: injects faults into a running arm, records it from outside, and checks the promises.
 
-observer → record → history → promises → report; faults and schedules are the monkey's. See `make chaos`.
+| module | content |
+|---|---|
+| `__main__` | `make chaos`: the command line, from the plan to the reports |
+| `schedule` | when which fault is injected: named scenarios, random faults |
+| `faults`, `inject/`, `babbler`, `partition` | the kinds of faults |
+| `testbed`, `arm` | the arms under test, and the injection |
+| `observer`, `process_monitor`, `record` | the record: messages, processes, faults |
+| `history` | what a record tells about one arm |
+| `promises`, `safety`, `liveness`, `positions`, `findings` | the checkers of S1–S5 and L1–L4 |
+| `report`, `page`, `pictures`, `cost` | the results |
 """

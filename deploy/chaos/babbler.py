@@ -1,13 +1,14 @@
-"""Publishers that speak too much, or nonsense. ::
+"""A babbling publisher: it sends too much, or nonsense. Its messages and its process carry a mark. ::
 
 python -m deploy.chaos.babbler flood     10,000 heartbeats a second
-python -m deploy.chaos.babbler babble    NaN and random bytes, on every topic
+python -m deploy.chaos.babbler babble    NaN and random bytes on every topic
 """
 
 from __future__ import annotations
 
 import os
 import random
+import struct
 import sys
 import time
 from collections.abc import Iterator
@@ -21,53 +22,77 @@ from rclpy.serialization import serialize_message
 from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import Bool, Float64, Header, String
 
-from deploy.chaos.marks import GARBAGE, TEXT, nan
+from deploy.supervision.system import namespace_of
 from interfaces import topics
 
-RATE = 10_000  # Hz, of a flood
-BABBLE = 200  # Hz, over all topics
-_FRESH = (Time(sec=0), Time(sec=2**31 - 1))  # of a presence that counts for nothing: long ago, and to come
+BABBLER = "babbler"
+"""The program name of a babbler's process, which is neither a program of the arm nor supervisord."""
+FLOOD_RATE = 10_000  # Hz
+BABBLE_RATE = 200  # Hz, over all topics
+
+TEXT = "babble"
+_CDR_TEXT = struct.pack("<I", len(TEXT) + 1) + TEXT.encode() + b"\0"  # the whole string, not a part of one
+_NANS = {
+    topic.name: struct.pack("<Q", 0x7FF8_BAB1_EBAB_1E00 + number)
+    for number, topic in enumerate(topics.CONTRACT)
+}
+_GARBAGE = b"\x00\xba\xbb\x1e"
+"""The first bytes of an unreadable message after the CDR header: as a bool false, as a length too big."""
+_INVALID_STAMPS = (Time(sec=0), Time(sec=2**31 - 1))  # of a presence: too old, and in the future
 
 
-def nonsense(topic: topics.Topic, rng: random.Random) -> Any:
-    """A message, or serialized bytes, that no reader of the topic may take for good."""
-    if rng.random() < 0.5:
-        # DDS checks the header. What follows is too short for a number, also when it is padded to 4 bytes.
-        tail = b"" if topic.type is Float64 else rng.randbytes(rng.randrange(64))
-        return b"\x00\x01\x00\x00" + GARBAGE + tail
-    if topic is topics.EFFECTOR_POSITION:
+def nan(topic: topics.Topic) -> float:
+    """Return a NaN that marks a topic. Arithmetic keeps the mark, so each topic has another one."""
+    number: float = struct.unpack("<d", _NANS[topic.name])[0]
+    return number
+
+
+def is_babble(topic: topics.Topic, data: bytes) -> bool:
+    """Return whether a babbler wrote this serialized message on a topic."""
+    return data[4:8] == _GARBAGE or _NANS[topic.name] in data or _CDR_TEXT in data
+
+
+def nonsense(topic: topics.Topic, rng: random.Random) -> bytes:
+    """Return a serialized message that no reader of the topic may accept."""
+    message = _bad_message(topic, rng) if rng.random() < 0.5 else None
+    if message is not None:
+        return bytes(serialize_message(message))
+    # DDS checks the header. The rest is too short for a number, even padded to 4 bytes.
+    tail = b"" if topic.type is Float64 else rng.randbytes(rng.randrange(64))
+    return b"\x00\x01\x00\x00" + _GARBAGE + tail
+
+
+def _bad_message(topic: topics.Topic, rng: random.Random) -> Any:
+    """Return a readable message with bad content; ``None`` for a type of which none is known."""
+    if topic.type is PointStamped:
         return PointStamped(header=Header(frame_id=TEXT), point=Point(x=nan(topic), y=rng.random()))
-    if topic is topics.OPERATOR_PRESENCE:
-        return Header(stamp=rng.choice(_FRESH), frame_id=TEXT)
-    if topic is topics.OPERATOR_HEARTBEAT:
-        return Bool(data=False)
-    if topic is topics.DIAGNOSTICS:
-        return topic.type()
-    return topic.type(data=TEXT if topic.type is String else nan(topic))
+    if topic.type is Header:
+        return Header(stamp=rng.choice(_INVALID_STAMPS), frame_id=TEXT)
+    contents = {Bool: False, Float64: nan(topic), String: TEXT}
+    return topic.type(data=contents[topic.type]) if topic.type in contents else None
 
 
 def flood(node: Node) -> None:
-    """Heartbeats, as fast as nobody presses."""
+    """Send heartbeats much faster than any switch."""
     topic = topics.OPERATOR_HEARTBEAT
     publisher = node.create_publisher(topic.type, topic.name, topic.qos)
-    for _ in _ticks(RATE):
+    for _ in _ticks(FLOOD_RATE):
         publisher.publish(Bool(data=True))
 
 
 def babble(node: Node) -> None:
-    """Nonsense on every topic."""
+    """Send nonsense on every topic."""
     rng = random.Random(1)
-    publishers = {
-        topic.name: node.create_publisher(topic.type, topic.name, topic.qos) for topic in topics.CONTRACT
-    }
-    for _ in _ticks(BABBLE):
-        topic = rng.choice(topics.CONTRACT)
-        message = nonsense(topic, rng)
-        publishers[topic.name].publish(message if isinstance(message, bytes) else serialize_message(message))
+    publishers = [
+        (topic, node.create_publisher(topic.type, topic.name, topic.qos)) for topic in topics.CONTRACT
+    ]
+    for _ in _ticks(BABBLE_RATE):
+        topic, publisher = rng.choice(publishers)
+        publisher.publish(nonsense(topic, rng))
 
 
 def _ticks(rate: float) -> Iterator[None]:
-    """So many a second, on the average."""
+    """Yield at an average rate [Hz]."""
     begin, count = time.monotonic(), 0
     while rclpy.ok():
         while count < (time.monotonic() - begin) * rate:
@@ -77,10 +102,9 @@ def _ticks(rate: float) -> Iterator[None]:
 
 
 def main(arguments: list[str]) -> None:
-    """Speak until killed."""
-    namespace = os.environ.get("ARM_NAMESPACE", "/")
-    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)  # no signal is worth a last word
-    node = Node(f"babbler_{os.getpid()}", namespace=namespace)
+    """Send until killed."""
+    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)  # a signal ends it without clean-up
+    node = Node(f"babbler_{os.getpid()}", namespace=namespace_of(os.environ))
     {"flood": flood, "babble": babble}[arguments[0]](node)
 
 

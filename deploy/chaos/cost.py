@@ -1,4 +1,4 @@
-"""What arms cost the machine: processor, memory, threads."""
+"""How much processor time, memory and threads the arms use."""
 
 from __future__ import annotations
 
@@ -9,26 +9,26 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from deploy.chaos.arena import ArmUnderTest
+from deploy.chaos.arm import Arm
 
 
 @dataclass(frozen=True)
 class Cost:
-    """What has been spent up to a moment."""
+    """The resources used at one moment."""
 
     time: float
-    """[s, monotonic clock]"""
+    """[s], monotonic clock."""
     busy: float
-    """[s] of processor time of the whole machine: the killed processes' is in it, and everybody else's"""
+    """Processor time of the whole machine [s]; it includes processes that were killed, and other programs."""
     arms: int
     processes: int
     memory: float
-    """[MB], resident"""
+    """Resident [MB]."""
     threads: int
 
     @classmethod
-    def now(cls, arms: Sequence[ArmUnderTest]) -> Cost:
-        """The cost of the arms now."""
+    def now(cls, arms: Sequence[Arm]) -> Cost:
+        """Measure the arms now."""
         processes = threads = 0
         memory = 0.0
         for arm in arms:
@@ -44,12 +44,12 @@ class Cost:
         return cls(time.monotonic(), busy, len(arms), processes, memory, threads)
 
     def since(self, before: Cost) -> str:
-        """In words, for each arm; in brackets what memory and threads have grown by."""
+        """Return the cost of an arm since an earlier moment; in brackets, how memory and threads grew."""
         cores = (self.busy - before.busy) / (self.time - before.time) / self.arms
         memory, threads = self.memory / self.arms, self.threads / self.arms
         return (
-            f"{cores:.2f} cores (with observer and monkey), "
+            f"{cores:.2f} cores (with observer and injection), "
             f"{memory:.0f} MB ({memory - before.memory / self.arms:+.0f}), "
             f"{threads:.0f} threads ({threads - before.threads / self.arms:+.0f}) "
-            f"in {self.processes / self.arms:.0f} processes an arm"
+            f"in {self.processes / self.arms:.0f} processes per arm"
         )

@@ -1,7 +1,4 @@
-"""The faults: what the monkey can do to an arm. Each says whom it may be done to and does it.
-
-A fault returns what ends it, or None if it takes no time.
-"""
+"""The kinds of faults that can be injected into an arm, and the targets of each."""
 
 from __future__ import annotations
 
@@ -13,61 +10,43 @@ import sys
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import yaml
 
-from deploy.chaos.history import ALL, NOTHING, PROGRAMS
-from deploy.chaos.marks import BABBLER
+from deploy.chaos.arm import Arm
+from deploy.chaos.babbler import BABBLER
+from deploy.chaos.history import ALL, NO_TARGET, PROGRAMS
+from deploy.commands import parameter_file
 from deploy.supervision import processes
-from deploy.supervision.system import System
 
 INJECTED = Path(__file__).parent / "inject"
-"""Has to stand on the PYTHONPATH of the system, for `hang`, `raise` and `hog`."""
-HEADROOM = 64 << 20  # bytes that a hog may take
+"""On the PYTHONPATH of an arm under test; the faults `hang`, `raise` and `hog` need it."""
+HEADROOM = 64 << 20  # bytes that a process may still allocate in `hog`
 
-PARAMETERS = {
-    "config_l1": "value",
-    "config_l2": "value",
-    "config_theta1": "value",
-    "config_theta2": "value",
-    "dead_mans_switch": "rate",
-    "operator_watchdog": "strikes",
-    "engine_controller": "presence_timeout",
-    "sentinel": "look",
-}
-"""A parameter of each program that has one; each is a number."""
+
+def _numbers() -> dict[str, str]:
+    """Return the first parameter that is a number, of each program that has one."""
+    return {
+        program: name
+        for program, declared in parameter_file.declared().items()
+        for name in [name for name, each in declared.items() if type(each.default) in (int, float)][:1]
+    }
+
+
+PARAMETERS = _numbers()
 
 Undo = Callable[[], None]
 
 
-class Arm(Protocol):
-    """What a fault needs to know of its victim."""
-
-    namespace: str
-    system: System
-
-    def pid(self, program: str) -> int:
-        """The process of a program; 0 if there is none just now."""
-
-    def environment(self) -> dict[str, str]:
-        """The environment of the arm's processes."""
-
-
-class Fault(NamedTuple):
+class FaultKind(NamedTuple):
     """A kind of fault."""
 
-    do: Callable[[Arm, str], Undo | None]
+    inject: Callable[[Arm, str], Undo | None]
+    """Injects the fault into an arm and a target; returns how to end it, or ``None`` if it is momentary."""
     targets: tuple[str, ...]
-    lasting: tuple[float, float] = (0.0, 0.0)
-    """how long it may last [s]: at least, at most"""
-
-
-def _signals(number: int) -> Callable[[Arm, str], Undo | None]:
-    def send(arm: Arm, program: str) -> None:
-        _send(arm, arm.pid(program), number)
-
-    return send
+    duration: tuple[float, float] = (0.0, 0.0)
+    """The shortest and the longest duration [s]."""
 
 
 def _send(arm: Arm, pid: int, number: int) -> None:
@@ -77,15 +56,19 @@ def _send(arm: Arm, pid: int, number: int) -> None:
         processes.close([handle])
 
 
+def _signal(number: int) -> Callable[[Arm, str], None]:
+    return lambda arm, program: _send(arm, arm.pid(program), number)
+
+
 def stop(arm: Arm, program: str) -> Undo:
-    """SIGSTOP, and SIGCONT in the end, if it still lives then."""
+    """Suspend a process by SIGSTOP; at the end, continue it if it is still alive."""
     pid = arm.pid(program)
     _send(arm, pid, signal.SIGSTOP)
     return lambda: _send(arm, pid, signal.SIGCONT)
 
 
 def hog(arm: Arm, program: str) -> None:
-    """Let it take memory up to a limit near by."""
+    """Let a process allocate memory up to a limit."""
     pid = arm.pid(program)
     with suppress(OSError):
         pages = int(Path(f"/proc/{pid}/statm").read_text().split()[0])
@@ -105,7 +88,7 @@ def kill_all(arm: Arm, target: str) -> None:
 
 
 def kill_supervisor(arm: Arm, target: str) -> Undo:
-    """SIGKILL supervisord; in the end the system is started again over what it left behind."""
+    """SIGKILL supervisord; at the end, start the system again over its orphans."""
     _send(arm, arm.system.supervisor() or 0, signal.SIGKILL)
 
     def start_again() -> None:
@@ -115,7 +98,7 @@ def kill_supervisor(arm: Arm, target: str) -> Undo:
 
 
 def double(arm: Arm, program: str) -> Undo:
-    """Start a second instance of a service, as somebody who does not know that it runs."""
+    """Start a second instance of a program."""
     command = []
     with suppress(OSError):  # it has just ended
         command = Path(f"/proc/{arm.pid(program)}/cmdline").read_bytes().decode().split("\0")[1:-1]
@@ -129,29 +112,36 @@ def double(arm: Arm, program: str) -> Undo:
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
     )
-    return _ender(process)
+    return _kill(process)
 
 
 def crash_loop(arm: Arm, program: str) -> Undo:
-    """A parameter of the wrong type, which the program refuses from its next start on."""
-    parameters = arm.system.parameters
+    """Give a parameter the wrong type, so that the program refuses to start; then SIGKILL it."""
+    path = arm.system.parameters
     node = f"{arm.namespace.rstrip('/')}/{program}"
-    bad = {node: {"ros__parameters": {PARAMETERS[program]: "a few"}}}
-    parameters.write_text(yaml.safe_dump(yaml.safe_load(parameters.read_text()) | bad))
+    bad = {node: {"ros__parameters": {PARAMETERS[program]: "not a number"}}}
+    _replace(path, yaml.safe_load(path.read_text()) | bad)
     _send(arm, arm.pid(program), signal.SIGKILL)
 
     def repair() -> None:
         with suppress(FileNotFoundError):  # the system was stopped
-            # Another program may have a bad parameter now.
-            left = yaml.safe_load(parameters.read_text())
+            # The file is read again: another program may have a bad parameter now.
+            left = yaml.safe_load(path.read_text())
             left.pop(node, None)
-            parameters.write_text(yaml.safe_dump(left))
+            _replace(path, left)
 
     return repair
 
 
+def _replace(path: Path, parameters: dict[str, object]) -> None:
+    """Replace a parameter file at once: another program may be reading it."""
+    new = path.with_suffix(".new")
+    new.write_text(yaml.safe_dump(parameters))
+    new.replace(path)
+
+
 def full_disk(arm: Arm, target: str) -> Undo:
-    """No log can be written any more."""
+    """Let every write of supervisord to a log fail."""
     supervisor = arm.system.supervisor()
     if supervisor is None:
         return lambda: None
@@ -165,21 +155,21 @@ def full_disk(arm: Arm, target: str) -> Undo:
     return lambda: limit(None)
 
 
-def _babbler(*arguments: str) -> Callable[[Arm, str], Undo]:
-    def babble(arm: Arm, target: str) -> Undo:
+def _babbler(mode: str) -> Callable[[Arm, str], Undo]:
+    def start(arm: Arm, target: str) -> Undo:
         process = subprocess.Popen(
-            [sys.executable, "-m", "deploy.chaos.babbler", *arguments],
+            [sys.executable, "-m", "deploy.chaos.babbler", mode],
             cwd=processes.ROOT,
-            env=arm.environment() | {"ARM_NAMESPACE": arm.namespace, "SUPERVISOR_PROCESS_NAME": BABBLER},
+            env=arm.environment() | {"SUPERVISOR_PROCESS_NAME": BABBLER},
             stdout=subprocess.DEVNULL,
-            start_new_session=True,  # Ctrl-C is for the monkey
+            start_new_session=True,  # Ctrl-C at the terminal is only for the chaos monkey
         )
-        return _ender(process)
+        return _kill(process)
 
-    return babble
+    return start
 
 
-def _ender(process: subprocess.Popen[bytes]) -> Undo:
+def _kill(process: subprocess.Popen[bytes]) -> Undo:
     def end() -> None:
         process.kill()
         process.wait()
@@ -187,19 +177,19 @@ def _ender(process: subprocess.Popen[bytes]) -> Undo:
     return end
 
 
-FAULTS: dict[str, Fault] = {
-    "kill": Fault(_signals(signal.SIGKILL), PROGRAMS),
-    "terminate": Fault(_signals(signal.SIGTERM), PROGRAMS),
-    "stop": Fault(stop, PROGRAMS, (1.0, 15.0)),
-    "hang": Fault(_signals(signal.SIGUSR1), PROGRAMS, (15.0, 15.0)),
-    "raise": Fault(_signals(signal.SIGUSR2), PROGRAMS),
-    "hog": Fault(hog, PROGRAMS),
-    "kill_all": Fault(kill_all, (ALL,)),
-    "kill_supervisor": Fault(kill_supervisor, (ALL,), (0.5, 5.0)),
-    "double": Fault(double, PROGRAMS, (6.0, 8.0)),
-    "crash_loop": Fault(crash_loop, tuple(PARAMETERS), (3.0, 6.0)),
-    "full_disk": Fault(full_disk, (NOTHING,), (3.0, 10.0)),
-    "flood": Fault(_babbler("flood"), (NOTHING,), (3.0, 6.0)),
-    "babble": Fault(_babbler("babble"), (NOTHING,), (3.0, 10.0)),
+FAULT_KINDS: dict[str, FaultKind] = {
+    "kill": FaultKind(_signal(signal.SIGKILL), PROGRAMS),
+    "terminate": FaultKind(_signal(signal.SIGTERM), PROGRAMS),
+    "stop": FaultKind(stop, PROGRAMS, (1.0, 15.0)),
+    "hang": FaultKind(_signal(signal.SIGUSR1), PROGRAMS, (15.0, 15.0)),
+    "raise": FaultKind(_signal(signal.SIGUSR2), PROGRAMS),
+    "hog": FaultKind(hog, PROGRAMS),
+    "kill_all": FaultKind(kill_all, (ALL,)),
+    "kill_supervisor": FaultKind(kill_supervisor, (ALL,), (0.5, 5.0)),
+    "double": FaultKind(double, PROGRAMS, (6.0, 8.0)),
+    "crash_loop": FaultKind(crash_loop, tuple(PARAMETERS), (3.0, 6.0)),
+    "full_disk": FaultKind(full_disk, (NO_TARGET,), (3.0, 10.0)),
+    "flood": FaultKind(_babbler("flood"), (NO_TARGET,), (3.0, 6.0)),
+    "babble": FaultKind(_babbler("babble"), (NO_TARGET,), (3.0, 10.0)),
 }
-"""All faults of one host; for those between hosts see `partition`."""
+"""All faults within one host; `partition` has those between hosts."""

@@ -1,4 +1,4 @@
-"""What a checker found."""
+"""The result of a checker: verdict, evidence and measured figures for one promise."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ HOLDS, VIOLATED, UNKNOWN = "holds", "VIOLATED", "unknown"
 
 
 class Evidence(NamedTuple):
-    """A violation: when, and what was seen."""
+    """A violation: its time [s] and a description."""
 
     time: float
     what: str
@@ -19,28 +19,46 @@ class Evidence(NamedTuple):
 
 @dataclass(frozen=True)
 class Finding:
-    """The verdict on one promise. What the record cannot tell is neither kept nor broken, but unknown."""
+    """The result for one promise. A case that the record cannot decide counts as unknown."""
 
     promise: str
-    """S1 to S5, L1 to L4"""
+    """S1 to S5, L1 to L4."""
     cases: int
-    """how often the promise was put to the test, with an outcome"""
-    figures: str
-    """how near it came to its bound"""
+    """How often the promise was exercised and the outcome is known."""
+    measured: str
+    """The figures, in words."""
     evidence: Sequence[Evidence] = ()
     unknown: int = 0
-    """tests whose outcome the record does not tell"""
+    """How often the promise was exercised and the record does not show the outcome."""
     times: dict[str, list[float]] = field(default_factory=dict)
-    """durations [s] by program, where the promise is about durations"""
+    """Durations [s] by program, for a promise about durations."""
 
     @property
     def verdict(self) -> str:
-        """Whether it holds."""
+        """HOLDS, VIOLATED or UNKNOWN."""
         return VIOLATED if self.evidence else HOLDS if self.cases else UNKNOWN
+
+    @property
+    def summary(self) -> str:
+        """The figures, or why there are none."""
+        if self.verdict != UNKNOWN:
+            return self.measured
+        return "outcome unknown" if self.unknown else "not exercised"
 
 
 def percentile(values: Sequence[float], percent: float) -> float:
-    """The nearest-rank percentile; NaN of nothing."""
+    """Return the nearest-rank percentile; NaN if there are no values."""
     if not values:
         return math.nan
     return sorted(values)[max(0, math.ceil(percent / 100 * len(values)) - 1)]
+
+
+def count(number: int, noun: str) -> str:
+    """Return a number and a noun, in the plural where needed: ``1 fault``, ``2 faults``."""
+    plural = "es" if noun.endswith("s") else "s"
+    return f"{number} {noun}{'' if number == 1 else plural}"
+
+
+def how_often(number: int) -> str:
+    """Return how often something happened: ``once``, ``2 times``."""
+    return "once" if number == 1 else f"{number} times"

@@ -1,138 +1,169 @@
-"""What happened, as seen from outside: the messages of each topic, the lives of processes, and the faults.
+"""What a record tells about one arm: its messages, its processes and the injected faults.
 
-Times are seconds since the record began, by the monotonic clock of the host.
+Times are seconds since the record began, on the monotonic clock of the host.
 """
 
 from __future__ import annotations
 
 import itertools
+import math
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
+from deploy.supervision import manifest
 from interfaces import topics
 
-SENTINEL = "sentinel"
-OPERATOR, ALL, NOTHING = "operator", "all", "nothing"
-"""What a fault may be done to besides a program; `nothing` is what must not be able to disturb anything."""
+PROGRAMS = tuple(program.name for program in manifest.programs())
+SWITCH = topics.OPERATOR_HEARTBEAT.publishers[0]
+WATCHDOG = topics.OPERATOR_PRESENCE.publishers[0]
+CONTROLLER = topics.ENGINES_STATE.publishers[0]
+KINEMATICS = topics.EFFECTOR_POSITION.publishers[0]
+SOURCES = tuple(topic.publishers[0] for topic in topics.CONFIGURATION.values())
+
+OPERATOR, ALL, NO_TARGET = "operator", "all", "nothing"
+"""Targets of faults besides programs: the operator, the whole arm, and nothing that belongs to the arm."""
 
 OVERLOAD, LOSS, SILENCE = "overload", "loss", "silence"
-CIRCUMSTANCES = (OVERLOAD, LOSS, SILENCE)
-"""Told like faults, but of no process: a machine or network that loses messages; an operator asleep."""
+CONDITIONS = (OVERLOAD, LOSS, SILENCE)
+"""Recorded like faults, but not injected into a process: the observer was not scheduled in time, the network
+loses packets, the operator released the switch."""
 
-BLINDING = ("stop", "hang", "hog")
-"""Faults that keep a process from hearing, until it goes on or is replaced."""
+SUSPENDING = ("stop", "hang", "hog")
+"""Faults in which a process receives nothing until it continues or is replaced."""
+
+
+def _output(program: str) -> topics.Topic | None:
+    own = (topic for topic in topics.CONTRACT if topic.publishers[0] == program)
+    return next((topic for topic in own if topic.longest_gap < math.inf), None)
+
+
+OUTPUTS = {program: topic for program in PROGRAMS if (topic := _output(program))}
+"""The topic that shows whether a program works: the first one that names it as its first publisher. Of the
+other programs, the health shows it."""
+
+
+def _dependents(program: str) -> tuple[str, ...]:
+    if program not in OUTPUTS:
+        return ()
+    direct = [name for name, topic in OUTPUTS.items() if topic.follows == OUTPUTS[program].name]
+    return (*direct, *itertools.chain.from_iterable(map(_dependents, direct)))
+
+
+DEPENDENTS = {
+    **{program: _dependents(program) for program in PROGRAMS},
+    OPERATOR: (SWITCH, *_dependents(SWITCH)),
+}
+"""The programs whose output stops when that of a program stops, or when the operator releases the switch."""
 
 
 class Sample(NamedTuple):
-    """A message as the observer got it."""
+    """A message as the observer received it."""
 
     sent: float
-    """when its publisher wrote it (DDS source time)"""
+    """DDS source time."""
     received: float
     value: Any
-    """its content, plain: a float, a bool, a string; (x, y) of a position, (node, pid) of a health report"""
+    """The content: a float, a bool or a string; (x, y) of a position, (node, pid) of a health report."""
 
 
 class Life(NamedTuple):
-    """A process of the system."""
+    """A process of the arm, from its start to its end."""
 
     program: str
-    """the supervised program; '' for supervisord"""
+    """The supervised program; empty for supervisord."""
     pid: int
     began: float
     ended: float | None
-    """None while it lives on"""
+    """``None`` if the process was alive when the record ended."""
 
 
-class Fault(NamedTuple):
-    """What the monkey did, and what it hit."""
+class InjectedFault(NamedTuple):
+    """A fault and its target, or a condition (:data:`CONDITIONS`)."""
 
     kind: str
     target: str
-    """the program, or what else it was done to"""
+    """A program, or one of :data:`OPERATOR`, :data:`ALL`, :data:`NO_TARGET`."""
     begin: float
     end: float
-    """when the monkey stopped doing it; `begin` for what takes no time"""
+    """When the injection ended; equal to ``begin`` for a momentary fault."""
     pid: int = 0
-    detail: str = ""
+    """The process that was hit; 0 if the target is not a program, or had no process."""
 
     def overlaps(self, begin: float, end: float) -> bool:
-        """Whether any of it was between two times."""
+        """Return whether the fault was active at any time between two times."""
         return self.begin < end and self.end > begin
 
 
 @dataclass(frozen=True)
 class History:
-    """Everything that one arm did while the record ran."""
+    """Everything that happened to one arm."""
 
     end: float
     streams: dict[str, list[Sample]] = field(default_factory=dict)
-    """by relative topic name, in the order of sending"""
+    """By topic name of the contract, in the order of sending."""
     lives: list[Life] = field(default_factory=list)
-    faults: list[Fault] = field(default_factory=list)
+    faults: list[InjectedFault] = field(default_factory=list)
+
+    @property
+    def injected(self) -> list[InjectedFault]:
+        """The faults without the conditions."""
+        return [fault for fault in self.faults if fault.kind not in CONDITIONS]
 
     def stream(self, topic: topics.Topic) -> list[Sample]:
-        """The messages of a topic."""
+        """Return the messages of a topic."""
         return self.streams.get(topic.name, [])
 
     def output(self, program: str) -> list[Sample]:
-        """The messages by which one sees that a program works."""
+        """Return the messages that show that a program works."""
         if topic := OUTPUTS.get(program):
             return self.stream(topic)
         return [s for s in self.stream(topics.DIAGNOSTICS) if s.value[0] == program]
 
+    def signs_of_life(self) -> list[Sample]:
+        """Return the heartbeats of a pressed switch."""
+        return [s for s in self.stream(topics.OPERATOR_HEARTBEAT) if s.value is True]
+
     def lives_of(self, program: str) -> list[Life]:
-        """The processes of a program, but none that ended beside an older one: that was a double."""
+        """Return the processes of a program, without duplicates that ended while an older one lived on."""
         lives = [life for life in self.lives if life.program == program]
         return [life for life in lives if not any(_outlives(older, life) for older in lives)]
 
-    def ended(self, fault: Fault) -> float:
-        """When a fault was over: when the monkey stopped doing it, or its victim was replaced before."""
-        if fault.kind not in BLINDING:
+    def effect_end(self, fault: InjectedFault) -> float:
+        """Return when a fault stopped to matter: at its end, or earlier if its target was replaced."""
+        if fault.kind not in SUSPENDING:
             return fault.end
-        victim = (fault.target, fault.pid)
-        ends = [life.ended for life in self.lives if (life.program, life.pid) == victim and life.ended]
+        target = (fault.target, fault.pid)
+        ends = [life.ended for life in self.lives if (life.program, life.pid) == target and life.ended]
         return min([fault.end, *ends])
 
     def may_have_missed(self, begin: float, end: float) -> bool:
-        """Whether the observer may not know all that was said between two times."""
+        """Return whether the observer may have missed messages between two times."""
         return any(True for _ in self._blind(begin, end))
 
     def missed(self, begin: float, end: float) -> float:
-        """How much of the time [s] between two times the observer may not know all that was said."""
+        """Return how long [s] between two times the observer may have missed messages."""
         return sum(min(end, f.end) - max(begin, f.begin) for f in self._blind(begin, end))
 
-    def _blind(self, begin: float, end: float) -> Iterator[Fault]:
+    def _blind(self, begin: float, end: float) -> Iterator[InjectedFault]:
         return (f for f in self.faults if f.kind in (OVERLOAD, LOSS) and f.overlaps(begin, end))
 
 
-OUTPUTS = {
-    publisher: topic
-    for topic in topics.CONTRACT
-    if topic not in (topics.ENGINES, topics.OPERATOR_ACTIVITY, topics.DIAGNOSTICS)
-    for publisher in topic.publishers
-}
-"""The topic by which one sees that a service works; the sentinel's is its health."""
-
-PROGRAMS = (*OUTPUTS, SENTINEL)
-
-
-def suffix(namespace: str) -> str:
-    """What the name of an arm's file ends with: nothing in the root namespace, `_arm1` in `/arm1`."""
-    return namespace.replace("/", "_").rstrip("_")
+def target_name(target: str) -> str:
+    """Return the name of a target for a reader."""
+    return {ALL: "(whole arm)", NO_TARGET: "(no target)"}.get(target, target)
 
 
 def between(samples: Sequence[Sample], begin: float, end: float) -> Sequence[Sample]:
-    """The samples sent from `begin` up to and including `end`."""
+    """Return the samples sent from ``begin`` to ``end``, both included."""
     return samples[
         bisect_left(samples, begin, key=lambda s: s.sent) : bisect_right(samples, end, key=lambda s: s.sent)
     ]
 
 
 def gaps(times: Iterable[float], begin: float, end: float) -> Iterable[tuple[float, float]]:
-    """The stretches into which the sorted `times` cut that from `begin` to `end`."""
+    """Yield the intervals into which the sorted ``times`` divide the one from ``begin`` to ``end``."""
     last = begin
     for time in itertools.chain(times, [end]):
         if last < min(time, end):
@@ -141,6 +172,6 @@ def gaps(times: Iterable[float], begin: float, end: float) -> Iterable[tuple[flo
 
 
 def _outlives(one: Life, two: Life) -> bool:
-    """Whether a process was there before another one, and longer."""
+    """Return whether a process started before another one and ended after it."""
     later = one.ended is None or (two.ended is not None and one.ended > two.ended)
     return one.began < two.began and later

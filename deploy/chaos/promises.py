@@ -10,18 +10,21 @@ from deploy.chaos.history import History
 
 CHECKERS: dict[str, Callable[[History], Finding]] = {
     "S1": safety.engines_off_in_time,
-    "S2": safety.stays_on,
-    "S3": safety.turned_on_by_the_present,
-    "S4": safety.speeds_and_positions_are_true,
-    "S5": safety.never_two_alive,
-    "L1": liveness.comes_back,
-    "L2": liveness.others_flow_on,
-    "L3": liveness.right_after_return,
+    "S2": safety.engines_stay_on,
+    "S3": safety.turned_on_with_operator,
+    "S4": safety.valid_speeds_and_positions,
+    "S5": safety.single_instances,
+    "L1": liveness.output_resumes,
+    "L2": liveness.other_streams_flow,
+    "L3": liveness.right_after_restart,
     "L4": liveness.hung_is_replaced,
 }
 
+DURATIONS = {"L1": "Silence after SIGKILL [s]", "L4": "Silence after a hang [s]"}
+"""The titles of the durations that a finding on these promises lists."""
+
 
 def meaning(promise: str) -> str:
-    """What is promised, in one sentence."""
+    """Return the promise in one sentence."""
     sentence = (CHECKERS[promise].__doc__ or "").partition(": ")[2].strip().replace("`", "")
     return sentence[:1].upper() + sentence[1:]

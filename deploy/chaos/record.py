@@ -1,7 +1,7 @@
-"""The file that a record is: an MCAP of ROS 2 messages, which Foxglove and `ros2 bag` open.
+"""The file of a record: an MCAP of ROS 2 messages, which Foxglove and `ros2 bag` open.
 
-Log time is when the observer got a message, publish time when its publisher wrote it. What processes and the
-monkey did stands beside it, as JSON in std_msgs/String.
+The log time of a message is its reception by the observer, the publish time its DDS source time. Processes
+and faults are recorded as JSON in std_msgs/String.
 """
 
 from __future__ import annotations
@@ -23,20 +23,20 @@ from rclpy.serialization import deserialize_message, serialize_message
 from rosbags.typesys import Stores, get_typestore
 from std_msgs.msg import String
 
-from deploy.chaos.history import Fault, History, Life, Sample
-from deploy.chaos.marks import is_babble
+from deploy.chaos.babbler import is_babble
+from deploy.chaos.history import History, InjectedFault, Life, Sample
 from deploy.supervision.system import DeploymentError
 from interfaces import topics
 
-PROCESSES, FAULTS = "/chaos/processes", "/chaos/faults"
+PROCESSES, FAULTS = "/chaos/processes", "/chaos/faults"  # topics
 METADATA = "reactive-arm"
 
 
 class Recorder:
-    """Writes a record; any thread may."""
+    """Writes a record. Thread-safe."""
 
     def __init__(self, path: Path, monotonic: int, epoch: int) -> None:
-        """:param monotonic, epoch: the same moment on the monotonic clock and since 1970 [ns]"""
+        """:param monotonic, epoch: the same moment on the monotonic clock and since 1970 [ns]."""
         self._file = path.open("xb")
         self._writer = Writer(self._file)
         self._writer.start(profile="ros2", library="reactive-arm")
@@ -50,7 +50,7 @@ class Recorder:
         self._writer.add_metadata(METADATA, {"origin": str(self._origin + self._offset)})
 
     def message(self, topic: str, type_name: str, qos: str, data: bytes, received: int, sent: int) -> None:
-        """Record a serialized message, until the file is complete; times by the monotonic clock [ns]."""
+        """Record a serialized message; without effect after :meth:`close`. Times: monotonic clock [ns]."""
         with self._lock:
             if self._file.closed:
                 return
@@ -66,7 +66,7 @@ class Recorder:
             )
 
     def event(self, topic: str, time: int, event: Mapping[str, object]) -> None:
-        """Record what a process or the monkey did."""
+        """Record an event of a process, or a fault, as JSON."""
         data = serialize_message(String(data=json.dumps(event)))
         self.message(topic, "std_msgs/msg/String", "", data, time, time)
 
@@ -86,7 +86,7 @@ class Recorder:
 
 
 def qos_profiles(topic: topics.Topic) -> str:
-    """The QoS of a topic as rosbag2 writes it."""
+    """Return the QoS of a topic in the form of rosbag2."""
     latched, lifespan = topics.is_latched(topic.qos), topic.qos.lifespan.nanoseconds
     profile = {
         "history": 1,
@@ -107,32 +107,30 @@ def _reader(path: Path) -> Iterator[McapReader]:
     """
     Open a record.
 
-    :raises DeploymentError: if it is not complete, or none at all.
+    :raises DeploymentError: if the file is incomplete or not a record.
     """
     try:
         with path.open("rb") as file:
             yield make_reader(file)
-    except (McapError, struct.error) as error:  # the latter of a file that ends within a number
-        raise DeploymentError(f"{path} is no complete record: {error}") from None
+    except (McapError, struct.error) as error:  # struct.error: the file ends within a number
+        raise DeploymentError(f"{path} is not a complete record: {error}") from None
 
 
 def namespaces(path: Path) -> list[str]:
-    """The namespaces of the arms that a record tells of."""
+    """Return the namespaces of the arms in a record."""
     with _reader(path) as reader:
         events = reader.iter_messages(topics=[PROCESSES])
-        told = {
-            json.loads(deserialize_message(message.data, String).data)["namespace"] for *_, message in events
-        }
-    return sorted(told, key=lambda namespace: (len(namespace), namespace))
+        found = {_event(message.data)["namespace"] for *_, message in events}
+    return sorted(found, key=lambda namespace: (len(namespace), namespace))
 
 
 def load(path: Path, namespace: str = "/") -> History:
-    """What happened to the arm in a namespace, according to a record."""
+    """Return the history of the arm in a namespace."""
     prefix = namespace.rstrip("/") + "/"
     names = {topic.name if topic.name[0] == "/" else prefix + topic.name: topic for topic in topics.CONTRACT}
     streams: dict[str, list[Sample]] = {topic.name: [] for topic in topics.CONTRACT}
     lives: dict[tuple[int, float], Life] = {}
-    faults: list[Fault] = []
+    faults: list[InjectedFault] = []
     with _reader(path) as reader:
         origin = next(int(m.metadata["origin"]) for m in reader.iter_metadata() if m.name == METADATA)
         summary = reader.get_summary()
@@ -146,11 +144,12 @@ def load(path: Path, namespace: str = "/") -> History:
                     Sample(sent, received, value) for value in _values(topic, message.data, prefix)
                 ]
             elif channel.topic in (PROCESSES, FAULTS):
-                event = json.loads(deserialize_message(message.data, String).data)
+                event = _event(message.data)
                 if event.pop("namespace", namespace) != namespace:
                     continue
                 if channel.topic == FAULTS:
-                    faults.append(Fault(**event))
+                    event.pop("detail", None)  # of an older record; always empty
+                    faults.append(InjectedFault(**event))
                 else:
                     life = Life(**event)
                     lives[life.pid, life.began] = life
@@ -164,23 +163,28 @@ def load(path: Path, namespace: str = "/") -> History:
     )
 
 
+def _event(data: bytes) -> dict[str, Any]:
+    event: dict[str, Any] = json.loads(deserialize_message(data, String).data)
+    return event
+
+
 def _values(topic: topics.Topic, data: bytes, prefix: str) -> list[Any]:
-    """What a message says, plain; nothing where it is the monkey's babble."""
+    """Return the content of a message as plain values; none for an injected one."""
     if is_babble(topic, data):
         return []
     try:
         message = deserialize_message(data, topic.type)
-    except Exception:  # whatever the runtime raises: it is babble that nobody can read
+    except Exception:  # of any type, by the runtime: the message is unreadable
         return []
     if topic is topics.EFFECTOR_POSITION:
         return [(message.point.x, message.point.y)]
     if topic is topics.OPERATOR_PRESENCE:
         return [message.stamp.sec + message.stamp.nanosec / 1e9]
     if topic is not topics.DIAGNOSTICS:
-        return [message.data]
+        return [getattr(message, "data", None)]
     found = []
     for status in message.status:
-        # The sentinel reports on others as `sentinel: NAME`; what it says of itself counts as its own.
+        # The sentinel reports on other processes as `sentinel: NAME`; its report on itself counts as its own.
         reporter, _, subject = status.name.removeprefix(prefix).partition(": ")
         if status.name.startswith(prefix) and "/" not in reporter and subject in ("", reporter):
             found += [(reporter, int(pair.value)) for pair in status.values if pair.key == "pid"]

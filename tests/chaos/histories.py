@@ -1,4 +1,4 @@
-"""Made-up histories: one in which all is well, and the means to plant what is not."""
+"""Histories made by hand: a good one, and functions that plant violations in it."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dataclasses import replace
 from functools import cache
 from typing import Any
 
-from deploy.chaos.history import PROGRAMS, Fault, History, Life, Sample
+from deploy.chaos.history import PROGRAMS, History, InjectedFault, Life, Sample
 from interfaces import topics
 from services.kinematics import forward_kinematics
 
@@ -30,13 +30,13 @@ def _times(rate: float) -> list[float]:
 
 
 def value_at(topic: str, time: float) -> float:
-    """What a config publisher says at a time."""
+    """Return the value of a configuration topic at a time."""
     return 2.0 + math.sin(time * (1 + len(topic)) / 7)
 
 
 @cache
 def good() -> History:
-    """A minute in which the operator holds the switch, turns the engines on at 5 s, and nothing dies."""
+    """Return a minute in which the operator turns the engines on at 5 s and nothing dies."""
     streams: dict[str, list[Sample]] = {topic.name: [] for topic in topics.CONTRACT}
     for name, rate in RATES.items():
         streams[name] = [Sample(t, t + 0.001, _value(name, t)) for t in _times(rate)]
@@ -67,38 +67,38 @@ def _latest(samples: list[Sample], time: float) -> Any:
 
 
 def change(history: History, topic: str, how: Callable[[Sample], Sample | None]) -> History:
-    """The history with other messages on a topic; None for none."""
+    """Return the history with each message of a topic replaced; ``None`` removes it."""
     samples = sorted(new for s in history.streams[topic] if (new := how(s)) is not None)
     return replace(history, streams=history.streams | {topic: samples})
 
 
 def silent(history: History, topic: str, begin: float, end: float) -> History:
-    """The history without what was sent on a topic between two times."""
+    """Return the history without the messages of a topic between two times."""
     return change(history, topic, lambda s: None if begin < s.sent < end else s)
 
 
 def says(history: History, topic: str, value: Any, begin: float, end: float = END) -> History:
-    """The history with another value on a topic between two times."""
+    """Return the history with another value on a topic between two times."""
     return change(history, topic, lambda s: s._replace(value=value) if begin < s.sent < end else s)
 
 
 def added(history: History, topic: str, *samples: tuple[float, Any]) -> History:
-    """The history with further messages."""
+    """Return the history with additional messages."""
     new = [Sample(t, t + 0.001, value) for t, value in samples]
     return replace(history, streams=history.streams | {topic: sorted([*history.streams[topic], *new])})
 
 
-def faulty(history: History, *faults: Fault) -> History:
-    """The history with faults."""
+def faulty(history: History, *faults: InjectedFault) -> History:
+    """Return the history with additional faults."""
     return replace(history, faults=sorted([*history.faults, *faults], key=lambda f: f.begin))
 
 
 def killed(history: History, program: str, at: float, back: float) -> History:
-    """The history in which a program was killed and its next process was there after `back` seconds."""
+    """Return the history with a program killed, and its output back after ``back`` [s]."""
     old = next(life for life in history.lives if life.program == program)
     new = Life(program, old.pid + 1000, at + 0.05, None)
-    lives = [replace_end(life, at) if life is old else life for life in history.lives]
-    history = faulty(replace(history, lives=[*lives, new]), Fault("kill", program, at, at, old.pid))
+    lives = [life._replace(ended=at) if life is old else life for life in history.lives]
+    history = faulty(replace(history, lives=[*lives, new]), InjectedFault("kill", program, at, at, old.pid))
     streams = [topic.name for topic in topics.CONTRACT if topic.publishers == (program,)]
     for topic in streams:
         history = silent(history, topic, at, at + back)
@@ -107,11 +107,6 @@ def killed(history: History, program: str, at: float, back: float) -> History:
         "/diagnostics",
         lambda s: s if s.value[0] != program or s.sent <= at else _successor(s, new.pid, at + back),
     )
-
-
-def replace_end(life: Life, time: float) -> Life:
-    """A life that ended."""
-    return life._replace(ended=time)
 
 
 def _successor(sample: Sample, pid: int, since: float) -> Sample | None:

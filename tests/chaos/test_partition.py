@@ -1,4 +1,4 @@
-"""The operator's host is cut off from the robot's, and comes back."""
+"""The network between the operator's host and the robot's is cut, and heals."""
 
 from __future__ import annotations
 
@@ -9,66 +9,66 @@ from pathlib import Path
 import pytest
 
 from deploy.chaos.findings import HOLDS
-from deploy.chaos.history import Fault, History, between
+from deploy.chaos.history import History, InjectedFault, between
 from deploy.chaos.partition import missing, namespaces
 from deploy.chaos.promises import CHECKERS
 from deploy.supervision import processes
 from interfaces.topics import ENGINES_STATE, OFF, ON, OPERATOR_HEARTBEAT
 
-from .plays import play
+from .experiments import experiment
 
-DISCOVERY = 10.0  # s until a host that was given up is known again
+DISCOVERY = 10.0  # s until a lost host is discovered again
 pytestmark = pytest.mark.timeout(120)
 
 
 @pytest.fixture(scope="module")
 def history(tmp_path_factory: pytest.TempPathFactory) -> History:
-    """What the robot's side sees."""
+    """The history on the robot's side."""
     if reason := missing():
         pytest.skip(reason)
-    return play(tmp_path_factory.mktemp("partition"), "--scenario", "partition").history
+    return experiment(tmp_path_factory.mktemp("partition"), "--scenario", "partition").history
 
 
 @pytest.fixture(scope="module")
-def cut(history: History) -> Fault:
+def cut(history: History) -> InjectedFault:
     """The partition."""
     (fault,) = (fault for fault in history.faults if fault.kind == "partition")
     return fault
 
 
-def test_engines_are_on_until_the_operator_is_cut_off(history: History, cut: Fault) -> None:
+def test_engines_are_on_before_the_partition(history: History, cut: InjectedFault) -> None:
     assert {s.value for s in between(history.stream(ENGINES_STATE), cut.begin - 1.0, cut.begin)} == {ON}
 
 
-def test_engines_go_off_in_time_when_the_operator_is_cut_off(history: History) -> None:
+def test_engines_turn_off_in_time_after_a_partition(history: History) -> None:
     finding = CHECKERS["S1"](history)
     assert finding.verdict == HOLDS, finding.evidence
     assert finding.cases == 1
 
 
-def test_heartbeats_are_back_soon_after_the_network(history: History, cut: Fault) -> None:
+def test_heartbeats_resume_soon_after_the_network(history: History, cut: InjectedFault) -> None:
     heartbeats = history.stream(OPERATOR_HEARTBEAT)
     assert not between(heartbeats, cut.begin + 0.5, cut.end - 0.5)
     assert between(heartbeats, cut.end, cut.end + DISCOVERY)
 
 
-def test_engines_stay_off_when_the_operator_is_back(history: History, cut: Fault) -> None:
+def test_engines_stay_off_after_a_partition_heals(history: History, cut: InjectedFault) -> None:
     assert {s.value for s in between(history.stream(ENGINES_STATE), cut.end, history.end)} == {OFF}
 
 
 @pytest.mark.parametrize("promise", CHECKERS)
-def test_no_promise_is_broken(history: History, promise: str) -> None:
+def test_no_promise_is_violated(history: History, promise: str) -> None:
     assert not CHECKERS[promise](history).evidence
 
 
-def test_no_promise_is_broken_by_a_bad_line_and_the_engines_stay_on(
+def test_bad_line_violates_no_promise_and_engines_stay_on(
     tmp_path_factory: pytest.TempPathFactory,
 ) -> None:
     if reason := missing() or missing("bad_line"):
-        # The words of the kernel, not of tc about how it is used.
+        # An error of the kernel; an error in the use of tc would read differently.
         assert "Specified qdisc kind is unknown" in reason or reason == missing()
         pytest.skip(f"platform: {reason}")
-    bad = play(tmp_path_factory.mktemp("bad_line"), "--scenario", "bad_line")
+    bad = experiment(tmp_path_factory.mktemp("bad_line"), "--scenario", "bad_line")
     (fault,) = (fault for fault in bad.history.faults if fault.kind == "bad_line")
     assert {s.value for s in between(bad.history.stream(ENGINES_STATE), fault.begin, fault.end)} == {ON}
     for promise in CHECKERS:
@@ -88,7 +88,7 @@ with ExitStack() as stack:
 """
 
 
-def test_what_a_killed_monkey_leaves_behind_is_found_by_the_next_one(tmp_path: Path) -> None:
+def test_next_start_cleans_up_after_a_killed_chaos_monkey(tmp_path: Path) -> None:
     if reason := missing():
         pytest.skip(reason)
     command = [sys.executable, "-c", PREPARED, str(tmp_path)]
@@ -96,17 +96,17 @@ def test_what_a_killed_monkey_leaves_behind_is_found_by_the_next_one(tmp_path: P
         try:
             assert monkey.stdout is not None
             monkey.stdout.readline()
-            with namespaces():  # it lives: what it has made is its own
+            with namespaces():  # the namespaces of a live process are left alone
                 assert f"arm{monkey.pid}-switch" in hosts()
         finally:
             monkey.kill()
-    assert (tmp_path / "run_operator").is_dir()  # by which make chaos ends the switch of an earlier play
+    assert (tmp_path / "run_operator").is_dir()  # lets the next make chaos end the switch
     assert f"arm{monkey.pid}-switch" in hosts()
     with namespaces():
         assert not [name for name in hosts() if name.startswith(f"arm{monkey.pid}-")]
 
 
 def hosts() -> list[str]:
-    """The network namespaces of this machine that have a name."""
+    """Return the named network namespaces of this machine."""
     listed = subprocess.run(["ip", "netns", "list"], check=True, capture_output=True, text=True)
     return [line.split()[0] for line in listed.stdout.splitlines()]

@@ -1,4 +1,4 @@
-"""Records: what others read in them, what the monkey says of them, and of files that are none."""
+"""Records: their format, the verdict on them, and files that are not records; the command line."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from interfaces import topics
 
 
 def recorded(path: Path, *lives: Life) -> bytes:
-    """A record of processes and a speed, and nothing else."""
+    """Write a record with processes and speeds only; return its bytes."""
     recorder = Recorder(path, 0, 10**18)
     for life in lives:
         recorder.event(PROCESSES, 1, life._asdict() | {"namespace": "/"})
@@ -37,7 +37,7 @@ def recorded(path: Path, *lives: Life) -> bytes:
 
 
 def replay(record: Path) -> subprocess.CompletedProcess[str]:
-    """Let the monkey judge a record; in a process of its own, as it handles signals."""
+    """Judge a record in a subprocess, because it handles signals."""
     command = [sys.executable, "-m", "deploy.chaos", "--replay", str(record)]
     return subprocess.run(command, cwd=processes.ROOT, capture_output=True, text=True, timeout=60)
 
@@ -48,17 +48,17 @@ def replay(record: Path) -> subprocess.CompletedProcess[str]:
         (
             "--faults crash_loop --targets kinematics",
             1,
-            "No fault is planned: the time is too short, or nothing of this can be done to that.",
+            "No fault is planned: the time is too short, or none of the faults applies to the targets",
         ),
-        ("--arms 73", 2, "73 arms need as many ROS domains, of which there are 72"),
+        ("--arms 73", 2, "--arms must be from 1 to 72: each arm needs a ROS domain"),
         (
             "--scenario kill_each --faults kill",
             2,
-            "--every, --faults and --targets are for the random monkey: not with --scenario",
+            "--every, --faults and --targets apply to random faults, not to a --scenario",
         ),
     ],
 )
-def test_a_play_that_cannot_be_is_refused(tmp_path: Path, options: str, code: int, reason: str) -> None:
+def test_impossible_options_are_refused(tmp_path: Path, options: str, code: int, reason: str) -> None:
     command = [sys.executable, "-m", "deploy.chaos", *options.split()]
     environment = {**os.environ, "REACTIVE_ARM_RUN_DIR": str(tmp_path)}
     end = subprocess.run(
@@ -69,13 +69,13 @@ def test_a_play_that_cannot_be_is_refused(tmp_path: Path, options: str, code: in
     assert not list(tmp_path.glob("chaos/*"))
 
 
-def test_ctrl_c_ends_the_judging(tmp_path: Path) -> None:
+def test_ctrl_c_ends_the_judgement(tmp_path: Path) -> None:
     path = tmp_path / "record.mcap"
     recorded(path, ONE)
     script = (
         "import os, signal, sys; signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT});"
         "os.kill(os.getpid(), signal.SIGINT);"
-        f"import deploy.chaos.__main__ as monkey; sys.exit(monkey.main(['--replay', {str(path)!r}]))"
+        f"import deploy.chaos.__main__ as chaos; sys.exit(chaos.main(['--replay', {str(path)!r}]))"
     )
     end = subprocess.run(
         [sys.executable, "-c", script], cwd=processes.ROOT, capture_output=True, text=True, timeout=60
@@ -86,7 +86,7 @@ def test_ctrl_c_ends_the_judging(tmp_path: Path) -> None:
 ONE, OTHER = Life("velocity", 7, 0.0, None), Life("velocity", 8, 5.0, 12.0)
 
 
-def test_a_record_is_read_by_the_tools_of_ros(tmp_path: Path) -> None:
+def test_ros_tools_read_a_record(tmp_path: Path) -> None:
     path = tmp_path / "record.mcap"
     recorded(path, ONE)
     with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_JAZZY)) as reader:
@@ -101,7 +101,7 @@ def test_a_record_is_read_by_the_tools_of_ros(tmp_path: Path) -> None:
     assert json.loads(read[0][2])["program"] == "velocity"
 
 
-def test_a_broken_promise_is_told_with_its_evidence_and_is_exit_code_1(tmp_path: Path) -> None:
+def test_violation_is_reported_with_evidence_and_exit_code_1(tmp_path: Path) -> None:
     path = tmp_path / "record.mcap"
     recorded(path, ONE, OTHER)
     done = replay(path)
@@ -112,26 +112,26 @@ def test_a_broken_promise_is_told_with_its_evidence_and_is_exit_code_1(tmp_path:
     assert "processes 7 and 8 are both velocity" in page
 
 
-def test_where_nothing_is_broken_the_exit_code_is_0(tmp_path: Path) -> None:
+def test_exit_code_is_0_without_a_violation(tmp_path: Path) -> None:
     path = tmp_path / "record.mcap"
     recorded(path, ONE)
     assert replay(path).returncode == 0
 
 
 @pytest.mark.parametrize("kept", [0, 5, 100, -10], ids="to {} bytes".format)
-def test_tells_in_a_line_that_a_record_is_not_complete(kept: int, tmp_path: Path) -> None:
+def test_incomplete_record_is_refused_in_one_line(kept: int, tmp_path: Path) -> None:
     record = tmp_path / "record.mcap"
     record.write_bytes(recorded(tmp_path / "whole.mcap", ONE)[:kept])
     done = replay(record)
     assert done.returncode == 1
-    assert done.stderr.startswith(f"{record} is no complete record: ")
+    assert done.stderr.startswith(f"{record} is not a complete record: ")
     assert done.stderr.count("\n") == 1
 
 
-def test_tells_in_a_line_that_a_file_is_no_record(tmp_path: Path) -> None:
+def test_other_file_is_refused_in_one_line(tmp_path: Path) -> None:
     record = tmp_path / "letter.txt"
     record.write_text("Dear monkey,\nplease stop.\n")
     done = replay(record)
     assert done.returncode == 1
-    assert done.stderr.startswith(f"{record} is no complete record: ")
+    assert done.stderr.startswith(f"{record} is not a complete record: ")
     assert done.stderr.count("\n") == 1

@@ -1,7 +1,7 @@
-"""Loaded by the interpreter of every supervised process in the arena: signals that break it from inside.
+"""Signal handlers that break a process from inside; Python imports them when it starts.
 
-A signal's handler runs on the main thread, which in a service is the executor's: what it does, happens to the
-recipe. This directory stands on the PYTHONPATH of systems that the monkey started, and of no other.
+A handler runs on the main thread, which in a service is the executor's: it breaks the recipe. Only the
+testbed puts this directory on the PYTHONPATH of a system.
 """
 
 import os
@@ -16,12 +16,12 @@ def hang(number: int, frame: FrameType | None) -> None:
 
 
 def fail(number: int, frame: FrameType | None) -> None:
-    """An error that nobody expects."""
-    raise RuntimeError("the chaos monkey was here")
+    """An unexpected error inside a callback."""
+    raise RuntimeError("injected by the chaos monkey")
 
 
 def hog(number: int, frame: FrameType | None) -> None:
-    """Take memory until there is no more."""
+    """Allocate memory until there is none left."""
     hoard = []
     while True:
         hoard.append(bytearray(4 << 20))

@@ -1,4 +1,4 @@
-"""Plays of the monkey in processes of their own, judged when they are over."""
+"""Runs of the chaos monkey in a subprocess, and their results."""
 
 from __future__ import annotations
 
@@ -8,38 +8,39 @@ import sys
 from pathlib import Path
 
 from deploy.chaos import record
+from deploy.chaos.arm import file_suffix
 from deploy.chaos.findings import Finding
-from deploy.chaos.history import History, suffix
+from deploy.chaos.history import History
 from deploy.chaos.promises import CHECKERS
 from deploy.supervision import processes
 
-LONGEST = 150.0  # s
+TIMEOUT = 150.0  # s
 
 
-class Play:
-    """What became of an arm in a play that is over."""
+class Experiment:
+    """The result of an experiment with one arm."""
 
     def __init__(self, directory: Path, output: str, code: int, namespace: str = "/") -> None:
         self.output = output
         self.code = code
-        self.page = next(directory.glob(f"chaos/*/report{suffix(namespace)}.html"))
+        self.page = next(directory.glob(f"chaos/*/report{file_suffix(namespace)}.html"))
         self.history: History = record.load(self.page.with_name("record.mcap"), namespace)
         self.findings: dict[str, Finding] = {name: check(self.history) for name, check in CHECKERS.items()}
 
     def finding(self, promise: str) -> Finding:
-        """The finding on a promise, which is not broken."""
+        """Return the finding on a promise, which must not be violated."""
         finding = self.findings[promise]
         assert not finding.evidence, f"{promise}: {finding.evidence}"
         return finding
 
 
-def play(run: Path, *options: str) -> Play:
-    """Play with one arm and a directory for its runtime files."""
-    return Play(run, *unleash(run, *options))
+def experiment(run: Path, *options: str) -> Experiment:
+    """Run an experiment with one arm; its files are in a directory."""
+    return Experiment(run, *unleash(run, *options))
 
 
 def unleash(run: Path, *options: str) -> tuple[str, int]:
-    """Let the monkey play; what it said, and its exit code."""
+    """Run `make chaos`; return its output and its exit code."""
     process = subprocess.Popen(
         [sys.executable, "-m", "deploy.chaos", *options],
         cwd=processes.ROOT,
@@ -49,7 +50,7 @@ def unleash(run: Path, *options: str) -> tuple[str, int]:
         text=True,
     )
     try:
-        output = process.communicate(timeout=LONGEST)[0]
+        output = process.communicate(timeout=TIMEOUT)[0]
     finally:
         if process.poll() is None:
             process.terminate()

@@ -1,0 +1,127 @@
+"""From the command line of `make chaos` to a plan: what to inject, and how long to record."""
+
+from __future__ import annotations
+
+import argparse
+import random
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
+from pathlib import Path
+from typing import NamedTuple
+
+from deploy.chaos import partition, schedule
+from deploy.chaos.faults import FAULT_KINDS
+from deploy.chaos.history import PROGRAMS
+from deploy.chaos.schedule import Schedule
+from deploy.chaos.testbed import SCENARIO, Testbed
+from deploy.supervision.system import DeploymentError
+from interfaces import topics
+from reactive_node.domains import DOMAINS
+
+RANDOM = "monkey"  # the scenario of random faults
+FLEET_RATE = 10.0  # Hz, of each source; many arms share the machine
+NAMED = (*partition.SCHEDULES, *schedule.SCENARIOS)
+
+
+class Plan(NamedTuple):
+    """What to inject, into which arms, and how long to record."""
+
+    title: str
+    schedules: list[Schedule]
+    """For each arm."""
+    length: float
+    """[s]."""
+    testbed: Callable[..., Testbed]
+
+
+def parse(arguments: Sequence[str]) -> argparse.Namespace:
+    """Parse the command line; exits with code 2 if it has an error."""
+    parser = argparse.ArgumentParser(
+        prog="make chaos",
+        description="Inject faults into an arm, record it from outside, and check the promises.",
+    )
+    add = parser.add_argument
+    add("--minutes", type=_number(0.01, 10_000), default=5.0, help="length of the random faults, default 5")
+    add("--seed", type=int, help="the same seed gives the same random faults")
+    add("--every", type=_number(0.01, 3600), default=5.0, help="seconds between two random faults, default 5")
+    add("--faults", type=_names(FAULT_KINDS), default=tuple(FAULT_KINDS), help=f"of {', '.join(FAULT_KINDS)}")
+    add("--targets", type=_names(PROGRAMS), default=(), help=f"of {', '.join(PROGRAMS)}")
+    names = f"instead of random faults: {', '.join(NAMED)}"
+    add("--scenario", choices=(RANDOM, *NAMED), default=RANDOM, metavar="NAME", help=names)
+    add("--arms", type=int, default=1, help="they share the random faults; each gets a whole scenario")
+    add("--loss", type=_number(0, 100), default=0.0, help="percent of all DDS packets that are lost")
+    add("--replay", type=Path, metavar="RECORD", help="only judge a record")
+    options = parser.parse_args(arguments)
+    if not 1 <= options.arms <= len(DOMAINS):
+        parser.error(f"--arms must be from 1 to {len(DOMAINS)}: each arm needs a ROS domain")
+    if options.arms > 1 and options.scenario in partition.SCHEDULES:
+        parser.error(f"--scenario {options.scenario} allows only one arm")
+    if options.scenario != RANDOM and any(
+        getattr(options, name) != parser.get_default(name) for name in ("every", "faults", "targets")
+    ):
+        parser.error("--every, --faults and --targets apply to random faults, not to a --scenario")
+    return options
+
+
+def plan(options: argparse.Namespace) -> Plan:
+    """Return the plan that a command line asks for.
+
+    :raises DeploymentError: if it is empty, or not possible on this machine.
+    """
+    if options.scenario in partition.SCHEDULES:
+        if reason := partition.missing(options.scenario):
+            raise DeploymentError(f"{options.scenario} is not possible on this machine: {reason}")
+        title = f"Scenario {options.scenario}: the network between the operator's host and the robot's"
+        return Plan(title, [partition.SCHEDULES[options.scenario]], partition.LENGTH, partition.TwoHosts)
+    several = f", {options.arms} arms" if options.arms > 1 else ""
+    testbed = _fleet(options.arms) if options.arms > 1 else Testbed
+    if options.scenario != RANDOM:
+        planned = schedule.SCENARIOS[options.scenario]()
+        length = schedule.duration(planned)
+        title = f"Scenario {options.scenario}, {length:.0f} s{several}"
+        return Plan(title, [planned] * options.arms, length, testbed)
+    seed = random.randrange(10**6) if options.seed is None else options.seed
+    length = 60 * options.minutes
+    planned = schedule.random_faults(
+        seed, length, every=options.every, kinds=options.faults, targets=options.targets
+    )
+    if not planned:
+        reason = "the time is too short, or none of the faults applies to the targets"
+        raise DeploymentError(f"No fault is planned: {reason}")
+    title = f"Random faults, seed {seed}, {options.minutes:g} min, every {options.every:g} s{several}"
+    if options.faults != tuple(FAULT_KINDS) or options.targets:
+        title += f", only {', '.join(options.faults)} of {', '.join(options.targets) or 'all programs'}"
+    return Plan(title, [planned[arm :: options.arms] for arm in range(options.arms)], length, testbed)
+
+
+def _fleet(arms: int) -> Callable[..., Testbed]:
+    """Return a testbed with several arms, each in a namespace of its own."""
+    namespaces = tuple(f"/arm{number}" for number in range(1, arms + 1))
+    slow = {name: {**SCENARIO[name], "rate": FLEET_RATE} for name in topics.CONFIGURATION}
+    return partial(Testbed, namespaces=namespaces, scenario={**SCENARIO, **slow})
+
+
+def _number(least: float, most: float) -> Callable[[str], float]:
+    def parse(text: str) -> float:
+        try:
+            number = float(text)
+        except ValueError:
+            raise argparse.ArgumentTypeError(f"{text!r} is not a number") from None
+        if not least <= number <= most:
+            raise argparse.ArgumentTypeError(f"{text} is not from {least:g} to {most:g}")
+        return number
+
+    return parse
+
+
+def _names(known: Iterable[str]) -> Callable[[str], tuple[str, ...]]:
+    names = list(known)
+
+    def parse(text: str) -> tuple[str, ...]:
+        words = tuple(word.strip() for word in text.split(","))
+        for word in words:
+            if word not in names:
+                raise argparse.ArgumentTypeError(f"{word!r} is not one of {', '.join(names)}")
+        return words
+
+    return parse

@@ -1,0 +1,74 @@
+"""Which positions follow from the values that were published (S4, L3)."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from bisect import bisect_left, bisect_right
+from collections.abc import Sequence
+
+from deploy.chaos.history import SOURCES, History, Sample
+from interfaces import topics
+
+ROUNDING = 1e-8  # m
+LONGEST_PAUSE = 20.0  # s for which a process may be suspended, and its values become old
+DISCOVERY = 1.0  # s from the first message that the observer received until every reader knows the publisher
+
+
+class PublishedValues:
+    """The values of the configuration, and the positions that follow from them."""
+
+    def __init__(self, history: History) -> None:
+        self._streams = [history.stream(topic) for topic in topics.CONFIGURATION.values()]
+
+    def explain(self, position: Sample, within: float) -> bool:
+        """Return whether a position follows from values that were the latest within ``within`` [s] before."""
+        # The newest values nearly always explain it; older ones are tried only if they do not.
+        for window in (0.05, 0.3, 2.0, LONGEST_PAUSE):
+            candidates = [
+                self._candidates(stream, position.sent, min(window, within)) for stream in self._streams
+            ]
+            if _any_fits(candidates, *position.value):
+                return True
+            if window >= within:
+                break
+        return False
+
+    @staticmethod
+    def _candidates(stream: Sequence[Sample], time: float, window: float) -> list[float]:
+        """Return the values that were the latest at some moment of the window, newest first."""
+        newest = bisect_right(stream, time + 0.005, key=lambda s: s.sent)
+        oldest = bisect_right(stream, time - window, key=lambda s: s.sent)
+        return [s.value for s in reversed(stream[max(0, oldest - 1) : newest])]
+
+
+def may_have_missed_values(history: History, time: float) -> bool:
+    """Return whether a reader may have received values before the observer discovered their publisher."""
+    if history.may_have_missed(time - DISCOVERY, time):
+        return True
+    for life in history.lives:
+        if life.program in SOURCES and life.began < time:
+            output = history.output(life.program)
+            first = bisect_right(output, life.began, key=lambda s: s.sent)
+            if first == len(output) or time < output[first].sent + DISCOVERY:
+                return True
+    return False
+
+
+def _any_fits(candidates: list[list[float]], x: float, y: float) -> bool:
+    """Return whether any combination of the values gives the position, up to rounding."""
+    if not (math.isfinite(x) and math.isfinite(y)):
+        return False
+    l1s, l2s, theta1s, theta2s = candidates
+    l2s = sorted(l2s)
+    for theta1, l1 in itertools.product(theta1s, l1s):
+        # The rest has to fit the second link in length before angles are tried.
+        rest_x, rest_y = x - l1 * math.cos(theta1), y - l1 * math.sin(theta1)
+        length = math.hypot(rest_x, rest_y)
+        for l2 in l2s[bisect_left(l2s, length - ROUNDING) : bisect_right(l2s, length + ROUNDING)]:
+            for theta2 in theta2s:
+                heading = theta1 + theta2
+                error_x, error_y = rest_x - l2 * math.cos(heading), rest_y - l2 * math.sin(heading)
+                if abs(error_x) < ROUNDING and abs(error_y) < ROUNDING:
+                    return True
+    return False

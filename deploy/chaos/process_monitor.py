@@ -1,0 +1,110 @@
+"""Notes the start and the end of every process of the observed arms."""
+
+from __future__ import annotations
+
+import os
+import select
+import threading
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from deploy.chaos.babbler import BABBLER
+from deploy.chaos.history import Life
+from deploy.supervision import processes
+
+STALL = 0.1  # s; a scan that takes longer shows that the machine is overloaded
+SCAN_PERIOD = 0.02  # s
+NAMING_TIMEOUT = 0.5  # s within which a new process shows its program
+FORK_TIME = 0.2  # s for which a child of supervisord may look like supervisord
+
+
+class ProcessMonitor:
+    """Sees a new process within 20 ms, and the end of a process at once."""
+
+    def __init__(
+        self,
+        runs: Mapping[Path, str],
+        report: Callable[[str, Life], None],
+        overload: Callable[[float, float], None],
+    ) -> None:
+        """
+        :param runs: the run directory of each arm, and its namespace.
+        :param report: receives the namespace and each new or ended process.
+        :param overload: receives begin and end of each time in which the machine was overloaded.
+        """
+        self._namespaces = {str(run): namespace for run, namespace in runs.items()}
+        self._report = report
+        self._overload = overload
+        self._poll = select.poll()
+        self._known: set[int] = set()
+        self._pending: dict[int, float] = {}  # new processes that do not show their program yet, since when
+        self._alive: dict[int, tuple[str, Life]] = {}  # by pidfd
+
+    def run(self, ended: threading.Event) -> None:
+        """Monitor until an event is set."""
+        while not ended.is_set():
+            before = time.monotonic()
+            self.scan()
+            ready = self._poll.poll(SCAN_PERIOD * 1000)
+            if (now := time.monotonic()) - before > STALL:
+                self._overload(before, now)
+            for handle, _ in ready:
+                self._end(handle, time.monotonic())
+        for handle in list(self._alive):
+            os.close(handle)
+
+    def scan(self) -> None:
+        """Find new processes."""
+        pids = {int(name) for name in os.listdir("/proc") if name.isdigit()}
+        now = time.monotonic()
+        self._pending |= dict.fromkeys(pids - self._known, now)
+        self._known = pids
+        for pid, since in list(self._pending.items()):
+            age = now - since
+            if self._identify(pid, age) or (age > NAMING_TIMEOUT and not self._is_child_of_supervisord(pid)):
+                del self._pending[pid]
+
+    def _identify(self, pid: int, age: float) -> bool:
+        """Report a process that shows its arm and its program; return whether it does, or has ended."""
+        environment = processes.environment_of(pid)
+        namespace = self._namespaces.get(environment.get(processes.MARK, ""))
+        program = environment.get("SUPERVISOR_PROCESS_NAME", "")
+        if namespace is None or program == BABBLER or not (program or "supervisord" in _command(pid)):
+            return False
+        if not program and (age < FORK_TIME or self._is_child_of_supervisord(pid)):
+            return False
+        try:
+            handle = os.pidfd_open(pid)
+            began = _start_time(pid)
+        except (OSError, ValueError, IndexError):
+            return True
+        life = Life(program, pid, began, None)
+        self._alive[handle] = (namespace, life)
+        self._poll.register(handle, select.POLLIN)
+        self._report(namespace, life)
+        return True
+
+    def _is_child_of_supervisord(self, pid: int) -> bool:
+        parent = processes.stat_of(pid)[1:2]
+        return any(not life.program and [str(life.pid)] == parent for _, life in self._alive.values())
+
+    def _end(self, handle: int, now: float) -> None:
+        self._poll.unregister(handle)
+        os.close(handle)
+        namespace, life = self._alive.pop(handle)
+        self._report(namespace, life._replace(ended=now))
+
+
+def _start_time(pid: int) -> float:
+    """Return when a process was started [s], on the monotonic clock."""
+    ticks = int(processes.stat_of(pid)[19])
+    suspended = time.clock_gettime(time.CLOCK_BOOTTIME) - time.monotonic()
+    return ticks / os.sysconf("SC_CLK_TCK") - suspended
+
+
+def _command(pid: int) -> str:
+    try:
+        return Path(f"/proc/{pid}/cmdline").read_bytes().replace(b"\0", b" ").decode(errors="replace")
+    except OSError:
+        return ""
