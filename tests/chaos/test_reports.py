@@ -1,0 +1,91 @@
+"""The reports: the terminal, the page with its list of faults, and the picture."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from html import unescape
+from xml.etree import ElementTree
+
+from deploy.chaos.findings import Finding, count, how_often
+from deploy.chaos.history import ALL, NO_TARGET, History, InjectedFault
+from deploy.chaos.page import page
+from deploy.chaos.pictures import framed, timeline
+from deploy.chaos.promises import CHECKERS
+from deploy.chaos.report import text
+
+from .histories import END, faulty, good, killed, says
+
+
+def faults_of(history: History) -> list[list[str]]:
+    """Return the cells of the page's list of faults."""
+    found = page("title", [], [], history).partition("<h2>Faults</h2>")[2].partition("</table>")[0]
+    rows = found.split("<tr>")[2:]
+    return [[unescape(cell) for cell in re.split(r"<td[^>]*>", row)[1:]] for row in rows]
+
+
+def test_page_lists_every_fault_with_its_effect() -> None:
+    history = killed(good(), "kinematics", 20.0, 0.6)
+    pid = next(life.pid for life in history.lives if life.program == "velocity")
+    history = faulty(
+        history,
+        InjectedFault("stop", "velocity", 30.0, 33.5, pid),
+        InjectedFault("raise", "config_l1", 40.0, 40.0),
+        InjectedFault("flood", NO_TARGET, 41.0, 45.0),
+        InjectedFault("kill_all", ALL, 50.0, 50.0),
+        InjectedFault("overload", NO_TARGET, 51.0, 52.0),
+    )
+    alive = sum(life.ended is None for life in history.lives) - 1  # without supervisord
+    assert faults_of(history) == [
+        ["1", "20.0 s", "kill", "kinematics", "–", KILLED],
+        ["2", "30.0 s", "stop", "velocity", "3.5 s", f"process {pid} survived"],
+        ["3", "40.0 s", "raise", "config_l1", "–", "no process: the program was restarting"],
+        ["4", "41.0 s", "flood", "(no target)", "4.0 s", "–"],
+        ["5", "50.0 s", "kill_all", "(whole arm)", "–", f"{alive} processes: 0 ended"],
+    ]
+
+
+KILLED = "process 105 ended after 0.00 s, the next one started 0.05 s later"
+
+
+def test_numbers_and_nouns_agree() -> None:
+    assert (count(1, "fault"), count(2, "fault"), count(0, "process")) == (
+        "1 fault",
+        "2 faults",
+        "0 processes",
+    )
+    assert (how_often(1), how_often(2)) == ("once", "2 times")
+    history = says(killed(good(), "engine_controller", 30.0, 0.6), "engines/state", "off", 30.5)
+    assert CHECKERS["S2"](history).measured == "0 kills while on; turned off once for a permitted reason"
+    assert CHECKERS["S3"](history).measured.startswith("turned on once, ")
+
+
+def test_promise_without_cases_is_not_exercised() -> None:
+    assert "not exercised" in text([CHECKERS["L1"](good())])
+    assert Finding("L1", 0, "", unknown=1).summary == "outcome unknown"
+
+
+def test_heading_states_the_verdict() -> None:
+    headings = {
+        "All exercised promises hold": [Finding("S1", 1, ""), Finding("L1", 0, "")],
+        "No promise was exercised": [Finding("S1", 0, "")],
+        "L1 violated": [Finding("S1", 1, ""), CHECKERS["L1"](killed(good(), "kinematics", 20.0, 9.0))],
+    }
+    for heading, findings in headings.items():
+        assert f">{heading}</h1>" in page("title", [], findings, good())
+
+
+def test_picture_is_well_formed_and_shows_every_fault() -> None:
+    history = killed(good(), "kinematics", 20.0, 0.6)
+    history = faulty(history, InjectedFault("stop", "velocity", 30.0, 33.5))
+    svg = framed(*timeline(history, [CHECKERS["S1"](history)]), "a title with < and &")
+    labels = [
+        element.text for element in ElementTree.fromstring(svg).iter("{http://www.w3.org/2000/svg}text")
+    ]
+    assert {"a title with < and &", "1 kill", "2 stop", "kinematics", "(no target)"} <= set(labels)
+
+
+def test_picture_of_a_long_history_is_drawn_at_a_smaller_scale() -> None:
+    _, short, _ = timeline(replace(good(), end=END))
+    _, long, _ = timeline(replace(good(), end=600.0))
+    assert short < long < 10 * short
