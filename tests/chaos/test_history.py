@@ -49,7 +49,9 @@ guard = replace(topics.ENGINES, name="guard/alarm", publishers=("guard",))
 acceleration = replace(
     topics.EFFECTOR_SPEED, name="acceleration", publishers=("accelerometer",), follows="effector/speed"
 )
-topics.CONTRACT = (*topics.CONTRACT, guard, acceleration)
+shared = replace(topics.OPERATOR_HEARTBEAT, publishers=("dead_mans_switch", "guard"))
+old = (topic for topic in topics.CONTRACT if topic is not topics.OPERATOR_HEARTBEAT)
+topics.CONTRACT = (*old, shared, guard, acceleration)
 new = [manifest.Program(name, "services.velocity", ()) for name in ("guard", "accelerometer")]
 programs = (*manifest.programs(), *new)
 manifest.programs = lambda: programs
@@ -58,7 +60,8 @@ from deploy.chaos.history import DEPENDENTS, OUTPUTS
 from deploy.chaos.liveness import STREAMS
 from deploy.chaos.schedule import everything, kill_each
 
-assert "guard" not in OUTPUTS  # its topic reports single events: its health shows that it works
+assert OUTPUTS["dead_mans_switch"] is shared
+assert "guard" not in OUTPUTS  # its own topic reports single events: its health shows that it works
 assert OUTPUTS["accelerometer"] is acceleration
 assert "accelerometer" in STREAMS
 assert DEPENDENTS["kinematics"] == ("velocity", "accelerometer")
