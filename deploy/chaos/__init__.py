@@ -7,7 +7,7 @@
 | `faults`, `inject/`, `babbler`, `partition` | the kinds of faults |
 | `testbed`, `arm` | the arms under test, and the injection |
 | `observer`, `process_monitor`, `record` | the record: messages, processes, faults |
-| `history` | what a record tells about one arm |
+| `history` | the content of a record for one arm |
 | `promises`, `safety`, `liveness`, `positions`, `findings` | the checkers of S1–S5 and L1–L4 |
 | `report`, `page`, `pictures`, `cost` | the results |
 """

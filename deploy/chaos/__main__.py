@@ -35,7 +35,7 @@ def main(arguments: Sequence[str]) -> int:
             return judge(options.replay, f"Record {options.replay}", "replay")
         return unleash(options)
     except interruption.Interrupted:
-        print("Interrupted: everything has been stopped.")
+        print("Interrupted: all processes have been stopped.")
         return 130
     except (DeploymentError, OSError) as error:
         print(error, file=sys.stderr)

@@ -116,7 +116,7 @@ def double(arm: Arm, program: str) -> Undo:
 
 
 def crash_loop(arm: Arm, program: str) -> Undo:
-    """Give a parameter the wrong type, so that the program refuses to start; then SIGKILL it."""
+    """SIGKILL a program after giving a parameter the wrong type: the program refuses to start."""
     path = arm.system.parameters
     node = f"{arm.namespace.rstrip('/')}/{program}"
     bad = {node: {"ros__parameters": {PARAMETERS[program]: "not a number"}}}
@@ -162,7 +162,7 @@ def _babbler(mode: str) -> Callable[[Arm, str], Undo]:
             cwd=processes.ROOT,
             env=arm.environment() | {"SUPERVISOR_PROCESS_NAME": BABBLER},
             stdout=subprocess.DEVNULL,
-            start_new_session=True,  # Ctrl-C at the terminal is only for the chaos monkey
+            start_new_session=True,  # Ctrl-C at the terminal must not end it
         )
         return _kill(process)
 

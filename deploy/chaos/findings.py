@@ -14,7 +14,7 @@ class Evidence(NamedTuple):
     """A violation: its time [s] and a description."""
 
     time: float
-    what: str
+    text: str
 
 
 @dataclass(frozen=True)

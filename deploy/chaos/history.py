@@ -1,4 +1,4 @@
-"""What a record tells about one arm: its messages, its processes and the injected faults.
+"""The history of one arm: its messages, its processes and the injected faults.
 
 Times are seconds since the record began, on the monotonic clock of the host.
 """
@@ -23,7 +23,7 @@ KINEMATICS = topics.EFFECTOR_POSITION.publishers[0]
 SOURCES = tuple(topic.publishers[0] for topic in topics.CONFIGURATION.values())
 
 OPERATOR, ALL, NO_TARGET = "operator", "all", "nothing"
-"""Targets of faults besides programs: the operator, the whole arm, and nothing that belongs to the arm."""
+"""Targets of faults besides programs: the operator, the whole arm, and no part of the arm."""
 
 OVERLOAD, LOSS, SILENCE = "overload", "loss", "silence"
 CONDITIONS = (OVERLOAD, LOSS, SILENCE)
@@ -98,7 +98,7 @@ class InjectedFault(NamedTuple):
 
 @dataclass(frozen=True)
 class History:
-    """Everything that happened to one arm."""
+    """The messages, processes and faults of one arm."""
 
     end: float
     streams: dict[str, list[Sample]] = field(default_factory=dict)

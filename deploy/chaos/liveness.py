@@ -35,7 +35,7 @@ FLOWING = 1.2  # s before a fault in which a program must have had output, or th
 SENTINEL = "sentinel"  # replaces hung processes
 STREAMS = tuple(program for program, topic in OUTPUTS.items() if topic.longest_gap <= GAP)
 OBSCURED = dict.fromkeys(("flood", "babble"), (SWITCH, *DEPENDENTS[SWITCH]))
-"""The programs whose output cannot be told from the injected messages, by kind of fault."""
+"""The programs whose output cannot be distinguished from injected messages, by kind of fault."""
 MOMENTARY = ("kill", "terminate", "raise")
 LASTING = ("stop", "hang", "hog", "crash_loop", "kill_all", "kill_supervisor")
 
@@ -53,8 +53,8 @@ def output_resumes(history: History) -> Finding:
         else:
             times.setdefault(fault.target, []).append(time)
             if time > SLOWEST:
-                what = f"{fault.target} is silent {_duration(time)} after SIGKILL"
-                evidence.append(Evidence(fault.begin, what))
+                text = f"{fault.target} is silent {_duration(time)} after SIGKILL"
+                evidence.append(Evidence(fault.begin, text))
     for program, values in times.items():
         if len(values) >= SAMPLES and (median := percentile(values, 50)) > MEDIAN:
             evidence.append(Evidence(0.0, f"{program}: the median silence after SIGKILL is {median:.2f} s"))
@@ -99,8 +99,8 @@ def other_streams_flow(history: History) -> Finding:
                     continue
                 longest = max(longest, two - one)
                 if two - one > GAP:
-                    what = f"{program} is silent for {two - one:.2f} s when {fault.target} is killed"
-                    evidence.append(Evidence(one, what))
+                    text = f"{program} is silent for {two - one:.2f} s when {fault.target} is killed"
+                    evidence.append(Evidence(one, text))
             cases += 1 - excused
             unknown += excused
     measured = f"longest gap {1000 * longest:.0f} ms, allowed {1000 * GAP:.0f} ms"
@@ -143,8 +143,8 @@ def right_after_restart(history: History) -> Finding:
             continue
         cases += bool(positions)
         if positions and not right:
-            what = f"the position does not follow from the last values after {fault.kind} of {fault.target}"
-            evidence.append(Evidence(positions[-1].sent, what))
+            text = f"the position does not follow from the last values after {fault.kind} of {fault.target}"
+            evidence.append(Evidence(positions[-1].sent, text))
     measured = f"right after {cases - len(evidence)} of {count(cases, 'return')}"
     return Finding("L3", cases, measured, evidence, unknown)
 
@@ -184,7 +184,7 @@ def _recovery(history: History, fault: InjectedFault) -> float | None:
     following = [s.received for s in between(output, begin + 0.01, history.end)]
     if following:
         return min(following) - begin
-    # Silent for good, if the record is long enough to tell.
+    # Silent for good, if the record is long enough to show it.
     return math.inf if history.end - begin > HUNG else None
 
 

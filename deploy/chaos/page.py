@@ -86,7 +86,7 @@ def _promises(findings: Sequence[Finding]) -> str:
 
 
 def _evidence(finding: Finding) -> str:
-    lines = [f"{e.time:.2f} s: {escape(e.what)}" for e in finding.evidence[:SHOWN]]
+    lines = [f"{e.time:.2f} s: {escape(e.text)}" for e in finding.evidence[:SHOWN]]
     if (more := len(finding.evidence) - SHOWN) > 0:
         lines.append(f"and {more} more")
     return "".join(f"<div class=evidence>{line}</div>" for line in lines)

@@ -45,7 +45,7 @@ HELD: dict[str, Any] = {
 
 
 def missing(scenario: str = "partition") -> str:
-    """Return what this machine lacks for a scenario; empty if it can be played."""
+    """Return what this machine lacks for a scenario; empty if nothing."""
     if os.geteuid() != 0:
         return "network namespaces need root"
     if shutil.which("ip") is None or shutil.which("tc") is None:
@@ -56,8 +56,8 @@ def missing(scenario: str = "partition") -> str:
                 _queue(full(BRIDGE), "replace", *NETEM)
             return ""
     except subprocess.CalledProcessError as error:
-        what = "netem" if error.cmd[0] == "tc" else "network namespaces, veth or bridge"
-        return f"this kernel has no {what}: {error.stderr.strip()}"
+        module = "netem" if error.cmd[0] == "tc" else "network namespaces, veth or bridge"
+        return f"this kernel has no {module}: {error.stderr.strip()}"
 
 
 @contextmanager
@@ -147,7 +147,7 @@ class TwoHosts(Testbed):
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
-            start_new_session=True,  # Ctrl-C is only for the chaos monkey
+            start_new_session=True,  # Ctrl-C at the terminal must not end it
         )
 
     def _cut(self, arm: Arm, target: str) -> Undo:

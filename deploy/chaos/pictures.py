@@ -53,7 +53,7 @@ ROWS = ("operator", "engines", target_name(NO_TARGET), SUPERVISORD, *PROGRAMS)
 
 
 def framed(picture: str, width: float, height: float, title: str) -> str:
-    """Return a picture as an SVG file of its own, with a title, on a card that suits light and dark pages."""
+    """Return an SVG file with a picture and a title, on a card that suits light and dark pages."""
     margin, heading = 16, 30
     outer_width, outer_height = width + 2 * margin, height + 2 * margin + heading
     content = [
@@ -96,7 +96,7 @@ def timeline(history: History, findings: Sequence[Finding] = ()) -> tuple[str, f
         parts += _marks(history, row, x, top)
     for finding in findings:
         for evidence in finding.evidence:
-            tip = _tag("title", escape(f"{finding.promise}: {evidence.what}"))
+            tip = _tag("title", escape(f"{finding.promise}: {evidence.text}"))
             at = x(evidence.time)
             parts.append(_tag("line", tip, class_="bound", x1=at, x2=at, y1=0, y2=axis))
     parts += _legend(axis + ROW + 8, history, findings)

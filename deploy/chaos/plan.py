@@ -1,4 +1,4 @@
-"""From the command line of `make chaos` to a plan: what to inject, and how long to record."""
+"""The plan of `make chaos`: the command line, and the schedules and the testbed that follow from it."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ NAMED = (*partition.SCHEDULES, *schedule.SCENARIOS)
 
 
 class Plan(NamedTuple):
-    """What to inject, into which arms, and how long to record."""
+    """An experiment: the faults, the arms, and the length of the record."""
 
     title: str
     schedules: list[Schedule]
@@ -95,7 +95,7 @@ def plan(options: argparse.Namespace) -> Plan:
 
 
 def _fleet(arms: int) -> Callable[..., Testbed]:
-    """Return a testbed with several arms, each in a namespace of its own."""
+    """Return a testbed with several arms, each in another namespace."""
     namespaces = tuple(f"/arm{number}" for number in range(1, arms + 1))
     slow = {name: {**SCENARIO[name], "rate": FLEET_RATE} for name in topics.CONFIGURATION}
     return partial(Testbed, namespaces=namespaces, scenario={**SCENARIO, **slow})

@@ -18,7 +18,7 @@ def text(findings: Sequence[Finding]) -> str:
     blocks = [table([HEADER, *(_row(finding) for finding in findings)])]
     for finding in findings:
         if finding.verdict == VIOLATED:
-            lines = [f"  at {e.time:.2f} s: {e.what}" for e in finding.evidence[:SHOWN]]
+            lines = [f"  at {e.time:.2f} s: {e.text}" for e in finding.evidence[:SHOWN]]
             if (more := len(finding.evidence) - SHOWN) > 0:
                 lines.append(f"  and {more} more")
             blocks.append("\n".join([f"{finding.promise} is violated:", *lines]))

@@ -51,8 +51,8 @@ def engines_off_in_time(history: History) -> Finding:
         # The silence exercises the promise if it lasts until the engines are off.
         cases += late[-1][1] < end and end - begin > MAX_PRESENCE_AGE
         if last - begin > OFF_WITHIN:
-            what = f"engines still on {last - begin:.2f} s after the operator's last sign of life"
-            evidence.append(Evidence(begin + OFF_WITHIN, what))
+            text = f"engines still on {last - begin:.2f} s after the operator's last sign of life"
+            evidence.append(Evidence(begin + OFF_WITHIN, text))
     return Finding("S1", cases, f"off within {longest:.2f} s, allowed {OFF_WITHIN} s", evidence)
 
 

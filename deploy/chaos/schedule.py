@@ -79,7 +79,7 @@ def hang_each(pause: float = 7.0) -> Schedule:
 
 
 def kill_watchdog() -> Schedule:
-    """Kill the operator watchdog every 2 s for a day, so that it never counts three strikes."""
+    """Kill the operator watchdog every 2 s for a day: it never counts three strikes."""
     return _kill_every(2.0, FIRST_FAULT, DAY, "operator_watchdog")
 
 

@@ -255,7 +255,7 @@ def _observer(command: Sequence[str], environment: Mapping[str, str]) -> Iterato
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,
-        start_new_session=True,  # Ctrl-C is only for the chaos monkey, which then completes the record
+        start_new_session=True,  # Ctrl-C at the terminal must not end it: it completes the record
     )
     try:
         yield process

@@ -77,7 +77,7 @@ def silent(history: History, topic: str, begin: float, end: float) -> History:
     return change(history, topic, lambda s: None if begin < s.sent < end else s)
 
 
-def says(history: History, topic: str, value: Any, begin: float, end: float = END) -> History:
+def with_value(history: History, topic: str, value: Any, begin: float, end: float = END) -> History:
     """Return the history with another value on a topic between two times."""
     return change(history, topic, lambda s: s._replace(value=value) if begin < s.sent < end else s)
 

@@ -13,7 +13,7 @@ from deploy.chaos.promises import CHECKERS, meaning
 from deploy.chaos.report import text
 from interfaces.topics import OFF, ON, TURN_OFF
 
-from .histories import END, added, change, faulty, good, killed, says, silent, value_at
+from .histories import END, added, change, faulty, good, killed, silent, value_at, with_value
 
 
 def verdict(promise: str, history: History) -> str:
@@ -25,7 +25,7 @@ def asleep(history: History, begin: float, off: float) -> History:
     """Return the history in which the operator falls asleep and the engines turn off."""
     history = silent(history, "operator_heartbeat", begin, END)
     history = silent(history, "operator_presence", begin, END)
-    history = says(history, "engines/state", OFF, off)
+    history = with_value(history, "engines/state", OFF, off)
     history = added(history, "engines", (off, TURN_OFF))
     return faulty(history, InjectedFault("silence", OPERATOR, begin, END))
 
@@ -67,7 +67,7 @@ def test_s1_detects_engines_that_turn_off_too_late() -> None:
 
 
 def test_s1_detects_engines_that_turn_on_again() -> None:
-    history = says(asleep(good(), 20.0, 29.6), "engines/state", ON, 40.0, 40.3)
+    history = with_value(asleep(good(), 20.0, 29.6), "engines/state", ON, 40.0, 40.3)
     assert verdict("S1", history) == VIOLATED
 
 
@@ -101,18 +101,18 @@ def test_s2_holds_if_other_services_are_killed() -> None:
 
 
 def test_s2_detects_engines_that_turn_off_with_operator_present() -> None:
-    history = says(killed(good(), "operator_watchdog", 30.0, 1.1), "engines/state", OFF, 31.0)
+    history = with_value(killed(good(), "operator_watchdog", 30.0, 1.1), "engines/state", OFF, 31.0)
     (evidence,) = CHECKERS["S2"](history).evidence
     assert evidence.time == pytest.approx(31.1)
 
 
 def test_s2_permits_turn_off_when_the_controller_dies() -> None:
-    history = says(killed(good(), "engine_controller", 30.0, 0.6), "engines/state", OFF, 30.5)
+    history = with_value(killed(good(), "engine_controller", 30.0, 0.6), "engines/state", OFF, 30.5)
     assert verdict("S2", history) != VIOLATED
 
 
 def test_s2_earlier_death_of_the_controller_is_no_reason() -> None:
-    history = says(killed(good(), "engine_controller", 20.0, 0.6), "engines/state", OFF, 30.5)
+    history = with_value(killed(good(), "engine_controller", 20.0, 0.6), "engines/state", OFF, 30.5)
     assert verdict("S2", history) == VIOLATED
 
 
@@ -121,8 +121,10 @@ def test_s2_permits_turn_off_after_three_silences_not_two() -> None:
     for begin in (20.0, 30.0):
         history = silent(history, "operator_heartbeat", begin, begin + 4.0)
     command = (44.05, TURN_OFF)
-    assert verdict("S2", added(says(history, "engines/state", OFF, 44.0), "engines", command)) == VIOLATED
-    history = says(silent(history, "operator_heartbeat", 40.0, 44.0), "engines/state", OFF, 44.0)
+    assert (
+        verdict("S2", added(with_value(history, "engines/state", OFF, 44.0), "engines", command)) == VIOLATED
+    )
+    history = with_value(silent(history, "operator_heartbeat", 40.0, 44.0), "engines/state", OFF, 44.0)
     assert verdict("S2", history) == VIOLATED  # without a turn_off
     assert verdict("S2", faulty(history, InjectedFault("overload", NO_TARGET, 43.5, 43.9))) != VIOLATED
     assert verdict("S2", added(history, "engines", command)) != VIOLATED
@@ -130,7 +132,7 @@ def test_s2_permits_turn_off_after_three_silences_not_two() -> None:
 
 def test_s2_silence_with_a_stopped_watchdog_counts_once() -> None:
     history = silent(good(), "operator_heartbeat", 40.0, 46.2)  # two strikes
-    history = added(says(history, "engines/state", OFF, 46.2), "engines", (46.15, TURN_OFF))
+    history = added(with_value(history, "engines/state", OFF, 46.2), "engines", (46.15, TURN_OFF))
     pid = next(life.pid for life in history.lives if life.program == "operator_watchdog")
     assert verdict("S2", history) == VIOLATED
     assert (
@@ -143,10 +145,10 @@ def test_s2_duplicate_that_ends_itself_is_not_a_successor() -> None:
     history = good()
     for begin in (20.0, 30.0, 40.0):
         history = silent(history, "operator_heartbeat", begin, begin + 4.0)
-    history = added(says(history, "engines/state", OFF, 44.0), "engines", (44.05, TURN_OFF))
+    history = added(with_value(history, "engines/state", OFF, 44.0), "engines", (44.05, TURN_OFF))
     watchdog = Life("operator_watchdog", 999, 36.0, 36.4)  # the older process has the strikes
     assert verdict("S2", replace(history, lives=[*history.lives, watchdog])) != VIOLATED
-    history = says(killed(good(), "velocity", 30.0, 0.6), "engines/state", OFF, 30.5)
+    history = with_value(killed(good(), "velocity", 30.0, 0.6), "engines/state", OFF, 30.5)
     controller = Life("engine_controller", 999, 30.3, 30.7)  # the other one turned them off
     assert verdict("S2", replace(history, lives=[*history.lives, controller])) == VIOLATED
 
@@ -155,19 +157,19 @@ def test_s2_replaced_watchdog_starts_without_strikes() -> None:
     history = killed(good(), "operator_watchdog", 13.0, 1.0)
     pid = next(life.pid for life in history.lives if life.program == "operator_watchdog")
     history = faulty(history, InjectedFault("hang", "operator_watchdog", 10.0, 25.0, pid))
-    history = added(says(history, "engines/state", OFF, 50.0), "engines", (50.05, TURN_OFF))
+    history = added(with_value(history, "engines/state", OFF, 50.0), "engines", (50.05, TURN_OFF))
     assert verdict("S2", history) == VIOLATED
 
 
 def test_s2_permits_turn_off_10_s_after_the_last_presence() -> None:
-    history = says(silent(good(), "operator_presence", 30.6, 45.0), "engines/state", OFF, 40.0)
+    history = with_value(silent(good(), "operator_presence", 30.6, 45.0), "engines/state", OFF, 40.0)
     assert verdict("S2", history) == VIOLATED
     assert verdict("S2", silent(history, "operator_heartbeat", 30.0, 45.0)) != VIOLATED
     assert verdict("S2", silent(history, "operator_heartbeat", 50.0, 55.0)) == VIOLATED  # too late
 
 
 def test_s2_permits_turn_off_after_a_stopped_controller() -> None:
-    history = says(silent(good(), "engines/state", 30.0, 31.55), "engines/state", OFF, 31.5)
+    history = with_value(silent(good(), "engines/state", 30.0, 31.55), "engines/state", OFF, 31.5)
     assert verdict("S2", history) == VIOLATED
     assert verdict("S2", faulty(history, InjectedFault("stop", "engine_controller", 30.0, 31.5))) != VIOLATED
 
@@ -180,11 +182,11 @@ def test_s3_holds_if_a_present_operator_turns_on() -> None:
 
 
 def test_s3_detects_turn_on_without_a_command() -> None:
-    assert verdict("S3", says(good(), "engines/state", OFF, 20.0, 25.0)) == VIOLATED
+    assert verdict("S3", with_value(good(), "engines/state", OFF, 20.0, 25.0)) == VIOLATED
 
 
 def test_s3_detects_a_second_turn_on_by_one_command() -> None:
-    assert verdict("S3", says(good(), "engines/state", OFF, 5.25, 5.65)) == VIOLATED
+    assert verdict("S3", with_value(good(), "engines/state", OFF, 5.25, 5.65)) == VIOLATED
 
 
 def test_s3_detects_turn_on_without_an_operator() -> None:
@@ -207,7 +209,7 @@ def test_s3_is_unknown_if_the_observer_was_overloaded() -> None:
 
 
 def test_s3_is_unknown_if_the_command_may_have_been_missed() -> None:
-    history = killed(says(good(), "engines/state", OFF, 20.0, 25.0), "dead_mans_switch", 23.0, 0.6)
+    history = killed(with_value(good(), "engines/state", OFF, 20.0, 25.0), "dead_mans_switch", 23.0, 0.6)
     finding = CHECKERS["S3"](history)
     assert (finding.verdict, finding.unknown) == (HOLDS, 1)
 
@@ -277,14 +279,14 @@ def test_l1_holds_if_output_resumes_soon() -> None:
     assert finding.times["kinematics"] == [pytest.approx(0.621, abs=0.02)]
 
 
-@pytest.mark.parametrize(("back", "what"), [(1.2, "median"), (2.5, "silent"), (99.0, "for good")])
-def test_l1_detects_output_that_resumes_late_or_never(back: float, what: str) -> None:
+@pytest.mark.parametrize(("back", "words"), [(1.2, "median"), (2.5, "silent"), (99.0, "for good")])
+def test_l1_detects_output_that_resumes_late_or_never(back: float, words: str) -> None:
     history = good()
     for at in (30.0, 20.0, 10.0):
         history = killed(history, "kinematics", at, back)
     finding = CHECKERS["L1"](history)
     assert finding.verdict == VIOLATED
-    assert any(what in evidence.what for evidence in finding.evidence)
+    assert any(words in evidence.text for evidence in finding.evidence)
 
 
 def test_l1_detects_silence_for_good_after_any_fault() -> None:
@@ -326,7 +328,7 @@ def test_l2_holds_if_the_other_streams_flow() -> None:
 def test_l2_detects_a_stream_that_pauses() -> None:
     history = silent(killed(good(), "kinematics", 20.0, 0.6), "theta1", 20.1, 20.5)
     (evidence,) = CHECKERS["L2"](history).evidence
-    assert "config_theta1 is silent" in evidence.what
+    assert "config_theta1 is silent" in evidence.text
 
 
 def test_l1_is_unknown_if_the_whole_machine_paused() -> None:
@@ -341,7 +343,7 @@ def test_l1_is_unknown_if_the_whole_machine_paused() -> None:
 def test_l2_detects_a_pause_longer_than_the_restart(end: float) -> None:
     history = silent(killed(good(), "kinematics", 20.0, 0.25), "theta1", 20.1, end)
     (evidence,) = CHECKERS["L2"](history).evidence
-    assert "config_theta1 is silent" in evidence.what
+    assert "config_theta1 is silent" in evidence.text
 
 
 def test_l2_ignores_a_pause_by_another_fault() -> None:
@@ -365,7 +367,7 @@ def test_l2_pause_of_the_machine_does_not_hide_another_pause() -> None:
     finding = CHECKERS["L2"](stalled)
     assert (finding.verdict, finding.cases, finding.unknown) == (HOLDS, 5, 1)
     (evidence,) = CHECKERS["L2"](silent(stalled, "l1", 20.41, 20.79)).evidence
-    assert "config_l1 is silent" in evidence.what
+    assert "config_l1 is silent" in evidence.text
 
 
 def test_l2_speed_may_pause_with_positions() -> None:

@@ -1,4 +1,4 @@
-"""What the checkers derive from the manifest and the contract; a new service changes nothing here."""
+"""Targets, outputs and dependents as they follow from the manifest and the contract."""
 
 from __future__ import annotations
 

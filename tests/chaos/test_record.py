@@ -80,7 +80,7 @@ def test_ctrl_c_ends_the_judgement(tmp_path: Path) -> None:
     end = subprocess.run(
         [sys.executable, "-c", script], cwd=processes.ROOT, capture_output=True, text=True, timeout=60
     )
-    assert (end.returncode, end.stdout) == (130, "Interrupted: everything has been stopped.\n")
+    assert (end.returncode, end.stdout) == (130, "Interrupted: all processes have been stopped.\n")
 
 
 ONE, OTHER = Life("velocity", 7, 0.0, None), Life("velocity", 8, 5.0, 12.0)

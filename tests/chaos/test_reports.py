@@ -14,7 +14,7 @@ from deploy.chaos.pictures import framed, timeline
 from deploy.chaos.promises import CHECKERS
 from deploy.chaos.report import text
 
-from .histories import END, faulty, good, killed, says
+from .histories import END, faulty, good, killed, with_value
 
 
 def faults_of(history: History) -> list[list[str]]:
@@ -55,7 +55,7 @@ def test_numbers_and_nouns_agree() -> None:
         "0 processes",
     )
     assert (how_often(1), how_often(2)) == ("once", "2 times")
-    history = says(killed(good(), "engine_controller", 30.0, 0.6), "engines/state", "off", 30.5)
+    history = with_value(killed(good(), "engine_controller", 30.0, 0.6), "engines/state", "off", 30.5)
     assert CHECKERS["S2"](history).measured == "0 kills while on; turned off once for a permitted reason"
     assert CHECKERS["S3"](history).measured.startswith("turned on once, ")
 
