@@ -12,7 +12,7 @@ from deploy.chaos.pictures import COLORS, STYLE, histograms, timeline
 from deploy.chaos.promises import DURATIONS, meaning
 
 SHOWN = 10  # pieces of evidence of a promise
-EFFECT = 2.0  # s after the end of a fault in which the end of a process counts as its effect
+EFFECT = 5.0  # s after a fault in which the end of a process is its effect, unless another fault follows
 
 PAGE_STYLE = """
 body { margin: 0 auto; padding: 32px; max-width: 1240px; background: var(--back); color: var(--text);
@@ -122,7 +122,11 @@ def _table(columns: Mapping[str, str], rows: Iterable[Sequence[str]]) -> str:
 def effect(history: History, fault: InjectedFault) -> str:
     """Return which processes a fault hit and when they ended."""
     hit = [life for life in history.lives if _is_hit(life, fault)]
-    ended = [life for life in hit if life.ended is not None and life.ended <= fault.end + EFFECT]
+    later = (
+        other.begin for other in history.injected if other.begin > fault.begin and other.pid == fault.pid
+    )
+    until = min([fault.end + EFFECT, *(later if fault.pid else ())])
+    ended = [life for life in hit if life.ended is not None and life.ended < until]
     if not hit:
         return "–" if fault.target == NO_TARGET else "no process: the program was restarting"
     if len(hit) > 1:

@@ -1,4 +1,7 @@
-"""Pictures of a record as SVG: the timeline of an arm, and histograms of durations."""
+"""Pictures of a record as SVG: the timeline of an arm, and histograms of durations.
+
+`example.svg` is the `report.svg` of `make chaos CHAOS='--scenario variously'`.
+"""
 
 from __future__ import annotations
 
