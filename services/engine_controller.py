@@ -6,7 +6,7 @@ since, whatever dies.
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from typing import NamedTuple
 
@@ -40,19 +40,26 @@ class State(NamedTuple):
     rejected: Rejected | None = None  # the last event
 
 
+@dataclass(frozen=True)
+class Parameters:
+    """Parameters that a user may set."""
+
+    max_presence_age: float = parameter(1.0, (0.1, 1.0), "s", "`turn_on` needs a younger presence")
+    presence_timeout: float = parameter(
+        10.0, (1.0, 10.0), "s", "engines stay on only with a younger presence"
+    )
+    repeat: float = parameter(0.1, (0.02, 0.2), "s", "period at which the state is repeated")
+
+
+DEFAULTS = Parameters()
+
+
 def step(
-    state: State,
-    event: Event,
-    *,
-    max_presence_age: float = 1.0,
-    presence_timeout: float = 10.0,
-    drive_timeout: float = topics.DRIVE_TIMEOUT,
+    state: State, event: Event, given: Parameters = DEFAULTS, drive_timeout: float = topics.DRIVE_TIMEOUT
 ) -> State:
     """
     Return the state after an event.
 
-    :param max_presence_age: ``turn_on`` is obeyed if it and the last presence are younger [s].
-    :param presence_timeout: the engines stay on only while the last presence is younger [s].
     :param drive_timeout: the drive stops the engines if ``on`` is not repeated within this time [s].
     """
 
@@ -61,7 +68,7 @@ def step(
 
     unseen = (event.at - state.seen).total_seconds()
     paused = (event.at - state.repeated).total_seconds() > drive_timeout
-    if state.engines == ON and (paused or unseen >= presence_timeout):
+    if state.engines == ON and (paused or unseen >= given.presence_timeout):
         state = state._replace(engines=OFF, repeated=event.at)
     state = state._replace(rejected=None)
     match event.name, event.age:
@@ -72,9 +79,9 @@ def step(
             return reject(topics.OPERATOR_PRESENCE, reason)
         case "presence", age:
             return state._replace(seen=max(state.seen, event.at - timedelta(seconds=max(age, 0.0))))
-        case topics.TURN_ON, age if abs(age) >= max_presence_age:
+        case topics.TURN_ON, age if abs(age) >= given.max_presence_age:
             return reject(topics.ENGINES, f"turn_on refused: {age:.3f} s old")
-        case topics.TURN_ON, _ if unseen >= max_presence_age:
+        case topics.TURN_ON, _ if unseen >= given.max_presence_age:
             since = "yet" if state.seen == NEVER else f"for {unseen:.3f} s"
             return reject(topics.ENGINES, f"turn_on refused: no operator seen {since}")
         case command, _:
@@ -82,16 +89,15 @@ def step(
 
 
 def engine_state(
-    commands: Observable[Event], presences: Observable[Event], *, repeat: float = 0.1, **limits: float
+    commands: Observable[Event],
+    presences: Observable[Event],
+    given: Parameters = DEFAULTS,
+    drive_timeout: float = topics.DRIVE_TIMEOUT,
 ) -> Observable[str | Rejected]:
-    """
-    Emit ``on`` or ``off``, on every change and every ``repeat`` [s], and each input that is rejected.
-
-    :param limits: those of :func:`step`.
-    """
-    ticks = rx.timer(0.0, repeat).timestamp().map(lambda it: Event("tick", it.timestamp))
+    """Emit ``on`` or ``off``, on every change and repeatedly, and each input that is rejected."""
+    ticks = rx.timer(0.0, given.repeat).timestamp().map(lambda it: Event("tick", it.timestamp))
     events = rx.merge(commands, presences, ticks)
-    states = events.scan(lambda state, event: step(state, event, **limits), State())
+    states = events.scan(lambda state, event: step(state, event, given, drive_timeout), State())
 
     def emitted(states: Observable[State]) -> Observable[str | Rejected]:
         rejections = states.map(lambda state: state.rejected).filter(bool)
@@ -99,17 +105,6 @@ def engine_state(
         return rx.merge(rejections, news.map(lambda state: state.engines))
 
     return states.publish(emitted)
-
-
-@dataclass(frozen=True)
-class Parameters:
-    """Parameters that a user may set."""
-
-    max_presence_age: float = parameter(1.0, (0.1, 1.0), "s", "`turn_on` needs a younger presence")
-    presence_timeout: float = parameter(
-        10.0, (1.0, 10.0), "s", "engines stay on only with a younger presence"
-    )
-    repeat: float = parameter(0.1, (0.02, 0.2), "s", "period at which the state is repeated")
 
 
 def wire(node: ServiceNode) -> None:
@@ -122,7 +117,7 @@ def wire(node: ServiceNode) -> None:
         presences.map(
             lambda it: Event("presence", it.timestamp, node.age(stamps.from_message(it.value.stamp)))
         ),
-        **asdict(node.declare(Parameters)),
+        node.declare(Parameters),
     )
     node.publish(topics.ENGINES_STATE, states, lambda state: String(data=state))
 

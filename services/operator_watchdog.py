@@ -22,10 +22,6 @@ from reactive_node import stamps
 from reactive_node.stamps import Timestamp
 
 FIRST_SAMPLE_AFTER_RESTART = 0.1  # s, so that a successor soon reports the operator
-WARNINGS = {
-    MISSED: "Not received signal from operator...",
-    INCAPACITATED: "Operator is sleeping !!! Turning off engines...",
-}
 
 
 class Activity(NamedTuple):
@@ -33,56 +29,6 @@ class Activity(NamedTuple):
 
     conclusion: str
     seen: datetime | None = None
-
-
-def operator_activity(
-    heartbeats: Observable[Timestamp[Any]],
-    *,
-    first: float = 0.5,
-    sampling: float = 0.5,
-    silence: float = 3.0,
-    strikes: int = 3,
-) -> Observable[Activity]:
-    """
-    Emit whether the operator is alive, missed, incapacitated (Listings 5.7 and 5.8).
-
-    A return between the strikes does not reset them. The first heartbeat after the last strike is ALIVE at
-    once and begins new strikes.
-
-    :param first: time from each subscription to its first sample [s].
-    :param sampling: period of the samples [s]; ALIVE is emitted at most this often.
-    :param silence: time without a sample that is a strike [s].
-    :param strikes: the strike at which the operator is incapacitated.
-    """
-
-    def watch(heartbeats: Observable[Timestamp[Any]]) -> Observable[Activity]:
-        alive = heartbeats.map(lambda heartbeat: Activity(ALIVE, heartbeat.timestamp))
-        return (
-            alive.sample(rx.timer(first, sampling))
-            .timeout(silence)
-            .catch(lambda error, _: rx.throw(error).start_with(Activity(MISSED)))
-            .retry(strikes)
-            .catch(lambda error, _: alive.take(1).start_with(Activity(INCAPACITATED)))
-            .repeat()
-        )
-
-    return heartbeats.concat(rx.never()).publish(watch)  # the end of a source is a silence
-
-
-def engine_commands(activity: Observable[Activity], *, repeat: float = 0.5) -> Observable[str]:
-    """
-    Emit ``turn_off`` when the operator is incapacitated, and again every ``repeat`` [s] until ALIVE.
-
-    The repetition reaches a subscriber that was discovered only after the first command.
-    """
-
-    def commands(activity: Observable[Activity]) -> Observable[str]:
-        away = activity.map(lambda it: it.conclusion == INCAPACITATED)
-        again = away.switch_map(lambda is_away: rx.interval(repeat) if is_away else rx.never())
-        # Not start_with, which emits a step later: a return in that step would prevent the first command.
-        return rx.merge(away.filter(bool), again).map(lambda _: TURN_OFF)
-
-    return activity.publish(commands)
 
 
 @dataclass(frozen=True)
@@ -96,28 +42,63 @@ class Parameters:
     repeat: float = parameter(0.5, (0.05, 10.0), "s", "period at which `turn_off` is repeated")
 
 
+DEFAULTS = Parameters()
+
+
+def operator_activity(
+    heartbeats: Observable[Timestamp[Any]], given: Parameters = DEFAULTS, *, first: float = 0.5
+) -> Observable[Activity]:
+    """
+    Emit whether the operator is alive, missed, incapacitated (Listings 5.7 and 5.8).
+
+    A return between the strikes does not reset them. The first heartbeat after the last strike is ALIVE at
+    once and begins new strikes.
+
+    :param first: time from each subscription to its first sample [s].
+    """
+
+    def watch(heartbeats: Observable[Timestamp[Any]]) -> Observable[Activity]:
+        alive = heartbeats.map(lambda heartbeat: Activity(ALIVE, heartbeat.timestamp))
+        return (
+            alive.sample(rx.timer(first, given.sampling))
+            .timeout(given.silence)
+            .catch(lambda error, _: rx.throw(error).start_with(Activity(MISSED)))
+            .retry(given.strikes)
+            .catch(lambda error, _: alive.take(1).start_with(Activity(INCAPACITATED)))
+            .repeat()
+        )
+
+    return heartbeats.concat(rx.never()).publish(watch)  # the end of a source is a silence
+
+
+def engine_commands(activity: Observable[Activity], *, repeat: float = 0.5) -> Observable[str]:
+    """Emit ``turn_off`` when the operator is incapacitated, and again every ``repeat`` [s] until ALIVE."""
+
+    def commands(activity: Observable[Activity]) -> Observable[str]:
+        away = activity.map(lambda it: it.conclusion == INCAPACITATED)
+        again = away.switch_map(lambda is_away: rx.interval(repeat) if is_away else rx.never())
+        return rx.merge(away.filter(bool), again).map(lambda _: TURN_OFF)
+
+    return activity.publish(commands)
+
+
 def wire(node: ServiceNode) -> None:
     """Connect the recipes with their topics."""
-    parameters = node.declare(Parameters)
+    given = node.declare(Parameters)
     origin = Origin(node)
 
-    def log(activity: Activity) -> None:
-        if activity.conclusion in WARNINGS:
-            node.get_logger().warning(WARNINGS[activity.conclusion])
+    def warn(activity: Activity) -> None:
+        node.get_logger().warning(f"operator {activity.conclusion}")
 
-    recipe = operator_activity(
-        node.observe(topics.OPERATOR_HEARTBEAT, timestamped=True, max_age=parameters.lifespan),
-        first=min(FIRST_SAMPLE_AFTER_RESTART, parameters.sampling) if origin.is_past else parameters.sampling,
-        sampling=parameters.sampling,
-        silence=parameters.silence,
-        strikes=parameters.strikes,
-    )
+    heartbeats = node.observe(topics.OPERATOR_HEARTBEAT, timestamped=True, max_age=given.lifespan)
+    first = min(FIRST_SAMPLE_AFTER_RESTART, given.sampling) if origin.is_past else given.sampling
     # Silences count from the origin of the scenario: before it, no operator is expected.
-    activity = origin.delay_subscription(recipe).do_action(log).share()
-    presence = activity.filter(lambda it: it.conclusion == ALIVE)
+    activity = origin.delay_subscription(operator_activity(heartbeats, given, first=first)).share()
+    presence, absence = activity.partition(lambda it: it.conclusion == ALIVE)
+    absence.subscribe(warn, scheduler=node.scheduler)
     node.publish(topics.OPERATOR_PRESENCE, presence, lambda it: Header(stamp=stamps.to_message(it.seen)))
     node.publish(topics.OPERATOR_ACTIVITY, activity, lambda it: String(data=it.conclusion))
-    commands = engine_commands(activity, repeat=parameters.repeat)
+    commands = engine_commands(activity, repeat=given.repeat)
     node.publish(topics.ENGINES, commands, lambda command: String(data=command))
 
 

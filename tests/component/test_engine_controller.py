@@ -13,7 +13,7 @@ from reactivex.testing import ReactiveTest, TestScheduler
 from interfaces.service import Rejected
 from interfaces.topics import DRIVE_TIMEOUT, OFF, ON, TURN_OFF, TURN_ON
 from reactive_node.stamps import Timestamp
-from services.engine_controller import CLOCK_TOLERANCE, NEVER, Event, State, engine_state, step
+from services.engine_controller import CLOCK_TOLERANCE, NEVER, Event, Parameters, State, engine_state, step
 
 on_next, subscribe = ReactiveTest.on_next, ReactiveTest.subscribe
 
@@ -132,8 +132,8 @@ class Engines:
             lambda: engine_state(
                 self.commands.map(self._event),
                 self.presences.map(self._event),
-                repeat=repeat,
-                drive_timeout=drive_timeout,
+                Parameters(repeat=repeat),
+                drive_timeout,
             ),
             created=0.001,
             subscribed=0.002,
