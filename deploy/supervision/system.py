@@ -45,23 +45,10 @@ class Program(NamedTuple):
     """[s] since its process was started; 0 when none runs"""
     restarts: int
     """how often it was started again since the system was started"""
-    description: str
-    """supervisord's own words on its state"""
-
-
-class Watched(NamedTuple):
-    """A supervised program as the sentinel sees it."""
-
-    name: str
-    state: str
-    pid: int
-    age: float
-    """[s] since its process was started"""
-    restarts: int
     exit: str
     """how its last process ended, in words; '' before the first end"""
     error: str
-    """what supervisord says about the last start or end"""
+    """supervisord's words about the last start or end"""
 
 
 class System:
@@ -181,22 +168,11 @@ class System:
         pid = self.supervisor()
         if pid is None:
             raise DeploymentError(self.unattended())
-        starts: dict[str, int] = self._ask(pid, "arm.starts")
-        return [
-            Program(
-                name=row["name"],
-                state=row["statename"],
-                pid=row["pid"],
-                uptime=row["now"] - row["start"] if row["pid"] else 0,
-                restarts=max(starts.get(row["name"], 0) - 1, 0),
-                description=row["spawnerr"] or row["description"],
-            )
-            for row in self._ask(pid, "supervisor.getAllProcessInfo")
-        ]
+        return [Program(**row) for row in self._ask(pid, "arm.programs")]
 
-    def watch(self, supervisor: int) -> list[Watched]:
+    def watch(self, supervisor: int) -> list[Program]:
         """The programs for the sentinel; this call is the sentinel's sign of life."""
-        return [Watched(**row) for row in self._ask(supervisor, "arm.watch", timeout=ANSWER_LIMIT)]
+        return [Program(**row) for row in self._ask(supervisor, "arm.watch", timeout=ANSWER_LIMIT)]
 
     def revive(self, supervisor: int, program: str) -> None:
         """Start a program that supervisord has given up. Raises DeploymentError."""
