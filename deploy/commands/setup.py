@@ -1,6 +1,6 @@
 """Brings .venv up to date: the requirements of the system and its tests and, without ROS 2, deploy/runtime.
 
-It runs on the bare interpreter, before anything is installed. Stamps in .venv record what it was made from.
+It runs on the bare interpreter, before anything is installed. Stamps in .venv record its sources.
 Where the right stamp is missing (older requirements, another interpreter, ROS 2 sourced since, an
 interrupted set-up) .venv is made anew: half an installation never counts as one. The distributions of this
 repository have stamps of their own, so a change in them takes only a second.
@@ -112,7 +112,7 @@ def make(ros: str) -> None:
     """Make .venv from nothing; with ROS 2 (the file of its rclpy) it includes the system's packages."""
     _refuse_while_running()
     version = ".".join(map(str, sys.version_info[:3]))
-    if importlib.util.find_spec("ensurepip") is None:  # a package of its own on Debian and Ubuntu
+    if importlib.util.find_spec("ensurepip") is None:  # a separate package on Debian and Ubuntu
         package = f"python{sys.version_info[0]}.{sys.version_info[1]}-venv"
         raise SetupError(f"Python {version} ({sys.executable}) lacks ensurepip: apt-get install {package}")
     if ros:
@@ -122,7 +122,7 @@ def make(ros: str) -> None:
             raise SetupError(
                 f"ROS 2 is sourced, but its rclpy ({ros}) or common_interfaces do not work with"
                 f" {sys.executable}: {check.stderr.strip().splitlines()[-1]}\n"
-                "Choose its interpreter (make setup PYTHON=/usr/bin/python3), install what it lacks, or use a"
+                "Choose its interpreter (make setup PYTHON=/usr/bin/python3), install the missing packages, or use a"
                 " shell without ROS 2"
             )
     print(f"Setting up .venv with Python {version}, once; this takes about half a minute.", flush=True)
@@ -151,7 +151,9 @@ def install(distribution: Path, stamp: Path) -> None:
 def _refuse_while_running() -> None:
     for run in using(PYTHON.parent):
         elsewhere = "" if run == run_directory() else f"REACTIVE_ARM_RUN_DIR={shlex.quote(str(run))} "
-        raise SetupError(f"A system runs from this .venv, which has to be changed: {elsewhere}make stop")
+        raise SetupError(
+            f"A system uses this .venv, which the set-up would replace. Stop it first: {elsewhere}make stop"
+        )
 
 
 def _step(title: str, command: list[str], log: Path | None = LOG) -> None:

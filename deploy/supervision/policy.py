@@ -149,7 +149,7 @@ class Policy:
         if itself := [action for action in silent if action.program == SENTINEL]:
             self.kill_inhibited_by = "the sentinel does not hear itself"
             self._deaf_since = min(self._deaf_since, observation.time)
-            # A deaf sentinel helps nobody; its successor may hear.
+            # A deaf sentinel is useless; its successor may hear.
             return itself if observation.time - self._deaf_since >= self._timeouts.start else []
         self._deaf_since = math.inf
         if len(silent) > 1 and 2 * len(silent) > expected:

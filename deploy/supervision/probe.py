@@ -32,7 +32,7 @@ class Probe:
     def observe(self) -> Observation:
         """Return an observation. Raises DeploymentError where supervisord is gone or does not answer."""
         if os.getppid() != self._supervisor:
-            raise DeploymentError("supervisord has died: nothing would replace what is killed")
+            raise DeploymentError("supervisord has died: a killed process would not be replaced")
         programs = self._system.watch(self._supervisor)
         now = time.monotonic()
         if now >= self._next_search:

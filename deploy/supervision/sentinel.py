@@ -1,8 +1,8 @@
 """The sentinel: keeps the services alive where supervisord does not notice that they are not.
 
 User story (ours): as a robot operator, I find a hanging service replaced within five seconds, and a service
-that supervisord has given up started again, without help; and I see on /diagnostics what happened to which
-process.
+that supervisord has given up started again, without help; and I see on /diagnostics why and how each process
+ended.
 
 It is a service like the others, and supervised like them. It kills processes that are stopped or report no
 health, kills duplicates of supervised processes, and revives programs that supervisord has given up, with
@@ -89,7 +89,7 @@ def carry_out(action: Action, system: System, supervisor: int) -> None:
 
 @dataclass(frozen=True)
 class Parameters:
-    """What a user may set."""
+    """The parameters that a user may set."""
 
     period: float = parameter(0.25, (0.05, 1.0), "s", "period at which the processes are observed")
     health_timeout: float = parameter(

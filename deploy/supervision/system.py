@@ -100,7 +100,7 @@ class System:
     def start(self, parameters: Mapping[str, object]) -> None:
         """Start supervisord with its programs, all with these parameters (content of a ROS parameter file).
 
-        A service never lives twice: what a killed supervisord left behind is ended first. Returns as soon as
+        The orphans of a killed supervisord are ended first: no service lives twice. Returns as soon as
         supervisord answers. Raises DeploymentError when a system runs already.
         """
         with self._alone():
@@ -231,7 +231,7 @@ class System:
             left = self.members()
             if not left:
                 return
-            # supervisord first: it would start anew what ends.
+            # supervisord first: it would restart the others.
             processes.end(self.run, [process.pid for process in left if not process.program], 0.0)
             processes.end(self.run, [process.pid for process in left if process.program], SERVICE_GRACE)
         raise DeploymentError(f"These processes do not end: {[process.pid for process in left]}")
@@ -265,7 +265,7 @@ class System:
         except BaseException:
             process.kill()
             process.wait()
-            self._end_members()  # what it may have started already
+            self._end_members()  # the services that it has started already
             raise
 
     def _supervisor_environment(self) -> dict[str, str]:

@@ -28,7 +28,7 @@ def program(name: str, state: str = "RUNNING", pid: int | None = None, uptime: f
 
 
 class Run:
-    """A policy with observations of services that report once a second unless told otherwise."""
+    """A policy with observations of services that report once a second, except the silent ones."""
 
     def __init__(self) -> None:
         self.policy = Policy()
