@@ -122,8 +122,8 @@ def make(ros: str) -> None:
             raise SetupError(
                 f"ROS 2 is sourced, but its rclpy ({ros}) or common_interfaces do not work with"
                 f" {sys.executable}: {check.stderr.strip().splitlines()[-1]}\n"
-                "Choose its interpreter (make setup PYTHON=/usr/bin/python3), install the missing packages, or use a"
-                " shell without ROS 2"
+                "Choose its interpreter (make setup PYTHON=/usr/bin/python3), install the missing packages, or"
+                " use a shell without ROS 2"
             )
     print(f"Setting up .venv with Python {version}, once; this takes about half a minute.", flush=True)
     STAMP.unlink(missing_ok=True)  # no sooner: a refused set-up leaves the old .venv usable
@@ -151,9 +151,7 @@ def install(distribution: Path, stamp: Path) -> None:
 def _refuse_while_running() -> None:
     for run in using(PYTHON.parent):
         elsewhere = "" if run == run_directory() else f"REACTIVE_ARM_RUN_DIR={shlex.quote(str(run))} "
-        raise SetupError(
-            f"A system uses this .venv, which the set-up would replace. Stop it first: {elsewhere}make stop"
-        )
+        raise SetupError(f"A running system uses this .venv. Stop it before the set-up: {elsewhere}make stop")
 
 
 def _step(title: str, command: list[str], log: Path | None = LOG) -> None:
