@@ -122,7 +122,7 @@ def make(ros: str) -> None:
             raise SetupError(
                 f"ROS 2 is sourced, but its rclpy ({ros}) or common_interfaces do not work with"
                 f" {sys.executable}: {check.stderr.strip().splitlines()[-1]}\n"
-                "Choose its interpreter (make setup PYTHON=/usr/bin/python3), install the missing packages, or"
+                "Choose its interpreter (make setup PYTHON=/usr/bin/python3), install what is missing, or"
                 " use a shell without ROS 2"
             )
     print(f"Setting up .venv with Python {version}, once; this takes about half a minute.", flush=True)
