@@ -24,9 +24,9 @@ help:
 	@echo "make status   its services: state, pid, uptime, restarts, last output"
 	@echo "make logs     follow their logs"
 	@echo "make stop     stop it"
-	@echo "make chaos    let a monkey break a system of its own, and judge  (MINUTES=5 SEED= CHAOS=--help for more)"
+	@echo "make chaos    break a system on purpose and check its promises  (MINUTES=5 SEED= CHAOS=--help for more)"
 	@echo "make test     run the tests                       (TESTS=tests/component for a part)"
-	@echo "make bench    measure what rclpy costs on this machine"
+	@echo "make bench    measure the costs of rclpy on this machine"
 	@echo "make check    ruff, mypy, import rules, shellcheck, yamllint"
 	@echo "make setup    only set up .venv                   (PYTHON= chooses the interpreter, 3.11 to 3.13)"
 

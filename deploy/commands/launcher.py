@@ -152,8 +152,8 @@ def _last_words(system: System, program: Program, begin: int) -> str:
     with suppress(OSError), (system.logs / f"{program.name}.log").open("rb") as log:
         log.seek(begin)
         lines = log.read().decode(errors="replace").splitlines()
-        return "\n".join(lines[-LOG_LINES:]) or program.description
-    return program.description
+        return "\n".join(lines[-LOG_LINES:]) or program.error
+    return program.error
 
 
 def _reports(program: Program, member: Member) -> bool:

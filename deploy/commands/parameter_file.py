@@ -29,7 +29,7 @@ def load(path: str, namespace: str) -> dict[str, Any]:
 
     :raises UserError: for the first error, with file, key and reason.
     """
-    with interruption.blocking():  # the file may be a pipe that nobody writes to
+    with interruption.blocking():  # the file may be a silent pipe
         document = yaml_file.load(path)
     for key, problem in problems(document, namespace):
         raise UserError(f"{path}: {key}: {problem}")

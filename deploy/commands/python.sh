@@ -3,7 +3,7 @@
 # usage: python.sh MODULE [INTERPRETER]    default: the one of .venv, else the first on the PATH that fits
 set -eu
 
-# Prints the base interpreter of $1: .venv cannot build on a virtual environment, nor on what is left of itself.
+# Prints the base interpreter of $1: .venv cannot build on a virtual environment, nor on its own remains.
 base_of() {
     "$1" -c 'import os, sys
 (3, 11) <= sys.version_info[:2] <= (3, 13) or sys.exit(1)

@@ -1,6 +1,6 @@
 """Brings .venv up to date: the requirements of the system and its tests and, without ROS 2, deploy/runtime.
 
-It runs on the bare interpreter, before anything is installed. Stamps in .venv record what it was made from.
+It runs on the bare interpreter, before anything is installed. Stamps in .venv record its sources.
 Where the right stamp is missing (older requirements, another interpreter, ROS 2 sourced since, an
 interrupted set-up) .venv is made anew: half an installation never counts as one. The distributions of this
 repository have stamps of their own, so a change in them takes only a second.
@@ -64,24 +64,26 @@ def main() -> int:
     except KeyboardInterrupt:
         print("\nSet-up interrupted; the next make starts it anew.", file=sys.stderr)
         return 130
+    finally:
+        signal.signal(signal.SIGINT, signal.SIG_DFL)  # no traceback from an interpreter that ends
     return 0
 
 
 def system_rclpy() -> str:
-    """Where this interpreter finds an rclpy that is not ours: its file, '' for none (no ROS 2 is sourced)."""
+    """The file of the rclpy of a sourced ROS 2; '' without ROS 2."""
     spec = importlib.util.find_spec("rclpy")
     origin = (spec and spec.origin) or ""
     return "" if Path(origin).is_relative_to(ROOT) else origin
 
 
 def fingerprint(ros: str) -> str:
-    """What .venv is made from, as a digest; `ros` is the system's rclpy."""
+    """The digest of everything that .venv is made from; `ros` is the file of ROS 2's rclpy."""
     sources = [*sorted(REQUIREMENTS.glob("*.txt")), Path(__file__)]
     return _digest(sources, sys.version, os.path.realpath(sys.executable), str(VENV), ros)
 
 
 def fingerprint_of(distribution: Path) -> str:
-    """All that is installed of a distribution, as a digest; without what tools and builds leave there."""
+    """The digest of the files that are installed of a distribution, without those of tools and builds."""
     made = ("__pycache__", "egg-info")
     sources = (path for path in (distribution / "src").rglob("*") if path.is_file())
     kept = (path for path in sources if not any(part.endswith(made) for part in path.parts))
@@ -98,7 +100,7 @@ def _digest(files: Iterable[Path], *words: str) -> str:
 
 
 def _update(stamp: Path, fingerprint: str, make: Callable[[], None]) -> bool:
-    """Make what a stamp tells of unless it was made from just this; whether it had to be made."""
+    """Call `make` unless the stamp has this fingerprint; whether it was called."""
     if stamp.exists() and stamp.read_text() == fingerprint:
         return False
     make()
@@ -107,10 +109,10 @@ def _update(stamp: Path, fingerprint: str, make: Callable[[], None]) -> bool:
 
 
 def make(ros: str) -> None:
-    """Make .venv from nothing; with ROS 2 (the file of its rclpy) it sees the system's packages."""
+    """Make .venv from nothing; with ROS 2 (the file of its rclpy) it includes the system's packages."""
     _refuse_while_running()
     version = ".".join(map(str, sys.version_info[:3]))
-    if importlib.util.find_spec("ensurepip") is None:  # Debian and Ubuntu pack it apart
+    if importlib.util.find_spec("ensurepip") is None:  # a separate package on Debian and Ubuntu
         package = f"python{sys.version_info[0]}.{sys.version_info[1]}-venv"
         raise SetupError(f"Python {version} ({sys.executable}) lacks ensurepip: apt-get install {package}")
     if ros:
@@ -120,8 +122,8 @@ def make(ros: str) -> None:
             raise SetupError(
                 f"ROS 2 is sourced, but its rclpy ({ros}) or common_interfaces do not work with"
                 f" {sys.executable}: {check.stderr.strip().splitlines()[-1]}\n"
-                "Choose its interpreter (make setup PYTHON=/usr/bin/python3), install what it lacks, or use a"
-                " shell without ROS 2"
+                "Choose its interpreter (make setup PYTHON=/usr/bin/python3), install what is missing, or"
+                " use a shell without ROS 2"
             )
     print(f"Setting up .venv with Python {version}, once; this takes about half a minute.", flush=True)
     STAMP.unlink(missing_ok=True)  # no sooner: a refused set-up leaves the old .venv usable
@@ -149,11 +151,11 @@ def install(distribution: Path, stamp: Path) -> None:
 def _refuse_while_running() -> None:
     for run in using(PYTHON.parent):
         elsewhere = "" if run == run_directory() else f"REACTIVE_ARM_RUN_DIR={shlex.quote(str(run))} "
-        raise SetupError(f"A system runs from this .venv, which has to be changed: {elsewhere}make stop")
+        raise SetupError(f"A running system uses this .venv. Stop it before the set-up: {elsewhere}make stop")
 
 
 def _step(title: str, command: list[str], log: Path | None = LOG) -> None:
-    """Run a command; show its title and, on a terminal, what pip is at. Raises SetupError with its errors."""
+    """Run a command; show its title and, on a terminal, pip's progress. Raises SetupError with its errors."""
     live = sys.stdout.isatty()
     print(f"  {title}", end="" if live else "\n", flush=True)
     lines: list[str] = []
@@ -164,7 +166,7 @@ def _step(title: str, command: list[str], log: Path | None = LOG) -> None:
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
-        start_new_session=True,  # so that all of it can be ended: venv and pip have children of their own
+        start_new_session=True,  # the children of venv and pip end with it
     )
     try:
         assert process.stdout is not None
@@ -177,7 +179,7 @@ def _step(title: str, command: list[str], log: Path | None = LOG) -> None:
     except BaseException:
         with suppress(ProcessLookupError):
             os.killpg(process.pid, signal.SIGTERM)
-        process.communicate()  # until the last of them has ended
+        process.communicate()  # returns when the last child has ended
         raise
     finally:
         if live:
@@ -189,13 +191,13 @@ def _step(title: str, command: list[str], log: Path | None = LOG) -> None:
         reasons = [line for line in lines if line.startswith("ERROR")] or lines[-5:]
         if any("Retrying" in line for line in lines):  # pip then blames the requirement
             reasons.append("The package index was not reached: network, proxy, PIP_INDEX_URL?")
-        where = f" (all of it: {log.relative_to(ROOT)})" if log is not None else ""
+        where = f" (full log: {log.relative_to(ROOT)})" if log is not None else ""
         raise SetupError(f"Set-up failed at {title}{where}:\n{''.join(reasons).rstrip()}")
 
 
 @contextmanager
 def _alone() -> Iterator[None]:
-    """Hold the set-up of this checkout: a second make waits for the first one."""
+    """Hold the lock of this checkout's set-up: a second make waits for the first."""
     directory = os.open(ROOT, os.O_RDONLY)
     try:
         try:

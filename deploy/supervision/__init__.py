@@ -1,1 +1,1 @@
-"""What keeps the services alive: the running system, its processes, and the sentinel."""
+"""Supervision: the manifest, the running system, its processes, and the sentinel."""

@@ -1,7 +1,7 @@
 """Extends supervisord through its own extension point (plugin.py).
 
-- It counts how often it started each program: RPC `arm.starts`.
-- It tells the sentinel about them (RPC `arm.watch`), and kills a sentinel that has stopped asking.
+- It adds to each program's state how often it was started and how it ended (RPC `arm.programs`).
+- It kills a sentinel that has stopped asking for them (RPC `arm.watch`).
 - It survives a full disk and a log that cannot be opened: only the affected lines are lost.
 - It looks after its children every 100 ms and at once after each change, instead of once a second: a killed
   service would start again only after 1-2 s otherwise.
@@ -81,28 +81,25 @@ class ArmInterface:
         events.subscribe(events.ProcessStateEvent, self._on_change)
         events.subscribe(events.SupervisorStoppingEvent, self._on_stopping)
 
-    def starts(self) -> dict[str, int]:
-        """How often each program was started since supervisord runs."""
-        return dict(self._starts)
+    def programs(self) -> list[dict[str, Any]]:
+        """The fields of `Program` (system.py) for each program."""
+        return [
+            {
+                "name": name,
+                "state": getProcessStateDescription(process.get_state()),
+                "pid": process.pid,
+                "uptime": max(0.0, time.time() - process.laststart) if process.pid else 0.0,
+                "restarts": max(0, self._starts[name] - 1),
+                "exit": self._exits.get(name, ""),
+                "error": process.spawnerr or "",
+            }
+            for name, process in self._processes().items()
+        ]
 
     def watch(self) -> list[dict[str, Any]]:
-        """The programs for the sentinel; each call is its sign of life."""
-        rows = []
-        for name, process in self._processes().items():
-            if name == SENTINEL:
-                self._guarded = (process.pid, self._clock + SENTINEL_TIMEOUT)
-            rows.append(
-                {
-                    "name": name,
-                    "state": getProcessStateDescription(process.get_state()),
-                    "pid": process.pid,
-                    "age": max(0.0, time.time() - process.laststart),
-                    "restarts": max(0, self._starts[name] - 1),
-                    "exit": self._exits.get(name, ""),
-                    "error": process.spawnerr or "",
-                }
-            )
-        return rows
+        """The same for the sentinel; each call is its sign of life."""
+        self._guarded = (self._processes()[SENTINEL].pid, self._clock + SENTINEL_TIMEOUT)
+        return self.programs()
 
     def _processes(self) -> dict[str, Any]:
         groups = self._supervisord.process_groups.values()
@@ -127,7 +124,7 @@ class ArmInterface:
         if isinstance(event, events.ProcessStateStartingEvent):
             self._starts[name] += 1
         elif isinstance(event, _ENDS):
-            # supervisord keeps no signal's number, and no code at all of a process that ended early.
+            # supervisord does not keep the number of a signal, nor the code of a process that ended early.
             code = event.process.exitstatus
             early = isinstance(event, events.ProcessStateBackoffEvent)
             self._exits[name] = "early" if early else "killed by a signal" if code == -1 else f"code {code}"
@@ -138,7 +135,7 @@ class ArmInterface:
                 os.remove(PARAMETERS)
 
     def _poll_briefly(self, timeout: float) -> Any:
-        # supervisord acts on a change only after its next poll: a change must not wait for one to time out.
+        # supervisord acts on a change only after its next poll: after a change this poll must not wait.
         now = time.monotonic()
         self._clock += min(now - self._polled, 2 * LONGEST_WAIT)
         self._polled = now
@@ -149,8 +146,8 @@ class ArmInterface:
 
 
 def make_interface(supervisord: Any, **config: str) -> ArmInterface:
-    """The factory that supervisord.conf names."""
-    loggers.RotatingFileHandler = LossyLog  # of the programs: each start of one opens it
+    """The factory of the RPC interface (plugin.py)."""
+    loggers.RotatingFileHandler = LossyLog  # for the programs: each start opens its log
     for handler in supervisord.options.logger.handlers:
-        handler.__class__ = LossyLog  # supervisord's own, which is open already
+        handler.__class__ = LossyLog  # supervisord's own log is open already
     return ArmInterface(supervisord)

@@ -37,5 +37,5 @@ def _absolute(word: str) -> str:
     return f"{option}{equals}{manifest.PATH}" if is_manifest else word
 
 
-if processes.MARK not in os.environ:
+if Path(sys.argv[0]).stem == "supervisord" and processes.MARK not in os.environ:
     start_by_hand(sys.argv[1:])

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from deploy.supervision import processes
 from deploy.supervision.manifest import SENTINEL
-from deploy.supervision.system import Watched
+from deploy.supervision.system import Program
 
 RECENT = 60.0  # s for which a restart counts as recent
 
@@ -20,7 +20,7 @@ class Observation:
 
     time: float
     """[s, monotonic clock]"""
-    programs: list[Watched]
+    programs: list[Program]
     last_health: Mapping[tuple[str, int], float] = field(default_factory=dict)
     """time of the last health report of a process, by program and pid [s, monotonic clock]"""
     stopped: frozenset[int] = frozenset()
@@ -119,7 +119,7 @@ class Policy:
                 del counts[0]
             self.recent_restarts[program.name] = max(0, program.restarts - counts[0][1])
 
-    def _kill_stopped(self, observation: Observation, running: list[Watched]) -> list[Action]:
+    def _kill_stopped(self, observation: Observation, running: list[Program]) -> list[Action]:
         """Kill stopped processes: the kernel reports them, so a failing network cannot mislead the policy."""
         now = observation.time
         since = {pid: self._stopped_since.get(pid, now) for pid in observation.stopped}
@@ -130,14 +130,14 @@ class Policy:
             if program.pid in since and now - since[program.pid] >= self._timeouts.health
         ]
 
-    def _kill_silent(self, observation: Observation, running: list[Watched]) -> list[Action]:
+    def _kill_silent(self, observation: Observation, running: list[Program]) -> list[Action]:
         silent = []
         expected = 0  # services whose health is due
         for program in running:
             pid, since, start = self._first_seen.get(program.name, (0, 0.0, 0.0))
             if pid != program.pid:
                 # A new sentinel subtracts the time that the process has had already.
-                start = max(2 * self._timeouts.health, self._timeouts.start - program.age)
+                start = max(2 * self._timeouts.health, self._timeouts.start - program.uptime)
                 pid, since = program.pid, observation.time
                 self._first_seen[program.name] = (pid, since, start)
             reported = observation.last_health.get((program.name, pid))
@@ -149,7 +149,7 @@ class Policy:
         if itself := [action for action in silent if action.program == SENTINEL]:
             self.kill_inhibited_by = "the sentinel does not hear itself"
             self._deaf_since = min(self._deaf_since, observation.time)
-            # A deaf sentinel helps nobody; its successor may hear.
+            # A deaf sentinel is useless; its successor may hear.
             return itself if observation.time - self._deaf_since >= self._timeouts.start else []
         self._deaf_since = math.inf
         if len(silent) > 1 and 2 * len(silent) > expected:

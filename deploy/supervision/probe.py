@@ -8,7 +8,7 @@ from collections.abc import Mapping
 
 from deploy.supervision import processes
 from deploy.supervision.policy import Observation
-from deploy.supervision.system import DeploymentError, System, Watched
+from deploy.supervision.system import DeploymentError, Program, System
 from interfaces.service.health import Health
 
 DUPLICATES_PERIOD = 1.0  # s between two searches for duplicates, which read the whole process table
@@ -32,7 +32,7 @@ class Probe:
     def observe(self) -> Observation:
         """Return an observation. Raises DeploymentError where supervisord is gone or does not answer."""
         if os.getppid() != self._supervisor:
-            raise DeploymentError("supervisord has died: nothing would replace what is killed")
+            raise DeploymentError("supervisord has died: a killed process would not be replaced")
         programs = self._system.watch(self._supervisor)
         now = time.monotonic()
         if now >= self._next_search:
@@ -43,7 +43,7 @@ class Probe:
         stopped = frozenset(p.pid for p in programs if p.pid and _state_of(p.pid)[0] == "T")
         return Observation(now, programs, dict(self._last_health), stopped, self._duplicates)
 
-    def _find_duplicates(self, programs: list[Watched]) -> frozenset[processes.Process]:
+    def _find_duplicates(self, programs: list[Program]) -> frozenset[processes.Process]:
         """The processes of a program that supervisord has not started and is not about to start."""
         supervised = {program.name: program.pid for program in programs}
         return frozenset(

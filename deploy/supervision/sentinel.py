@@ -1,8 +1,8 @@
 """The sentinel: keeps the services alive where supervisord does not notice that they are not.
 
 User story (ours): as a robot operator, I find a hanging service replaced within five seconds, and a service
-that supervisord has given up started again, without help; and I see on /diagnostics what happened to which
-process.
+that supervisord has given up started again, without help; and I see on /diagnostics why and how each process
+ended.
 
 It is a service like the others, and supervised like them. It kills processes that are stopped or report no
 health, kills duplicates of supervised processes, and revives programs that supervisord has given up, with
@@ -28,7 +28,7 @@ from deploy.supervision import processes
 from deploy.supervision.manifest import SENTINEL
 from deploy.supervision.policy import Action, Observation, Policy, Timeouts
 from deploy.supervision.probe import Probe
-from deploy.supervision.system import DeploymentError, System, Watched
+from deploy.supervision.system import DeploymentError, Program, System
 from interfaces import service
 from interfaces.service import ServiceNode, parameter
 from interfaces.service.health import healths
@@ -39,7 +39,7 @@ DISCOVERY = 0.3  # s until other nodes have discovered this one; earlier message
 
 
 def states(
-    programs: Iterable[Watched], reasons: Mapping[str, str], recent_restarts: Mapping[str, int], node: str
+    programs: Iterable[Program], reasons: Mapping[str, str], recent_restarts: Mapping[str, int], node: str
 ) -> list[DiagnosticStatus]:
     """The states of the processes as a node publishes them on /diagnostics."""
     return [
@@ -47,7 +47,7 @@ def states(
     ]
 
 
-def _state(program: Watched, reason: str, recent_restarts: int, node: str) -> DiagnosticStatus:
+def _state(program: Program, reason: str, recent_restarts: int, node: str) -> DiagnosticStatus:
     good = program.state in ("STARTING", "RUNNING")
     level, message = DiagnosticStatus.OK, program.state
     if not good:
@@ -89,7 +89,7 @@ def carry_out(action: Action, system: System, supervisor: int) -> None:
 
 @dataclass(frozen=True)
 class Parameters:
-    """What a user may set."""
+    """The parameters that a user may set."""
 
     period: float = parameter(0.25, (0.05, 1.0), "s", "period at which the processes are observed")
     health_timeout: float = parameter(
@@ -121,7 +121,7 @@ def wire(node: ServiceNode) -> None:
         if policy.kill_inhibited_by:
             node.remark(SENTINEL, f"kills no silent service: {policy.kill_inhibited_by}")
 
-    def message(programs: list[Watched]) -> DiagnosticArray:
+    def message(programs: list[Program]) -> DiagnosticArray:
         array = DiagnosticArray(status=states(programs, policy.reasons, policy.recent_restarts, own_name))
         array.header.stamp = node.get_clock().now().to_msg()
         return array
@@ -129,7 +129,7 @@ def wire(node: ServiceNode) -> None:
     reports = node.observe(DIAGNOSTICS).map(lambda array: healths(array, namespace))
     observations = rx.timer(0.0, timeouts.period).flat_map(observe).share()
     programs = observations.map(lambda observation: observation.programs)
-    changed = programs.distinct_until_changed(lambda each: [program._replace(age=0.0) for program in each])
+    changed = programs.distinct_until_changed(lambda each: [program._replace(uptime=0.0) for program in each])
     repeated = rx.timer(DISCOVERY, 1.0).with_latest_from(programs).map(lambda pair: pair[1])
 
     reports.subscribe(probe.hear, scheduler=node.scheduler)

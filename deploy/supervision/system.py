@@ -45,23 +45,10 @@ class Program(NamedTuple):
     """[s] since its process was started; 0 when none runs"""
     restarts: int
     """how often it was started again since the system was started"""
-    description: str
-    """supervisord's own words on its state"""
-
-
-class Watched(NamedTuple):
-    """A supervised program as the sentinel sees it."""
-
-    name: str
-    state: str
-    pid: int
-    age: float
-    """[s] since its process was started"""
-    restarts: int
     exit: str
     """how its last process ended, in words; '' before the first end"""
     error: str
-    """what supervisord says about the last start or end"""
+    """supervisord's words about the last start or end"""
 
 
 class System:
@@ -113,7 +100,7 @@ class System:
     def start(self, parameters: Mapping[str, object]) -> None:
         """Start supervisord with its programs, all with these parameters (content of a ROS parameter file).
 
-        A service never lives twice: what a killed supervisord left behind is ended first. Returns as soon as
+        The orphans of a killed supervisord are ended first: no service lives twice. Returns as soon as
         supervisord answers. Raises DeploymentError when a system runs already.
         """
         with self._alone():
@@ -181,22 +168,11 @@ class System:
         pid = self.supervisor()
         if pid is None:
             raise DeploymentError(self.unattended())
-        starts: dict[str, int] = self._ask(pid, "arm.starts")
-        return [
-            Program(
-                name=row["name"],
-                state=row["statename"],
-                pid=row["pid"],
-                uptime=row["now"] - row["start"] if row["pid"] else 0,
-                restarts=max(starts.get(row["name"], 0) - 1, 0),
-                description=row["spawnerr"] or row["description"],
-            )
-            for row in self._ask(pid, "supervisor.getAllProcessInfo")
-        ]
+        return [Program(**row) for row in self._ask(pid, "arm.programs")]
 
-    def watch(self, supervisor: int) -> list[Watched]:
+    def watch(self, supervisor: int) -> list[Program]:
         """The programs for the sentinel; this call is the sentinel's sign of life."""
-        return [Watched(**row) for row in self._ask(supervisor, "arm.watch", timeout=ANSWER_LIMIT)]
+        return [Program(**row) for row in self._ask(supervisor, "arm.watch", timeout=ANSWER_LIMIT)]
 
     def revive(self, supervisor: int, program: str) -> None:
         """Start a program that supervisord has given up. Raises DeploymentError."""
@@ -255,7 +231,7 @@ class System:
             left = self.members()
             if not left:
                 return
-            # supervisord first: it would start anew what ends.
+            # supervisord first: it would restart the others.
             processes.end(self.run, [process.pid for process in left if not process.program], 0.0)
             processes.end(self.run, [process.pid for process in left if process.program], SERVICE_GRACE)
         raise DeploymentError(f"These processes do not end: {[process.pid for process in left]}")
@@ -289,7 +265,7 @@ class System:
         except BaseException:
             process.kill()
             process.wait()
-            self._end_members()  # what it may have started already
+            self._end_members()  # the services that it has started already
             raise
 
     def _supervisor_environment(self) -> dict[str, str]:

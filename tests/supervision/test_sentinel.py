@@ -14,21 +14,21 @@ from deploy.supervision.policy import Action, Observation, Policy, Timeouts
 from deploy.supervision.probe import Probe
 from deploy.supervision.processes import Process
 from deploy.supervision.sentinel import states
-from deploy.supervision.system import DeploymentError, System, Watched
+from deploy.supervision.system import DeploymentError, Program, System
 
 SERVICES = ("engine_controller", "kinematics", "operator_watchdog", "velocity", SENTINEL)
 PIDS = {name: 100 + index for index, name in enumerate(SERVICES)}
 PERIOD = Timeouts.period
 
 
-def program(name: str, state: str = "RUNNING", pid: int | None = None, age: float = 0.0) -> Watched:
+def program(name: str, state: str = "RUNNING", pid: int | None = None, uptime: float = 0.0) -> Program:
     """A supervised program."""
     up = state in ("RUNNING", "STARTING")
-    return Watched(name, state, (pid or PIDS[name]) if up else 0, age, 0, "", "")
+    return Program(name, state, (pid or PIDS[name]) if up else 0, uptime, 0, "", "")
 
 
 class Run:
-    """A policy with observations of services that report once a second unless told otherwise."""
+    """A policy with observations of services that report once a second, except the silent ones."""
 
     def __init__(self) -> None:
         self.policy = Policy()
@@ -89,7 +89,7 @@ def test_gives_a_new_process_time_to_start() -> None:
 
 def test_a_new_sentinel_counts_the_time_that_a_process_has_had() -> None:
     run = Run()
-    run.programs["velocity"] = program("velocity", age=300.0)
+    run.programs["velocity"] = program("velocity", uptime=300.0)
     (when, action), *_ = run.observe(7.0, silent=["velocity"])
     assert action[:3] == ("kill", "velocity", PIDS["velocity"])
     assert when < 6.0
@@ -224,7 +224,7 @@ def test_warns_of_a_program_that_dies_again_and_again() -> None:
 
 
 def test_publishes_state_pid_restarts_exit_and_reason() -> None:
-    given_up = Watched("velocity", "FATAL", 0, 0.0, 7, "code 2", "Exited too quickly")
+    given_up = Program("velocity", "FATAL", 0, 0.0, 7, "code 2", "Exited too quickly")
     status, fatal = states([program("kinematics"), given_up], {"velocity": "no health"}, {}, "/sentinel")
     assert (status.level, status.name) == (DiagnosticStatus.OK, "/sentinel: kinematics")
     assert fatal.level == DiagnosticStatus.ERROR

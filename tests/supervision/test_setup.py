@@ -76,9 +76,9 @@ def test_a_refused_set_up_leaves_the_old_one(checkout: Path, tmp_path: Path) -> 
     stamp.write_text("another shell's environment")
     (tmp_path / "rclpy").mkdir()
     (tmp_path / "rclpy" / "__init__.py").write_text("raise ImportError('made for another Python')")
-    code, said = set_up(checkout, PYTHONPATH=str(tmp_path))
+    code, errors = set_up(checkout, PYTHONPATH=str(tmp_path))
     assert code == 1
-    assert "made for another Python" in said
+    assert "made for another Python" in errors
     assert stamp.read_text() == "another shell's environment"
 
 
@@ -95,9 +95,9 @@ def test_the_interpreter_is_none_of_an_interrupted_set_up(checkout: Path) -> Non
 
 def test_an_error_of_the_file_system_is_one_line(checkout: Path) -> None:
     (checkout / ".venv").touch()
-    code, said = set_up(checkout)
+    code, errors = set_up(checkout)
     assert code == 1
-    assert said == f"Set-up failed: [Errno 20] Not a directory: '{checkout / STAMP}'\n"
+    assert errors == f"Set-up failed: [Errno 20] Not a directory: '{checkout / STAMP}'\n"
 
 
 @pytest.mark.parametrize("command", ["console", "status", "logs"])

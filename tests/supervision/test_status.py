@@ -18,10 +18,10 @@ def health(pid: int, *, since_output: float | None = 0.0, reason: str = "") -> H
 def test_the_table_shows_each_service(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(time, "monotonic", lambda: 100.0)
     programs = [
-        Program("kinematics", "RUNNING", 101, 3725.9, 2, ""),
-        Program("velocity", "RUNNING", 102, 5.0, 0, ""),
-        Program("operator_watchdog", "RUNNING", 103, 1.0, 1, ""),
-        Program("engine_controller", "BACKOFF", 0, 0.0, 7, ""),
+        Program("kinematics", "RUNNING", 101, 3725.9, 2, "", ""),
+        Program("velocity", "RUNNING", 102, 5.0, 0, "", ""),
+        Program("operator_watchdog", "RUNNING", 103, 1.0, 1, "", ""),
+        Program("engine_controller", "BACKOFF", 0, 0.0, 7, "", ""),
     ]
     reports = {
         "kinematics": health(101, since_output=0.2, reason="l1: nan is not finite"),

@@ -89,7 +89,7 @@ def test_make_stop_needs_neither_venv_nor_run_directory(checkout: Checkout) -> N
     assert ".venv is not set up: make setup (make stop works without it)" in printed
     code, printed = checkout.do_command("make", "setup")
     assert code != 0
-    assert "A system runs from this .venv, which has to be changed: make stop\n" in printed
+    assert "A running system uses this .venv. Stop it before the set-up: make stop\n" in printed
     code, printed = checkout.do_command("make", "stop")
     assert (code, printed.splitlines()[-1]) == (0, "All have ended.")
     assert checkout.members == {}
