@@ -53,7 +53,7 @@ def unleash(options: argparse.Namespace) -> int:
         print(line, flush=True)
 
     with _directory() as directory:
-        with new_testbed(directory, say=say, check=interruption.check, loss=options.loss) as testbed:
+        with new_testbed(directory, say=say, loss=options.loss) as testbed:
             before = Cost.now(testbed.arms)
             testbed.inject(schedules, length)
             cost = Cost.now(testbed.arms).since(before)

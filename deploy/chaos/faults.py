@@ -19,6 +19,7 @@ from deploy.chaos.babbler import BABBLER
 from deploy.chaos.history import ALL, NO_TARGET, PROGRAMS
 from deploy.commands import parameter_file
 from deploy.supervision import processes
+from deploy.supervision.system import KEY
 
 INJECTED = Path(__file__).parent / "inject"
 """On the PYTHONPATH of an arm under test; the faults `hang`, `raise` and `hog` need it."""
@@ -119,8 +120,8 @@ def crash_loop(arm: Arm, program: str) -> Undo:
     """SIGKILL a program after giving a parameter the wrong type: the program refuses to start."""
     path = arm.system.parameters
     node = f"{arm.namespace.rstrip('/')}/{program}"
-    bad = {node: {"ros__parameters": {PARAMETERS[program]: "not a number"}}}
-    _replace(path, yaml.safe_load(path.read_text()) | bad)
+    bad = {node: {KEY: {PARAMETERS[program]: "not a number"}}}
+    arm.system.write_parameters(yaml.safe_load(path.read_text()) | bad)
     _send(arm, arm.pid(program), signal.SIGKILL)
 
     def repair() -> None:
@@ -128,16 +129,9 @@ def crash_loop(arm: Arm, program: str) -> Undo:
             # The file is read again: another program may have a bad parameter now.
             left = yaml.safe_load(path.read_text())
             left.pop(node, None)
-            _replace(path, left)
+            arm.system.write_parameters(left)
 
     return repair
-
-
-def _replace(path: Path, parameters: dict[str, object]) -> None:
-    """Replace a parameter file at once: another program may be reading it."""
-    new = path.with_suffix(".new")
-    new.write_text(yaml.safe_dump(parameters))
-    new.replace(path)
 
 
 def full_disk(arm: Arm, target: str) -> Undo:

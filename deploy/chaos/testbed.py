@@ -41,8 +41,8 @@ from deploy.chaos.history import (
     target_name,
 )
 from deploy.chaos.schedule import AWAKE, DAY, FIRST_FAULT, PlannedFault, Schedule
-from deploy.supervision import processes
-from deploy.supervision.system import NAMESPACE, SETTINGS, DeploymentError, System
+from deploy.supervision import interruption, processes
+from deploy.supervision.system import NAMESPACE, DeploymentError, System, scenario_parameters
 from interfaces import topics
 from reactive_node.domains import reserved_domain
 
@@ -77,13 +77,11 @@ class Testbed:
         namespaces: tuple[str, ...] = ("/",),
         scenario: Mapping[str, Any] = SCENARIO,
         say: Callable[[str], None] = lambda text: None,
-        check: Callable[[], None] = lambda: None,
         loss: float = 0.0,
     ) -> None:
         """
         :param directory: for the record and the runtime files; must not exist yet.
         :param say: receives a line for each injected fault.
-        :param check: called often while waiting; raises an exception to end the `with`.
         :param loss: DDS packets that each process loses [%], by Cyclone DDS: not every kernel has netem.
         """
         self.record = directory / "record.mcap"
@@ -93,7 +91,6 @@ class Testbed:
         self._directory = directory
         self._scenario = scenario
         self._say = say
-        self._check = check
         self._loss = loss
         self._stack = ExitStack()
         self._epoch = 0.0  # origin of the scenario
@@ -153,7 +150,7 @@ class Testbed:
                 at, _, action = heapq.heappop(actions)
                 while (wait := at - time.monotonic()) > 0:
                     time.sleep(min(wait, 0.1))
-                    self._check()
+                    interruption.check()
                 if lasting := action():
                     end, undo = lasting
                     once: Action = cache(undo)  # at its time, or earlier if the `with` ends
@@ -195,8 +192,7 @@ class Testbed:
         scenario = self._directory / "scenario.yaml"
         scenario.write_text(yaml.safe_dump(dict(self._scenario)))
         self._epoch = time.monotonic() + self.lead
-        shared = {"scenario": str(scenario), "scenario_epoch": round(self._epoch, 3), "settings": SETTINGS}
-        return {"/**": {"ros__parameters": shared}}
+        return scenario_parameters(scenario, round(self._epoch, 3))
 
     def _start_observer(self, stack: ExitStack, environment: Mapping[str, str]) -> queue.Queue[str]:
         """Start the observer; return the lines that it prints from now on."""
@@ -225,7 +221,7 @@ class Testbed:
 
     def _next(self, lines: queue.Queue[str], deadline: float, error: str) -> str:
         while time.monotonic() < deadline:
-            self._check()
+            interruption.check()
             with suppress(queue.Empty):
                 return lines.get(timeout=0.1)
         raise DeploymentError(error)

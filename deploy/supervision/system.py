@@ -203,7 +203,7 @@ class System:
 
         document = yaml.safe_load(self.parameters.read_text())
         document[ALL][KEY]["scenario_epoch"] = origin
-        self._write_parameters(document)
+        self.write_parameters(document)
 
     # The steps of start and stop
 
@@ -212,9 +212,9 @@ class System:
             raise DeploymentError(f"Already running: supervisord has pid {pid} and works in {self.run}")
         self.logs.mkdir(exist_ok=True)
         shutil.rmtree(self.run / SETTINGS, ignore_errors=True)
-        self._write_parameters(parameters)
+        self.write_parameters(parameters)
 
-    def _write_parameters(self, parameters: Mapping[str, object]) -> None:
+    def write_parameters(self, parameters: Mapping[str, object]) -> None:
         """Write the parameter file; services read the old one or the new one."""
         import yaml
 

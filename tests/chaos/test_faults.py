@@ -25,7 +25,8 @@ from deploy.chaos.faults import FAULT_KINDS, PARAMETERS, Undo
 from deploy.chaos.history import ALL, NO_TARGET, Life
 from deploy.chaos.process_monitor import ProcessMonitor
 from deploy.supervision import processes
-from deploy.supervision.system import NAMESPACE, System
+from deploy.supervision.system import ALL as ALL_NODES
+from deploy.supervision.system import KEY, NAMESPACE, System
 from interfaces import topics
 
 
@@ -60,12 +61,12 @@ def test_duplicate_of_a_stopped_program_starts_nothing(arm: Arm) -> None:
 
 
 def test_two_crash_loops_restore_the_parameters(arm: Arm) -> None:
-    good = {"/**": {"ros__parameters": {"scenario": "demo"}}}
+    good = {ALL_NODES: {KEY: {"scenario": "demo"}}}
     arm.system.parameters.write_text(yaml.safe_dump(good))
     first = FAULT_KINDS["crash_loop"].inject(arm, "config_l1")
     second = FAULT_KINDS["crash_loop"].inject(arm, "sentinel")
     during = yaml.safe_load(arm.system.parameters.read_text())
-    assert during.keys() == {"/**", "/arm1/config_l1", "/arm1/sentinel"}
+    assert during.keys() == {ALL_NODES, "/arm1/config_l1", "/arm1/sentinel"}
     assert first is not None
     assert second is not None
     first()
