@@ -1,7 +1,7 @@
 """The engine controller: a latch that fails safe.
 
 User story (ours): as a robot operator, I find the engines off unless I turned them on and have been seen ever
-since, whatever dies.
+since, no matter which process dies.
 """
 
 from __future__ import annotations
