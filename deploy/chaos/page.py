@@ -104,7 +104,8 @@ def _faults(history: History) -> str:
     }
     rows = []
     for number, fault in enumerate(history.injected, start=1):
-        duration = f"{fault.end - fault.begin:.1f} s" if fault.end > fault.begin else "–"
+        end = history.effect_end(fault)
+        duration = f"{end - fault.begin:.1f} s" if end > fault.begin else "–"
         kind, target = escape(fault.kind), escape(target_name(fault.target))
         rows.append((str(number), f"{fault.begin:.1f} s", kind, target, duration, effect(history, fault)))
     return _table(columns, rows) if rows else "No faults."

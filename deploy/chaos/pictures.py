@@ -150,8 +150,8 @@ def _marks(history: History, row: str, x: Callable[[float], float], top: int) ->
     faults = [each for each in enumerate(history.injected, start=1) if row in _rows(each[1])]
     places = [*(x(fault.begin) for _, fault in faults), math.inf]
     for (number, fault), left, following in zip(faults, places, places[1:], strict=False):
-        if fault.end - fault.begin >= 0.1:
-            width = x(fault.end) - left
+        if (end := history.effect_end(fault)) - fault.begin >= 0.1:
+            width = x(end) - left
             yield _tag("rect", class_="lasting", x=left, y=top, width=width, height=BAR)
         yield _tag("path", class_="momentary", d=f"M{left - 4:.1f} {top - 3}h8l-4 7z")
         label = f"{number} {fault.kind}"

@@ -29,8 +29,8 @@ def test_page_lists_every_fault_with_its_effect() -> None:
     pid = next(life.pid for life in history.lives if life.program == "velocity")
     history = faulty(
         history,
+        InjectedFault("hang", "kinematics", 15.0, 30.0, 105),  # the kill at 20 s ends the process
         InjectedFault("stop", "velocity", 30.0, 33.5, pid),
-        InjectedFault("raise", "kinematics", 18.0, 18.0, 105),  # the kill at 20 s ends the process
         InjectedFault("raise", "config_l1", 40.0, 40.0),
         InjectedFault("flood", NO_TARGET, 41.0, 45.0),
         InjectedFault("kill_all", ALL, 50.0, 50.0),
@@ -38,7 +38,7 @@ def test_page_lists_every_fault_with_its_effect() -> None:
     )
     alive = sum(life.ended is None for life in history.lives) - 1  # without supervisord
     assert faults_of(history) == [
-        ["1", "18.0 s", "raise", "kinematics", "–", "process 105 survived"],
+        ["1", "15.0 s", "hang", "kinematics", "5.0 s", "process 105 survived"],
         ["2", "20.0 s", "kill", "kinematics", "–", KILLED],
         ["3", "30.0 s", "stop", "velocity", "3.5 s", f"process {pid} survived"],
         ["4", "40.0 s", "raise", "config_l1", "–", "no process: the program was restarting"],
