@@ -66,10 +66,10 @@ def test_ctrl_c_leaves_a_complete_system_or_nothing(site: Site, target: str, del
 def test_a_second_ctrl_c_does_not_interrupt_the_stop(site: Site) -> None:
     command = site.begin("run", STEADY)
     command.await_line("Engines are off")
-    os.kill(site.members["velocity"], signal.SIGSTOP)  # the stop has to wait for SIGKILL
-    command.signal(signal.SIGINT)
-    command.await_line("Stopping")
-    command.signal(signal.SIGINT)
+    with another_at_work(site):
+        command.signal(signal.SIGINT)
+        command.await_line("Waiting for another make to end its start or stop")
+        command.signal(signal.SIGINT)
     assert command.wait() == 0
     assert "All have ended." in command.output
     assert site.members == {}
@@ -123,7 +123,7 @@ def caught_signals(pid: int) -> set[int]:
 @contextmanager
 def another_at_work(site: Site) -> Iterator[None]:
     """Hold the lock of a start or stop."""
-    site.run.mkdir()
+    site.run.mkdir(exist_ok=True)
     directory = os.open(site.run, os.O_RDONLY)
     try:
         fcntl.flock(directory, fcntl.LOCK_EX)
@@ -379,6 +379,20 @@ def test_a_service_that_does_not_start_shows_its_last_words(
     lines = printed.splitlines()
     assert set(lines[lines.index("velocity does not start:") + 1 :]) == {"crash"}
     assert site.members == {}
+
+
+def test_the_scenario_begins_when_all_services_are_up(
+    site: Site, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    slow = "import sys, time\nif 'services.dead_mans_switch' in sys.orig_argv: time.sleep(6.0)"
+    (tmp_path / "sitecustomize.py").write_text(slow)
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    scenario = tmp_path / "early.yaml"
+    scenario.write_text("operator: {pressed: [{from: 0.0}]}\nengines: [{at: 1.0, command: turn_on}]")
+    command = site.begin("run", str(scenario))
+    command.await_line("All services are up")
+    time = command.await_line(r"^\[(\d+)\] Engines are on")[1]
+    assert 1000 <= int(time) < 4000
 
 
 def test_an_error_in_a_parameter_file_is_reported_before_the_start(site: Site, tmp_path: Path) -> None:
