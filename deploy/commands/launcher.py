@@ -168,18 +168,18 @@ def _show(system: System, member: Member, *, owner: bool = False) -> None:
     # In the background, reading the terminal fails and does not stop the process.
     signal.signal(signal.SIGTTIN, signal.SIG_IGN)
     parent = os.getppid()
-    console = Console(member.node, system.origin())
-    say(HELP)
-    while not console.has_quit:
-        member.spin_once()
-        console.read_commands()
-        if owner and os.getppid() != parent:  # make was killed
-            return
-        if system.supervisor_has_ended():
-            if not owner or not system.start_again():
-                say(system.unattended() if system.is_wanted else "The system has ended.")
+    with Console(member.node, system.origin()) as console:
+        say(HELP)
+        while not console.has_quit:
+            member.spin_some()
+            console.refresh()
+            if owner and os.getppid() != parent:  # make was killed
                 return
-            say("supervisord was killed: everything has been started anew.")
+            if system.supervisor_has_ended():
+                if not owner or not system.start_again():
+                    say(system.unattended() if system.is_wanted else "The system has ended.")
+                    return
+                say("supervisord was killed: everything has been started anew.")
 
 
 def _adopt_environment(system: System) -> bool:

@@ -18,6 +18,8 @@ from deploy.supervision.system import DeploymentError, namespace_of
 from interfaces.service.health import Health, HealthMonitor
 from reactive_node import ReactiveNode
 
+SPIN_TIME = 0.01  # s
+
 
 class Member:
     """In a `with`, this process takes part in the system's communication; it handles no signals."""
@@ -43,6 +45,11 @@ class Member:
         """Run one callback; waits at most 0.1 s for it. Raises Interrupted after a signal."""
         interruption.check()
         self._executor.spin_once(timeout_sec=0.1)
+
+    def spin_some(self) -> None:
+        """Run the callbacks of what has come, for ``SPIN_TIME``. Raises Interrupted after a signal."""
+        interruption.check()
+        self._executor.spin_until_future_complete(Future(), timeout_sec=SPIN_TIME)
 
     def set_everywhere(self, name: str, value: object, limit: float) -> None:
         """Set a parameter on all services that have it; wait at most `limit` [s] for their answers."""

@@ -1,4 +1,4 @@
-"""What is said to whoever watches the system: never at the price of the system."""
+"""Best-effort console output that never blocks."""
 
 from __future__ import annotations
 
@@ -9,11 +9,12 @@ from typing import TextIO
 
 def say(line: str) -> None:
     """
-    Print a line to standard output; it is lost where nobody has read for long.
+    Print a line to standard output; drop it if the reader is stuck.
 
-    A pipe that is full, or a terminal that is stopped, would let a print wait for ever: whoever runs the
-    system could neither stop it nor revive it. Nothing is said where standard output is closed (`>&-`).
-    Raises BrokenPipeError where nobody can read any more.
+    A print to a full pipe or a stopped terminal would wait for its reader, and the system could neither be
+    stopped nor revived meanwhile. Nothing is printed if standard output is closed (`>&-`).
+
+    :raises BrokenPipeError: if the pipe has no reader any more.
     """
     output: TextIO | None = sys.stdout
     if output and select.select([], [output], [], 0)[1]:

@@ -15,7 +15,7 @@ from reactivex.subject import Subject
 from reactivex.testing import TestScheduler
 from std_msgs.msg import Bool, Float64, Header, String
 
-from deploy.console import view
+from deploy.console.lines import Line, line_batches
 from interfaces import topics
 from interfaces.scenario import playback, scenario_file
 from reactive_node import stamps
@@ -81,7 +81,8 @@ class Arm:
         self.topics: dict[str, Subject[Any]] = {topic.name: Subject() for topic in topics.CONTRACT}
         self.lines: list[str] = []
         played = scenario_file.load(path)
-        view.view(self.seen, WATCH_BEGINS).subscribe(self.print, scheduler=self.scheduler)
+        batches = line_batches(self.seen, rx.never(), rx.interval(0.1))
+        batches.subscribe(self.print, scheduler=self.scheduler)
         self.scheduler.advance_to(START)
         self.wire()
         for name, timeline in played.configuration.items():
@@ -97,8 +98,9 @@ class Arm:
     def publish(self, name: str, messages: Observable[Any]) -> None:
         messages.subscribe(self.topics[name].on_next, scheduler=self.scheduler)
 
-    def print(self, line: view.Line) -> None:
-        self.lines.append(f"[{(line.time - ORIGIN) / timedelta(milliseconds=1):.0f}] {line.text}")
+    def print(self, lines: list[Line]) -> None:
+        for line in lines:
+            self.lines.append(f"[{(line.time - ORIGIN) / timedelta(milliseconds=1):.0f}] {line.text}")
 
     def wire(self) -> None:
         configuration = [self.topics[name].map(lambda m: m.data) for name in topics.CONFIGURATION]

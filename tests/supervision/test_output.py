@@ -1,4 +1,4 @@
-"""What is said to a reader, to one who does not read, and to nobody."""
+"""Console output: to a reader, to a stuck reader, and without one."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ import pytest
 from deploy.console.output import say
 from deploy.supervision.processes import ROOT
 
-LINES = 5000  # of 100 characters, which no pipe takes all
+LINES = 5000  # of 100 characters, more than a pipe holds
 FLOOD = f"from deploy.console.output import say\nfor _ in range({LINES}): say('#' * 99)"
 
 
-def test_a_line_is_printed(capfd: pytest.CaptureFixture[str]) -> None:
+def test_line_is_printed(capfd: pytest.CaptureFixture[str]) -> None:
     say("All have ended.")
     assert capfd.readouterr().out == "All have ended.\n"
 
 
-def test_whoever_does_not_read_stops_nobody() -> None:
+def test_reader_that_does_not_read_blocks_nothing() -> None:
     with subprocess.Popen([sys.executable, "-c", FLOOD], cwd=ROOT, stdout=subprocess.PIPE) as process:
         try:
             assert process.wait(30) == 0
@@ -31,13 +31,13 @@ def test_whoever_does_not_read_stops_nobody() -> None:
     assert set(lines) == {b"#" * 99}
 
 
-def test_without_standard_output_nothing_is_said() -> None:
+def test_closed_standard_output_gets_nothing() -> None:
     command = f'exec "{sys.executable}" -c "from deploy.console.output import say; say(0)" >&-'
     done = subprocess.run(["sh", "-c", command], cwd=ROOT, stderr=subprocess.PIPE)
     assert (done.returncode, done.stderr) == (0, b"")
 
 
-def test_to_nobody_it_is_an_error() -> None:
+def test_pipe_without_reader_is_an_error() -> None:
     with subprocess.Popen(
         [sys.executable, "-c", FLOOD], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE
     ) as process:

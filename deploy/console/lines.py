@@ -1,0 +1,229 @@
+"""The recipes of the operator's terminal: from the topics of an arm to the lines of thesis Listing 5.9."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from datetime import UTC, datetime
+from enum import IntEnum, auto
+from typing import Any, NamedTuple
+
+import reactivex as rx
+from reactivex import Observable
+
+from interfaces import topics
+from reactive_node.stamps import Timestamp
+
+Seen = Callable[[topics.Topic], Observable[Timestamp[Any]]]
+"""Gives the messages of a topic with their source times."""
+Span = tuple[datetime, datetime]
+"""The times just before and just after a command was published."""
+
+BURST = 6  # lines of a kind in a row before they are thinned
+SIGNAL_BURST = 12  # Listing 5.9 has 11 signals
+FIRST, LAST = datetime.min.replace(tzinfo=UTC), datetime.max.replace(tzinfo=UTC)
+NEVER = (LAST, FIRST)
+TURNING_OFF = "Turning off engines..."
+
+
+class Kind(IntEnum):
+    """What a line is about, in the order of lines with the same time."""
+
+    DATA = auto()
+    POSITION = auto()
+    SPEED = auto()
+    SIGNAL = auto()
+    ALIVE = auto()
+    MISSED = auto()
+    ASLEEP = auto()
+    ENGINES = auto()
+    OTHERS_TURN_OFF = auto()
+    SERVICE = auto()
+
+
+class Line(NamedTuple):
+    """A line for the operator; lines sort by time, then kind."""
+
+    time: datetime
+    kind: Kind
+    text: str
+
+
+class Batch(NamedTuple):
+    """Lines that are shown together."""
+
+    is_asleep: bool | None
+    """Whether the operator sleeps, as far as it is known."""
+    lines: list[Line]
+
+
+class Complaints(NamedTuple):
+    """What services complain about."""
+
+    known: dict[str, str]
+    """By the name of the service; empty if it does not complain."""
+    new: Timestamp[str]
+    """What was new in the latest message of ``/diagnostics``."""
+
+
+def line_batches(
+    seen: Seen, own_turn_offs: Observable[Span], ticks: Observable[Any], namespace: str = "/"
+) -> Observable[list[Line]]:
+    """
+    Emit the lines of an arm, at each tick those since the last one in the order of their times, if any.
+
+    :param own_turn_offs: when this terminal has turned off the engines.
+    :param namespace: that of the arm; ``/diagnostics`` carries the health of all arms.
+    """
+    commands = engines(seen, own_turn_offs)
+    lines = rx.merge(measurements(seen), operator(seen), commands, services(seen, namespace))
+    batches: Observable[list[Line]] = lines.buffer(ticks).filter(bool)
+    return batches.scan(next_batch, Batch(None, [])).map(lambda batch: batch.lines).filter(bool)
+
+
+def measurements(seen: Seen) -> Observable[Line]:
+    """New configurations, positions and speeds."""
+    configuration = rx.combine_latest(*(seen(topic) for topic in topics.CONFIGURATION.values())).map(_joined)
+    return rx.merge(
+        thinned(configuration).map(_line(Kind.DATA, lambda it: f"### Received new data: {{{_numbers(it)}}}")),
+        thinned(seen(topics.EFFECTOR_POSITION)).map(
+            _line(Kind.POSITION, lambda it: f"Position x: {it.point.x:g} and y: {it.point.y:g}")
+        ),
+        thinned(seen(topics.EFFECTOR_SPEED)).map(_line(Kind.SPEED, lambda it: f"Speed: {it.data:g} [m/s]")),
+    )
+
+
+def operator(seen: Seen) -> Observable[Line]:
+    """The operator's signals, and what the operator watchdog concludes from them."""
+    signals = seen(topics.OPERATOR_HEARTBEAT).filter(_says(True))
+    activity = seen(topics.OPERATOR_ACTIVITY)
+    alive, missed, asleep = (
+        thinned(activity.filter(_says(conclusion)))
+        for conclusion in (topics.ALIVE, topics.MISSED, topics.INCAPACITATED)
+    )
+    return rx.merge(
+        thinned(signals, SIGNAL_BURST).map(_line(Kind.SIGNAL, "### Received signal from operator")),
+        alive.map(_line(Kind.ALIVE, "Operator is alive")),
+        missed.map(_line(Kind.MISSED, "Not received signal from operator...")),
+        asleep.map(_line(Kind.ASLEEP, "Operator is sleeping !!!")),
+    )
+
+
+def engines(seen: Seen, own_turn_offs: Observable[Span]) -> Observable[Line]:
+    """Commands to the engines from here and from other nodes, and whether the engines are on."""
+    commands = seen(topics.ENGINES)
+    own, others = (
+        commands.filter(_says(topics.TURN_OFF))
+        .with_latest_from(own_turn_offs.start_with(NEVER))
+        .partition(_is_own)
+    )
+    return rx.merge(
+        thinned(commands.filter(_says(topics.TURN_ON))).map(_line(Kind.ENGINES, "Turning on engines...")),
+        own.map(_first).map(_line(Kind.ENGINES, "Turning off engines, as you asked...")),
+        thinned(others.map(_first)).map(
+            _line(Kind.OTHERS_TURN_OFF, "Turning off engines, as another node asked...")
+        ),
+        thinned(seen(topics.ENGINES_STATE).distinct_until_changed(_data)).map(
+            _line(Kind.ENGINES, lambda it: f"Engines are {it.data}")
+        ),
+    )
+
+
+def services(seen: Seen, namespace: str) -> Observable[Line]:
+    """The complaints of services, each when it is new."""
+
+    def compare(before: Complaints, diagnostics: Timestamp[Any]) -> Complaints:
+        now = dict(_complaints(diagnostics.value, namespace.rstrip("/")))
+        new = [f"{name}: {now[name]}" for name in now if now[name] and now[name] != before.known.get(name)]
+        return Complaints(before.known | now, Timestamp("; ".join(new), diagnostics.timestamp))
+
+    complaints = (
+        seen(topics.DIAGNOSTICS).scan(compare, Complaints({}, Timestamp("", FIRST))).map(lambda it: it.new)
+    )
+    return thinned(complaints.filter(lambda it: it.value)).map(_line(Kind.SERVICE, str))
+
+
+def thinned(items: Observable[Timestamp[Any]], burst: int = BURST) -> Observable[Timestamp[Any]]:
+    """Emit at most ``burst`` items in a row, then the first of each second; pauses refill the burst."""
+    return items.filter(Allowance(burst).covers)
+
+
+class Allowance:
+    """
+    How many items may be shown: one more with each second, up to ``burst``.
+
+    Seconds are those of the clock: lines of different kinds appear together, of the same moment.
+    """
+
+    def __init__(self, burst: int) -> None:
+        """Allow ``burst`` items at first."""
+        self._burst = burst
+        self._left = burst
+        self._second = 0
+
+    def covers(self, item: Timestamp[Any]) -> bool:
+        """Whether an item may be shown; it is counted then."""
+        second = int(item.timestamp.timestamp())
+        self._left = min(self._burst, self._left + max(0, second - self._second))
+        self._second = second
+        if not self._left:
+            return False
+        self._left -= 1
+        return True
+
+
+def next_batch(previous: Batch, lines: list[Line]) -> Batch:
+    """Sort lines, and show one command of the operator watchdog for each sleep of the operator."""
+    is_asleep = previous.is_asleep
+    shown = []
+    for line in sorted(lines):
+        match line.kind:
+            case Kind.ALIVE | Kind.MISSED:
+                is_asleep = False
+            case Kind.ASLEEP:
+                is_asleep = True
+            case Kind.OTHERS_TURN_OFF if is_asleep:
+                continue  # the watchdog repeats its command
+            case Kind.OTHERS_TURN_OFF if is_asleep is None:  # it may do so since before this terminal began
+                is_asleep, line = True, line._replace(text=TURNING_OFF)
+        shown.append(line)
+        if line.kind is Kind.ASLEEP:
+            shown.append(Line(line.time, Kind.ENGINES, TURNING_OFF))
+    return Batch(is_asleep, shown)
+
+
+def _line(kind: Kind, text: str | Callable[[Any], str]) -> Callable[[Timestamp[Any]], Line]:
+    if isinstance(text, str):
+        return lambda item: Line(item.timestamp, kind, text)
+    return lambda item: Line(item.timestamp, kind, text(item.value))
+
+
+def _joined(items: Sequence[Timestamp[Any]]) -> Timestamp[list[Any]]:
+    return Timestamp([item.value for item in items], max(item.timestamp for item in items))
+
+
+def _numbers(messages: Sequence[Any]) -> str:
+    return ", ".join(f"{message.data:g}" for message in messages)
+
+
+def _data(item: Timestamp[Any]) -> Any:
+    return item.value.data
+
+
+def _says(data: object) -> Callable[[Timestamp[Any]], bool]:
+    return lambda item: bool(item.value.data == data)
+
+
+def _is_own(command: tuple[Timestamp[Any], Span]) -> bool:
+    item, (before, after) = command
+    return before <= item.timestamp <= after
+
+
+def _first(command: tuple[Timestamp[Any], Span]) -> Timestamp[Any]:
+    return command[0]
+
+
+def _complaints(diagnostics: Any, namespace: str) -> Iterator[tuple[str, str]]:
+    for status in diagnostics.status:
+        path, _, service = status.name.rpartition("/")
+        if path == namespace:
+            yield service, "" if status.level == type(status).OK else status.message
