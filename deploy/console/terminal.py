@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from typing import Protocol
 
 from deploy.console.plain import PlainTerminal
@@ -26,5 +28,18 @@ class Terminal(Protocol):
 
 
 def open_terminal(words: Sequence[str]) -> Terminal:
-    """Return the terminal of this process."""
-    return PlainTerminal()
+    """Return the terminal of this process; a prompt completes the words."""
+    if not _takes_a_prompt():
+        return PlainTerminal()
+    from deploy.console.prompt import Prompt  # loads prompt_toolkit: 0.1 s
+
+    return Prompt(words)
+
+
+def _takes_a_prompt() -> bool:
+    """Whether this process is in the foreground of a terminal with a movable cursor."""
+    if not (os.isatty(0) and os.isatty(1)) or os.environ.get("TERM", "") in ("", "dumb", "unknown"):
+        return False
+    with suppress(OSError):  # it is not our controlling terminal
+        return os.tcgetpgrp(0) == os.getpgrp()
+    return False
