@@ -168,7 +168,8 @@ class Site:
 
     def begin_in_terminal(self, *command: str) -> Command:
         """Begin any command in a terminal of its own, which closes when the returned command is killed."""
-        return self._begin([sys.executable, "-c", "import pty, sys; pty.spawn(sys.argv[1:])", *command])
+        spawn = [sys.executable, "-c", "import pty, sys; pty.spawn(sys.argv[1:])"]
+        return self._begin([*spawn, *command], TERM="xterm")
 
     def _begin(self, command: list[str], **environment: str) -> Command:
         begun = Command(command, self.environment | environment, self.directory)

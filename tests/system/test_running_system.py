@@ -172,13 +172,17 @@ def test_a_killed_service_comes_back_though_its_log_does_not_open(module_site: S
         away.rename(logs)
 
 
-def test_the_operator_commands_switch_and_engines_from_the_console(module_site: Site) -> None:
-    console = module_site.begin("console")
+@pytest.mark.parametrize("in_terminal", [False, True], ids=["plain", "prompt"])
+def test_the_operator_commands_switch_and_engines_from_the_console(
+    module_site: Site, in_terminal: bool
+) -> None:
+    begin = module_site.begin_in_terminal if in_terminal else module_site.begin_command
+    console = begin(sys.executable, "-m", "deploy.commands.launcher", "console")
     console.await_line("Engines are off")
     console.insist("press\n", "Operator is alive")
     console.insist("turn_on\n", "Engines are on")
     console.type("turn_off\n")
-    console.await_line("Turning off engines")
+    console.await_line("Turning off engines, as you asked...")
     console.type("release\nfly\n")
     console.await_line(r"fly\? Commands: press, release, turn_on, turn_off, quit")
     console.await_line("Not received signal from operator")
@@ -193,7 +197,7 @@ def test_releasing_the_switch_in_the_demo_stops_the_engines(site: Site) -> None:
     with pauses.watched() as paused:
         released = time.monotonic()
         command.type("release\n")
-        command.await_line("Turning off engines")
+        command.await_line(r"Turning off engines\.\.\.$")
     turned_off = next(time_ for time_, text in command.lines if "Turning off engines" in text)
     assert turned_off - released < 10.5 + paused.total
     command.type("quit\n")
