@@ -7,7 +7,6 @@ import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
-from types import TracebackType
 from typing import Any
 
 from rclpy import logging
@@ -180,14 +179,6 @@ class EventHandler(Waitable):
     def destroy(self) -> None:
         """Stop calling back."""
         self._destroyed = True
-
-    def __enter__(self) -> None:
-        """Do nothing, as handles."""
-
-    def __exit__(
-        self, t: type[BaseException] | None, v: BaseException | None, tb: TracebackType | None
-    ) -> None:
-        """Do nothing."""
 
     def get_num_entities(self) -> NumberOfEntities:
         """Return one event."""

@@ -147,6 +147,7 @@ class Executor(AbstractContextManager["Executor"]):
         self._ready: deque[tuple[Any, bool]] = deque()
         self._repeatable: deque[tuple[Any, bool]] = deque()  # readers that had a message in this burst
         self._burst_end = 0
+        self._tasks_were_first = False
         self._context._executors.add(self)
         signals._watch(self)
 
@@ -346,10 +347,15 @@ class Executor(AbstractContextManager["Executor"]):
 
         :return: whether :meth:`wake` was called.
         """
-        timeout = _remaining(deadline)
-        while self._tasks:
-            timeout = 0
-            self._ready.append((self._tasks.popleft(), False))
+        if (
+            self._tasks and not self._tasks_were_first
+        ):  # tasks come before data, as in rclpy, and in turn with it
+            self._tasks_were_first = True
+            while self._tasks:
+                self._ready.append((self._tasks.popleft(), False))
+            return False
+        self._tasks_were_first = False
+        timeout = 0 if self._tasks else _remaining(deadline)
         for guard in self._guards:
             if guard._is_ready() and self.can_execute(guard):
                 timeout = 0
@@ -368,6 +374,8 @@ class Executor(AbstractContextManager["Executor"]):
             self._ready.append((next_timer, False))  # the wait lasted until the timer was due
         if tokens:
             self._burst_end = time.monotonic_ns() + _BURST
+            if len(tokens) > 1:
+                tokens.sort()  # subscriptions before services and clients, as in rclpy
         woken = False
         for token in tokens:
             if token == _WAKE:
@@ -393,6 +401,7 @@ class Executor(AbstractContextManager["Executor"]):
             self._timers.extend(node.timers)
             self._guards.extend(node.guards)
             for entity in node._rclpy_waitables():
+                self._timers.extend(getattr(entity, "_timers", ()))
                 for handle in entity._handles:
                     wanted[handle] = entity
         for handle in [handle for handle in self._tokens if handle not in wanted]:

@@ -1,10 +1,12 @@
-"""The base class of rclpy's waitables. Custom waitables are not supported."""
+"""Waitables: what an executor waits for beside subscriptions, timers, services and guard conditions."""
 
 from __future__ import annotations
 
+from types import TracebackType
 from typing import Any
 
 from rclpy.callback_groups import CallbackGroup
+from rclpy.task import Future
 
 
 class NumberOfEntities:
@@ -37,10 +39,31 @@ class NumberOfEntities:
 
 
 class Waitable:
-    """Base class of QoS event handlers; this runtime has no wait sets of rcl, so others cannot be added."""
+    """Base class of action clients, action servers and QoS event handlers.
+
+    This runtime has no wait sets of rcl, so others cannot be added to a node.
+    """
 
     def __init__(self, callback_group: CallbackGroup) -> None:
         self.callback_group: CallbackGroup | None = callback_group
+        self._futures: list[Future] = []
+        callback_group.add_entity(self)
+
+    def __enter__(self) -> None:
+        """Do nothing: the destruction of an entity in use is safe."""
+
+    def __exit__(
+        self, t: type[BaseException] | None, v: BaseException | None, tb: TracebackType | None
+    ) -> None:
+        """Do nothing."""
+
+    def add_future(self, future: Future) -> None:
+        """Let the executor that runs the waitable run the done callbacks of a future."""
+        self._futures.append(future)
+
+    def remove_future(self, future: Future) -> None:
+        """Undo :meth:`add_future`. Raises ValueError if the future was not added."""
+        self._futures.remove(future)
 
     def is_ready(self, wait_set: Any) -> bool:
         """Not supported: raises NotImplementedError."""

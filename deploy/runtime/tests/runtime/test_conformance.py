@@ -28,7 +28,6 @@ def test_readme_has_the_current_table() -> None:
     )
 
 
-@pytest.mark.parametrize("module", ["rclpy.action", "rclpy.lifecycle"])
-def test_actions_and_lifecycle_nodes_cannot_be_imported(module: str) -> None:
-    with pytest.raises(ModuleNotFoundError, match=f"No module named '{module}'"):
-        importlib.import_module(module)
+def test_lifecycle_nodes_cannot_be_imported() -> None:
+    with pytest.raises(ModuleNotFoundError, match=r"'rclpy\.lifecycle'"):
+        importlib.import_module("rclpy.lifecycle")
