@@ -19,7 +19,7 @@ from rclpy.context import Context
 from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_action_status_default
+from rclpy.qos import qos_profile_action_status_default
 from rclpy.task import Future
 from unique_identifier_msgs.msg import UUID
 
@@ -578,66 +578,6 @@ def test_goals_of_several_threads_run_in_parallel(make_node: MakeNode, context: 
             executor.spin_until_future_complete(result, 10)
     assert [result.result().status for result in results] == [SUCCEEDED] * 2
     client.destroy()
-    server.destroy()
-
-
-# Names, types and QoS
-
-
-def test_an_action_is_made_of_hidden_topics_and_services(
-    serve: MakeServer, client: ActionClient, node: Node, spin_until: SpinUntil
-) -> None:
-    serve()
-    assert client.wait_for_server(timeout_sec=10)
-    topics = dict(node.get_topic_names_and_types())
-    services = dict(node.get_service_names_and_types())
-    assert topics["/fibonacci/_action/feedback"] == ["example_interfaces/action/Fibonacci_FeedbackMessage"]
-    assert topics["/fibonacci/_action/status"] == ["action_msgs/msg/GoalStatusArray"]
-    assert {name: types for name, types in services.items() if "_action" in name} == {
-        "/fibonacci/_action/cancel_goal": ["action_msgs/srv/CancelGoal"],
-        "/fibonacci/_action/get_result": ["example_interfaces/action/Fibonacci_GetResult"],
-        "/fibonacci/_action/send_goal": ["example_interfaces/action/Fibonacci_SendGoal"],
-    }
-    (status,) = node.get_publishers_info_by_topic("/fibonacci/_action/status")
-    assert status.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL
-    (feedback,) = node.get_publishers_info_by_topic("/fibonacci/_action/feedback")
-    assert feedback.qos_profile.durability == DurabilityPolicy.VOLATILE
-    assert [one.node_name for one in node.get_subscriptions_info_by_topic("/fibonacci/_action/status")] == [
-        "asker"
-    ]
-
-
-def test_the_qos_of_an_action_may_be_chosen(node: Node, spin_until: SpinUntil) -> None:
-    chosen = QoSProfile(depth=3, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-    server = ActionServer(
-        node,
-        Fibonacci,
-        "fibonacci",
-        fibonacci,
-        goal_service_qos_profile=QoSProfile(depth=3),
-        result_service_qos_profile=QoSProfile(depth=3),
-        cancel_service_qos_profile=QoSProfile(depth=3),
-        feedback_pub_qos_profile=chosen,
-        status_pub_qos_profile=QoSProfile(depth=1),
-    )
-    spin_until(lambda: node.count_publishers("/fibonacci/_action/feedback"))
-    (feedback,) = node.get_publishers_info_by_topic("/fibonacci/_action/feedback")
-    (status,) = node.get_publishers_info_by_topic("/fibonacci/_action/status")
-    assert feedback.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL
-    assert status.qos_profile.durability == DurabilityPolicy.VOLATILE
-    server.destroy()
-
-
-def test_an_action_belongs_to_the_namespace_and_rules_of_its_node(
-    make_node: MakeNode, executor: SingleThreadedExecutor, spin_until: SpinUntil
-) -> None:
-    rules = ["--ros-args", "-r", "count/_action/feedback:=elsewhere"]
-    node = make_node("counter", namespace="/far", cli_args=rules)
-    server = ActionServer(node, Fibonacci, "count", fibonacci)
-    spin_until(lambda: node.count_services("/far/count/_action/send_goal"))
-    topics = dict(node.get_topic_names_and_types())
-    assert "/far/elsewhere" in topics
-    assert "/far/count/_action/status" in topics
     server.destroy()
 
 
