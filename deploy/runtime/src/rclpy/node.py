@@ -147,6 +147,7 @@ class Node(NodeParameters, NodeGraph):
         self._timers: list[Timer] = []
         self._guards: list[GuardCondition] = []
         self._rclpy_actions: list[Any] = []
+        self._rclpy_added_waitables: list[Waitable] = []
         self._rclpy_rates: dict[Rate, Timer] = {}
         self._rclpy_events: dict[Publisher | Subscription, EndpointEvents] = {}
         self._rclpy_used_types: set[Any] = set()  # for the service get_type_description
@@ -243,7 +244,8 @@ class Node(NodeParameters, NodeGraph):
     def _rclpy_entities(self) -> list[Any]:
         """All entities with a callback."""
         timers = (timer for action in list(self._rclpy_actions) for timer in action._timers)
-        return [*self._rclpy_waitables(), *list(self._timers), *timers, *list(self._guards)]
+        entities = [*self._rclpy_waitables(), *list(self._rclpy_added_waitables)]
+        return [*entities, *list(self._timers), *timers, *list(self._guards)]
 
     # Entities
 
@@ -279,20 +281,22 @@ class Node(NodeParameters, NodeGraph):
 
     @property
     def waitables(self) -> Iterator[Waitable]:
-        """The node's action clients and servers, and the QoS event handlers of its endpoints."""
+        """The node's action clients and servers, added waitables, and QoS event handlers."""
         yield from list(self._rclpy_actions)
+        yield from list(self._rclpy_added_waitables)
         for publisher in self.publishers:
             yield from publisher.event_handlers
         for subscription in self.subscriptions:
             yield from subscription.event_handlers
 
     def add_waitable(self, waitable: Waitable) -> None:
-        """Not supported: raises NotImplementedError."""
-        raise NotImplementedError("rclpy.node.Node.add_waitable")
+        """Add a waitable: the executor waits for what it adds to the wait set, and runs it."""
+        self._rclpy_add(self._rclpy_added_waitables, waitable)
 
     def remove_waitable(self, waitable: Waitable) -> None:
-        """Not supported: raises NotImplementedError."""
-        raise NotImplementedError("rclpy.node.Node.remove_waitable")
+        """Remove a waitable. Raises ValueError if it was not added."""
+        self._rclpy_added_waitables.remove(waitable)
+        self._rclpy_entities_have_changed()
 
     def _rclpy_add_action(self, action: Waitable) -> None:
         self._rclpy_add(self._rclpy_actions, action)

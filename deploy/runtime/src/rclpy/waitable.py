@@ -39,9 +39,12 @@ class NumberOfEntities:
 
 
 class Waitable:
-    """Base class of action clients, action servers and QoS event handlers.
+    """
+    Base class of what :meth:`rclpy.node.Node.add_waitable` adds to a node.
 
-    This runtime has no wait sets of rcl, so others cannot be added to a node.
+    Before each wait, the executor calls :meth:`add_to_wait_set`. If :meth:`is_ready` afterwards, it calls
+    :meth:`take_data`, and runs :meth:`execute` with the result. The wait set accepts the handles of guard
+    conditions, timers, subscriptions and services.
     """
 
     def __init__(self, callback_group: CallbackGroup) -> None:
@@ -66,21 +69,21 @@ class Waitable:
         self._futures.remove(future)
 
     def is_ready(self, wait_set: Any) -> bool:
-        """Not supported: raises NotImplementedError."""
-        raise NotImplementedError("rclpy.waitable.Waitable.is_ready")
+        """Return whether the waitable has work, after a wait; implemented by subclasses."""
+        raise NotImplementedError("Must be implemented by subclass")
 
     def take_data(self) -> Any:
-        """Not supported: raises NotImplementedError."""
-        raise NotImplementedError("rclpy.waitable.Waitable.take_data")
+        """Return what :meth:`execute` needs; implemented by subclasses."""
+        raise NotImplementedError("Must be implemented by subclass")
 
     async def execute(self, taken_data: Any) -> None:
-        """Not supported: raises NotImplementedError."""
-        raise NotImplementedError("rclpy.waitable.Waitable.execute")
+        """Do the work; implemented by subclasses."""
+        raise NotImplementedError("Must be implemented by subclass")
 
     def get_num_entities(self) -> NumberOfEntities:
-        """Not supported: raises NotImplementedError."""
-        raise NotImplementedError("rclpy.waitable.Waitable.get_num_entities")
+        """Return the numbers of entities that are added to wait sets; implemented by subclasses."""
+        raise NotImplementedError("Must be implemented by subclass")
 
     def add_to_wait_set(self, wait_set: Any) -> None:
-        """Not supported: raises NotImplementedError."""
-        raise NotImplementedError("rclpy.waitable.Waitable.add_to_wait_set")
+        """Add entities to a wait set; implemented by subclasses."""
+        raise NotImplementedError("Must be implemented by subclass")

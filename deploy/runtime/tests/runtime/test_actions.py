@@ -14,7 +14,9 @@ import pytest
 from action_msgs.msg import GoalStatus
 from example_interfaces.action import Fibonacci
 from example_interfaces.srv import AddTwoInts
+from rclpy._dds.library import blocking
 from rclpy.action import ActionClient, ActionServer
+from rclpy.action._endpoints import uuid_bytes
 from rclpy.action.server import ServerGoalHandle
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
@@ -57,6 +59,35 @@ def test_two_processes_share_an_action(
     server.destroy()
     there.destroy_node()
     client.destroy()
+
+
+def test_feedback_that_arrived_before_the_result_is_not_lost(
+    make_node: MakeNode, node: Node, context: Context, spin_until: SpinUntil
+) -> None:
+    goals: list[ServerGoalHandle] = []
+
+    def execute(goal_handle: ServerGoalHandle) -> Fibonacci.Result:
+        for number in range(5):
+            goal_handle.publish_feedback(Fibonacci.Feedback(sequence=[number]))
+        return succeed(goal_handle)
+
+    server = ActionServer(node, Fibonacci, "fibonacci", execute, handle_accepted_callback=goals.append)
+    asker = make_node("asker")
+    client = ActionClient(asker, Fibonacci, "fibonacci")
+    assert client.wait_for_server(timeout_sec=10)
+    heard: list[int] = []
+    sent = client.send_goal_async(Fibonacci.Goal(), lambda message: heard.extend(message.feedback.sequence))
+    with SingleThreadedExecutor(context=context) as other_executor:
+        other_executor.add_node(asker)
+        spin_until(lambda: other_executor.spin_once(0.0) or (sent.done() and goals))
+        future = sent.result().get_result_async()
+        goals[0].execute()
+        spin_until(lambda: server._result_futures[uuid_bytes(goals[0].goal_id)].done())
+        spin_until(lambda: blocking.dds_triggered(client._result_calls._handles[0]))
+        other_executor.spin_until_future_complete(future, 10)
+    assert heard == [0, 1, 2, 3, 4]
+    client.destroy()
+    server.destroy()
 
 
 def test_the_endpoints_of_an_action_carry_type_hashes(node: Node, spin_until: SpinUntil) -> None:
@@ -228,7 +259,9 @@ import rclpy
 from rclpy.node import Node
 assert not [name for name in sys.modules if name.startswith(("rclpy.action", "action_msgs"))]
 from example_interfaces.action import Fibonacci
+from rclpy._dds.library import blocking
 from rclpy.action import ActionClient, ActionServer
+from rclpy.action._endpoints import uuid_bytes
 rclpy.init()
 node = Node("node")
 def execute(goal_handle):

@@ -108,3 +108,14 @@ def uuid_bytes(goal_id: Any) -> bytes:
     """Return the 16 bytes of a ``unique_identifier_msgs/msg/UUID``, read without importing NumPy."""
     data: bytes = goal_id.uuid_.tobytes()
     return data
+
+
+def add_to_wait_set(wait_set: Any, endpoints: Endpoints) -> list[tuple[str, int]]:
+    """Add what receives messages to a wait set; return the kinds and indices."""
+    kinds = {Subscription: "subscription", Service: "service"}
+    return [
+        (kind, wait_set._add(kind, handle))
+        for endpoint in endpoints.created
+        for kind in (kinds.get(type(endpoint), "client"),)
+        for handle in getattr(endpoint, "_handles", ())
+    ]

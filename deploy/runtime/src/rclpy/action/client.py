@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from action_msgs.msg import GoalStatus
 from action_msgs.srv import CancelGoal
-from rclpy.action._endpoints import creation, uuid_bytes
+from rclpy.action._endpoints import add_to_wait_set, creation, uuid_bytes
 from rclpy.callback_groups import CallbackGroup
 from rclpy.client import Client
 from rclpy.executors import await_or_execute
@@ -164,6 +164,7 @@ class ActionClient(Waitable):
             )
             self._status = endpoints.subscription(impl.GoalStatusMessage, "status", status_sub_qos_profile)
         self._endpoints = endpoints
+        self._in_wait_set: list[tuple[str, int]] = []
         # The interface that executors use for every entity.
         self._handles = endpoints.handles()
         self._timers: tuple[Timer, ...] = ()
@@ -271,6 +272,14 @@ class ActionClient(Waitable):
     def get_num_entities(self) -> NumberOfEntities:
         """Return the numbers of subscriptions and clients."""
         return NumberOfEntities(num_subs=2, num_clients=3)
+
+    def add_to_wait_set(self, wait_set: Any) -> None:
+        """Add the subscriptions and clients to a wait set; the node's executor does without."""
+        self._in_wait_set = add_to_wait_set(wait_set, self._endpoints)
+
+    def is_ready(self, wait_set: Any) -> bool:
+        """Return whether anything has arrived, after a wait."""
+        return any(wait_set.is_ready(kind, index) for kind, index in self._in_wait_set)
 
     def take_data(self) -> dict[str, Any]:
         """Take what has arrived: a response of each service, a status message and feedback messages."""

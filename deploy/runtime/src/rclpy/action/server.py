@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from action_msgs.msg import GoalInfo, GoalStatus, GoalStatusArray
 from action_msgs.srv import CancelGoal
-from rclpy.action._endpoints import creation, uuid_bytes
+from rclpy.action._endpoints import add_to_wait_set, creation, uuid_bytes
 from rclpy.callback_groups import CallbackGroup
 from rclpy.constants import S_TO_NS
 from rclpy.exceptions import InvalidHandle, RCLError
@@ -263,6 +263,7 @@ class ActionServer(Waitable):
             self._feedback = endpoints.publisher(impl.FeedbackMessage, "feedback", feedback_pub_qos_profile)
             self._status = endpoints.publisher(impl.GoalStatusMessage, "status", status_pub_qos_profile)
         self._endpoints = endpoints
+        self._in_wait_set: list[tuple[str, int]] = []
         self._expiry = Timer(
             self._expire_goals,
             group,
@@ -482,6 +483,14 @@ class ActionServer(Waitable):
     def get_num_entities(self) -> NumberOfEntities:
         """Return the numbers of timers and services."""
         return NumberOfEntities(num_timers=1, num_services=3)
+
+    def add_to_wait_set(self, wait_set: Any) -> None:
+        """Add the services to a wait set; the node's executor does without."""
+        self._in_wait_set = add_to_wait_set(wait_set, self._endpoints)
+
+    def is_ready(self, wait_set: Any) -> bool:
+        """Return whether anything has arrived, after a wait."""
+        return any(wait_set.is_ready(kind, index) for kind, index in self._in_wait_set)
 
     def take_data(self) -> dict[str, Any]:
         """Take what has arrived: at most one request of each service."""
