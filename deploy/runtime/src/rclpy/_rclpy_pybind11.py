@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NoReturn
+from typing import Any
 
 from rclpy import service_introspection
 from rclpy.clock_type import ClockType
@@ -35,8 +35,20 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> NoReturn:
-    """:raises NotImplementedError: for all other names of the extension."""
+def __getattr__(name: str) -> Any:
+    """
+    Return an enumeration of a module that few programs need.
+
+    :raises NotImplementedError: for all other names of the extension.
+    """
     if name.startswith("__"):
         raise AttributeError(name)
+    if name == "GoalEvent":
+        from rclpy.action.server import GoalEvent
+
+        return GoalEvent
+    if name == "TransitionCallbackReturnType":
+        from rclpy.lifecycle import TransitionCallbackReturn
+
+        return TransitionCallbackReturn
     raise NotImplementedError(f"rclpy._rclpy_pybind11.{name}: this runtime has no C extension")
