@@ -3,6 +3,7 @@
 PYTHON ?=
 SCENARIO ?= demo
 PARAMETERS ?=
+WEB ?=
 TESTS ?= tests interfaces/reactive_node deploy/runtime
 MINUTES ?= 5
 SEED ?=
@@ -13,13 +14,14 @@ PY := .venv/bin/python
 STAMP := .venv/made-from
 # A Python that is still starting answers Ctrl-C with a traceback: SIGINT waits until the command is ready for it.
 HOLD := $(shell env --block-signal=INT echo env --block-signal=INT 2>/dev/null)
-export PYTHON SCENARIO PARAMETERS
+export PYTHON SCENARIO PARAMETERS WEB
 
 .PHONY: help setup run start stop status logs console chaos test check bench
 
 help:
 	@echo "make run      start the system, show it in this terminal, stop it with Ctrl-C"
 	@echo "make start    start it in the background          (run, start: SCENARIO=demo, listing_5_9 or a file)"
+	@echo "                                                  (WEB=off for no page, or its port)"
 	@echo "make console  attach this terminal to it"
 	@echo "make status   its services: state, pid, uptime, restarts, last output"
 	@echo "make logs     follow their logs"

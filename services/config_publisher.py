@@ -1,7 +1,8 @@
 """Publishes one configuration value of the manipulator: a virtual source (thesis 5.2.1).
 
 User story (ours): as a developer, I am able to set the manipulator's configuration by hand
-(``ros2 param set /config_l1 value 2.5``) or by a scenario. ::
+(``ros2 param set /config_l1 value 2.5``) or by a scenario, and to give it back to the scenario
+(``ros2 param set /config_l1 follow_scenario true``). ::
 
     python -m services.config_publisher l1
 """
@@ -21,6 +22,9 @@ def _parameters(topic: Topic, default: float, within: tuple[float, float]) -> ty
     @dataclass(frozen=True)
     class Parameters:
         value: float = parameter(default, within, topic.unit, topic.meaning, settable=True)
+        follow_scenario: bool = parameter(
+            True, None, "", "whether the scenario sets the value; setting it by hand ends that", settable=True
+        )
 
     return Parameters
 
@@ -38,7 +42,8 @@ def wire(node: ServiceNode, topic: Topic) -> None:
     """Publish the values of the parameter or the scenario."""
     node.declare(Parameters[topic.name])
     source = VirtualSource(node)
-    values = source.follow("value", source.scenario.configuration.get(topic.name))
+    timeline = source.scenario.configuration.get(topic.name)
+    values = source.follow("value", timeline, given_back="follow_scenario")
     node.publish(topic, values, lambda value: topic.type(data=value))
 
 

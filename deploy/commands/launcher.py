@@ -62,6 +62,8 @@ def console(system: System) -> None:
     from deploy.commands.member import Member
 
     with Member() as member:
+        if page := system.page:
+            say(page)
         _show(system, member)
 
 
@@ -124,6 +126,8 @@ def _started(system: System, scenario: str, parameter_file: str) -> Iterator[Mem
             system.keep_origin(origin)
             member.set_everywhere("scenario_epoch", origin, BEGIN_LIMIT)
             print(f"All services are up after {time.monotonic() - began:.1f} s.", flush=True)
+            if page := system.page:
+                print(page, flush=True)
             yield member
         except BaseException:
             interruption.ignore()

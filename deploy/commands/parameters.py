@@ -26,6 +26,7 @@ from interfaces.scenario import scenario_file
 from interfaces.service import UserError, instance
 
 SCENARIOS = ROOT / "deploy" / "scenarios"
+WEB = "WEB"  # environment variable: the port of the page, or off
 
 
 def of_system(scenario_name: str, user_file: str) -> dict[str, Any]:
@@ -45,7 +46,19 @@ def of_system(scenario_name: str, user_file: str) -> dict[str, Any]:
     shared = given.pop(ALL, {}).get(KEY, {})
     parameters: dict[str, Any] = scenario_parameters(path, NOT_YET)
     parameters[ALL][KEY] |= shared
+    if (port := _port(os.environ.get(WEB, ""))) is not None:
+        page = f"{namespace_of(os.environ).rstrip('/')}/{manifest.PAGE}"
+        given.setdefault(page, {KEY: {}})[KEY]["port"] = port
     return parameters | given
+
+
+def _port(web: str) -> int | None:
+    """The port of the page that WEB asks for; 0 for no page, ``None`` for the default."""
+    if web in ("", "off"):
+        return 0 if web else None
+    if web.isdecimal() and 0 < int(web) < 65536:
+        return int(web)
+    raise DeploymentError(f"WEB={web} is neither off nor a port from 1 to 65535")
 
 
 def _scenario_file(name: str) -> Path:

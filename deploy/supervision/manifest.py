@@ -12,6 +12,8 @@ GROUP = "arm"
 """The supervisor group of all programs."""
 SENTINEL = "sentinel"
 """The program that supervises the others together with supervisord."""
+PAGE = "operator_console"
+"""The program that serves the operator's page."""
 
 
 class Program(NamedTuple):

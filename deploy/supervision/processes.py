@@ -119,6 +119,21 @@ def open_handles(run: Path, pids: Iterable[int]) -> list[int]:
     return handles
 
 
+def send_signal(run: Path, program: str, pid: int, number: int) -> bool:
+    """Send a signal to a process that a program of the system has; whether it still has that process."""
+    for handle in open_handles(run, [pid] if pid > 0 else []):
+        try:
+            # Through the handle the signal reaches this very process, or none.
+            if environment_of(pid).get("SUPERVISOR_PROCESS_NAME") == program:
+                signal.pidfd_send_signal(handle, number)
+                return True
+        except ProcessLookupError:
+            pass
+        finally:
+            close([handle])
+    return False
+
+
 def await_end(handles: Iterable[int], wait: float) -> list[int]:
     """Wait at most `wait` seconds for the end of processes; the pidfds of those that live on."""
     left = list(handles)

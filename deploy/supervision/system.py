@@ -24,6 +24,7 @@ ANSWER_LIMIT = 1.5  # s that supervisord has to answer the sentinel
 READY_LIMIT = 20.0  # s that supervisord has to answer its first call
 NAMESPACE = "REACTIVE_ARM_NAMESPACE"  # environment variable: the ROS namespace of an arm
 SETTINGS = "settings"  # in the run directory: where services keep the values that were set by hand
+PAGE_FILE = "page.txt"  # in the settings: the line that tells the address of the page
 PARAMETERS = "parameters.yaml"  # in the run directory: the ROS parameter file of all services
 ALL, KEY = "/**", "ros__parameters"  # the form of ROS 2's parameter files
 NOT_YET = -1.0  # scenario_epoch: the scenario waits until this parameter is set
@@ -70,6 +71,13 @@ class System:
     def parameters(self) -> Path:
         """The ROS parameter file of all services; written at each start, removed by an orderly end."""
         return self.run / PARAMETERS
+
+    @property
+    def page(self) -> str:
+        """The line that tells the address of the page, or why there is none; empty if it is switched off."""
+        with suppress(OSError):
+            return (self.run / SETTINGS / PAGE_FILE).read_text(encoding="ascii").strip()
+        return ""
 
     @property
     def is_wanted(self) -> bool:

@@ -49,6 +49,11 @@ class Origin:
             return SetParametersResult(successful=False, reason="the scenario has an origin already")
         return SetParametersResult(successful=True)
 
+    @property
+    def is_known(self) -> bool:
+        """Whether the origin is known; before that the scenario has not begun."""
+        return self._epochs.value >= 0.0
+
     def elapsed(self) -> float:
         """Return the time since the origin [s]; negative before it. The origin must be known."""
         return time.monotonic() - self._epochs.value

@@ -33,9 +33,17 @@ class Settings:
 
     def keep(self, name: str, value: Any) -> None:
         """Write a setting atomically. Raises UserError if that fails."""
-        if self._path is None:
-            return
-        settings = self.read() | {name: value}
+        if self._path is not None:
+            self._write(self.read() | {name: value})
+
+    def forget(self, name: str) -> None:
+        """Remove a setting. Raises UserError if that fails."""
+        if self._path is not None and name in (settings := self.read()):
+            del settings[name]
+            self._write(settings)
+
+    def _write(self, settings: dict[str, Any]) -> None:
+        assert self._path is not None
         new = self._path.with_suffix(".new")
         try:
             self._path.parent.mkdir(exist_ok=True)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import reactivex as rx
+from rclpy.exceptions import ParameterException
 from rclpy.parameter import Parameter
 from reactivex import Observable
 from reactivex.subject import Subject
@@ -39,31 +40,42 @@ class VirtualSource:
         self._node = node
         self._origin = Origin(node)
         self._settings = Settings(parameters.settings, node.get_name())
-        self._followed: set[str] = set()
+        self._followed: dict[str, str] = {}  # with the parameter that gives it back, if it has one
         self._set_by_hand: Subject[str] = Subject()
         node.add_post_set_parameters_callback(self._keep)
         self.scenario = load(parameters.scenario) if parameters.scenario else Scenario()
 
-    def follow(self, name: str, timeline: Events[T] | Sweep | None = None) -> Observable[T]:
+    def follow(
+        self, name: str, timeline: Events[T] | Sweep | None = None, *, given_back: str = ""
+    ) -> Observable[T]:
         """
         Return the values of a parameter, or those of a timeline until the parameter is set by hand.
 
         A restarted process goes on with the parameter that was set. See :func:`playback.follow`.
 
+        :param given_back: a boolean parameter: whether the timeline is followed, or the first value of the
+            parameter without a timeline. Setting the parameter by hand makes it false; setting it to true
+            gives the source back.
         :raises UserError: if the setting of the last process is bad.
         """
+        first = self._node.get_parameter(name).value
         settings = self._settings.read()
         if name in settings:
-            (result,) = self._node.set_parameters([Parameter(name, value=settings[name])])
-            if not result.successful:
-                raise UserError(f"{name} was set to {settings[name]!r}: {result.reason}")
+            self._declare_again(name, settings[name])
+            if given_back:
+                self._declare_again(given_back, False)
+        self._followed[name] = given_back
 
-        self._followed.add(name)
         values: Observable[T] = self._node.create_parameter_observable(name)
-        if timeline is None or name in settings:
-            return values
-        played = rx.defer(lambda _: playback.state(timeline, self._origin.elapsed()))
-        return playback.follow(values, self._origin.delay_subscription(played))
+        played: Observable[T] | None = None
+        if timeline is not None:
+            played = self._origin.delay_subscription(
+                rx.defer(lambda _: playback.state(timeline, self._origin.elapsed()))
+            )
+        if not given_back:
+            return values if name in settings else playback.follow(values, played)
+        follows = self._node.create_parameter_observable(given_back).distinct_until_changed()
+        return follows.switch_map(lambda follows: (played or rx.just(first)) if follows else values)
 
     def play(self, timeline: Events[T] | None, *, until_set: str = "") -> Observable[T]:
         """
@@ -81,10 +93,28 @@ class VirtualSource:
             return items
         return items.take_until(self._set_by_hand.filter(lambda name: name == until_set))
 
+    def _declare_again(self, name: str, value: Any) -> None:
+        """Replace the value of a parameter, without the event of a parameter that is set by hand."""
+        descriptor, kind = self._node.describe_parameter(name), type(self._node.get_parameter(name).value)
+        if type(value) is not kind:
+            raise UserError(f"{name} was set to {value!r}: not a {kind.__name__}")
+        self._node.undeclare_parameter(name)
+        try:
+            self._node.declare_parameter(name, value, descriptor, ignore_override=True)
+        except ParameterException as error:
+            raise UserError(f"{name} was set to {value!r}: {error}") from None
+
     def _keep(self, parameters: list[Parameter]) -> None:
-        for name in self._followed.intersection(each.name for each in parameters):
+        values = {each.name: each.value for each in parameters}
+        for name, given_back in self._followed.items():
             try:
-                self._settings.keep(name, self._node.get_parameter(name).value)
+                if values.get(given_back):
+                    self._settings.forget(name)
+                elif name in values or given_back in values:
+                    self._settings.keep(name, self._node.get_parameter(name).value)
             except UserError as error:
                 self._node.remark(name, f"a restart would forget the setting: {error}")
-            self._set_by_hand.on_next(name)
+            if name in values:
+                if given_back:
+                    self._node.set_parameters([Parameter(given_back, value=False)])
+                self._set_by_hand.on_next(name)

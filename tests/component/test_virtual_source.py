@@ -10,8 +10,10 @@ from typing import Any
 
 import pytest
 import reactivex as rx
+from rcl_interfaces.msg import ParameterEvent
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from rclpy.qos import qos_profile_parameter_events
 from reactivex import Observable
 
 from interfaces import topics
@@ -31,6 +33,7 @@ SHORT = 0.1  # [s] in which nothing must happen
 class Parameters:
     value: float = parameter(1.0, (0.0, 9.0), "m", "length", settable=True)
     pressed: bool = parameter(False, None, "", "whether the switch is pressed", settable=True)
+    follow_scenario: bool = parameter(True, None, "", "whether the scenario sets the value", settable=True)
 
 
 @pytest.fixture
@@ -211,6 +214,81 @@ def test_setting_survives_a_restart(make_source: Make, spin_until: SpinUntil, tm
 
     spin_until(lambda: values == [5.0])
     assert second.get_parameter("value").value == 5.0
+
+
+def test_source_is_given_back_to_its_scenario(
+    make_source: Make, spin_until: SpinUntil, tmp_path: Path
+) -> None:
+    def source() -> tuple[ServiceNode, list[float]]:
+        node = make_source(scenario_epoch=time.monotonic() - 1.0, settings=str(tmp_path))
+        timeline = Events(((0.0, 2.0),))
+        return node, emitted(
+            node, VirtualSource(node).follow("value", timeline, given_back="follow_scenario")
+        )
+
+    node, values = source()
+    spin_until(lambda: values == [2.0])
+    set_to(node, "value", 5.0)
+    set_to(node, "value", 6.0)
+    assert values == [2.0, 5.0, 6.0]
+    assert node.get_parameter("follow_scenario").value is False
+    node.destroy_node()
+    node, values = source()
+    spin_until(lambda: values == [6.0])
+    assert node.get_parameter("follow_scenario").value is False
+
+    set_to(node, "follow_scenario", True)
+    spin_until(lambda: values == [6.0, 2.0])
+    node.destroy_node()
+    node, values = source()
+    spin_until(lambda: values == [2.0])
+    assert node.get_parameter("follow_scenario").value is True
+
+
+def test_source_without_a_timeline_is_given_back_to_its_first_value(
+    make_source: Make, spin_until: SpinUntil
+) -> None:
+    node = make_source(value=3.0)
+    values = emitted(node, VirtualSource(node).follow("value", given_back="follow_scenario"))
+    spin_until(lambda: values == [3.0])
+
+    set_to(node, "value", 5.0)
+    set_to(node, "follow_scenario", True)
+
+    spin_until(lambda: values == [3.0, 5.0, 3.0])
+
+
+def test_source_that_leaves_its_scenario_keeps_its_parameter(
+    make_source: Make, spin_until: SpinUntil, tmp_path: Path
+) -> None:
+    node = make_source(scenario_epoch=time.monotonic() - 1.0, settings=str(tmp_path))
+    timeline = Events(((0.0, 2.0),))
+    values = emitted(node, VirtualSource(node).follow("value", timeline, given_back="follow_scenario"))
+    spin_until(lambda: values == [2.0])
+
+    set_to(node, "follow_scenario", False)
+
+    assert values == [2.0, 1.0]
+    assert (tmp_path / "source.yaml").read_text() == "value: 1.0\n"
+
+
+def test_restart_sets_no_parameter(
+    make_source: Make, make_node: Make, spin_until: SpinUntil, spin_for: SpinFor, tmp_path: Path
+) -> None:
+    (tmp_path / "source.yaml").write_text("pressed: true")
+    events: list[Any] = []
+    peer = make_node("peer", kind=Node)
+    peer.create_subscription(ParameterEvent, "/parameter_events", events.append, qos_profile_parameter_events)
+    node = make_source(settings=str(tmp_path))
+    spin_until(lambda: peer.count_publishers("/parameter_events") > 1)
+    spin_for(SHORT)
+
+    pressed = emitted(node, VirtualSource(node).follow("pressed"))
+    set_to(node, "value", 2.0)
+    spin_until(lambda: any(each.name == "value" for event in events for each in event.changed_parameters))
+
+    assert pressed == [True]
+    assert not any(each.name == "pressed" for event in events for each in event.changed_parameters)
 
 
 def test_setting_replaces_a_scenario_that_has_not_begun(make_source: Make, spin_for: SpinFor) -> None:

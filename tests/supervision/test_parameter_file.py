@@ -13,11 +13,12 @@ from deploy.supervision import manifest
 from interfaces.service import UserError
 
 PARAMETERS = {
-    "config_theta2": {"value"},
+    "config_theta2": {"value", "follow_scenario"},
     "dead_mans_switch": {"rate", "pressed"},
     "kinematics": set(),
     "operator_watchdog": {"lifespan", "sampling", "silence", "strikes", "repeat"},
     "engine_controller": {"max_presence_age", "presence_timeout", "repeat"},
+    "operator_console": {"port", "address", "names", "certificate", "key"},
     "sentinel": {"period", "health_timeout", "start_timeout"},
 }
 

@@ -1,0 +1,198 @@
+"""The operator's page: shows the arm in a browser, and is a hold-to-run switch.
+
+User story (ours): as a robot operator, I see in a browser what the arm does and why its engines are off.
+While my hand holds the page, I count as alive; when hand, page, browser or network go away, the engines stop.
+"""
+
+from __future__ import annotations
+
+import ssl
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import timedelta
+from typing import Any
+
+import reactivex as rx
+from reactivex import Observable
+from reactivex.subject import BehaviorSubject, Subject
+from std_msgs.msg import Bool, String
+
+from deploy.console.lines import Span, line_batches
+from deploy.console.page import address, hold, protocol, requests, server, state
+from deploy.console.page.remote import parameter_changes
+from deploy.console.page.site import Site
+from deploy.console.page.switch import Switch
+from deploy.supervision import manifest
+from interfaces import service, topics
+from interfaces.scenario.origin import Origin
+from interfaces.service import ServiceNode, UserError, parameter
+from interfaces.topics import TURN_OFF
+from reactive_node import stamps
+from services import engine_controller, operator_watchdog
+
+LINGER = 5.0  # s after the last page has left until its topics are given up: a reload is faster
+LINES_PERIOD = 0.5  # s
+PUBLISHED_WITHIN = timedelta(milliseconds=50)
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """What a user may set."""
+
+    port: int = parameter(
+        address.DEFAULT_PORT,
+        (0, 65535),
+        "",
+        "TCP port of the page; one of the next if this default is taken; 0 for no page",
+    )
+    address: str = parameter(
+        "127.0.0.1", None, "", "IPv4 address to listen on; others than loopback need TLS"
+    )
+    names: str = parameter("", None, "", "names of the host in browsers, separated by spaces")
+    certificate: str = parameter("", None, "", "file of the TLS certificate")
+    key: str = parameter("", None, "", "file of the key of the certificate")
+
+
+@dataclass(frozen=True)
+class _Parameters:
+    settings: str = parameter("", None, "", "folder that keeps the address of the page, or empty")
+
+
+def wire(node: ServiceNode) -> None:
+    """Connect the pages with topics, parameters and processes."""
+    parameters, folder = node.declare(Parameters), node.declare(_Parameters).settings
+    tls = address.tls(parameters.address, parameters.certificate, parameters.key)
+    origin = Origin(node)
+    clock = state.Clock(hold.monotonic, node.age, lambda: origin.elapsed() if origin.is_known else 0.0)
+    newest = BehaviorSubject(state.PageState(since_when=state.OLDER if origin.is_past else state.NOT_YET))
+
+    events: Subject[server.Event] = Subject()
+    is_open = pages_are_open(events).share()
+    parameter_events = is_open.switch_map(lambda it: parameter_changes(node) if it else rx.never()).share()
+    hands = only(events, hold.Press, hold.Beat, hold.Release)
+    switch = Switch(node, hands, parameter_events, is_open, clock.now)
+    node.publish(topics.OPERATOR_HEARTBEAT, hold.heartbeats(switch.holds), lambda beat: Bool(data=beat))
+
+    asked = only(events, server.Request).share()
+    configuration = requests.Configuration(node)
+    commands = requests.engine_commands(asked).share()
+    turn_offs = commands.filter(lambda command: command == TURN_OFF).share()
+    signals = asked.filter(lambda it: isinstance(it.message, protocol.Process))
+    node.publish(topics.ENGINES, commands, lambda command: String(data=command))
+
+    # One reader of each topic for state and lines, while they observe it.
+    observed = {topic.name: node.observe(topic, timestamped=True).share() for topic in topics.CONTRACT}
+
+    def seen(topic: topics.Topic) -> Observable[Any]:
+        return observed[topic.name]
+
+    lines = line_batches(seen, turn_offs.map(just_now), rx.interval(LINES_PERIOD), node.get_namespace())
+    session = state.while_open(seen, lines, node.get_namespace(), clock)
+    changes = rx.merge(
+        state.always(seen, new_watchdogs(node, origin), clock),
+        is_open.switch_map(lambda it: session if it else rx.never()),
+        switch.holds.map(state.held),
+        switch.pressed.map(state.held_by_terminal),
+        turn_offs.map(lambda _: state.turned_off(clock.now())),
+        configuration.followers(parameter_events, is_open),
+        configuration.refusals(asked),
+        signals.flat_map(lambda it: requests.send_signal(it, newest.value.programs)),
+    )
+    states = state.page_states(changes, newest.value)
+    states.subscribe(newest.on_next, node.fail, scheduler=node.scheduler)
+    only(events, server.Violation).subscribe(lambda it: node.health.drop("page", it.reason))
+
+    def receive(event: server.Event) -> None:
+        node.scheduler.schedule(lambda *_: events.on_next(event))
+
+    serve(node, parameters, folder, tls, receive, lambda: newest.value, clock)
+
+
+def only(events: Observable[Any], *kinds: type) -> Observable[Any]:
+    """Emit the events of some kinds."""
+    return events.filter(lambda event: isinstance(event, kinds))
+
+
+def pages_are_open(events: Observable[server.Event]) -> Observable[bool]:
+    """Emit ``True`` when the first page opens, ``False`` ``LINGER`` [s] after the last page has closed."""
+    opened = only(events, server.Opened, server.Closed).map(lambda it: isinstance(it, server.Opened))
+    are_open = opened.scan(lambda count, opens: count + (1 if opens else -1), 0).map(bool)
+    closed = rx.timer(LINGER).map(lambda _: False)
+    present = are_open.distinct_until_changed().switch_map(lambda it: rx.of(True) if it else closed)
+    return present.distinct_until_changed()
+
+
+def new_watchdogs(node: ServiceNode, origin: Origin) -> Observable[bool]:
+    """Emit for each operator watchdog that appears whether it is new; the first may be older than us."""
+    topic = topics.OPERATOR_ACTIVITY
+    matches = node.create_event_observable(topic.type, topic.name, topic.qos, "matched")
+    appeared = matches.filter(lambda it: it.current_count_change > 0)
+    return appeared.map_indexed(lambda _, index: index > 0 or not origin.is_past)
+
+
+def just_now(_: Any) -> Span:
+    """Return the time within which a command is published that a page has just sent."""
+    now = stamps.now()
+    return now, now + PUBLISHED_WITHIN
+
+
+def serve(
+    node: ServiceNode,
+    parameters: Parameters,
+    folder: str,
+    tls: ssl.SSLContext | None,
+    receive: Callable[[server.Event], None],
+    newest: Callable[[], state.PageState],
+    clock: state.Clock,
+) -> None:
+    """Serve the page until the node ends, and note its address; say so if that is not possible."""
+    if not parameters.port:
+        return
+    file = address.AddressFile(folder)
+    last_port, token = file.read()
+    try:
+        listener = address.listen(parameters.address, parameters.port, last_port)
+    except OSError as error:
+        note(node, file, f"No page: {error}")
+        node.remark("page", str(error))
+        return
+    port = listener.getsockname()[1]
+    names = address.host_names(parameters.address, port, parameters.names.split())
+    scheme = "https" if tls else "http"
+    pages = server.PageServer(
+        listener,
+        Site(token, names, scheme),
+        welcome=welcome(),
+        receive=receive,
+        newest=newest,
+        clock=clock,
+        tls=tls,
+    )
+    node.context.on_shutdown(pages.close)
+    note(node, file, f"The page: {scheme}://{names[0]}/#{token}")
+
+
+def note(node: ServiceNode, file: address.AddressFile, line: str) -> None:
+    """Write the line for the user; a full disk is no reason to end."""
+    try:
+        file.write(line)
+    except UserError as error:
+        node.remark("page", str(error))
+
+
+def welcome() -> dict[str, Any]:
+    """Return what each page is told first."""
+    watchdog, controller = operator_watchdog.Parameters(), engine_controller.Parameters()
+    return {
+        "programs": protocol.PROGRAMS,
+        "limits": protocol.LIMITS,
+        "strikes": watchdog.strikes,
+        "silence": watchdog.silence,
+        "presence_timeout": controller.presence_timeout,
+        "beat": server.UPDATE_PERIOD,
+        "max_nonce_age": hold.MAX_NONCE_AGE,
+    }
+
+
+if __name__ == "__main__":
+    service.run(manifest.PAGE, wire)

@@ -1,0 +1,96 @@
+/** The newest state that the server sent, and what happened in the last minute. */
+
+import { Changes, Rows } from "./ring.js";
+
+export const SPAN = 60; // s of history
+const SAMPLES = SPAN * 30; // the server sends at most 30 a second
+const MOST_LINES = 200;
+/** Without a change for this time [s], a plot shows a gap. */
+export const GAP = 1.5;
+
+const KEYS = ["time", "arm", "position", "speed", "operator", "switch", "engines", "sources", "processes"];
+
+const INITIAL = {
+  time: NaN,
+  arm: { l1: null, l2: null, theta1: null, theta2: null },
+  position: null,
+  speed: null,
+  operator: { seen: null, age: null, activity: null, strikes_left: null },
+  switch: { held: false, by: null },
+  engines: { state: null, why: "", refused: null },
+  sources: {},
+  processes: [],
+};
+
+export class Model {
+  constructor() {
+    /** What the server said about itself at the begin of the connection. */
+    this.welcome = null;
+    /** Samples [time, x, y, speed]. */
+    this.trace = new Rows(SAMPLES, 4);
+    this.hands = new Changes(SPAN);
+    this.operators = new Changes(SPAN);
+    /** How many strikes fell. */
+    this.strikes = new Changes(SPAN);
+    this.engineStates = new Changes(SPAN);
+    this._histories = [this.hands, this.operators, this.strikes, this.engineStates];
+    /** Lines that are not shown yet. */
+    this.lines = [];
+    Object.assign(this, INITIAL);
+  }
+
+  /** Begin anew after a connection; the last minute stays, with a gap. */
+  begin(welcome) {
+    this.welcome = welcome;
+    this.lines = [];
+    Object.assign(this, INITIAL, { time: this.time });
+  }
+
+  /** Take over what changed. */
+  update(message) {
+    if (message.time < this.time - 1) this._forget(); // another scenario
+    const before = this.time;
+    for (const key of KEYS) if (key in message) this[key] = message[key];
+    if (this.time - before > GAP) this._gap(before);
+    for (const sample of message.trace ?? []) this._trace(sample);
+    if (message.lines) this.lines = this.lines.concat(message.lines).slice(-MOST_LINES);
+    this.hands.push(this.time, this.switch.held ? (this.switch.by ?? "somewhere") : "released");
+    this.operators.push(this.time, operatorState(this.operator));
+    this.strikes.push(this.time, this._strikesFallen());
+    this.engineStates.push(this.time, this.engines.state);
+  }
+
+  /** The lines that came since the last call. */
+  takeLines() {
+    const lines = this.lines;
+    this.lines = [];
+    return lines;
+  }
+
+  _strikesFallen() {
+    const { strikes_left: left } = this.operator;
+    return left === null || !this.welcome ? null : this.welcome.strikes - left;
+  }
+
+  _trace(sample) {
+    const { length } = this.trace;
+    const isNew = !length || sample[0] > this.trace.at(length - 1, 0);
+    if (isNew) this.trace.push(sample);
+  }
+
+  _gap(time) {
+    for (const history of this._histories) history.push(time, null);
+  }
+
+  _forget() {
+    for (const history of [this.trace, ...this._histories]) history.clear();
+  }
+}
+
+/** The operator as one word: `seen`, `missed`, `unseen`, `incapacitated`; null where nothing is known. */
+export function operatorState(operator) {
+  if (operator.seen) return "seen";
+  if (operator.activity === "incapacitated") return "incapacitated";
+  if (operator.activity === "missed") return "missed";
+  return operator.seen === null ? null : "unseen";
+}

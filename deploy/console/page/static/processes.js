@@ -1,0 +1,125 @@
+/** The table of processes: what runs, what was restarted, and buttons that break them. */
+
+import { alert, announce } from "./announce.js";
+import { confirmByHolding } from "./confirm.js";
+import { byId, create, setAttributes, setNote, setText } from "./dom.js";
+import { duration, sentence } from "./format.js";
+
+const REMEMBERED = 20; // s for which a row tells that its process came back
+const ACTIONS = {
+  kill: "Kill",
+  stop: "Stop",
+};
+const HELP_LOCAL =
+  "Break a process and watch it heal. Hold a button for a second: Kill ends the process at once, Stop freezes it. " +
+  "The supervisor and the sentinel bring it back.";
+const HELP_REMOTE =
+  "The supervisor and the sentinel bring back what ends or hangs. Kill and Stop work only on the machine itself.";
+
+export class Processes {
+  /** @param {(message: object) => boolean} send */
+  constructor(send) {
+    this._send = send;
+    this._rows = new Map();
+    this._drawn = null;
+  }
+
+  render({ processes, welcome, time }, isLive) {
+    if (welcome) this._begin(welcome);
+    for (const process of processes) {
+      if (!this._rows.has(process.name)) this._build(process.name);
+      this._update(this._rows.get(process.name), process, time);
+    }
+    if (isLive !== this._isLive) {
+      this._isLive = isLive;
+      for (const { buttons } of this._rows.values()) {
+        for (const button of buttons) setAttributes(button, { "aria-disabled": isLive ? null : true });
+      }
+    }
+  }
+
+  refuse(why) {
+    this._note(`Not done. ${sentence(why)}`);
+  }
+
+  _begin(welcome) {
+    if (welcome === this._welcome) return;
+    this._welcome = welcome;
+    setAttributes(byId("services"), { "data-local": welcome.local ? "yes" : "no" });
+    setText(byId("process-help"), welcome.local ? HELP_LOCAL : HELP_REMOTE);
+    for (const name of welcome.programs) if (!this._rows.has(name)) this._build(name);
+  }
+
+  _build(name) {
+    const cell = (column, ...children) => create("td", { "data-column": column }, ...children);
+    const sign = create("span", { class: "sign", "data-sign": "idle", "aria-hidden": "true" });
+    const state = create("span", {}, "not known");
+    const cells = { restarts: cell("restarts"), output: cell("output"), health: cell("health") };
+    const buttons = Object.entries(ACTIONS).map(([action, label]) => {
+      const attributes = { type: "button", "data-action": action, "aria-label": `${label} ${name}` };
+      const button = create("button", attributes, label);
+      confirmByHolding(
+        button,
+        () => this._act(name, action),
+        () => this._note(`Not done. Hold ${label} for a second.`),
+      );
+      return button;
+    });
+    const row = create(
+      "tr",
+      { "data-process": name },
+      create("th", { scope: "row" }, ...breakable(name)),
+      cell("state", sign, state),
+      cells.restarts,
+      cells.output,
+      cells.health,
+      create("td", { class: "local", "data-column": "actions" }, ...buttons),
+    );
+    byId("processes").tBodies[0].append(row);
+    const past = { process: null, goodUntil: null, downSince: null, back: null };
+    this._rows.set(name, { row, sign, state, ...cells, buttons, ...past });
+  }
+
+  _update(entry, process, time) {
+    const isGood = process.ok && process.state === "RUNNING";
+    if (!isGood) entry.downSince ??= entry.goodUntil;
+    else if (entry.downSince !== null) this._healed(entry, process, time - entry.downSince, time);
+    else if (entry.process && entry.process.pid !== process.pid) {
+      this._healed(entry, process, time - entry.goodUntil, time);
+    }
+    if (isGood) entry.goodUntil = time;
+    if (process !== entry.process) {
+      setAttributes(entry.row, { "data-ok": process.ok ? "yes" : "no", "data-state": process.state.toLowerCase() });
+      setAttributes(entry.sign, { "data-sign": isGood ? "good" : process.state === "STARTING" ? "warn" : "bad" });
+      setText(entry.state, !process.ok && process.state === "RUNNING" ? "unhealthy" : process.state.toLowerCase());
+      setText(entry.restarts, String(process.restarts));
+      setText(entry.output, process.since_output === null ? "–" : `${duration(process.since_output)} ago`);
+    }
+    const isBack = entry.back && time - entry.back.time < REMEMBERED;
+    setAttributes(entry.row, { "data-back": isBack ? "yes" : null });
+    setText(entry.health, isBack && process.ok ? `back after ${duration(entry.back.after)}` : process.health);
+    entry.process = process;
+  }
+
+  _healed(entry, process, after, time) {
+    entry.back = { time, after };
+    entry.downSince = null;
+    announce(`${process.name} is back after ${duration(after)}.`);
+  }
+
+  _act(name, action) {
+    if (!this._send({ type: "process", name, action })) return;
+    this._note("");
+    announce(`${name}: ${action} was sent.`);
+  }
+
+  _note(text) {
+    setNote(byId("process-note"), text);
+    if (text) alert(text);
+  }
+}
+
+/** A name that may be broken after an underscore where there is little room. */
+function breakable(name) {
+  return name.split(/(?<=_)/).flatMap((part, index) => (index ? [create("wbr"), part] : [part]));
+}
