@@ -280,7 +280,7 @@ class ActionServer(Waitable):
 
     @property
     def _logger(self) -> RcutilsLogger:
-        # Made for each message: a garbage collection must not wait for the lock that the end of a logger takes.
+        # Made for each message: a garbage collection must not wait for the lock that ends a logger.
         return self._node.get_logger().get_child("action_server")
 
     @property
