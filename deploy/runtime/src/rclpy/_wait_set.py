@@ -85,11 +85,23 @@ class WaitableEntity:
         return self.waitable.execute(taken[0])
 
 
+class _Wake:
+    """Wakes an executor without keeping it alive."""
+
+    def __init__(self, executor: Executor) -> None:
+        self._executor = weakref.ref(executor)
+
+    def __call__(self) -> None:
+        if (executor := self._executor()) is not None:
+            executor._wake_if_waiting()
+
+
 class WaitableWatch:
     """Lets an executor wait for the waitables of users."""
 
     def __init__(self, executor: Executor) -> None:
         self._executor = executor
+        self._wake = _Wake(executor)
         self._wait_set = WaitSet()
         self._added: list[WaitableEntity] = []  # to the current wait set
         self._postponed: list[WaitableEntity] = []  # ready, but their callback group was busy
@@ -137,8 +149,8 @@ class WaitableWatch:
     def _watched(self, kind: str) -> list[Any]:
         """The timers or guard conditions in the wait set, whose changes will wake the executor."""
         for entity in self._wait_set._entities[kind]:
-            if entity._on_change is ignore_change:
-                entity._on_change = _weak_wake(self._executor)
+            if entity._on_change is ignore_change or isinstance(entity._on_change, _Wake):
+                entity._on_change = self._wake
         return self._wait_set._entities[kind]
 
     def _attach(self, handles: set[int]) -> None:
@@ -174,14 +186,3 @@ class WaitableWatch:
         ready = [entity for entity in self._postponed if self._executor.can_execute(entity)]
         self._postponed = [entity for entity in self._postponed if entity not in ready]
         return ready + [entity for entity in self._added if entity.waitable.is_ready(self._wait_set)]
-
-
-def _weak_wake(executor: Executor) -> Callable[[], None]:
-    """Return a function that wakes an executor without keeping it alive."""
-    reference = weakref.ref(executor)
-
-    def wake() -> None:
-        if (executor := reference()) is not None:
-            executor._wake_if_waiting()
-
-    return wake

@@ -295,16 +295,12 @@ class Node(NodeParameters, NodeGraph):
 
     def remove_waitable(self, waitable: Waitable) -> None:
         """Remove a waitable. Raises ValueError if it was not added."""
-        self._rclpy_added_waitables.remove(waitable)
+        waitables = self._rclpy_actions if waitable in self._rclpy_actions else self._rclpy_added_waitables
+        waitables.remove(waitable)
         self._rclpy_entities_have_changed()
 
     def _rclpy_add_action(self, action: Waitable) -> None:
         self._rclpy_add(self._rclpy_actions, action)
-
-    def _rclpy_remove_action(self, action: Waitable) -> None:
-        if action in self._rclpy_actions:
-            self._rclpy_actions.remove(action)
-            self._rclpy_entities_have_changed()
 
     # Creating
 

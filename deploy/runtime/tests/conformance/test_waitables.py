@@ -145,6 +145,21 @@ def test_a_waitable_of_a_node_that_is_added_later_runs(
     node.remove_waitable(bell)
 
 
+def test_a_waitable_follows_its_node_to_another_executor(
+    bell: Bell, node: Node, executor: SingleThreadedExecutor, context: Context, spin_until: SpinUntil
+) -> None:
+    bell.guard.trigger()
+    spin_until(lambda: bell.executed)
+    executor.remove_node(node)
+    started = time.monotonic()
+    with SingleThreadedExecutor(context=context) as other:
+        other.add_node(node)
+        while len(bell.executed) < 3:  # the new executor may see the first trigger again
+            threading.Timer(0.05, bell.guard.trigger).start()
+            other.spin_once(timeout_sec=30)
+    assert time.monotonic() - started < 30
+
+
 def test_several_waitables_and_other_entities_share_an_executor(
     bell: Bell, node: Node, context: Context, spin_until: SpinUntil
 ) -> None:

@@ -132,7 +132,7 @@ def test_a_waitable_may_consist_of_an_action_client(
     server = ActionServer(node, Fibonacci, "fibonacci", execute)
     client = ActionClient(node, Fibonacci, "fibonacci")
     for one in (server, client):  # from now on, they are run as any waitable
-        node._rclpy_remove_action(one)
+        node.remove_waitable(one)
         node.add_waitable(one)
     assert client.wait_for_server(timeout_sec=10)
     future = client.send_goal_async(Fibonacci.Goal())

@@ -353,7 +353,8 @@ class ActionClient(Waitable):
 
     def destroy(self) -> None:
         """Destroy the client: it receives nothing any more."""
-        self._node._rclpy_remove_action(self)
+        if self in self._node.waitables:
+            self._node.remove_waitable(self)
         self._close()
 
     def _close(self) -> None:

@@ -27,6 +27,7 @@ from rclpy.waitable import NumberOfEntities, Waitable
 
 if TYPE_CHECKING:
     from rclpy._service_wire import RequestId
+    from rclpy.impl.rcutils_logger import RcutilsLogger
     from rclpy.node import Node
     from rclpy.service import Service
     from unique_identifier_msgs.msg import UUID
@@ -244,7 +245,6 @@ class ActionServer(Waitable):
             raise ValueError("Failed to create action server: result_timeout must be non-negative")
         self._node = node
         self._action_type = action_type
-        self._logger = node.get_logger().get_child("action_server")
         self._lock = threading.RLock()
         self._goal_handles: dict[bytes, ServerGoalHandle] = {}
         self._result_futures: dict[bytes, Future] = {}
@@ -277,6 +277,11 @@ class ActionServer(Waitable):
         self._handles = endpoints.handles()
         self._timers = (self._expiry,)
         node._rclpy_add_action(self)
+
+    @property
+    def _logger(self) -> RcutilsLogger:
+        # Made for each message: the end of a logger takes a lock, which a garbage collection must not do.
+        return self._node.get_logger().get_child("action_server")
 
     @property
     def action_type(self) -> Any:
@@ -519,7 +524,8 @@ class ActionServer(Waitable):
 
     def destroy(self) -> None:
         """Destroy the server: its goals are forgotten, and clients get no more responses."""
-        self._node._rclpy_remove_action(self)
+        if self in self._node.waitables:
+            self._node.remove_waitable(self)
         self._close()
 
     def _close(self) -> None:
