@@ -351,11 +351,13 @@ class Executor(AbstractContextManager["Executor"]):
 
         :return: whether :meth:`wake` was called.
         """
-        self._tasks_were_first = bool(self._tasks) and not self._tasks_were_first
-        if self._tasks_were_first:  # as in rclpy; the next time, they come after the data
-            self._collect_tasks()
-            return False
-        timeout = 0 if self._tasks else _remaining(deadline)
+        timeout = _remaining(deadline)
+        if self._tasks:
+            self._tasks_were_first = not self._tasks_were_first
+            if self._tasks_were_first:  # as in rclpy; the next time, they come after the data
+                self._collect_tasks()
+                return False
+            timeout = 0
         for guard in self._guards:
             if guard._is_ready() and self.can_execute(guard):
                 timeout = 0

@@ -239,6 +239,27 @@ def test_a_finished_goal_is_forgotten_by_its_client(node: Node, spin_until: Spin
     server.destroy()
 
 
+def test_a_destroyed_server_starts_no_execution(
+    node: Node, executor: SingleThreadedExecutor, spin_until: SpinUntil
+) -> None:
+    executed: list[ServerGoalHandle] = []
+    goals: list[ServerGoalHandle] = []
+    server = ActionServer(
+        node, Fibonacci, "fibonacci", executed.append, handle_accepted_callback=goals.append
+    )
+    client = ActionClient(node, Fibonacci, "fibonacci")
+    assert client.wait_for_server(timeout_sec=10)
+    client.send_goal_async(Fibonacci.Goal())
+    spin_until(lambda: goals)
+    goals[0].execute()
+    (task,) = server._executions
+    server.destroy()
+    assert task.cancelled()
+    executor.spin_once(0.0)
+    assert (executed, server._executions) == ([], set())
+    client.destroy()
+
+
 def test_a_cancelled_send_is_forgotten(node: Node) -> None:
     client = ActionClient(node, Fibonacci, "fibonacci")
     client.send_goal_async(Fibonacci.Goal(), lambda _: None).cancel()

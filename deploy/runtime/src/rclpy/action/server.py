@@ -21,7 +21,7 @@ from rclpy.constants import S_TO_NS
 from rclpy.exceptions import InvalidHandle, RCLError
 from rclpy.executors import await_or_execute
 from rclpy.qos import QoSProfile, qos_profile_action_status_default, qos_profile_services_default
-from rclpy.task import Future
+from rclpy.task import Future, Task
 from rclpy.timer import Timer
 from rclpy.waitable import NumberOfEntities, Waitable
 
@@ -248,6 +248,7 @@ class ActionServer(Waitable):
         self._lock = threading.RLock()
         self._goal_handles: dict[bytes, ServerGoalHandle] = {}
         self._result_futures: dict[bytes, Future] = {}
+        self._executions: set[Task] = set()
         self._result_timeout = int(result_timeout * S_TO_NS)
         with creation(node, "action server", action_type, action_name, group) as endpoints:
             impl = action_type.Impl
@@ -280,7 +281,7 @@ class ActionServer(Waitable):
 
     @property
     def _logger(self) -> RcutilsLogger:
-        # Made for each message: a garbage collection must not wait for the lock that ends a logger.
+        # Made for each message: the end of a logger takes a lock, which a garbage collection must not do.
         return self._node.get_logger().get_child("action_server")
 
     @property
@@ -323,7 +324,11 @@ class ActionServer(Waitable):
         executor = self._node.executor
         if executor is None:
             raise RuntimeError("cannot execute a goal: no executor spins the node of the action server")
-        executor.create_task(self._execute_goal, execute_callback or self._execute_callback, goal_handle)
+        task = executor.create_task(
+            self._execute_goal, execute_callback or self._execute_callback, goal_handle
+        )
+        self._executions.add(task)
+        task._call_when_complete(lambda: self._executions.discard(task))
 
     async def _execute_goal(
         self, execute_callback: Callable[[ServerGoalHandle], Any], goal_handle: ServerGoalHandle
@@ -529,6 +534,8 @@ class ActionServer(Waitable):
         self._close()
 
     def _close(self) -> None:
+        for task in list(self._executions):
+            task._cancel_before_start()
         for goal_handle in list(self._goal_handles.values()):
             goal_handle.destroy()
         self._expiry.destroy()
