@@ -9,7 +9,6 @@ The page releases by rule when the machine stands still for 250 ms. A test in wh
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from contextlib import closing
 from typing import Any
 
