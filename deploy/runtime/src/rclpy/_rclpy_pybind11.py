@@ -37,12 +37,14 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     """
-    Return an enumeration of a module that few programs need.
+    Return what few programs need: enumerations, and guard conditions for waitables.
 
     :raises NotImplementedError: for all other names of the extension.
     """
     if name.startswith("__"):
         raise AttributeError(name)
+    if name == "GuardCondition":
+        return _guard_condition
     if name == "GoalEvent":
         from rclpy.action.server import GoalEvent
 
@@ -52,3 +54,10 @@ def __getattr__(name: str) -> Any:
 
         return TransitionCallbackReturn
     raise NotImplementedError(f"rclpy._rclpy_pybind11.{name}: this runtime has no C extension")
+
+
+def _guard_condition(context: object) -> Any:
+    """Create a guard condition, given the handle of its context."""
+    from rclpy.guard_condition import GuardCondition
+
+    return GuardCondition(callback=None, callback_group=None).handle

@@ -7,9 +7,9 @@ from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any
 
 from rclpy._dds import INFINITY, Reader
-from rclpy._handle import EntityHandle, ignore_change
+from rclpy._handle import ignore_change
 from rclpy.exceptions import InvalidHandle
-from rclpy.guard_condition import GuardCondition
+from rclpy.guard_condition import GuardCondition, GuardConditionHandle
 from rclpy.timer import Timer, TimerHandle
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ class WaitSet:
         """Add the ``handle`` of a timer; return its index."""
         return self._add("timer", timer._entity)
 
-    def add_guard_condition(self, gc: EntityHandle[GuardCondition]) -> int:
+    def add_guard_condition(self, gc: GuardConditionHandle) -> int:
         """Add the ``handle`` of a guard condition; return its index."""
         return self._add("guard_condition", gc._entity)
 

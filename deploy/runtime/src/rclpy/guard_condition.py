@@ -14,6 +14,14 @@ if TYPE_CHECKING:
     from rclpy.context import Context
 
 
+class GuardConditionHandle(EntityHandle["GuardCondition"]):
+    """A guard condition for a waitable that waits for it."""
+
+    def trigger_guard_condition(self) -> None:
+        """Trigger the guard condition; may be called from any thread."""
+        self._entity.trigger()
+
+
 class GuardCondition:
     """Runs its callback on the executor after :meth:`trigger`; several triggers may cause one call."""
 
@@ -34,10 +42,10 @@ class GuardCondition:
         self._on_change: Callable[[], None] = ignore_change
 
     @property
-    def handle(self) -> EntityHandle[GuardCondition]:
+    def handle(self) -> GuardConditionHandle:
         """A handle for the guard condition. Raises InvalidHandle if it was destroyed."""
         self._check_usable()
-        return EntityHandle(self)
+        return GuardConditionHandle(self)
 
     def _check_usable(self) -> None:
         if self._destroyed:

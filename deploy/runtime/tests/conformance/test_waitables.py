@@ -16,6 +16,7 @@ from rclpy.context import Context
 from rclpy.event_handler import EventHandler, QoSSubscriptionEventType, SubscriptionEventCallbacks
 from rclpy.executors import Executor, MultiThreadedExecutor, SingleThreadedExecutor
 from rclpy.guard_condition import GuardCondition
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.task import Future
 from rclpy.timer import Timer
@@ -109,6 +110,20 @@ def test_a_trigger_of_another_thread_ends_the_wait(bell: Bell, executor: SingleT
     while not bell.executed:
         executor.spin_once(timeout_sec=30)
     assert time.monotonic() - started < 30
+
+
+def test_a_waitable_may_have_a_guard_condition_of_the_extension(
+    bell: Bell, context: Context, spin_until: SpinUntil
+) -> None:
+    class Alarm:
+        def __init__(self) -> None:
+            with context.handle:
+                self.handle = rclpy_implementation.GuardCondition(context.handle)
+
+    alarm: Any = Alarm()
+    bell.guard = alarm
+    alarm.handle.trigger_guard_condition()
+    spin_until(lambda: bell.executed == ["ding"])
 
 
 def test_a_timer_runs_a_waitable(node: Node, context: Context, spin_until: SpinUntil) -> None:
