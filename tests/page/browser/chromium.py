@@ -39,14 +39,24 @@ window.WebSocket = class extends WebSocket {
 """
 """Notes what the page sends."""
 
-DEAF = """
+STUBBORN = """
+let nonce;
+let isStubborn = false;
+window.beStubborn = () => { isStubborn = true; };
 window.WebSocket = class extends WebSocket {
-    set onmessage(listen) {
-        super.onmessage = (event) => JSON.parse(event.data).type !== "released" && listen(event);
+    constructor(...options) {
+        super(...options);
+        this.addEventListener("message", (event) => { nonce = JSON.parse(event.data).nonce ?? nonce; });
+        setInterval(() => {
+            if (isStubborn && this.readyState === 1) super.send(JSON.stringify({ type: "beat", nonce }));
+        }, 50);
+    }
+    send(text) {
+        if (!isStubborn) super.send(text);
     }
 };
 """
-"""Makes the page go on to beat when the server ends its hold."""
+"""Makes the page go on to beat with the newest nonce whatever happens, and never release."""
 
 DECIDED = "#hold[data-state=held], #hold[data-state=other_page], #hold-why:not(:empty)"
 """What the page has when a press has led to a hold or to a refusal."""
