@@ -8,7 +8,6 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from deploy.console.page.hold import MAX_NONCE_AGE
 from tests.system.sites import ROOT, Site
 
 from .chromium import HandOnPage
@@ -16,7 +15,7 @@ from .record import Record
 
 STEADY = str(ROOT / "tests" / "system" / "steady.yaml")
 LINK = "127.0.0.2"  # where a test may listen between page and server
-GONE = MAX_NONCE_AGE + 0.1  # s for which a beat on its way may count after a page has gone
+GONE = 0.25 + 0.1  # s for which a beat on its way may count: the age of its nonce, and the way to the topic
 
 
 class Arm:

@@ -50,9 +50,7 @@ class Record:
         peer = Peer(domain)
         try:
             self._subscribe(peer, topics.OPERATOR_HEARTBEAT, lambda at, _: self.beats.append(at))
-            self._subscribe(
-                peer, topics.ENGINES_STATE, lambda at, it: self.states.append(State(at, it.data))
-            )
+            self._subscribe(peer, topics.ENGINES_STATE, lambda at, it: self.states.append(State(at, it.data)))
             self._commands = peer.publisher(topics.ENGINES)
             self._ready.set()
             while not self._ended.is_set():
@@ -109,7 +107,9 @@ class Record:
         """
 
         def off() -> float | None:
-            return next((it.time for it in self.states if it.time > moment and it.engines == topics.OFF), None)
+            return next(
+                (it.time for it in self.states if it.time > moment and it.engines == topics.OFF), None
+            )
 
         self.until(off)
         stopped = off()

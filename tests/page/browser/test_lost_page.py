@@ -31,7 +31,9 @@ def test_engines_stop_in_time_after_the_browser_is_killed(arm: Arm, own_browser:
     arm.record.silence_after(killed + GONE)
     last = arm.record.beats[-1]
     off = arm.record.await_off(killed)
-    print(f"browser killed: last heartbeat after {last - killed:.3f} s, engines off after {off - killed:.3f} s")
+    print(
+        f"browser killed: last heartbeat after {last - killed:.3f} s, engines off after {off - killed:.3f} s"
+    )
     assert off - last <= S1
 
 
