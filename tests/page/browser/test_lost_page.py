@@ -51,7 +51,7 @@ def test_suspended_browser_releases_and_resumes_released(arm: Arm, own_browser: 
     arm.record.silence_after(stopped + GONE, 3.0)
     hand.await_state("released")
     last = max(arm.record.beats)
-    print(f"browser suspended: last heartbeat after {last - stopped:.3f} s")
+    print(f"suspended: last heartbeat after {last - stopped:.3f} s")
     hand.up()
     hand.hold()
 
