@@ -61,7 +61,7 @@ window.WebSocket = class extends WebSocket {
 DECIDED = "#hold[data-state=held], #hold[data-state=other_page], #hold-why:not(:empty)"
 """What the page has when a press has led to a hold or to a refusal."""
 
-STALLS = ("too busy", "word from the server", "too slow", "no beat")
+STALLS = ("too busy", "word from the server", "too slow", "too late")
 """Reasons for a release that a machine gives which stands still for 250 ms: no behaviour of the page."""
 
 
