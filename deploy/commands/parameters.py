@@ -56,7 +56,7 @@ def _port(web: str) -> int | None:
     """The port of the page that WEB asks for; 0 for no page, ``None`` for the default."""
     if web in ("", "off"):
         return 0 if web else None
-    if web.isdecimal() and 0 < int(web) < 65536:
+    if web.isascii() and web.isdecimal() and 0 < int(web) < 65536:
         return int(web)
     raise DeploymentError(f"WEB={web} is neither off nor a port from 1 to 65535")
 

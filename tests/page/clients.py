@@ -6,6 +6,8 @@ import contextlib
 import json
 import queue
 import socket
+import ssl
+import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -29,20 +31,22 @@ TOKEN = "s3cr3t-token"
 class Arm:
     """A page server and what it has received."""
 
-    def __init__(self, files: Path) -> None:
+    def __init__(self, files: Path, tls: ssl.SSLContext | None = None) -> None:
+        scheme = "https" if tls else "http"
         self.received: queue.SimpleQueue[server.Event] = queue.SimpleQueue()
         self.state = PageState()
         listener = socket.create_server(("127.0.0.1", 0))
         self.port = listener.getsockname()[1]
         self.host = f"127.0.0.1:{self.port}"
-        self.origin = f"http://{self.host}"
+        self.origin = f"{scheme}://{self.host}"
         self._server = server.PageServer(
             listener,
-            Site(TOKEN, (self.host, f"localhost:{self.port}"), folder=files),
+            Site(TOKEN, (self.host, f"localhost:{self.port}"), scheme, files),
             welcome={"strikes": 3},
             receive=self.received.put,
             newest=lambda: self.state,
             clock=Clock(hold.monotonic, lambda stamp: 0.0, lambda: 1.25),
+            tls=tls,
         )
 
     def close(self) -> None:
@@ -77,7 +81,8 @@ class Arm:
 
     def connect(self, **options: Any) -> ClientConnection:
         options = {"origin": self.origin, "compression": None, "open_timeout": 5.0} | options
-        return connect(f"ws://{self.host}/socket", **options)
+        scheme = "wss" if "ssl" in options else "ws"
+        return connect(f"{scheme}://{self.host}/socket", **options)
 
     @contextlib.contextmanager
     def page(self) -> Iterator[ClientConnection]:
@@ -147,3 +152,100 @@ class SleepyPage:
     def _send(self) -> None:
         for data in self._protocol.data_to_send():
             self._socket.sendall(data)
+
+
+class Link:
+    """A TCP connection to the page server through a relay that can be stalled."""
+
+    def __init__(self, port: int) -> None:
+        self._flows = threading.Event()
+        self._flows.set()
+        self.end, near = socket.socketpair()
+        far = socket.create_connection(("127.0.0.1", port))
+        self._threads = [
+            threading.Thread(target=self._relay, args=ends, daemon=True)
+            for ends in ((near, far), (far, near))
+        ]
+        for thread in self._threads:
+            thread.start()
+
+    def stall(self) -> None:
+        """Hold back all bytes in both directions."""
+        self._flows.clear()
+
+    def heal(self) -> None:
+        """Let all bytes go on, also those that were held back."""
+        self._flows.set()
+
+    def _relay(self, source: socket.socket, target: socket.socket) -> None:
+        with source, contextlib.suppress(OSError):
+            while data := source.recv(65536):
+                self._flows.wait()
+                target.sendall(data)
+            target.shutdown(socket.SHUT_RDWR)
+
+
+class Hand:
+    """A page whose button a thread holds, without the safeguards of the real page."""
+
+    def __init__(self, line: str, link: Link | None = None) -> None:
+        """:param line: the line that tells the address of the page."""
+        host, _, token = line.removeprefix("The page: http://").partition("/#")
+        self.shown: dict[str, Any] = {}
+        self.refused: list[Any] = []
+        self.is_connected = True
+        self._lock = threading.Lock()
+        self._nonce = ""
+        self._holds = False
+        self._connection = connect(
+            f"ws://{host}/socket", origin=Origin(f"http://{host}"), compression=None, sock=link and link.end
+        )
+        self._connection.__enter__()
+        self._connection.send(json.dumps({"type": "hello", "token": token}))
+        self._threads = [threading.Thread(target=each, daemon=True) for each in (self._read, self._beat)]
+        for thread in self._threads:
+            thread.start()
+
+    def say(self, kind: str, **fields: Any) -> None:
+        """Send a message."""
+        self._connection.send(json.dumps({"type": kind, **fields}))
+
+    def press(self) -> None:
+        """Begin to hold."""
+        with self._lock:
+            self.say("press", nonce=self._nonce)
+            self._holds = True
+
+    def release(self) -> float:
+        """Let go; returns when [s, monotonic clock]."""
+        with self._lock:
+            self._holds = False
+            now = time.monotonic()
+            self.say("release")
+            return now
+
+    def close(self) -> None:
+        """Close the page."""
+        self._holds = False
+        self._connection.close_socket()
+        for thread in self._threads:
+            thread.join()
+
+    def _read(self) -> None:
+        with contextlib.suppress(ConnectionClosed):
+            while True:
+                message = json.loads(self._connection.recv())
+                if message["type"] == "update":
+                    self._nonce = message["nonce"]
+                    self.shown |= message
+                elif message["type"] == "refused":
+                    self.refused.append(message)
+        self.is_connected = False
+
+    def _beat(self) -> None:
+        with contextlib.suppress(ConnectionClosed):
+            while self.is_connected:
+                with self._lock:
+                    if self._holds:
+                        self.say("beat", nonce=self._nonce)
+                time.sleep(0.05)

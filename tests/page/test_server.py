@@ -5,7 +5,10 @@ from __future__ import annotations
 import contextlib
 import itertools
 import json
+import shutil
 import socket
+import ssl
+import subprocess
 import threading
 import time
 from collections.abc import Iterator
@@ -15,7 +18,7 @@ from typing import Any
 import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
-from deploy.console.page import hold, protocol, server
+from deploy.console.page import address, hold, protocol, server
 from deploy.console.page.state import PageState, refuse
 from tests.page.clients import TOKEN, Arm, SleepyPage, close_code, end, message, update
 
@@ -296,6 +299,36 @@ def test_too_many_connections_are_closed(arm: Arm) -> None:
             break
         except (AssertionError, IndexError):
             assert time.monotonic() < deadline
+
+
+def test_page_over_tls(tmp_path: Path) -> None:
+    if shutil.which("openssl") is None:
+        pytest.skip("platform: no openssl to make a certificate with")
+    certificate, key = tmp_path / "certificate.pem", tmp_path / "key.pem"
+    subprocess.run(
+        [
+            *("openssl", "req", "-x509", "-nodes", "-newkey", "rsa:2048", "-days", "2", "-subj", "/CN=arm"),
+            *("-addext", "subjectAltName=IP:127.0.0.1", "-keyout", str(key), "-out", str(certificate)),
+        ],
+        check=True,
+        capture_output=True,
+    )
+    (tmp_path / "static").mkdir()
+    (tmp_path / "static" / "index.html").write_text("")
+    arm = Arm(tmp_path / "static", address.tls("127.0.0.1", str(certificate), str(key)))
+    try:
+        assert arm.request(f"GET / HTTP/1.1\r\nHost: {arm.host}\r\n\r\n".encode()) == b""
+        with arm.connect(ssl=ssl.create_default_context(cafile=certificate)) as page:
+            page.send(json.dumps({"type": "hello", "token": TOKEN}))
+            assert message(page)["type"] == "welcome"
+            assert update(page)["nonce"]
+        with (
+            pytest.raises(InvalidStatus),
+            arm.connect(ssl=ssl.create_default_context(cafile=certificate), origin=f"http://{arm.host}"),
+        ):
+            pass
+    finally:
+        arm.close()
 
 
 def test_nothing_is_left_when_the_server_closes(tmp_path: Path) -> None:

@@ -87,3 +87,24 @@ def test_a_pid_of_no_process_is_ignored(spawn: Spawn, tmp_path: Path) -> None:
     process = spawn(READY)
     process.wait()
     processes.end(tmp_path, [process.pid], grace=0.1)
+
+
+def test_signal_reaches_the_process_of_a_program(spawn: Spawn, tmp_path: Path) -> None:
+    process = spawn(**{processes.MARK: str(tmp_path)}, SUPERVISOR_PROCESS_NAME="velocity")
+
+    assert processes.send_signal(tmp_path, "velocity", process.pid, signal.SIGKILL)
+
+    assert process.wait() == -signal.SIGKILL
+
+
+def test_signal_reaches_no_other_process(spawn: Spawn, tmp_path: Path) -> None:
+    other_program = spawn(**{processes.MARK: str(tmp_path)}, SUPERVISOR_PROCESS_NAME="kinematics")
+    other_system = spawn(**{processes.MARK: str(tmp_path / "other")}, SUPERVISOR_PROCESS_NAME="velocity")
+    stranger = spawn(SUPERVISOR_PROCESS_NAME="velocity")
+    ended = spawn(READY, **{processes.MARK: str(tmp_path)}, SUPERVISOR_PROCESS_NAME="velocity")
+    ended.wait()
+
+    for pid in (other_program.pid, other_system.pid, stranger.pid, ended.pid, 0, -1, 1):
+        assert not processes.send_signal(tmp_path, "velocity", pid, signal.SIGKILL)
+
+    assert [each.poll() for each in (other_program, other_system, stranger)] == [None, None, None]

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import functools
 import re
 import socket
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
+
+import pytest
 
 from tests.system.sites import ROOT, Site
 
@@ -15,6 +19,7 @@ from .record import Record
 
 STEADY = str(ROOT / "tests" / "system" / "steady.yaml")
 LINK = "127.0.0.2"  # where a test may listen between page and server
+ATTEMPTS = 5
 GONE = 0.25 + 0.1  # s for which a beat on its way may count: the age of its nonce, and the way to the topic
 
 
@@ -62,13 +67,18 @@ def hold_with_engines_on(arm: Arm, hand: HandOnPage, *hands: Callable[[], None])
             return
 
 
-def undisturbed(hand: HandOnPage, attempt: Callable[[], None], up: Callable[[], None] | None = None) -> None:
-    """Make an attempt; anew if the page had to release because the machine stood still."""
-    for _ in range(5):
-        try:
-            return attempt()
-        except Exception:
-            if not hand.stalled:
-                raise
-            (up or hand.up)()
-    return attempt()
+def undisturbed(test: Callable[..., None]) -> Callable[..., None]:
+    """Begin a test of a ``hand`` anew if the page had to release because the machine stood still."""
+
+    @functools.wraps(test)
+    def attempts(hand: HandOnPage, **others: Any) -> None:
+        for _ in range(ATTEMPTS):
+            try:
+                return test(hand=hand, **others)
+            except Exception:
+                if not hand.stalled:
+                    raise
+            hand.begin_anew()
+        pytest.skip(f"platform: the machine stood still in each of {ATTEMPTS} attempts")
+
+    return attempts

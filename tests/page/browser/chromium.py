@@ -61,7 +61,7 @@ window.WebSocket = class extends WebSocket {
 DECIDED = "#hold[data-state=held], #hold[data-state=other_page], #hold-why:not(:empty)"
 """What the page has when a press has led to a hold or to a refusal."""
 
-STALLS = ("too busy", "word from the server", "too slow", "no beat")
+STALLS = ("too busy", "word from the server", "too slow", "too late")
 """Reasons for a release that a machine gives which stands still for 250 ms: no behaviour of the page."""
 
 
@@ -136,6 +136,14 @@ class HandOnPage:
         self.page.goto(url)
         self.await_live()
 
+    def begin_anew(self) -> None:
+        """Load the page again, with nothing pressed."""
+        for key in (" ", "Enter"):
+            self.page.keyboard.up(key)
+        self.up()
+        self.page.reload()
+        self.await_live()
+
     def await_live(self) -> None:
         """Wait until the page shows what the server says."""
         self.page.wait_for_selector("html[data-connection=live]", timeout=1000 * LIMIT)
@@ -182,7 +190,8 @@ class HandOnPage:
             self.page.wait_for_selector(DECIDED, state="attached", timeout=1000 * LIMIT)
             if self.state == "held":
                 return
-            assert self.stalled and time.monotonic() < deadline, f"not held: {self.why!r}"
+            assert self.stalled, f"not held: {self.why!r}"
+            assert time.monotonic() < deadline, "the machine stands still all the time"
             (up or self.up)()
 
     def await_drawing(self) -> None:

@@ -44,10 +44,10 @@ def own_browser(playwright: Any) -> Iterator[Any]:
 
 
 @pytest.fixture
-def hand(arm: Arm, browser: Any) -> Iterator[HandOnPage]:
-    """A hand in front of a page of its own."""
+def hand(arm: Arm, browser: Any, request: pytest.FixtureRequest) -> Iterator[HandOnPage]:
+    """A hand in front of a page of its own; as an indirect parameter a script that runs before the page's."""
     with closing(browser.new_context(has_touch=True)) as context:
-        yield HandOnPage(context, arm.url)
+        yield HandOnPage(context, arm.url, *([request.param] if hasattr(request, "param") else []))
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ import time
 
 
 class Link:
-    """Passes on bytes between the clients of an address and a server, and lets them wait when a test says so."""
+    """Passes on bytes between the clients of an address and a server, or lets them wait."""
 
     def __init__(self, address: str, server: tuple[str, int]) -> None:
         """Listen on an address, at the port of the server."""

@@ -106,14 +106,11 @@ class Record:
         It stops at ``off``, and when no ``on`` has come for ``topics.DRIVE_TIMEOUT``.
         """
 
-        def off() -> float | None:
-            return next(
-                (it.time for it in self.states if it.time > moment and it.engines == topics.OFF), None
-            )
+        def offs() -> list[float]:
+            return [it.time for it in self.states if it.time > moment and it.engines == topics.OFF]
 
-        self.until(off)
-        stopped = off()
-        assert stopped is not None
+        self.until(offs)
+        stopped = offs()[0]
         last_on = max(it.time for it in self.states if it.time < stopped and it.engines == topics.ON)
         return min(stopped, last_on + topics.DRIVE_TIMEOUT)
 

@@ -19,6 +19,7 @@ from .link import Link
 
 S1 = 10.5  # s
 HELD_UP = 2.0  # s
+LATE = 0.4  # s for which a page goes on: the server still talks to it
 
 
 def test_engines_stop_in_time_after_the_browser_is_killed(arm: Arm, own_browser: Any) -> None:
@@ -51,7 +52,7 @@ def test_suspended_browser_releases_and_resumes_released(arm: Arm, own_browser: 
     arm.record.silence_after(stopped + GONE, 3.0)
     hand.await_state("released")
     last = max(arm.record.beats)
-    print(f"browser suspended: last heartbeat after {last - stopped:.3f} s")
+    print(f"suspended: last heartbeat after {last - stopped:.3f} s")
     hand.up()
     hand.hold()
 
@@ -118,3 +119,18 @@ def test_queued_beats_count_for_nothing(arm: Arm, browser: Any, link: Link) -> N
         print(f"{queued} beats let loose after {HELD_UP} s, then {beats - queued} with new nonces")
         assert queued >= 10
         assert beats > queued
+
+
+def test_page_is_told_that_its_beats_came_too_late(arm: Arm, browser: Any, link: Link) -> None:
+    with closing(browser.new_context()) as context:
+        hand = HandOnPage(context, arm.url.replace("127.0.0.1", LINK))
+        hold_with_engines_on(arm, hand)
+        link.hold_up_page()
+        held_up = time.time()
+        time.sleep(LATE)
+        link.mend()
+        hand.await_state("released")
+        arm.record.silence_after(held_up + GONE)
+        assert hand.stalled, hand.why
+        hand.up()
+        hand.hold()

@@ -10,6 +10,7 @@ import pytest
 
 from deploy.supervision import manifest
 from interfaces import topics
+from tests.system.sites import LIMIT
 
 from .arm import LINK, Arm, hold_with_engines_on, undisturbed
 from .chromium import HandOnPage
@@ -18,6 +19,7 @@ from .link import Link
 WIDTHS = {320: 568, 390: 844, 1280: 800, 3840: 2160}
 CONTROLS = ("button", "slider", "spinbutton")
 NAMED = (*CONTROLS, "link", "textbox", "image", "table", "region")
+WAIT = 1000 * LIMIT  # ms
 TABS = 100  # more than the page has stops
 GREY = 0.5  # s
 SAMPLES = 5
@@ -38,7 +40,8 @@ window.WebSocket = class extends WebSocket {
     }
 };
 addEventListener("DOMContentLoaded", () => new MutationObserver(() => {
-    if (document.documentElement.dataset.connection === "lost") greyed.push([performance.now() - heard, late]);
+    const isLost = document.documentElement.dataset.connection === "lost";
+    if (isLost) greyed.push([performance.now() - heard, late]);
 }).observe(document.documentElement, { attributeFilter: ["data-connection"] }));
 """
 """Notes how long after the last message the page turned grey, and how late its timers were meanwhile [ms]."""
@@ -125,50 +128,51 @@ def test_address_without_its_token_shows_nothing(arm: Arm, browser: Any) -> None
         assert page.get_attribute("#engines", "data-state") == "unknown"
 
 
-def test_keyboard_alone_operates_everything(arm: Arm, hand: HandOnPage) -> None:
+@undisturbed
+def test_keyboard_alone_holds_and_turns_the_engines_on(arm: Arm, hand: HandOnPage) -> None:
     keyboard = hand.page.keyboard
-
-    def tab_to(selector: str) -> None:
-        for _ in range(TABS):
-            if hand.page.evaluate("it => document.activeElement.matches(it)", selector):
-                return
-            keyboard.press("Tab")
-        raise AssertionError(f"Tab does not lead to {selector}")
-
-    def attempt() -> None:
-        hand.page.evaluate("document.activeElement.blur()")
-        tab_to("#hold")
-        hand.hold(lambda: keyboard.down(" "), lambda: keyboard.up(" "))
-        begin = time.time()
-        arm.record.await_beats(begin, 12)  # the watchdog samples every 500 ms
-        tab_to("#turn-on")
-        keyboard.press("Enter")
-        hand.page.wait_for_selector("#engines[data-state=on]", timeout=5000)
-
-    undisturbed(hand, attempt, lambda: keyboard.up(" "))
+    tab_to(hand, "#hold")
+    hand.hold(lambda: keyboard.down(" "), lambda: keyboard.up(" "))
+    arm.record.await_beats(time.time(), 12)  # the watchdog samples every 500 ms
+    tab_to(hand, "#turn-on")
+    keyboard.press("Enter")
+    hand.page.wait_for_selector("#engines[data-state=on]", timeout=5000)
     assert arm.record.states[-1].engines == topics.ON
     keyboard.up(" ")
     hand.await_state("released")
     arm.record.silence_after(time.time())
+    assert not hand.stalled
 
-    tab_to("#set-theta1")
+
+def test_keyboard_alone_moves_the_arm_and_kills_a_process(arm: Arm, hand: HandOnPage) -> None:
+    keyboard = hand.page.keyboard
+    tab_to(hand, "#set-theta1")
     for _ in range(10):
         keyboard.press("ArrowRight")
-    hand.page.wait_for_selector("#source-theta1[data-source=hand]", timeout=5000)
-    tab_to("#follow-scenario")
+    hand.page.wait_for_selector("#source-theta1[data-source=hand]", timeout=WAIT)
+    tab_to(hand, "#follow-scenario")
     keyboard.press("Enter")
-    hand.page.wait_for_selector("#source-theta1[data-source=scenario]", timeout=5000)
+    hand.page.wait_for_selector("#source-theta1[data-source=scenario]", timeout=WAIT)
 
     killed = arm.site.members["kinematics"]
-    tab_to("tr[data-process=kinematics] [data-action=kill]")
+    tab_to(hand, "tr[data-process=kinematics] [data-action=kill]")
     keyboard.press("Enter")  # too short
-    hand.page.wait_for_selector("#process-note:not([hidden])", timeout=5000)
+    hand.page.wait_for_selector("#process-note:not([hidden])", timeout=WAIT)
     assert arm.site.members["kinematics"] == killed
     keyboard.down("Enter")
     arm.site.await_members(lambda members: members.get("kinematics", killed) != killed)
     keyboard.up("Enter")
-    hand.page.wait_for_selector("tr[data-process=kinematics][data-back=yes]", timeout=10_000)
+    hand.page.wait_for_selector("tr[data-process=kinematics][data-back=yes]", timeout=WAIT)
     assert hand.errors == []
+
+
+def tab_to(hand: HandOnPage, selector: str) -> None:
+    """Press Tab until an element has the focus."""
+    for _ in range(TABS):
+        if hand.page.evaluate("it => document.activeElement.matches(it)", selector):
+            return
+        hand.page.keyboard.press("Tab")
+    raise AssertionError(f"Tab does not lead to {selector}")
 
 
 def test_page_turns_grey_within_500_ms(arm: Arm, browser: Any, link: Link) -> None:

@@ -1,0 +1,42 @@
+"""WEB: the environment variable that moves the page, or switches it off."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from deploy.commands import parameters
+from deploy.supervision.system import KEY, NAMESPACE, DeploymentError
+
+
+def port_of(web: str, namespace: str = "", user_file: str = "") -> Any:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("WEB", web)
+        patch.setenv(NAMESPACE, namespace)
+        given = parameters.of_system("demo", user_file)
+    return given.get(f"{namespace}/operator_console", {}).get(KEY)
+
+
+@pytest.mark.parametrize(
+    ("web", "expected"),
+    [("", None), ("off", {"port": 0}), ("8000", {"port": 8000}), ("65535", {"port": 65535})],
+)
+def test_web_sets_the_port(web: str, expected: object) -> None:
+    assert port_of(web) == expected
+    assert port_of(web, "/arm1") == expected
+
+
+@pytest.mark.parametrize("web", ["on", "0", "65536", "-1", "8000 ", "80.0", "localhost:80", "²"])
+def test_other_values_are_an_error(web: str) -> None:
+    with pytest.raises(DeploymentError, match=r"^WEB=.* is neither off nor a port from 1 to 65535$"):
+        port_of(web)
+
+
+def test_web_wins_over_the_parameter_file(tmp_path: Path) -> None:
+    file = tmp_path / "parameters.yaml"
+    file.write_text("operator_console: {ros__parameters: {port: 9000, names: arm.example}}")
+
+    assert port_of("", user_file=str(file)) == {"port": 9000, "names": "arm.example"}
+    assert port_of("8000", user_file=str(file)) == {"port": 8000, "names": "arm.example"}
