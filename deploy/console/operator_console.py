@@ -166,6 +166,7 @@ def serve(
         receive=receive,
         newest=newest,
         clock=clock,
+        fail=node.fail,
         tls=tls,
     )
     node.context.on_shutdown(pages.close)

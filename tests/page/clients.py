@@ -34,6 +34,7 @@ class Arm:
     def __init__(self, files: Path, tls: ssl.SSLContext | None = None) -> None:
         scheme = "https" if tls else "http"
         self.received: queue.SimpleQueue[server.Event] = queue.SimpleQueue()
+        self.failures: list[Exception] = []
         self.state = PageState()
         listener = socket.create_server(("127.0.0.1", 0))
         self.port = listener.getsockname()[1]
@@ -46,11 +47,14 @@ class Arm:
             receive=self.received.put,
             newest=lambda: self.state,
             clock=Clock(hold.monotonic, lambda stamp: 0.0, lambda: 1.25),
+            fail=self.failures.append,
             tls=tls,
         )
 
     def close(self) -> None:
         self._server.close()
+        for failure in self.failures:
+            raise failure
 
     def next(self, kind: type | None = None, seconds: float = 5.0) -> Any:
         """The next event, or the next event of a kind."""
@@ -81,8 +85,7 @@ class Arm:
 
     def connect(self, **options: Any) -> ClientConnection:
         options = {"origin": self.origin, "compression": None, "open_timeout": 5.0} | options
-        scheme = "wss" if "ssl" in options else "ws"
-        return connect(f"{scheme}://{self.host}/socket", **options)
+        return connect(f"ws://{self.host}/socket", **options)
 
     @contextlib.contextmanager
     def page(self) -> Iterator[ClientConnection]:
@@ -124,14 +127,19 @@ def end(page: ClientConnection) -> ConnectionClosed:
 class SleepyPage:
     """A page that reads, and answers pings, only when it is told to."""
 
-    def __init__(self, arm: Arm) -> None:
+    def __init__(self, arm: Arm, tls: ssl.SSLContext | None = None) -> None:
         self._socket = socket.create_connection(("127.0.0.1", arm.port), timeout=0.2)
+        if tls is not None:
+            self._socket = tls.wrap_socket(self._socket, server_hostname="127.0.0.1")
         self._protocol = ClientProtocol(parse_uri(f"ws://{arm.host}/socket"), origin=Origin(arm.origin))
         self._protocol.send_request(self._protocol.connect())
         self._send()
         while self._protocol.state is not State.OPEN:
             self._protocol.receive_data(self._socket.recv(65536))
             self._protocol.events_received()
+            if self._protocol.handshake_exc:
+                self._socket.close()
+                raise self._protocol.handshake_exc
         self._protocol.send_text(json.dumps({"type": "hello", "token": TOKEN}).encode())
         self._send()
 

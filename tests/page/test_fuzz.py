@@ -20,7 +20,7 @@ from pathlib import Path
 import pytest
 from websockets.exceptions import ConnectionClosed
 
-from deploy.console.page import hold, server
+from deploy.console.page import connection, hold, server
 from tests.page.clients import TOKEN, Arm
 from tests.page.noise import noise
 
@@ -148,7 +148,7 @@ def test_random_messages_of_a_page_move_nothing(arm: Arm) -> None:
 
 def assert_calm(arm: Arm, blocks: int) -> None:
     """The server still serves, and has no more threads and memory than before."""
-    deadline = time.monotonic() + server.REQUEST_TIMEOUT + 3.0
+    deadline = time.monotonic() + connection.REQUEST_TIMEOUT + 3.0
     while sum(thread.name == "page" for thread in threading.enumerate()) > 1:
         assert time.monotonic() < deadline, f"FUZZ_SEED={SEED}: threads stay"
         time.sleep(0.05)

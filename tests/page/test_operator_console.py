@@ -17,6 +17,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
 from deploy.console import operator_console
+from deploy.console.page import remote
 from deploy.supervision.system import PAGE_FILE
 from interfaces import topics
 from interfaces.service import ServiceNode
@@ -256,6 +257,7 @@ def test_switch_that_is_not_there_is_taken_when_it_comes_back(
         world.switch.destroy_node()
         page.press()
         world.until(lambda: page.shown["switch"]["by"] == "this_page")
+        world.for_seconds(remote.TIMEOUT + 0.5)
         world.switch = World._service(make_node, "dead_mans_switch", dead_mans_switch.wire, pressed=True)
         world.until(lambda: world.switch.get_parameter("pressed").value is False)
 

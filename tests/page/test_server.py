@@ -18,7 +18,7 @@ from typing import Any
 import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
-from deploy.console.page import address, hold, protocol, server
+from deploy.console.page import address, connection, hold, protocol, server
 from deploy.console.page.state import PageState, refuse
 from tests.page.clients import TOKEN, Arm, SleepyPage, close_code, end, message, update
 
@@ -136,7 +136,7 @@ def test_connection_without_hello_is_closed(arm: Arm) -> None:
     with arm.connect() as page:
         begin = time.monotonic()
         assert close_code(page) == 4408
-        assert time.monotonic() - begin < server.HELLO_TIMEOUT + 1.0
+        assert time.monotonic() - begin < connection.HELLO_TIMEOUT + 1.0
     assert arm.next(server.Violation)
 
 
@@ -285,6 +285,47 @@ def test_too_many_pages_are_refused(arm: Arm) -> None:
         assert arm.next(server.Violation).reason == "too many pages are open"
 
 
+def test_pages_that_have_left_make_room(arm: Arm) -> None:
+    for _ in range(2 * server.MAX_PAGES):
+        with arm.page() as page:
+            update(page)
+        assert arm.next(server.Closed)
+
+
+@pytest.mark.parametrize(
+    "raw",
+    [
+        b"\x00\xff\r\n\r\n",
+        b"GET /\r\n\r\n",
+        b"GET / HTTP/1.1\r\nno colon\r\n\r\n",
+        b"GET / HTTP/1.1\r\nX: " + 9000 * b"y" + b"\r\n\r\n",
+        b"GET / HTTP/1.1\r\n" + 200 * b"X: y\r\n" + b"\r\n",
+        b"GET / HTTP/1.1\r\nContent-Length: 5\r\n\r\nhello",
+    ],
+)
+def test_malformed_request_is_counted(arm: Arm, raw: bytes) -> None:
+    assert not arm.request(raw).startswith(b"HTTP/1.1 200")
+    assert arm.next() == server.Violation("a request is not valid HTTP or no WebSocket")
+
+
+def test_client_that_does_not_wait_for_its_response_is_closed(arm: Arm) -> None:
+    request = (
+        f"GET /socket HTTP/1.1\r\nHost: {arm.host}\r\nOrigin: {arm.origin}\r\n"
+        "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
+        f"Sec-WebSocket-Key: {22 * 'A'}==\r\n\r\n"
+    )
+    for early in (b"\x88\x80\0\0\0\0", b"\x89\x80\0\0\0\0", b"\xff\xff"):
+        assert arm.request(request.encode() + early) == b""
+        assert "does not wait" in arm.next(server.Violation).reason
+
+
+def test_connection_that_is_not_used_is_not_counted(arm: Arm) -> None:
+    with socket.create_connection(("127.0.0.1", arm.port)):
+        pass
+    assert arm.get("/")[0] == 200
+    assert arm.received.empty()
+
+
 def test_too_many_connections_are_closed(arm: Arm) -> None:
     with contextlib.ExitStack() as stack:
         for _ in range(server.MAX_CONNECTIONS):
@@ -317,16 +358,14 @@ def test_page_over_tls(tmp_path: Path) -> None:
     (tmp_path / "static" / "index.html").write_text("")
     arm = Arm(tmp_path / "static", address.tls("127.0.0.1", str(certificate), str(key)))
     try:
-        assert arm.request(f"GET / HTTP/1.1\r\nHost: {arm.host}\r\n\r\n".encode()) == b""
-        with arm.connect(ssl=ssl.create_default_context(cafile=certificate)) as page:
-            page.send(json.dumps({"type": "hello", "token": TOKEN}))
-            assert message(page)["type"] == "welcome"
-            assert update(page)["nonce"]
-        with (
-            pytest.raises(InvalidStatus),
-            arm.connect(ssl=ssl.create_default_context(cafile=certificate), origin=f"http://{arm.host}"),
-        ):
-            pass
+        assert arm.request(f"GET / HTTP/1.1\r\nHost: {arm.host}\r\n\r\n".encode()) == b"", "not over TLS"
+        context = ssl.create_default_context(cafile=certificate)
+        with contextlib.closing(SleepyPage(arm, context)) as page:
+            messages = page.wake(0.5)
+        assert [message["type"] for message in messages[:2]] == ["welcome", "update"]
+        arm.origin = f"http://{arm.host}"
+        with pytest.raises(InvalidStatus):
+            SleepyPage(arm, context)
     finally:
         arm.close()
 

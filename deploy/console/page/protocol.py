@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Collection, Mapping
-from typing import Any, NamedTuple, NoReturn
+from typing import Any, NamedTuple
 
 from deploy.supervision import manifest
 from interfaces.service.parameters import declarations
@@ -97,7 +97,7 @@ def parse(text: str | bytes) -> Message:
     if len(text) > MAX_SIZE:
         raise ProtocolError("a message is too long")
     try:
-        fields = json.loads(text, object_pairs_hook=_object, parse_constant=_refuse)
+        fields = json.loads(text, object_pairs_hook=_object)
     except (ValueError, RecursionError):
         raise ProtocolError("a message is not valid JSON") from None
     kind = fields.pop("type", None) if isinstance(fields, dict) else None
@@ -111,7 +111,7 @@ def parse(text: str | bytes) -> Message:
             raise ProtocolError(f"{kind} has a wrong {name}")
     if message is Set:
         least, greatest = LIMITS[fields["name"]]
-        if not least <= fields["value"] <= greatest:
+        if not least <= fields["value"] <= greatest:  # nor a NaN, which json accepts
             raise ProtocolError(f"{kind} has a value out of range")
         return Set(fields["name"], float(fields["value"]))
     return message(**fields)
@@ -122,10 +122,6 @@ def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     if len(fields) != len(pairs):
         raise ValueError("a key stands twice")
     return fields
-
-
-def _refuse(constant: str) -> NoReturn:
-    raise ValueError(f"{constant} is not JSON")
 
 
 def _is_word(value: object) -> bool:
