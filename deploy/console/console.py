@@ -25,7 +25,7 @@ PERIOD = 0.2  # s between two batches of lines
 BACKLOG = 50  # messages of a topic that wait for the next batch
 
 HELP = """\
-Type press or release (the operator's switch), turn_on or turn_off (the engines), or quit, and Enter.
+Commands: press, release (the operator's switch), turn_on, turn_off (the engines), quit.
 Lines that come too fast to be read are thinned to one a second of each kind."""
 
 

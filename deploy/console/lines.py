@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from datetime import UTC, datetime
 from enum import IntEnum, auto
 from typing import Any, NamedTuple
@@ -18,9 +18,10 @@ Seen = Callable[[topics.Topic], Observable[Timestamp[Any]]]
 Span = tuple[datetime, datetime]
 """The times just before and just after a command was published."""
 
-BURST = 6  # lines of a kind in a row, before there is one a second
+BURST = 6  # lines of a kind in a row before they are thinned
 SIGNAL_BURST = 12  # Listing 5.9 has 11 signals
-NEVER = (datetime.max.replace(tzinfo=UTC), datetime.min.replace(tzinfo=UTC))
+FIRST, LAST = datetime.min.replace(tzinfo=UTC), datetime.max.replace(tzinfo=UTC)
+NEVER = (LAST, FIRST)
 TURNING_OFF = "Turning off engines..."
 
 
@@ -55,6 +56,15 @@ class Batch(NamedTuple):
     lines: list[Line]
 
 
+class Complaints(NamedTuple):
+    """What services complain about."""
+
+    known: dict[str, str]
+    """By the name of the service; empty if it does not complain."""
+    new: Timestamp[str]
+    """What was new in the latest message of ``/diagnostics``."""
+
+
 def line_batches(
     seen: Seen, own_turn_offs: Observable[Span], ticks: Observable[Any], namespace: str = "/"
 ) -> Observable[list[Line]]:
@@ -74,11 +84,11 @@ def measurements(seen: Seen) -> Observable[Line]:
     """New configurations, positions and speeds."""
     configuration = rx.combine_latest(*(seen(topic) for topic in topics.CONFIGURATION.values())).map(_joined)
     return rx.merge(
-        thinned(configuration).map(_line(Kind.DATA, lambda m: f"### Received new data: {{{_numbers(m)}}}")),
+        thinned(configuration).map(_line(Kind.DATA, lambda it: f"### Received new data: {{{_numbers(it)}}}")),
         thinned(seen(topics.EFFECTOR_POSITION)).map(
-            _line(Kind.POSITION, lambda m: f"Position x: {m.point.x:g} and y: {m.point.y:g}")
+            _line(Kind.POSITION, lambda it: f"Position x: {it.point.x:g} and y: {it.point.y:g}")
         ),
-        thinned(seen(topics.EFFECTOR_SPEED)).map(_line(Kind.SPEED, lambda m: f"Speed: {m.data:g} [m/s]")),
+        thinned(seen(topics.EFFECTOR_SPEED)).map(_line(Kind.SPEED, lambda it: f"Speed: {it.data:g} [m/s]")),
     )
 
 
@@ -95,7 +105,6 @@ def operator(seen: Seen) -> Observable[Line]:
         alive.map(_line(Kind.ALIVE, "Operator is alive")),
         missed.map(_line(Kind.MISSED, "Not received signal from operator...")),
         asleep.map(_line(Kind.ASLEEP, "Operator is sleeping !!!")),
-        asleep.map(_line(Kind.ENGINES, TURNING_OFF)),
     )
 
 
@@ -114,30 +123,23 @@ def engines(seen: Seen, own_turn_offs: Observable[Span]) -> Observable[Line]:
             _line(Kind.OTHERS_TURN_OFF, "Turning off engines, as another node asked...")
         ),
         thinned(seen(topics.ENGINES_STATE).distinct_until_changed(_data)).map(
-            _line(Kind.ENGINES, lambda state: f"Engines are {state.data}")
+            _line(Kind.ENGINES, lambda it: f"Engines are {it.data}")
         ),
     )
 
 
 def services(seen: Seen, namespace: str) -> Observable[Line]:
     """The complaints of services, each when it is new."""
-    prefix = namespace.rstrip("/") + "/"
 
-    def complaints(diagnostics: Timestamp[Any]) -> Observable[Timestamp[tuple[str, str]]]:
-        return rx.from_iterable(
-            Timestamp((status.name.removeprefix(prefix), _complaint(status)), diagnostics.timestamp)
-            for status in diagnostics.value.status
-            if status.name.startswith(prefix) and "/" not in status.name.removeprefix(prefix)
-        )
+    def compare(before: Complaints, diagnostics: Timestamp[Any]) -> Complaints:
+        now = dict(_complaints(diagnostics.value, namespace.rstrip("/")))
+        new = [f"{name}: {now[name]}" for name in now if now[name] and now[name] != before.known.get(name)]
+        return Complaints(before.known | now, Timestamp("; ".join(new), diagnostics.timestamp))
 
-    new = (
-        seen(topics.DIAGNOSTICS)
-        .flat_map(complaints)
-        .group_by(lambda item: item.value[0])
-        .flat_map(lambda of_one_service: of_one_service.distinct_until_changed(lambda item: item.value))
-        .filter(lambda item: item.value[1])
+    complaints = (
+        seen(topics.DIAGNOSTICS).scan(compare, Complaints({}, Timestamp("", FIRST))).map(lambda it: it.new)
     )
-    return thinned(new).map(_line(Kind.SERVICE, lambda value: ": ".join(value)))
+    return thinned(complaints.filter(lambda it: it.value)).map(_line(Kind.SERVICE, str))
 
 
 def thinned(items: Observable[Timestamp[Any]], burst: int = BURST) -> Observable[Timestamp[Any]]:
@@ -170,20 +172,22 @@ class Allowance:
 
 
 def next_batch(previous: Batch, lines: list[Line]) -> Batch:
-    """Sort lines, and drop the commands that the operator watchdog repeats while the operator sleeps."""
+    """Sort lines, and show one command of the operator watchdog for each sleep of the operator."""
     is_asleep = previous.is_asleep
     shown = []
     for line in sorted(lines):
-        if line.kind in (Kind.ALIVE, Kind.MISSED):
-            is_asleep = False
-        elif line.kind is Kind.ASLEEP:
-            is_asleep = True
-        elif line.kind is Kind.OTHERS_TURN_OFF:
-            if is_asleep:
-                continue
-            if is_asleep is None:  # the watchdog may have concluded that before this terminal was there
-                line, is_asleep = line._replace(text=TURNING_OFF), True
+        match line.kind:
+            case Kind.ALIVE | Kind.MISSED:
+                is_asleep = False
+            case Kind.ASLEEP:
+                is_asleep = True
+            case Kind.OTHERS_TURN_OFF if is_asleep:
+                continue  # the watchdog repeats its command
+            case Kind.OTHERS_TURN_OFF if is_asleep is None:  # it may do so since before this terminal began
+                is_asleep, line = True, line._replace(text=TURNING_OFF)
         shown.append(line)
+        if line.kind is Kind.ASLEEP:
+            shown.append(Line(line.time, Kind.ENGINES, TURNING_OFF))
     return Batch(is_asleep, shown)
 
 
@@ -218,5 +222,8 @@ def _first(command: tuple[Timestamp[Any], Span]) -> Timestamp[Any]:
     return command[0]
 
 
-def _complaint(status: Any) -> str:
-    return "" if status.level == type(status).OK else status.message
+def _complaints(diagnostics: Any, namespace: str) -> Iterator[tuple[str, str]]:
+    for status in diagnostics.status:
+        path, _, service = status.name.rpartition("/")
+        if path == namespace:
+            yield service, "" if status.level == type(status).OK else status.message

@@ -22,7 +22,7 @@ from prompt_toolkit.shortcuts import CompleteStyle
 
 from deploy.console.output import say
 
-CLOSE_LIMIT = 1.0  # s that the prompt has to vanish; it hangs where the terminal takes no output
+CLOSE_LIMIT = 0.5  # s that the prompt has to vanish; it hangs where the terminal takes no output
 STOP_TIME = 0.1  # s within which a stop signal takes effect on all threads
 
 
@@ -35,16 +35,16 @@ class Prompt:
 
     def __init__(self, words: Sequence[str]) -> None:
         """Show the prompt, which completes the words."""
-        # Asking the terminal for its cursor's position doubles the cost of a line; only menus need it.
+        # Only menus need the cursor's position; to ask the terminal for it doubles the cost of a line.
         os.environ["PROMPT_TOOLKIT_NO_CPR"] = "1"
         self._modes = termios.tcgetattr(0)
         self._typed: queue.SimpleQueue[str | None] = queue.SimpleQueue()
-        self._is_shown = threading.Event()
+        self._is_ready = threading.Event()
         self._loop = asyncio.new_event_loop()
         self._asking = self._loop.create_task(self._ask(words))
         self._thread = threading.Thread(target=self._run, name="prompt", daemon=True)
         self._thread.start()
-        self._is_shown.wait()
+        self._is_ready.wait()
 
     def show(self, lines: Iterable[str]) -> None:
         """Print lines above the prompt; drop them if the terminal has no room."""
@@ -75,7 +75,7 @@ class Prompt:
             with suppress(asyncio.CancelledError):
                 self._loop.run_until_complete(self._asking)
         finally:
-            self._is_shown.set()
+            self._is_ready.set()
             self._loop.close()
 
     async def _ask(self, words: Sequence[str]) -> None:
@@ -91,7 +91,7 @@ class Prompt:
             input=keyboard,
         )
         with patch_stdout(), keyboard.raw_mode():
-            self._is_shown.set()
+            self._is_ready.set()
             while True:
                 try:
                     self._typed.put(await session.prompt_async(set_exception_handler=False))

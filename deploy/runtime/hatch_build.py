@@ -13,7 +13,7 @@ from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 
 class StubsHook(BuildHookInterface[Any]):
-    """Adds ``<package>/msg/__init__.pyi`` and ``…/srv/__init__.pyi``; writes nothing into the source tree."""
+    """Adds ``<package>/<msg, srv or action>/__init__.pyi``; writes nothing into the source tree."""
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
         """Generate the stubs in a process that imports this source tree, not an installed runtime."""

@@ -6,6 +6,7 @@ import time
 from dataclasses import dataclass
 from typing import TypeVar
 
+import reactivex as rx
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.parameter import Parameter
 from reactivex import Observable
@@ -59,5 +60,7 @@ class Origin:
 
     def delay_subscription(self, items: Observable[T]) -> Observable[T]:
         """Subscribe to an observable when the scenario begins, at once if it has begun."""
+        # Not RxPY's operator of this name: it schedules each item anew, which doubles the cost of a source.
         known = self._epochs.filter(lambda epoch: epoch >= 0.0).take(1)
-        return known.flat_map(lambda _: items.delay_subscription(max(0.0, -self.elapsed())))
+        begun = known.flat_map(lambda _: rx.timer(max(0.0, -self.elapsed())))
+        return begun.flat_map(lambda _: items)

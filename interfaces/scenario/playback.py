@@ -49,7 +49,7 @@ def _samples(sweep: Sweep, elapsed: float) -> Observable[float]:
 
     def begin(scheduler: abc.SchedulerBase) -> Observable[float]:
         origin = scheduler.now - timedelta(seconds=elapsed)
-        ticks = rx.timer(0.0, 1.0 / sweep.rate)
+        ticks = rx.interval(1.0 / sweep.rate).start_with(0)
         values = ticks.map(lambda _: sweep.at((scheduler.now - origin).total_seconds()))
         return values.distinct_until_changed()
 

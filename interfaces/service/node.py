@@ -89,7 +89,9 @@ class ServiceNode(ReactiveNode):
             items = self.create_observable(topic.type, topic.name, topic.qos, timestamped=True)
 
         def is_good(item: Timestamp[Any]) -> bool:
-            return self._is_good(topic, item.value) and self._is_fresh(topic, item.timestamp, max_age)
+            return self._is_good(topic, item.value) and (
+                max_age is None or self._is_fresh(topic, item.timestamp, max_age)
+            )
 
         good = items.filter(is_good)
         return good if timestamped else good.map(lambda item: item.value)
@@ -141,14 +143,18 @@ class ServiceNode(ReactiveNode):
         :param message: makes a message of an item.
         """
 
-        def accept(item: Any) -> bool:
+        def good_message(item: Any) -> Any | None:
             if isinstance(item, Rejected):
                 self.health.drop(item.topic.name, item.reason)
-            return not isinstance(item, Rejected)
+                return None
+            result = message(item)
+            if not self._is_good(topic, result):
+                return None
+            self.health.count_output()
+            return result
 
-        good = items.filter(accept).map(message).filter(lambda message: self._is_good(topic, message))
-        counted = good.do_action(lambda _: self.health.count_output())
-        self.publish_observable(counted, topic.type, topic.name, topic.qos)
+        messages = items.map(good_message).filter(lambda message: message is not None)
+        self.publish_observable(messages, topic.type, topic.name, topic.qos)
 
     def age(self, stamp: datetime) -> float:
         """
@@ -169,9 +175,7 @@ class ServiceNode(ReactiveNode):
             self.health.drop(topic.name, problem)
         return not problem
 
-    def _is_fresh(self, topic: Topic, stamp: datetime, max_age: float | None) -> bool:
-        if max_age is None:
-            return True
+    def _is_fresh(self, topic: Topic, stamp: datetime, max_age: float) -> bool:
         age = self.age(stamp)
         if abs(age) > max_age:
             problem = f"it is {age:.3f} s old" if age > 0 else f"its clock is {-age:.3f} s ahead of ours"

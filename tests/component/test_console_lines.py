@@ -131,6 +131,10 @@ def test_operator_who_returned_can_fall_asleep_again(play: Play) -> None:
     assert texts(shown) == [*ASLEEP, "Operator is alive", *ASLEEP]
 
 
+def test_every_sleep_of_an_operator_is_shown(play: Play) -> None:
+    assert texts(play(activity(topics.INCAPACITATED, *range(10, 50, 5)))) == ASLEEP * 8
+
+
 def test_turn_off_of_another_node_is_attributed_to_it(play: Play) -> None:
     script = (
         activity(topics.ALIVE, 1, 1.5, 2) + commands(topics.TURN_ON, 1.2) + commands(topics.TURN_OFF, 1.7)

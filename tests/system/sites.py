@@ -265,7 +265,11 @@ class Peer:
         deadline = time.monotonic() + seconds
         while not condition():
             assert time.monotonic() < deadline, f"not within {seconds} s"
-            self._executor.spin_once(timeout_sec=0.1)
+            self.spin_once(0.1)
+
+    def spin_once(self, seconds: float) -> None:
+        """Run the next callback, if there is one within a time."""
+        self._executor.spin_once(timeout_sec=seconds)
 
     def close(self) -> None:
         """Leave the domain."""

@@ -19,6 +19,7 @@ from reactivex import Observable
 MAX_NONCE_AGE = 0.25  # s; also the longest gap between two beats
 OTHER_PAGE = "another page holds the switch"
 TOO_LATE = "the connection is too slow to hold the switch"
+ENDED = "a beat came too late, or the terminal has released the switch"
 
 
 class Press(NamedTuple):
@@ -59,6 +60,8 @@ class Hold(NamedTuple):
     """Whether the event is the press that this hold begins with."""
     refused: tuple[str, str] | None = None
     """The page whose press does not count, and why."""
+    ended: str = ""
+    """The page that beats although it does not hold the switch any more."""
 
     def holder(self, now: float, max_age: float = MAX_NONCE_AGE) -> str:
         """Return the page that holds the switch at a time [s]; empty after a gap in its beats."""
@@ -85,8 +88,8 @@ def step(hold: Hold, event: Event, now: float, max_age: float = MAX_NONCE_AGE) -
             return Hold(page, now, alive=True, pressed=not holder)
         case Beat(page, sent):
             if not holder or page != holder:
-                return kept
-            return Hold(page, now, alive=True) if now - sent <= max_age else Hold()
+                return kept._replace(ended=page)
+            return Hold(page, now, alive=True) if now - sent <= max_age else Hold(ended=page)
         case Release(page):
             return Hold() if page in ("", holder) else kept
 

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import reactivex as rx
 from reactivex import Observable
 
-from deploy.console.page.hold import Hold
+from deploy.console.page.hold import ENDED, Hold
 from deploy.supervision import manifest
 from interfaces import topics
 from interfaces.service.health import healths
@@ -27,6 +27,7 @@ ECHO = 0.15  # s after a beat of a page for which a heartbeat on the topic is ta
 TOGETHER = 1.0  # s within which a command or a conclusion explains that the engines are off
 RENEWED = 0.5  # s: the drive's 0.4 s and the way of the message
 SAMPLE_PERIOD = 1 / 30  # s between two samples of the trace
+BEAT = "beat"  # the request of a page that is held
 MAX_SAMPLES, MAX_LINES, MAX_REFUSALS = 90, 200, 20  # that are kept for a page that is slow
 
 BY_WATCHDOG = "turned off by the operator watchdog: operator incapacitated"
@@ -319,6 +320,8 @@ def held(hold: Hold) -> Change:
 
     def change(state: PageState) -> PageState:
         state = state._replace(hold=hold)
+        if hold.ended:
+            return refuse(hold.ended, BEAT, ENDED)(state)
         return refuse(hold.refused[0], "press", hold.refused[1])(state) if hold.refused else state
 
     return change

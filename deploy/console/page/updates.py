@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from deploy.console.page.state import PROGRAMS, RENEWED, Clock, PageState, Program
+from deploy.console.page.state import BEAT, PROGRAMS, RENEWED, Clock, PageState, Program
 from deploy.supervision import sentinel
 from interfaces import topics
 from interfaces.topics import ON
@@ -102,11 +102,13 @@ class Updates:
         return {"type": "update", "nonce": nonce, "time": round(self._clock.elapsed(), 3), **changes}
 
     def refusals(self, state: PageState) -> list[dict[str, str]]:
-        """Return the new refusals of requests of the page."""
+        """Return the new refusals of requests of the page, and once that its hold has ended."""
         new, self._refusals = state.refusal_count - self._refusals, state.refusal_count
         latest = state.refusals[-new:] if new else ()
+        ours = dict.fromkeys((request, reason) for page, request, reason in latest if page == self._page)
         return [
-            {"type": "refused", "request": request, "why": reason}
-            for page, request, reason in latest
-            if page == self._page
+            {"type": "released", "why": reason}
+            if request == BEAT
+            else {"type": "refused", "request": request, "why": reason}
+            for request, reason in ours
         ]

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 from types import TracebackType
+from typing import Generic, TypeVar
+
+_Entity = TypeVar("_Entity")
 
 
 class Handle:
@@ -23,3 +26,14 @@ class Handle:
         exc_tb: TracebackType | None,
     ) -> None:
         """Do nothing."""
+
+
+class EntityHandle(Handle, Generic[_Entity]):
+    """A handle with which waitables add an entity to a wait set."""
+
+    def __init__(self, entity: _Entity) -> None:
+        self._entity = entity
+
+
+def ignore_change() -> None:
+    """Do nothing: no executor waits for the timer or guard condition that has changed."""

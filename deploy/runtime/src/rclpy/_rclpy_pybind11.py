@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NoReturn
+from typing import Any
 
 from rclpy import service_introspection
 from rclpy.clock_type import ClockType
@@ -35,8 +35,29 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> NoReturn:
-    """:raises NotImplementedError: for all other names of the extension."""
+def __getattr__(name: str) -> Any:
+    """
+    Return what few programs need: enumerations, and guard conditions for waitables.
+
+    :raises NotImplementedError: for all other names of the extension.
+    """
     if name.startswith("__"):
         raise AttributeError(name)
+    if name == "GuardCondition":
+        return _guard_condition
+    if name == "GoalEvent":
+        from rclpy.action.server import GoalEvent
+
+        return GoalEvent
+    if name == "TransitionCallbackReturnType":
+        from rclpy.lifecycle import TransitionCallbackReturn
+
+        return TransitionCallbackReturn
     raise NotImplementedError(f"rclpy._rclpy_pybind11.{name}: this runtime has no C extension")
+
+
+def _guard_condition(context: object) -> Any:
+    """Create a guard condition, given the handle of its context."""
+    from rclpy.guard_condition import GuardCondition
+
+    return GuardCondition(callback=None, callback_group=None).handle

@@ -130,9 +130,13 @@ class Client(ServiceSide):
             )
             with self._lock:
                 future = self._pending_requests.get(number)
-            if future is not None:  # else the request was removed
+            if future is not None:
                 return future, response
+            self._ignore_reply()
         return None
+
+    def _ignore_reply(self) -> None:
+        """Do nothing for a reply to a request that was removed, or that another server has answered."""
 
     def _execute(self, taken: tuple[Future, Any]) -> None:
         future, response = taken

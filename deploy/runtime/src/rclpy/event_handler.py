@@ -7,7 +7,6 @@ import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
-from types import TracebackType
 from typing import Any
 
 from rclpy import logging
@@ -176,22 +175,32 @@ class EventHandler(Waitable):
         self._status, self._make_info = events[event_type]
         self._parent = parent_impl
         self._destroyed = False
+        self._index = 0
 
     def destroy(self) -> None:
         """Stop calling back."""
         self._destroyed = True
 
-    def __enter__(self) -> None:
-        """Do nothing, as handles."""
-
-    def __exit__(
-        self, t: type[BaseException] | None, v: BaseException | None, tb: TracebackType | None
-    ) -> None:
-        """Do nothing."""
-
     def get_num_entities(self) -> NumberOfEntities:
         """Return one event."""
         return NumberOfEntities(num_events=1)
+
+    def add_to_wait_set(self, wait_set: Any) -> None:
+        """Add the DDS entity; executors do without for the handlers of publishers and subscriptions."""
+        if self._status != _NO_STATUS:
+            status.watch_also(self._parent.handle, self._status)
+        self._index = wait_set._add("event", self._parent.handle)
+
+    def is_ready(self, wait_set: Any) -> bool:
+        """Return whether the DDS entity has any event."""
+        return bool(wait_set.is_ready("event", self._index))
+
+    async def execute(self, taken_data: Any) -> None:
+        """Call back, unless the event is of another type."""
+        if taken_data is not None:
+            result = self.callback(taken_data)
+            if inspect.iscoroutine(result):
+                await result
 
     def take_data(self) -> Any:
         """Return the changes since the last call, ``None`` without any."""

@@ -30,9 +30,11 @@ from rclpy.task import Future, Task
 from rclpy.utilities import get_default_context
 
 if TYPE_CHECKING:
+    from rclpy._wait_set import WaitableWatch
     from rclpy.context import Context
     from rclpy.node import Node
     from rclpy.timer import Timer
+    from rclpy.waitable import Waitable
 
 # For this long after a wait [ns], ready readers take further messages in turn. Then timers are checked again.
 # So a flood of messages needs few waits, and a slow callback delays the others only by its own duration.
@@ -139,6 +141,7 @@ class Executor(AbstractContextManager["Executor"]):
         self._seen: list[tuple[Node, int]] = []  # nodes in the wait set, with the version of their entities
         self._timers: list[Timer] = []
         self._guards: list[Any] = []
+        self._watch: WaitableWatch | None = None  # if nodes have waitables of users
         self._attached: dict[int, tuple[_Entity, int]] = {}  # token -> entity, DDS handle
         self._blocked: dict[int, tuple[_Entity, int]] = {}  # likewise, while the callback group is busy
         self._tokens: dict[int, int] = {}  # DDS handle -> token
@@ -147,6 +150,7 @@ class Executor(AbstractContextManager["Executor"]):
         self._ready: deque[tuple[Any, bool]] = deque()
         self._repeatable: deque[tuple[Any, bool]] = deque()  # readers that had a message in this burst
         self._burst_end = 0
+        self._tasks_were_first = False
         self._context._executors.add(self)
         signals._watch(self)
 
@@ -274,9 +278,10 @@ class Executor(AbstractContextManager["Executor"]):
         finally:
             if nodes is not None:
                 self._wait_only_for(None)
+        task = Task(self._run, (entity, taken), executor=self)
+        entity = getattr(entity, "waitable", entity)
         candidates = self.get_nodes() if nodes is None else nodes
         node = next((node for node in candidates if entity in node._rclpy_entities()), None)
-        task = Task(self._run, (entity, taken), executor=self)
         # When the task ends, its callback group may allow other callbacks, for which another thread may wait.
         task._call_when_complete(self.wake)
         return task, entity, node
@@ -347,9 +352,12 @@ class Executor(AbstractContextManager["Executor"]):
         :return: whether :meth:`wake` was called.
         """
         timeout = _remaining(deadline)
-        while self._tasks:
+        if self._tasks:
+            self._tasks_were_first = not self._tasks_were_first
+            if self._tasks_were_first:  # as in rclpy; the next time, they come after the data
+                self._collect_tasks()
+                return False
             timeout = 0
-            self._ready.append((self._tasks.popleft(), False))
         for guard in self._guards:
             if guard._is_ready() and self.can_execute(guard):
                 timeout = 0
@@ -363,11 +371,16 @@ class Executor(AbstractContextManager["Executor"]):
                     self._ready.append((timer, False))
             elif remaining < timeout:
                 next_timer, timeout = timer, remaining
+        watch = self._watch
+        if watch is not None and (remaining := watch.prepare()) < timeout:
+            next_timer, timeout = None, remaining
         tokens = self._waitset.wait(timeout)
         if not tokens and next_timer is not None:
             self._ready.append((next_timer, False))  # the wait lasted until the timer was due
         if tokens:
             self._burst_end = time.monotonic_ns() + _BURST
+            if len(tokens) > 1:
+                tokens.sort()  # subscriptions before services and clients, as in rclpy
         woken = False
         for token in tokens:
             if token == _WAKE:
@@ -375,7 +388,15 @@ class Executor(AbstractContextManager["Executor"]):
                 self._guard.take()
             elif token in self._attached:
                 self._ready.append((self._attached[token][0], True))
+        if watch is not None:
+            self._ready.extend((entity, False) for entity in watch.ready(tokens))
+        if self._tasks:
+            self._collect_tasks()
         return woken
+
+    def _collect_tasks(self) -> None:
+        while self._tasks:
+            self._ready.append((self._tasks.popleft(), False))
 
     # The contents of the wait set
 
@@ -389,10 +410,13 @@ class Executor(AbstractContextManager["Executor"]):
         self._seen = seen
         self._timers, self._guards = [], []
         wanted: dict[int, _Entity] = {}
+        waitables: list[Waitable] = []
         for node in nodes:
             self._timers.extend(node.timers)
             self._guards.extend(node.guards)
+            waitables.extend(node._rclpy_added_waitables)
             for entity in node._rclpy_waitables():
+                self._timers.extend(getattr(entity, "_timers", ()))
                 for handle in entity._handles:
                     wanted[handle] = entity
         for handle in [handle for handle in self._tokens if handle not in wanted]:
@@ -406,13 +430,27 @@ class Executor(AbstractContextManager["Executor"]):
                 if self._waitset.attach(handle, self._last_token):
                     self._tokens[handle] = self._last_token
                     self._attached[self._last_token] = (entity, handle)
+        self._update_waitables(waitables)
         self._repeatable.clear()
         if self._ready:  # drop entities of nodes that were removed or destroyed
             present = {*self._timers, *self._guards, *wanted.values()}
+            if self._watch is not None:
+                present.update(self._watch.entities)
             self._ready = deque(one for one in self._ready if one[0].__class__ is Task or one[0] in present)
+
+    def _update_waitables(self, waitables: list[Waitable]) -> None:
+        """Update what the waitables of users wait for."""
+        if self._watch is None and waitables:
+            from rclpy._wait_set import WaitableWatch  # here: few programs have waitables
+
+            self._watch = WaitableWatch(self)
+        if self._watch is not None:
+            self._watch.update(waitables)
 
     def _block(self, entity: _Entity) -> None:
         """Stop waiting for an entity whose callback group is busy: its data would end every wait at once."""
+        if self._watch is not None and entity in self._watch.entities:
+            self._watch.postpone(entity)
         for token, (attached, handle) in list(self._attached.items()):
             if attached is entity:
                 del self._attached[token]

@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
-import threading
+import itertools
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from rclpy._handle import Handle
+from rclpy._handle import EntityHandle, ignore_change
 from rclpy.callback_groups import CallbackGroup
 from rclpy.exceptions import InvalidHandle
 
 if TYPE_CHECKING:
     from rclpy.context import Context
+
+
+class GuardConditionHandle(EntityHandle["GuardCondition"]):
+    """A guard condition for a waitable that waits for it."""
+
+    def trigger_guard_condition(self) -> None:
+        """Trigger the guard condition; may be called from any thread."""
+        self._entity.trigger()
 
 
 class GuardCondition:
@@ -27,16 +35,17 @@ class GuardCondition:
         self.callback = callback
         self.callback_group = callback_group
         self._context = context
-        self._handle = Handle()
-        self._triggered = threading.Event()
+        self._numbers = itertools.count(1)
+        self._last_trigger = 0
+        self._last_call = 0  # the trigger that caused it
         self._destroyed = False
-        self._on_change: Callable[[], None] = lambda: None
+        self._on_change: Callable[[], None] = ignore_change
 
     @property
-    def handle(self) -> Handle:
+    def handle(self) -> GuardConditionHandle:
         """A handle for the guard condition. Raises InvalidHandle if it was destroyed."""
         self._check_usable()
-        return self._handle
+        return GuardConditionHandle(self)
 
     def _check_usable(self) -> None:
         if self._destroyed:
@@ -45,7 +54,7 @@ class GuardCondition:
     def trigger(self) -> None:
         """Make the callback run; may be called from any thread."""
         self._check_usable()
-        self._triggered.set()
+        self._last_trigger = next(self._numbers)
         self._on_change()
 
     def destroy(self) -> None:
@@ -56,12 +65,12 @@ class GuardCondition:
 
     def _is_ready(self) -> bool:
         """Whether it is triggered and its callback has not started."""
-        return self._triggered.is_set() and not self._destroyed
+        return self._last_trigger != self._last_call and not self._destroyed
 
     def _take(self) -> tuple[()] | None:
         if not self._is_ready():
             return None
-        self._triggered.clear()
+        self._last_call = self._last_trigger
         return ()
 
     def _execute(self, taken: tuple[()]) -> Any:

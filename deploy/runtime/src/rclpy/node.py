@@ -146,6 +146,8 @@ class Node(NodeParameters, NodeGraph):
         self._clients: list[Client] = []
         self._timers: list[Timer] = []
         self._guards: list[GuardCondition] = []
+        self._rclpy_actions: list[Any] = []
+        self._rclpy_added_waitables: list[Waitable] = []
         self._rclpy_rates: dict[Rate, Timer] = {}
         self._rclpy_events: dict[Publisher | Subscription, EndpointEvents] = {}
         self._rclpy_used_types: set[Any] = set()  # for the service get_type_description
@@ -236,11 +238,14 @@ class Node(NodeParameters, NodeGraph):
             *list(self._services),
             *list(self._clients),
             *list(self._rclpy_events.values()),
+            *list(self._rclpy_actions),
         ]
 
     def _rclpy_entities(self) -> list[Any]:
         """All entities with a callback."""
-        return [*self._rclpy_waitables(), *list(self._timers), *list(self._guards)]
+        timers = (timer for action in list(self._rclpy_actions) for timer in action._timers)
+        entities = [*self._rclpy_waitables(), *list(self._rclpy_added_waitables)]
+        return [*entities, *list(self._timers), *timers, *list(self._guards)]
 
     # Entities
 
@@ -276,19 +281,26 @@ class Node(NodeParameters, NodeGraph):
 
     @property
     def waitables(self) -> Iterator[Waitable]:
-        """The QoS event handlers of the node's publishers and subscriptions."""
+        """The node's action clients and servers, added waitables, and QoS event handlers."""
+        yield from list(self._rclpy_actions)
+        yield from list(self._rclpy_added_waitables)
         for publisher in self.publishers:
             yield from publisher.event_handlers
         for subscription in self.subscriptions:
             yield from subscription.event_handlers
 
     def add_waitable(self, waitable: Waitable) -> None:
-        """Not supported: raises NotImplementedError."""
-        raise NotImplementedError("rclpy.node.Node.add_waitable")
+        """Add a waitable: the executor waits for what it adds to the wait set, and runs it."""
+        self._rclpy_add(self._rclpy_added_waitables, waitable)
 
     def remove_waitable(self, waitable: Waitable) -> None:
-        """Not supported: raises NotImplementedError."""
-        raise NotImplementedError("rclpy.node.Node.remove_waitable")
+        """Remove a waitable. Raises ValueError if it was not added."""
+        waitables = self._rclpy_actions if waitable in self._rclpy_actions else self._rclpy_added_waitables
+        waitables.remove(waitable)
+        self._rclpy_entities_have_changed()
+
+    def _rclpy_add_action(self, action: Waitable) -> None:
+        self._rclpy_add(self._rclpy_actions, action)
 
     # Creating
 
@@ -362,31 +374,46 @@ class Node(NodeParameters, NodeGraph):
         :param raw: whether the callback gets serialized messages (``bytes``).
         :raises InvalidTopicNameException: if the topic's name is invalid.
         """
-        profile, name = self._rclpy_endpoint_options(
-            Subscription, msg_type, topic, qos_profile, qos_overriding_options
+        subscription = self._rclpy_make_subscription(
+            msg_type,
+            topic,
+            callback,
+            qos_profile,
+            callback_group or self._default_callback_group,
+            event_callbacks or SubscriptionEventCallbacks(),
+            qos_overriding_options,
+            raw=raw,
         )
+        subscription.callback_group.add_entity(subscription)
+        if subscription.event_handlers:
+            self._rclpy_events[subscription] = EndpointEvents(
+                subscription.event_handlers, subscription.handle
+            )
+        self._rclpy_add(self._subscriptions, subscription)
+        return subscription
+
+    def _rclpy_make_subscription(
+        self,
+        msg_type: Any,
+        topic: str,
+        callback: Callable[..., Any],
+        qos_profile: QoSProfile | int,
+        group: CallbackGroup,
+        event_callbacks: SubscriptionEventCallbacks,
+        overriding: QoSOverridingOptions | None = None,
+        *,
+        raw: bool = False,
+    ) -> Subscription:
+        """Make a subscription that is not listed: executors do not take its messages."""
+        profile, name = self._rclpy_endpoint_options(Subscription, msg_type, topic, qos_profile, overriding)
         dds_name = _names.topic_to_dds(name, avoid_conventions=profile.avoid_ros_namespace_conventions)
         reader = self._rclpy_graph.create_reader(self, dds_name, msg_type, profile)
-        group = callback_group or self._default_callback_group
+        endpoint = SubscriptionEndpoint(self, name, reader)
         try:
-            subscription = Subscription(
-                SubscriptionEndpoint(self, name, reader),
-                msg_type,
-                topic,
-                callback,
-                group,
-                profile,
-                raw,
-                event_callbacks or SubscriptionEventCallbacks(),
-            )
+            return Subscription(endpoint, msg_type, topic, callback, group, profile, raw, event_callbacks)
         except Exception:
             self._rclpy_graph.destroy(self, reader)
             raise
-        group.add_entity(subscription)
-        if subscription.event_handlers:
-            self._rclpy_events[subscription] = EndpointEvents(subscription.event_handlers, reader)
-        self._rclpy_add(self._subscriptions, subscription)
-        return subscription
 
     def _rclpy_endpoint_options(
         self,
@@ -611,6 +638,8 @@ class Node(NodeParameters, NodeGraph):
             ):
                 for entity in list(entities):
                     self._rclpy_destroy(entities, entity)
+            for action in list(self._rclpy_actions):
+                action._close()
             self._rclpy_graph.remove_node(self)
         self._context._forget(self)
 

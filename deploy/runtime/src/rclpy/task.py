@@ -214,6 +214,12 @@ class Task(Future):
             self._executing = False
             self._task_lock.release()
 
+    def _cancel_before_start(self) -> None:
+        """Cancel a coroutine that has not started; others go on."""
+        if inspect.iscoroutine(self._handler) and inspect.getcoroutinestate(self._handler) == "CORO_CREATED":
+            self.cancel()
+            self()  # closes the coroutine
+
     def executing(self) -> bool:
         """Return whether the task is running now."""
         return self._executing

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from rclpy._dds import INFINITY
-from rclpy._handle import Handle
+from rclpy._handle import EntityHandle, ignore_change
 from rclpy.callback_groups import CallbackGroup
 from rclpy.clock import Clock, ClockChange, JumpThreshold, TimeJump
 from rclpy.clock_type import ClockType
@@ -19,6 +19,18 @@ if TYPE_CHECKING:
     from rclpy.context import Context
 
 TimerCallbackType = Callable[[], Any]
+
+
+class TimerHandle(EntityHandle["Timer"]):
+    """A timer for a waitable that waits for it."""
+
+    def is_timer_ready(self) -> bool:
+        """Whether the next call is due."""
+        return self._entity.is_ready()
+
+    def call_timer(self) -> None:
+        """Start the next period, as a call of the timer's callback does."""
+        self._entity._take()
 
 
 class Timer:
@@ -45,7 +57,6 @@ class Timer:
         self.callback = callback
         self.callback_group = callback_group
         self._context = get_default_context() if context is None else context
-        self._handle = Handle()
         self._clock = clock
         self._source = clock.handle
         self._period = int(timer_period_ns)
@@ -54,7 +65,7 @@ class Timer:
         self._canceled = not autostart
         self._destroyed = False
         # Called when the time until the next call changes.
-        self._on_change: Callable[[], None] = lambda: None
+        self._on_change: Callable[[], None] = ignore_change
         self._jump_handle = None
         if clock.clock_type == ClockType.ROS_TIME:
             self._jump_handle = clock.create_jump_callback(
@@ -76,9 +87,9 @@ class Timer:
         self._on_change()
 
     @property
-    def handle(self) -> Handle:
+    def handle(self) -> TimerHandle:
         """A handle for the timer. Raises InvalidHandle if it was destroyed."""
-        return self._usable()._handle
+        return TimerHandle(self._usable())
 
     def _usable(self) -> Timer:
         if self._destroyed:

@@ -55,6 +55,7 @@ class _NodeWithOneSubscription:
 
     timers = ()
     guards = ()
+    _rclpy_added_waitables = ()
     executor = None
     _rclpy_entities_version = 0
 

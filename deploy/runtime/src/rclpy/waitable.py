@@ -1,10 +1,12 @@
-"""The base class of rclpy's waitables. Custom waitables are not supported."""
+"""Waitables: what an executor waits for beside subscriptions, timers, services and guard conditions."""
 
 from __future__ import annotations
 
+from types import TracebackType
 from typing import Any
 
 from rclpy.callback_groups import CallbackGroup
+from rclpy.task import Future
 
 
 class NumberOfEntities:
@@ -37,27 +39,51 @@ class NumberOfEntities:
 
 
 class Waitable:
-    """Base class of QoS event handlers; this runtime has no wait sets of rcl, so others cannot be added."""
+    """
+    Base class of what :meth:`rclpy.node.Node.add_waitable` adds to a node.
+
+    Before each wait, the executor calls :meth:`add_to_wait_set`. If :meth:`is_ready` afterwards, it calls
+    :meth:`take_data`, and runs :meth:`execute` with the result. The wait set accepts the handles of guard
+    conditions, timers, subscriptions and services.
+    """
 
     def __init__(self, callback_group: CallbackGroup) -> None:
         self.callback_group: CallbackGroup | None = callback_group
+        self._futures: list[Future] = []
+        callback_group.add_entity(self)
+
+    def __enter__(self) -> None:
+        """Do nothing: the destruction of an entity in use is safe."""
+
+    def __exit__(
+        self, t: type[BaseException] | None, v: BaseException | None, tb: TracebackType | None
+    ) -> None:
+        """Do nothing."""
+
+    def add_future(self, future: Future) -> None:
+        """Let the executor that runs the waitable run the done callbacks of a future."""
+        self._futures.append(future)
+
+    def remove_future(self, future: Future) -> None:
+        """Undo :meth:`add_future`. Raises ValueError if the future was not added."""
+        self._futures.remove(future)
 
     def is_ready(self, wait_set: Any) -> bool:
-        """Not supported: raises NotImplementedError."""
-        raise NotImplementedError("rclpy.waitable.Waitable.is_ready")
+        """Return whether the waitable has work, after a wait; implemented by subclasses."""
+        raise NotImplementedError("Must be implemented by subclass")
 
     def take_data(self) -> Any:
-        """Not supported: raises NotImplementedError."""
-        raise NotImplementedError("rclpy.waitable.Waitable.take_data")
+        """Return what :meth:`execute` needs; implemented by subclasses."""
+        raise NotImplementedError("Must be implemented by subclass")
 
     async def execute(self, taken_data: Any) -> None:
-        """Not supported: raises NotImplementedError."""
-        raise NotImplementedError("rclpy.waitable.Waitable.execute")
+        """Do the work; implemented by subclasses."""
+        raise NotImplementedError("Must be implemented by subclass")
 
     def get_num_entities(self) -> NumberOfEntities:
-        """Not supported: raises NotImplementedError."""
-        raise NotImplementedError("rclpy.waitable.Waitable.get_num_entities")
+        """Return the numbers of entities that are added to wait sets; implemented by subclasses."""
+        raise NotImplementedError("Must be implemented by subclass")
 
     def add_to_wait_set(self, wait_set: Any) -> None:
-        """Not supported: raises NotImplementedError."""
-        raise NotImplementedError("rclpy.waitable.Waitable.add_to_wait_set")
+        """Add entities to a wait set; implemented by subclasses."""
+        raise NotImplementedError("Must be implemented by subclass")

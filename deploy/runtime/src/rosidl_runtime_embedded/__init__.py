@@ -1,5 +1,6 @@
-"""Classes, codecs and type hashes of messages and services, made from their definition files."""
+"""Classes, codecs and type hashes of messages, services and actions, made from their definition files."""
 
+from .action import Action, action_class
 from .definition import InvalidDefinition
 from .message import Message, message_class
 from .packages import install, interfaces
@@ -7,4 +8,13 @@ from .service import Service, service_class
 
 install()
 
-__all__ = ["InvalidDefinition", "Message", "Service", "interfaces", "message_class", "service_class"]
+__all__ = [
+    "Action",
+    "InvalidDefinition",
+    "Message",
+    "Service",
+    "action_class",
+    "interfaces",
+    "message_class",
+    "service_class",
+]

@@ -1,4 +1,4 @@
-"""Parses ``.msg`` and ``.srv`` files into fields, constants and default values.
+"""Parses ``.msg``, ``.srv`` and ``.action`` files into fields, constants and default values.
 
 Source of the format: the ROS 2 interface definition language (docs.ros.org, "Interfaces"), as Jazzy's
 ``rosidl_adapter`` reads it. Parsed types have their IDL names (``double``, ``octet``, ``sequence<string>``),
@@ -135,6 +135,53 @@ class ServiceDefinition(NamedTuple):
         )
 
 
+class ActionDefinition(NamedTuple):
+    """An action type, and the services and the message that transport it."""
+
+    name: str
+    """Full name, for example ``example_interfaces/action/Fibonacci``."""
+    goal: MessageDefinition
+    result: MessageDefinition
+    feedback: MessageDefinition
+
+    @property
+    def send_goal(self) -> ServiceDefinition:
+        """The service that sends a goal with its UUID."""
+        return self._service(
+            "SendGoal",
+            (_GOAL_ID, Field("goal", FieldType(self.goal.name))),
+            (
+                Field("accepted", FieldType("boolean")),
+                Field("stamp", FieldType("builtin_interfaces/msg/Time")),
+            ),
+        )
+
+    @property
+    def get_result(self) -> ServiceDefinition:
+        """The service that waits for the result of a goal."""
+        result = Field("result", FieldType(self.result.name))
+        return self._service("GetResult", (_GOAL_ID,), (Field("status", FieldType("int8")), result))
+
+    @property
+    def feedback_message(self) -> MessageDefinition:
+        """The feedback with the UUID of its goal."""
+        feedback = Field("feedback", FieldType(self.feedback.name))
+        return MessageDefinition(f"{self.name}_FeedbackMessage", (_GOAL_ID, feedback))
+
+    def _service(
+        self, suffix: str, request: tuple[Field, ...], response: tuple[Field, ...]
+    ) -> ServiceDefinition:
+        name = f"{self.name}_{suffix}"
+        return ServiceDefinition(
+            name,
+            MessageDefinition(f"{name}_Request", request),
+            MessageDefinition(f"{name}_Response", response),
+        )
+
+
+_GOAL_ID = Field("goal_id", FieldType("unique_identifier_msgs/msg/UUID"))
+
+
 def parse_message(name: str, text: str, source: str, is_defined: Callable[[str], bool]) -> MessageDefinition:
     """Read a ``.msg`` file. Raises InvalidDefinition.
 
@@ -145,19 +192,38 @@ def parse_message(name: str, text: str, source: str, is_defined: Callable[[str],
 
 def parse_service(name: str, text: str, source: str, is_defined: Callable[[str], bool]) -> ServiceDefinition:
     """Read a ``.srv`` file, with the arguments and errors of parse_message."""
+    parts = ("Request", "Response")
+    return ServiceDefinition(name, *_parse_parts(name, parts, "a service", text, source, is_defined))
+
+
+def parse_action(name: str, text: str, source: str, is_defined: Callable[[str], bool]) -> ActionDefinition:
+    """Read an ``.action`` file, with the arguments and errors of parse_message."""
+    parts = ("Goal", "Result", "Feedback")
+    return ActionDefinition(name, *_parse_parts(name, parts, "an action", text, source, is_defined))
+
+
+def _parse_parts(
+    name: str,
+    parts: tuple[str, ...],
+    kind: str,
+    text: str,
+    source: str,
+    is_defined: Callable[[str], bool],
+) -> list[MessageDefinition]:
+    """Read the messages ``<name>_<part>`` of a file, which lines ``---`` separate."""
     lines = text.splitlines()
     separators = [number for number, line in enumerate(lines) if line.strip() == "---"]
-    if len(separators) != 1:
-        line = separators[1] + 1 if separators else max(len(lines), 1)
-        raise InvalidDefinition(
-            f"{source}:{line}: a service needs exactly one line '---', not {len(separators)}"
-        )
-    split = separators[0]
-    return ServiceDefinition(
-        name,
-        _parse(f"{name}_Request", lines[:split], source, 1, is_defined),
-        _parse(f"{name}_Response", lines[split + 1 :], source, split + 2, is_defined),
-    )
+    wanted = len(parts) - 1
+    if len(separators) != wanted:
+        line = separators[wanted] + 1 if len(separators) > wanted else max(len(lines), 1)
+        expected = "one line '---'" if wanted == 1 else f"{wanted} lines '---'"
+        raise InvalidDefinition(f"{source}:{line}: {kind} needs exactly {expected}, not {len(separators)}")
+    starts = [0, *(number + 1 for number in separators)]
+    ends = [*separators, len(lines)]
+    return [
+        _parse(f"{name}_{part}", lines[start:end], source, start + 1, is_defined)
+        for part, start, end in zip(parts, starts, ends, strict=True)
+    ]
 
 
 def _parse(

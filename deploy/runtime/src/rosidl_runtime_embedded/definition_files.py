@@ -1,8 +1,9 @@
 """Finds the definition files of message packages, and reads each file once.
 
-A message package is a directory with ``msg/*.msg`` and ``srv/*.srv``. The packages of this distribution are
-the directories beside this one. Packages of users are in ``<prefix>/share/<package>``, for every prefix in
-``AMENT_PREFIX_PATH``. A package of this distribution wins over a user's package of the same name.
+A message package is a directory with ``msg/*.msg``, ``srv/*.srv`` and ``action/*.action``. The packages of
+this distribution are the directories beside this one. Packages of users are in ``<prefix>/share/<package>``,
+for every prefix in ``AMENT_PREFIX_PATH``. A package of this distribution wins over a user's package of the
+same name.
 """
 
 from __future__ import annotations
@@ -11,13 +12,35 @@ import os
 from functools import cache
 from typing import TYPE_CHECKING
 
-from .definition import InvalidDefinition, MessageDefinition, ServiceDefinition, parse_message, parse_service
+from .definition import (
+    ActionDefinition,
+    InvalidDefinition,
+    MessageDefinition,
+    ServiceDefinition,
+    parse_action,
+    parse_message,
+    parse_service,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
 _SHIPPED = os.path.dirname(os.path.dirname(__file__))
+KINDS = ("msg", "srv", "action")
+"""The directories of definition files, which are also the suffixes of the files."""
 SERVICE_PARTS = ("Request", "Response", "Event")
+_ACTION_MESSAGES = {
+    "Goal": "goal",
+    "Result": "result",
+    "Feedback": "feedback",
+    "FeedbackMessage": "feedback_message",
+}
+ACTION_SERVICES = {"SendGoal": "send_goal", "GetResult": "get_result"}
+ACTION_PARTS = (
+    *_ACTION_MESSAGES,
+    *(f"{service}_{part}" for service in ACTION_SERVICES for part in SERVICE_PARTS),
+)
+"""The messages that an action defines."""
 
 
 def _directories(package: str) -> Iterator[str]:
@@ -36,11 +59,11 @@ def _file(name: str) -> str | None:
 def shipped_packages() -> list[str]:
     """Names of the message packages of this distribution, sorted."""
     names = [entry.name for entry in os.scandir(_SHIPPED) if entry.is_dir()]
-    return sorted(name for name in names if any(interface_names(name, kind) for kind in ("msg", "srv")))
+    return sorted(name for name in names if any(interface_names(name, kind) for kind in KINDS))
 
 
 def interface_names(package: str, kind: str) -> list[str]:
-    """Names of all messages (kind ``msg``) or services (``srv``) that a package defines, sorted."""
+    """Names of all messages, services or actions (see KINDS) that a package defines, sorted."""
     directories = filter(
         os.path.isdir, (os.path.join(directory, kind) for directory in _directories(package))
     )
@@ -50,7 +73,7 @@ def interface_names(package: str, kind: str) -> list[str]:
 
 @cache
 def definition_source(name: str) -> tuple[str, str]:
-    """File and text that define ``<package>/<msg or srv>/<Name>``. Raises LookupError or InvalidDefinition.
+    """File and text that define ``<package>/<kind>/<Name>``. Raises LookupError or InvalidDefinition.
 
     Cached, because a type in use stays the same when its file changes.
     """
@@ -65,25 +88,41 @@ def definition_source(name: str) -> tuple[str, str]:
 
 
 def is_defined(name: str) -> bool:
-    """Whether ``<package>/<msg or srv>/<Name>`` has a definition file."""
+    """Whether ``<package>/<kind>/<Name>`` has a definition file."""
     return _file(name) is not None
 
 
 @cache
+def action_definition(name: str) -> ActionDefinition:
+    """Definition of an action by its full name. Raises LookupError or InvalidDefinition."""
+    path, text = definition_source(name)
+    return parse_action(name, text, path, is_defined)
+
+
+@cache
 def service_definition(name: str) -> ServiceDefinition:
-    """Definition of a service by its full name. Raises LookupError or InvalidDefinition."""
+    """Definition of a service, also of an action's, by full name. Raises LookupError or InvalidDefinition."""
+    if "/action/" in name:
+        action, _, service = name.rpartition("_")
+        if service not in ACTION_SERVICES:
+            raise LookupError(f"{name} is not a service")
+        definition: ServiceDefinition = getattr(action_definition(action), ACTION_SERVICES[service])
+        return definition
     path, text = definition_source(name)
     return parse_service(name, text, path, is_defined)
 
 
 @cache
 def message_definition(name: str) -> MessageDefinition:
-    """Definition of a message or of a service's part. Raises LookupError or InvalidDefinition."""
-    if "/srv/" in name:
-        service, _, part = name.rpartition("_")
-        if part not in SERVICE_PARTS:
-            raise LookupError(f"{name} is not a message")
-        definition: MessageDefinition = getattr(service_definition(service), part.lower())
-        return definition
-    path, text = definition_source(name)
-    return parse_message(name, text, path, is_defined)
+    """Definition of a message, also of a service's or action's. Raises LookupError or InvalidDefinition."""
+    if "/msg/" in name:
+        path, text = definition_source(name)
+        return parse_message(name, text, path, is_defined)
+    owner, _, part = name.rpartition("_")
+    if "/action/" in name and part in _ACTION_MESSAGES:
+        definition: MessageDefinition = getattr(action_definition(owner), _ACTION_MESSAGES[part])
+    elif part in SERVICE_PARTS:
+        definition = getattr(service_definition(owner), part.lower())
+    else:
+        raise LookupError(f"{name} is not a message")
+    return definition

@@ -217,7 +217,10 @@ _classes: dict[str, type[Message]] = {}
 
 
 def message_class(name: str) -> type[Message]:
-    """Class of a message or of a service's part by full name. Raises LookupError or InvalidDefinition."""
+    """Class of a message, also of a service's or action's, by its full name.
+
+    Raises LookupError or InvalidDefinition.
+    """
     if name not in _classes:
         # setdefault: two threads that get here at once must see the same class
         _classes.setdefault(name, _make_message_class(message_definition(name)))

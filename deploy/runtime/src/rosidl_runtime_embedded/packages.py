@@ -7,7 +7,8 @@ import sys
 from importlib.machinery import ModuleSpec, PathFinder
 from typing import TYPE_CHECKING, Any, cast
 
-from .definition_files import SERVICE_PARTS, interface_names, is_defined
+from .action import action_class
+from .definition_files import ACTION_PARTS, ACTION_SERVICES, KINDS, SERVICE_PARTS, interface_names, is_defined
 from .message import message_class
 from .service import service_class
 
@@ -16,7 +17,8 @@ if TYPE_CHECKING:
     from importlib.abc import Loader
     from types import ModuleType
 
-_KINDS = ["msg", "srv", "action"]
+_PARTS: dict[str, tuple[str, ...]] = {"msg": (), "srv": SERVICE_PARTS, "action": ACTION_PARTS}
+"""Suffixes of the messages that an interface of each kind defines."""
 
 
 def _snake_case(name: str) -> str:
@@ -24,32 +26,32 @@ def _snake_case(name: str) -> str:
 
 
 def interfaces(module_name: str) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
-    """The functions ``__getattr__`` and ``__dir__`` of a module ``<package>.msg`` or ``<package>.srv``."""
+    """The functions ``__getattr__`` and ``__dir__`` of a module ``<package>.<msg, srv or action>``."""
     package, kind = module_name.split(".")
 
     def names() -> list[str]:
         names = interface_names(package, kind)
-        if kind == "srv":
-            names += [f"{name}_{part}" for name in names for part in SERVICE_PARTS]
-        return sorted(names)
+        return sorted([*names, *(f"{name}_{part}" for name in names for part in _PARTS[kind])])
 
     def get(name: str) -> Any:
         if name == "__all__":
             return names()
-        is_part = kind == "srv" and name.endswith(tuple(f"_{part}" for part in SERVICE_PARTS))
-        interface = name.rpartition("_")[0] if is_part else name
-        if not is_defined(f"{package}/{kind}/{interface}"):
+        interface, _, part = name.partition("_")
+        known = not part or part in _PARTS[kind] or (kind == "action" and part in ACTION_SERVICES)
+        if not known or not is_defined(f"{package}/{kind}/{interface}"):
             raise AttributeError(f"module '{module_name}' has no attribute '{name}'")
-        make = service_class if kind == "srv" and not is_part else message_class
-        value = make(f"{package}/{kind}/{name}")
+        value = _make(kind, part)(f"{package}/{kind}/{name}")
         setattr(sys.modules[module_name], name, value)
         return value
 
     return get, names
 
 
-class NoActions(ImportError, NotImplementedError):
-    """The runtime has no actions. An ImportError, so code may fall back on doing without them."""
+def _make(kind: str, part: str) -> Callable[[str], Any]:
+    """The function that makes the class of an interface, or of a part of it."""
+    if part in ACTION_SERVICES or (kind == "srv" and not part):
+        return service_class
+    return action_class if kind == "action" and not part else message_class
 
 
 class _UserPackages:
@@ -66,10 +68,10 @@ class _UserPackages:
         package, _, kind = name.partition(".")
         kind, _, module = kind.partition(".")
         if module:
-            names = interface_names(package, kind) if kind in _KINDS else []
+            names = interface_names(package, kind) if kind in KINDS else []
             known = any(f"_{_snake_case(interface)}" == module for interface in names)
             return ModuleSpec(name, cast("Loader", self)) if known else None
-        kinds = [kind] if kind in _KINDS else [] if kind else _KINDS
+        kinds = [kind] if kind in KINDS else [] if kind else list(KINDS)
         if not kinds:
             return None
         found = PathFinder.find_spec(name, path, target)
@@ -82,8 +84,6 @@ class _UserPackages:
 
     def exec_module(self, module: ModuleType) -> None:
         """Let the module provide its classes."""
-        if module.__name__.endswith(".action"):
-            raise NoActions(f"{module.__name__}: the embedded runtime has no actions")
         if "." in module.__name__:
             parent = ".".join(module.__name__.split(".")[:2])
             vars(module)["__getattr__"], vars(module)["__dir__"] = interfaces(parent)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from .definition_files import SERVICE_PARTS, service_definition
 from .message import Message, message_class
@@ -11,12 +11,15 @@ if TYPE_CHECKING:
     from .definition import ServiceDefinition
 
 
-class _TypeHash:
-    def __get__(self, instance: object, owner: type[Service]) -> str:
+class InterfaceTypeHash:
+    """The type hash of a class of services or actions, which is computed on its first use."""
+
+    def __get__(self, instance: object, owner: Any) -> str:
         from .type_hash import type_hash
 
-        owner._TYPE_HASH = type_hash(owner._TYPE_NAME)
-        return owner._TYPE_HASH
+        computed = type_hash(owner._TYPE_NAME)
+        owner._TYPE_HASH = computed
+        return computed
 
 
 class Service:
@@ -27,7 +30,7 @@ class Service:
     Event: ClassVar[type[Message]]
     _TYPE_NAME: ClassVar[str]
     """``std_srvs/srv/Trigger``"""
-    _TYPE_HASH: ClassVar[str] = _TypeHash()  # type: ignore[assignment]
+    _TYPE_HASH: ClassVar[str] = InterfaceTypeHash()  # type: ignore[assignment]
     """``RIHS01_…``"""
 
     def __init__(self) -> None:

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def type_description(name: str) -> Message:
-    """``type_description_interfaces/msg/TypeDescription`` of a message or service by its full name."""
+    """``type_description_interfaces/msg/TypeDescription`` of an interface by its full name."""
     description, referenced = describe(name)
     return _to_message(
         "TypeDescription", {"type_description": description, "referenced_type_descriptions": referenced}
@@ -23,8 +23,8 @@ def type_description(name: str) -> Message:
 def type_sources(description: Any) -> list[Message]:
     """``type_description_interfaces/msg/TypeSource`` of every type in a ``TypeDescription``, in its order.
 
-    The parts of a service have no definition file: their source is empty, with the encoding ``implicit``, as
-    in rcl.
+    The parts of a service or action have no definition file: their source is empty, with the encoding
+    ``implicit``, as in rcl.
     """
     individual = [description.type_description, *description.referenced_type_descriptions]
     return [_to_message("TypeSource", _source(each.type_name)) for each in individual]

@@ -7,7 +7,7 @@ from hashlib import sha256
 from typing import Any
 
 from .definition import Field, FieldType, MessageDefinition
-from .definition_files import SERVICE_PARTS, message_definition, service_definition
+from .definition_files import ACTION_SERVICES, action_definition, message_definition, service_definition
 
 # numbers of type_description_interfaces/msg/FieldType
 _TYPE_IDS = {
@@ -30,18 +30,35 @@ _NESTED, _BOUNDED_TEXT, _ARRAY, _BOUNDED_SEQUENCE, _SEQUENCE = 1, 4, 48, 96, 144
 
 
 def is_part(name: str) -> bool:
-    """Whether a full name is the name of a service's request, response or event."""
-    return "/srv/" in name and name.rpartition("_")[2] in SERVICE_PARTS
+    """Whether a full name is the name of a message or service that a service or action defines."""
+    return "/msg/" not in name and "_" in name.rpartition("/")[2]
 
 
 def _individual(name: str) -> MessageDefinition:
-    """The type as a struct; a service is a struct of its three messages."""
-    if "/srv/" not in name or is_part(name):
+    """The type as a struct; a service or action is a struct of its messages and services."""
+    members: dict[str, str] = {}
+    if "/action/" in name and not is_part(name):
+        action = action_definition(name)
+        members = {
+            "goal": action.goal.name,
+            "result": action.result.name,
+            "feedback": action.feedback.name,
+            "send_goal_service": action.send_goal.name,
+            "get_result_service": action.get_result.name,
+            "feedback_message": action.feedback_message.name,
+        }
+    elif ("/srv/" in name and not is_part(name)) or name.endswith(tuple(f"_{s}" for s in ACTION_SERVICES)):
+        service = service_definition(name)
+        members = {
+            "request_message": service.request.name,
+            "response_message": service.response.name,
+            "event_message": service.event.name,
+        }
+    else:
         return message_definition(name)
-    service = service_definition(name)
-    parts = {"request": service.request, "response": service.response, "event": service.event}
-    fields = (Field(f"{part}_message", FieldType(message.name)) for part, message in parts.items())
-    return MessageDefinition(name, tuple(fields))
+    return MessageDefinition(
+        name, tuple(Field(member, FieldType(type_)) for member, type_ in members.items())
+    )
 
 
 def _field_type(type_: FieldType) -> dict[str, Any]:
@@ -87,7 +104,7 @@ def describe(name: str) -> tuple[dict[str, Any], list[dict[str, Any]]]:
 
 
 def type_hash(name: str) -> str:
-    """RIHS01 hash of a message or service: SHA-256 of its description in JSON without default values."""
+    """RIHS01 hash of an interface: SHA-256 of its description in JSON without default values."""
     description, referenced = describe(name)
     for struct in (description, *referenced):
         for field in struct["fields"]:

@@ -159,6 +159,33 @@ def test_a_future_completed_on_another_thread_ends_spinning_at_once(
     assert (STEADY.now() - before).nanoseconds < 10_000_000_000
 
 
+def test_spinning_once_runs_a_pending_task_without_waiting(executor: SingleThreadedExecutor) -> None:
+    order: list[int] = []
+    for number in range(4):
+        executor.create_task(order.append, number)
+        executor.spin_once(timeout_sec=0)
+        assert order == [*range(number + 1)]
+
+
+def test_tasks_run_before_data_and_data_in_the_order_of_creation(
+    executor: SingleThreadedExecutor, node: Node, spin_until: SpinUntil
+) -> None:
+    order: list[str] = []
+    first, second = (node.create_publisher(Float64, name, 10) for name in ("first", "second"))
+    node.create_subscription(Float64, "first", lambda _: order.append("first"), 10)
+    node.create_subscription(Float64, "second", lambda _: order.append("second"), 10)
+    spin_until(lambda: first.get_subscription_count() and second.get_subscription_count())
+
+    def start() -> None:
+        timer.cancel()
+        second.publish(Float64())
+        executor.create_task(first.publish, Float64())
+
+    timer = node.create_timer(0.0, start)
+    spin_until(lambda: len(order) == 2)
+    assert order == ["first", "second"]
+
+
 def test_a_waiting_executor_keeps_no_reference_to_finished_tasks(
     executor: SingleThreadedExecutor,
 ) -> None:

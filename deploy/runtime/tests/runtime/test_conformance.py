@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import importlib
 from pathlib import Path
 
-import pytest
 from deploy.runtime.tests.runtime import conformance
 
 README = Path(__file__).parents[2] / "README.md"
@@ -26,9 +24,3 @@ def test_readme_has_the_current_table() -> None:
         "the table in README.md is out of date: replace it with the output of"
         " python -m deploy.runtime.tests.runtime.conformance"
     )
-
-
-@pytest.mark.parametrize("module", ["rclpy.action", "rclpy.lifecycle"])
-def test_actions_and_lifecycle_nodes_cannot_be_imported(module: str) -> None:
-    with pytest.raises(ModuleNotFoundError, match=f"No module named '{module}'"):
-        importlib.import_module(module)

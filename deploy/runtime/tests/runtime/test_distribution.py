@@ -41,7 +41,7 @@ def test_wheel_has_the_sources_and_a_stub_of_each_module_of_interfaces(built: Pa
     stubs = {name for name in files if name.endswith(".pyi")}
     sources = {str(path.relative_to(SOURCE)) for path in SOURCE.rglob("*") if path.is_file()}
     assert files - stubs == {name for name in sources if "__pycache__" not in name}
-    definitions = {Path(name) for name in files if name.endswith((".msg", ".srv"))}
+    definitions = {Path(name) for name in files if name.endswith((".msg", ".srv", ".action"))}
     assert {path.parent / "__init__.pyi" for path in definitions} <= {Path(name) for name in stubs}
     assert "class Float64(Message):\n    data: float\n" in stub
 

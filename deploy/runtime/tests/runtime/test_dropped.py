@@ -12,7 +12,9 @@ from typing import Any
 import pytest
 
 import rclpy
+from example_interfaces.action import Fibonacci
 from rclpy._dds.library import blocking
+from rclpy.action import ActionClient, ActionServer
 from rclpy.context import Context
 from rclpy.exceptions import InvalidParameterTypeException
 from rclpy.executors import Executor, MultiThreadedExecutor, SingleThreadedExecutor
@@ -37,8 +39,13 @@ class FullNode(Node):
         self.create_timer(1.0, self.destroy_node)
         self.create_guard_condition(self.destroy_node)
         self.create_rate(1.0)
+        self.action_server = ActionServer(self, Fibonacci, "fibonacci", self.reach)
+        self.action_client = ActionClient(self, Fibonacci, "fibonacci")
 
     def hear(self, message: Float64) -> None:
+        pass
+
+    def reach(self, goal_handle: Any) -> Any:
         pass
 
 

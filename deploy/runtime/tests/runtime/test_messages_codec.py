@@ -25,12 +25,17 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 import rosidl_runtime_embedded
 from rosidl_runtime_embedded import message_class
 from rosidl_runtime_embedded.definition import FieldType, integer_range
-from rosidl_runtime_embedded.definition_files import interface_names, message_definition
+from rosidl_runtime_embedded.definition_files import definition_source, interface_names, message_definition
 from rosidl_runtime_embedded.fields import ARRAY_CODES
 
 SOURCE = Path(rosidl_runtime_embedded.__file__).parents[1]
 PACKAGES = sorted({path.parents[1].name for path in SOURCE.glob("*/msg/*.msg")})
-MESSAGES = [f"{package}/msg/{name}" for package in PACKAGES for name in interface_names(package, "msg")]
+MESSAGES = [
+    f"{package}/msg/{name}"
+    for package in PACKAGES
+    for name in interface_names(package, "msg")
+    if name != "WString"  # rosbags has no wide strings
+]
 MAIN_TYPES = [
     "std_msgs/msg/Float64",
     "std_msgs/msg/Bool",
@@ -48,6 +53,9 @@ MAIN_TYPES = [
     "type_description_interfaces/srv/GetTypeDescription_Response",
 ]
 STORE = get_typestore(Stores.ROS2_JAZZY)
+for _name in MESSAGES:
+    if _name not in STORE.types:
+        STORE.register(get_types_from_msg(definition_source(_name)[1], _name))
 NUMBERS = itertools.count()
 
 

@@ -10,10 +10,13 @@ from typing import Any
 import pytest
 
 from rosidl_runtime_embedded import message_class
+from rosidl_runtime_embedded.type_hash import type_hash
 
 FACTS = Path(__file__).parents[1] / "facts"
 GOLDEN: dict[str, dict[str, str]] = json.loads((FACTS / "cdr_golden.json").read_text())
 FIELDS: dict[str, dict[str, str]] = json.loads((FACTS / "message_fields.json").read_text())
+# computed by rosidl_generator_type_description 4.6.5 (Jazzy)
+HASHES: dict[str, str] = json.loads((FACTS / "type_hashes.json").read_text())
 WIRE: dict[str, str] = json.loads((FACTS / "wire_samples.json").read_text())["samples"]
 ANNOUNCEMENTS = re.findall(
     r"^(PUB|SUB) \S+ (\S+) (\S+) .*typehash=(RIHS01_[0-9a-f]{64});",
@@ -47,9 +50,15 @@ def test_dds_names_and_type_hashes_are_the_announced_ones(
     assert type_hash == message_class(name)._TYPE_HASH
 
 
+@pytest.mark.parametrize("name", HASHES)
+def test_type_hashes_are_those_that_rosidl_computes(name: str) -> None:
+    assert type_hash(name) == HASHES[name]
+
+
 def test_the_facts_are_complete() -> None:
     assert len(ANNOUNCEMENTS) == 24
     assert len(FIELDS) == 111
+    assert len(HASHES) == 54
 
 
 def test_recorded_discovery_info_survives_a_round_trip() -> None:

@@ -146,6 +146,7 @@ _BLOCKING: dict[str, tuple[Any, list[Any]]] = {
     "dds_writecdr": (ct.c_int32, [Entity, Pointer]),
     "dds_wait_for_acks": (ct.c_int32, [Entity, Duration]),
     "dds_assert_liveliness": (ct.c_int32, [Entity]),
+    "dds_get_status_mask": (ct.c_int32, [Entity, ct.POINTER(ct.c_uint32)]),
     "dds_set_status_mask": (ct.c_int32, [Entity, ct.c_uint32]),
     "dds_get_status_changes": (ct.c_int32, [Entity, ct.POINTER(ct.c_uint32)]),
     "dds_read_mask": (ct.c_int32, [Entity, Pointer, Pointer, ct.c_size_t, ct.c_uint32, ct.c_uint32]),

@@ -64,6 +64,13 @@ def watch(handle: int, names: list[str]) -> None:
     blocking.dds_set_status_mask(handle, mask)
 
 
+def watch_also(handle: int, name: str) -> None:
+    """Watch a further status."""
+    mask = ct.c_uint32()
+    blocking.dds_get_status_mask(handle, ct.byref(mask))
+    blocking.dds_set_status_mask(handle, mask.value | STATUSES[name][0])
+
+
 def changed(handle: int, name: str) -> Any:
     """Return the status if it has changed since the last call, else ``None``."""
     bit, structure = STATUSES[name]

@@ -1,0 +1,1 @@
+"""Interfaces of example_interfaces, as in ROS 2 Jazzy."""

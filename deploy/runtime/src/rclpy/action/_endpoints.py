@@ -1,0 +1,121 @@
+"""The topics and services of an action (design.ros2.org, "Actions")."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+from rclpy.callback_groups import CallbackGroup
+from rclpy.client import Client
+from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.exceptions import NameValidationException
+from rclpy.publisher import Publisher
+from rclpy.qos import QoSProfile
+from rclpy.service import Service
+from rclpy.subscription import Subscription
+from rclpy.type_support import check_for_type_support
+
+if TYPE_CHECKING:
+    from rclpy.node import Node
+
+
+class Endpoints:
+    """Creates the endpoints of an action client or server, which the node does not list."""
+
+    def __init__(self, node: Node, action_name: str, group: CallbackGroup) -> None:
+        self._node = node
+        self._prefix = f"{action_name}/_action/"
+        self._group = group
+        self.created: list[Publisher | Subscription | Client | Service] = []
+
+    def client(self, srv_type: Any, name: str, profile: QoSProfile, kind: type[Client] = Client) -> Client:
+        """Create a client of the action's service ``name``."""
+        name = self._prefix + name
+        endpoint = self._node._rclpy_service_endpoint(srv_type, name, profile, is_server=False)
+        client = kind(self._node.context, endpoint, srv_type, name, profile, self._group)
+        self.created.append(client)
+        return client
+
+    def service(self, srv_type: Any, name: str, profile: QoSProfile) -> Service:
+        """Create the action's service ``name``."""
+        name = self._prefix + name
+        endpoint = self._node._rclpy_service_endpoint(srv_type, name, profile, is_server=True)
+        service = Service(endpoint, srv_type, name, _never_called, self._group, profile)
+        self.created.append(service)
+        return service
+
+    def subscription(self, msg_type: Any, name: str, profile: QoSProfile) -> Subscription:
+        """Create a subscription to the action's topic ``name``."""
+        silent = SubscriptionEventCallbacks(use_default_callbacks=False)
+        subscription = self._node._rclpy_make_subscription(
+            msg_type, self._prefix + name, _never_called, profile, self._group, silent
+        )
+        self.created.append(subscription)
+        return subscription
+
+    def publisher(self, msg_type: Any, name: str, profile: QoSProfile) -> Publisher:
+        """Create a publisher of the action's topic ``name``."""
+        publisher = self._node._rclpy_create_own_publisher(msg_type, self._prefix + name, profile)
+        self.created.append(publisher)
+        return publisher
+
+    def handles(self) -> tuple[int, ...]:
+        """The DDS conditions that an executor waits for."""
+        return tuple(handle for endpoint in self.created for handle in getattr(endpoint, "_handles", ()))
+
+    def destroy(self) -> None:
+        """Destroy the endpoints."""
+        with self._node._rclpy_graph.one_announcement():
+            for endpoint in self.created:
+                endpoint.destroy()
+
+
+def _never_called(message: Any, response: Any = None) -> None:
+    """Stand in for a callback: the action client or server takes the messages itself."""
+
+
+@contextmanager
+def creation(
+    node: Node, kind: str, action_type: Any, action_name: str, group: CallbackGroup
+) -> Iterator[Endpoints]:
+    """
+    Announce all endpoints that the block creates together; if it fails, destroy them.
+
+    :param kind: the subject of error messages.
+    :raises AttributeError: if ``action_type`` is not the type of an action.
+    :raises ValueError: if the action's name is invalid.
+    """
+    check_for_type_support(action_type)
+    if not hasattr(action_type, "Impl"):
+        raise AttributeError(f"{action_type!r} is not a ROS 2 action type")
+    if not action_name:
+        raise ValueError(f"Failed to create {kind}: the name of the action is empty")
+    endpoints = Endpoints(node, action_name, group)
+    with node._rclpy_graph.one_announcement():
+        try:
+            yield endpoints
+        except BaseException as error:
+            endpoints.destroy()
+            if isinstance(error, NameValidationException):
+                text = f"Failed to create {kind} due to invalid topic name '{action_name}' : {error}"
+                raise ValueError(text) from error
+            raise
+    node._rclpy_used_types.add(action_type)
+
+
+def uuid_bytes(goal_id: Any) -> bytes:
+    """Return the 16 bytes of a ``unique_identifier_msgs/msg/UUID``, read without importing NumPy."""
+    data: bytes = goal_id.uuid_.tobytes()
+    return data
+
+
+def add_to_wait_set(wait_set: Any, endpoints: Endpoints) -> list[tuple[str, int]]:
+    """Add what receives messages to a wait set; return the kinds and indices."""
+    kinds = {Subscription: "subscription", Service: "service"}
+    return [
+        (kind, wait_set._add(kind, handle))
+        for endpoint in endpoints.created
+        for kind in (kinds.get(type(endpoint), "client"),)
+        for handle in getattr(endpoint, "_handles", ())
+    ]

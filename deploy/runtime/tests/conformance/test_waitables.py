@@ -1,0 +1,303 @@
+"""Waitables of users: what wakes them, when they run, how they are removed."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+
+from rclpy.callback_groups import CallbackGroup, MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
+from rclpy.clock import Clock
+from rclpy.clock_type import ClockType
+from rclpy.context import Context
+from rclpy.event_handler import EventHandler, QoSSubscriptionEventType, SubscriptionEventCallbacks
+from rclpy.executors import Executor, MultiThreadedExecutor, SingleThreadedExecutor
+from rclpy.guard_condition import GuardCondition
+from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.node import Node
+from rclpy.task import Future
+from rclpy.timer import Timer
+from rclpy.waitable import NumberOfEntities, Waitable
+from std_msgs.msg import Float64
+
+MakeNode = Callable[..., Node]
+SpinUntil = Callable[..., None]
+
+
+class Bell(Waitable):
+    """Runs whenever its guard condition was triggered."""
+
+    def __init__(self, context: Context, group: CallbackGroup) -> None:
+        super().__init__(group)
+        self.guard = GuardCondition(callback=None, callback_group=None, context=context)
+        self.index = 0
+        self.executed: list[Any] = []
+        self.threads: set[int] = set()
+
+    def get_num_entities(self) -> NumberOfEntities:
+        return NumberOfEntities(num_gcs=1)
+
+    def add_to_wait_set(self, wait_set: Any) -> None:
+        self.index = wait_set.add_guard_condition(self.guard.handle)
+
+    def is_ready(self, wait_set: Any) -> bool:
+        return bool(wait_set.is_ready("guard_condition", self.index))
+
+    def take_data(self) -> Any:
+        return "ding"
+
+    async def execute(self, taken_data: Any) -> None:
+        self.threads.add(threading.get_ident())
+        self.executed.append(taken_data)
+
+
+class Ticker(Waitable):
+    """Runs whenever its timer is due."""
+
+    def __init__(self, context: Context) -> None:
+        super().__init__(ReentrantCallbackGroup())
+        clock = Clock(clock_type=ClockType.STEADY_TIME)
+        self.timer = Timer(lambda: None, None, 10_000_000, clock, context=context)  # type: ignore[arg-type]
+        self.index = 0
+        self.ticks = 0
+
+    def get_num_entities(self) -> NumberOfEntities:
+        return NumberOfEntities(num_timers=1)
+
+    def add_to_wait_set(self, wait_set: Any) -> None:
+        self.index = wait_set.add_timer(self.timer.handle)
+
+    def is_ready(self, wait_set: Any) -> bool:
+        return bool(wait_set.is_ready("timer", self.index))
+
+    def take_data(self) -> Any:
+        self.timer.handle.call_timer()
+        return None
+
+    async def execute(self, taken_data: Any) -> None:
+        assert taken_data is None
+        self.ticks += 1
+
+
+@pytest.fixture
+def bell(node: Node, context: Context) -> Iterator[Bell]:
+    """A waitable of the node."""
+    bell = Bell(context, node.default_callback_group)
+    node.add_waitable(bell)
+    yield bell
+    if bell in list(node.waitables):
+        node.remove_waitable(bell)
+
+
+def test_a_guard_condition_runs_a_waitable(
+    bell: Bell, executor: SingleThreadedExecutor, spin_until: SpinUntil
+) -> None:
+    bell.guard.trigger()
+    spin_until(lambda: bell.executed == ["ding"])
+    for _ in range(3):
+        executor.spin_once(timeout_sec=0.01)
+    assert bell.executed == ["ding"]
+    bell.guard.trigger()
+    spin_until(lambda: len(bell.executed) == 2)
+
+
+def test_a_trigger_of_another_thread_ends_the_wait(bell: Bell, executor: SingleThreadedExecutor) -> None:
+    started = time.monotonic()
+    threading.Timer(0.05, bell.guard.trigger).start()
+    while not bell.executed:
+        executor.spin_once(timeout_sec=30)
+    assert time.monotonic() - started < 30
+
+
+def test_a_waitable_may_have_a_guard_condition_of_the_extension(
+    bell: Bell, context: Context, spin_until: SpinUntil
+) -> None:
+    class Alarm:
+        def __init__(self) -> None:
+            with context.handle:
+                self.handle = rclpy_implementation.GuardCondition(context.handle)
+
+    alarm: Any = Alarm()
+    bell.guard = alarm
+    alarm.handle.trigger_guard_condition()
+    spin_until(lambda: bell.executed == ["ding"])
+
+
+def test_a_timer_runs_a_waitable(node: Node, context: Context, spin_until: SpinUntil) -> None:
+    ticker = Ticker(context)
+    node.add_waitable(ticker)
+    spin_until(lambda: ticker.ticks >= 3)
+    ticker.timer.cancel()
+    node.remove_waitable(ticker)
+
+
+def test_a_removed_waitable_does_not_run(
+    bell: Bell, node: Node, executor: SingleThreadedExecutor, spin_until: SpinUntil
+) -> None:
+    assert bell in list(node.waitables)
+    node.remove_waitable(bell)
+    assert bell not in list(node.waitables)
+    bell.guard.trigger()
+    for _ in range(3):
+        executor.spin_once(timeout_sec=0.01)
+    assert bell.executed == []
+    with pytest.raises(ValueError, match="not in list"):
+        node.remove_waitable(bell)
+
+
+def test_a_waitable_of_a_node_that_is_added_later_runs(
+    make_node: MakeNode, executor: SingleThreadedExecutor, context: Context, spin_until: SpinUntil
+) -> None:
+    node = make_node("late")
+    bell = Bell(context, ReentrantCallbackGroup())
+    node.add_waitable(bell)
+    bell.guard.trigger()
+    executor.add_node(node)
+    spin_until(lambda: bell.executed)
+    node.remove_waitable(bell)
+
+
+def test_a_waitable_follows_its_node_to_another_executor(
+    bell: Bell, node: Node, executor: SingleThreadedExecutor, context: Context, spin_until: SpinUntil
+) -> None:
+    bell.guard.trigger()
+    spin_until(lambda: bell.executed)
+    executor.remove_node(node)
+    started = time.monotonic()
+    with SingleThreadedExecutor(context=context) as other:
+        other.add_node(node)
+        while len(bell.executed) < 3:  # the new executor may see the first trigger again
+            threading.Timer(0.05, bell.guard.trigger).start()
+            other.spin_once(timeout_sec=30)
+    assert time.monotonic() - started < 30
+
+
+def test_several_waitables_and_other_entities_share_an_executor(
+    bell: Bell, node: Node, context: Context, spin_until: SpinUntil
+) -> None:
+    other, ticker = Bell(context, ReentrantCallbackGroup()), Ticker(context)
+    heard: list[float] = []
+    node.add_waitable(other)
+    node.add_waitable(ticker)
+    node.create_subscription(Float64, "x", lambda message: heard.append(message.data), 10)
+    publisher = node.create_publisher(Float64, "x", 10)
+    spin_until(lambda: publisher.get_subscription_count())
+    publisher.publish(Float64(data=1.0))
+    other.guard.trigger()
+    spin_until(lambda: heard and other.executed and ticker.ticks)
+    assert bell.executed == []
+    node.remove_waitable(other)
+    node.remove_waitable(ticker)
+
+
+def test_a_waitable_obeys_its_callback_group(make_node: MakeNode, context: Context) -> None:
+    node = make_node()
+    group = MutuallyExclusiveCallbackGroup()
+    bell = Bell(context, group)
+    node.add_waitable(bell)
+    entered, leave = threading.Event(), threading.Event()
+
+    def occupy() -> None:
+        timer.cancel()
+        bell.guard.trigger()
+        entered.set()
+        leave.wait(10)
+
+    timer = node.create_timer(0.0, occupy, group)
+    with MultiThreadedExecutor(3, context=context) as executor:
+        executor.add_node(node)
+        spinning = threading.Thread(target=executor.spin)
+        spinning.start()
+        assert entered.wait(10)
+        assert bell.executed == []
+        leave.set()
+        done = threading.Event()
+        while not bell.executed:
+            assert not done.wait(0.01)
+        executor.shutdown()
+        spinning.join()
+    assert bell.executed == ["ding"]
+    node.remove_waitable(bell)
+
+
+def test_done_callbacks_of_the_futures_of_a_waitable_run_on_the_executor(
+    bell: Bell, spin_until: SpinUntil
+) -> None:
+    future = Future()
+    bell.add_future(future)
+    threads = []
+    future.add_done_callback(lambda _: threads.append(threading.get_ident()))
+    bell.guard.trigger()
+    spin_until(lambda: bell.executed)
+    completing = threading.Thread(target=future.set_result, args=(1,))
+    completing.start()
+    completing.join()
+    spin_until(lambda: threads)
+    assert threads == [threading.get_ident()]
+    bell.remove_future(future)
+
+
+def test_an_error_in_a_waitable_ends_the_spinning(
+    node: Node, context: Context, spin_until: SpinUntil
+) -> None:
+    class Failing(Bell):
+        async def execute(self, taken_data: Any) -> None:
+            raise ZeroDivisionError("planted")
+
+    failing = Failing(context, ReentrantCallbackGroup())
+    node.add_waitable(failing)
+    failing.guard.trigger()
+    with pytest.raises(ZeroDivisionError, match="planted"):
+        spin_until(lambda: False)
+    node.remove_waitable(failing)
+
+
+def test_an_executor_of_a_user_runs_waitables(
+    make_node: MakeNode, context: Context, user_executor: Executor
+) -> None:
+    node = make_node()
+    bell = Bell(context, ReentrantCallbackGroup())
+    node.add_waitable(bell)
+    user_executor.add_node(node)
+    bell.guard.trigger()
+    while not bell.executed:
+        user_executor.spin_once(timeout_sec=10)
+    node.remove_waitable(bell)
+
+
+def test_an_event_handler_may_be_added_as_a_waitable(node: Node, spin_until: SpinUntil) -> None:
+    silent = SubscriptionEventCallbacks(use_default_callbacks=False)
+    subscription = node.create_subscription(Float64, "x", lambda _: None, 1, event_callbacks=silent)
+    matches: list[Any] = []
+    handler = EventHandler(
+        callback_group=node.default_callback_group,
+        callback=matches.append,
+        event_type=QoSSubscriptionEventType.RCL_SUBSCRIPTION_MATCHED,
+        parent_impl=subscription.handle,
+    )
+    node.add_waitable(handler)
+    node.create_publisher(Float64, "x", 1)
+    spin_until(lambda: matches)
+    assert matches[0].current_count == 1
+    node.remove_waitable(handler)
+
+
+def test_numbers_of_entities_are_added() -> None:
+    total = NumberOfEntities(1, 2, 3, 4, 5, 6) + NumberOfEntities(num_gcs=1, num_events=1)
+    assert repr(total) == "<NumberOfEntities(1, 3, 3, 4, 5, 7)>"
+
+
+def test_the_methods_of_a_waitable_are_abstract() -> None:
+    waitable = Waitable(ReentrantCallbackGroup())
+    for method in (waitable.is_ready, waitable.add_to_wait_set):
+        with pytest.raises(NotImplementedError, match="Must be implemented by subclass"):
+            method(None)
+    with pytest.raises(NotImplementedError, match="Must be implemented by subclass"):
+        waitable.take_data()
+    with pytest.raises(NotImplementedError, match="Must be implemented by subclass"):
+        waitable.get_num_entities()
+    assert waitable.callback_group is not None
+    assert waitable.callback_group.has_entity(waitable)

@@ -1,0 +1,84 @@
+"""An arm with a page, as `make start` starts it, and a hand that holds it."""
+
+from __future__ import annotations
+
+import functools
+import re
+import socket
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.system.sites import ROOT, Site
+
+from .chromium import HandOnPage
+from .record import Record
+
+STEADY = str(ROOT / "tests" / "system" / "steady.yaml")
+LINK = "127.0.0.2"  # where a test may listen between page and server
+ATTEMPTS = 5
+GONE = 0.25 + 0.1  # s for which a beat on its way may count: the age of its nonce, and the way to the topic
+
+
+class Arm:
+    """A running system in which nothing moves and nobody holds the switch."""
+
+    def __init__(self, run: Path, domain: int, namespace: str = "", **page: object) -> None:
+        """
+        Start the system.
+
+        :param namespace: the network namespace of the system; empty for that of this process.
+        :param page: parameters of the page.
+        """
+        self.site = Site(run, domain)
+        with socket.create_server(("127.0.0.1", 0)) as free:
+            self.port: int = free.getsockname()[1]
+        page = {"port": self.port} | page
+        parameters = run.with_suffix(".yaml")
+        lines = "".join(f"\n    {name}: {value}" for name, value in page.items())
+        parameters.write_text(f"operator_console:\n  ros__parameters:{lines}\n")
+        within = ["ip", "netns", "exec", namespace] if namespace else []
+        launcher = [self.site.python, "-m", "deploy.commands.launcher"]
+        code, printed = self.site.do_command(*within, *launcher, "start", STEADY, str(parameters))
+        assert code == 0, printed
+        found = re.fullmatch(r"The page: (\S+)\n", (run / "settings" / "page.txt").read_text())
+        assert found
+        self.url = found[1]
+        """The address of the page."""
+        self.record = Record(domain, namespace)
+
+    def close(self) -> None:
+        """Stop the system."""
+        self.record.close()
+        self.site.close()
+
+
+def hold_with_engines_on(arm: Arm, hand: HandOnPage, *hands: Callable[[], None]) -> None:
+    """Hold until heartbeats flow and the engines are on; ``hands`` as of :meth:`HandOnPage.hold`."""
+    begin = time.time()
+    while True:
+        hand.hold(*hands)
+        arm.record.turn_on()
+        arm.record.await_beats(begin, 3)
+        if hand.state == "held":
+            return
+
+
+def undisturbed(test: Callable[..., None]) -> Callable[..., None]:
+    """Begin a test of a ``hand`` anew if the page had to release because the machine stood still."""
+
+    @functools.wraps(test)
+    def attempts(hand: HandOnPage, **others: Any) -> None:
+        for _ in range(ATTEMPTS):
+            try:
+                return test(hand=hand, **others)
+            except Exception:
+                if not hand.stalled:
+                    raise
+            hand.begin_anew()
+        pytest.skip(f"platform: the machine stood still in each of {ATTEMPTS} attempts")
+
+    return attempts
