@@ -241,6 +241,26 @@ def test_transport_of_the_user_finds_its_interface(
     Participant(domain_id, "enclave=/;").close()
 
 
+# Security
+
+
+@pytest.mark.parametrize("strategy", ["Enforce", "Permissive", None])
+def test_security_is_refused_in_one_line(
+    strategy: str | None, monkeypatch: pytest.MonkeyPatch, domain_id: int
+) -> None:
+    monkeypatch.setenv("ROS_SECURITY_ENABLE", "true")
+    if strategy is not None:
+        monkeypatch.setenv("ROS_SECURITY_STRATEGY", strategy)
+    with pytest.raises(RCLError, match=r"^ROS_SECURITY_ENABLE is true, but .* no DDS security: [^\n]*$"):
+        Context().init(args=[], domain_id=domain_id)
+
+
+@pytest.mark.parametrize("value", ["", "false", "TRUE"])
+def test_security_is_off_unless_true(value: str) -> None:
+    environment = {"ROS_SECURITY_ENABLE": value, "ROS_SECURITY_STRATEGY": "Enforce"}
+    assert domain.configuration(environment) == domain.configuration({})
+
+
 def test_context_forgets_callbacks_of_lost_objects(context: Context) -> None:
     class Listener:
         def hear(self) -> None: ...

@@ -45,6 +45,10 @@ def domain_id_from_environment(environment: Mapping[str, str] = os.environ) -> i
 
 def configuration(environment: Mapping[str, str] = os.environ, domain_id: int = 0) -> str:
     """Return Cyclone's configuration of a domain. Raises RCLError if the environment is invalid."""
+    if environment.get("ROS_SECURITY_ENABLE") == "true":  # no other spelling counts, as in ROS 2
+        raise RCLError(
+            "ROS_SECURITY_ENABLE is true, but this runtime has no DDS security: unset it, or use ROS 2"
+        )
     discovery_range = environment.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "").strip().upper() or "SUBNET"
     if discovery_range not in RANGES:
         raise RCLError(
