@@ -21,10 +21,6 @@ from rclpy.node import Node
 
 SOURCE = Path(__file__).with_name("peer.cpp")
 LIBRARIES = ("-lfastrtps", "-lfastcdr")
-LOOPBACK = (
-    '<CycloneDDS><Domain><General><Interfaces><NetworkInterface name="lo" multicast="true"/></Interfaces>'
-    "</General></Domain></CycloneDDS>"
-)
 SECONDS = 15.0  # until discovery or a message must have come
 
 
@@ -137,9 +133,8 @@ def peer(peer_program: Path, domain_id: int) -> Iterator[FastPeer]:
 
 
 @pytest.fixture
-def node(domain_id: int, monkeypatch: pytest.MonkeyPatch) -> Iterator[Node]:
-    """A node in the test's domain, on loopback alone as the peer is."""
-    monkeypatch.setenv("CYCLONEDDS_URI", LOOPBACK)
+def node(domain_id: int) -> Iterator[Node]:
+    """A node in the test's domain, in LOCALHOST as the peer is."""
     context = Context()
     rclpy.init(args=[], context=context, domain_id=domain_id)
     node = Node("ours", context=context)
