@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
-from rclpy.clock import ROSClock
+from rclpy.clock import Clock, ROSClock
 from rclpy.clock_type import ClockType
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile, ReliabilityPolicy
@@ -18,9 +18,11 @@ if TYPE_CHECKING:
     import rosgraph_msgs.msg
     from rclpy.node import Node
     from rclpy.subscription import Subscription
+    from rclpy.timer import Timer
 
 CLOCK_TOPIC = "/clock"
 USE_SIM_TIME_NAME = "use_sim_time"
+CLOCK_TIMEOUT = 2.0  # s of steady time without a message on /clock until a warning
 
 
 class TimeSource:
@@ -29,6 +31,7 @@ class TimeSource:
     def __init__(self, *, node: Node | None = None) -> None:
         """Create a time source, and attach `node` if it is given."""
         self._clock_sub: Subscription | None = None
+        self._timeout: Timer | None = None
         self._node_weak_ref: weakref.ReferenceType[Node] | None = None
         self._associated_clocks: set[ROSClock] = set()
         # Zero: no time was received.
@@ -107,6 +110,8 @@ class TimeSource:
 
         :raises ValueError: if it is negative.
         """
+        if self._timeout is not None:
+            self._end_timeout()
         time = Time.from_msg(msg.clock)
         # The initial time of clocks that are attached later.
         self._last_time_set = time
@@ -117,13 +122,17 @@ class TimeSource:
         node = self._get_node()
         if node is None or self._clock_sub is not None:
             return
+        # A separate group: time must go on while a callback of the node sleeps.
+        group = MutuallyExclusiveCallbackGroup()
         self._clock_sub = node.create_subscription(
             _valid_clock(),
             CLOCK_TOPIC,
             self.clock_callback,
             QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT),
-            # A separate group: time must go on while a callback of the node sleeps.
-            callback_group=MutuallyExclusiveCallbackGroup(),
+            callback_group=group,
+        )
+        self._timeout = node.create_timer(
+            CLOCK_TIMEOUT, self._warn, callback_group=group, clock=Clock(clock_type=ClockType.STEADY_TIME)
         )
 
     def _unsubscribe(self) -> None:
@@ -131,6 +140,27 @@ class TimeSource:
         if node is not None and self._clock_sub is not None:
             node.destroy_subscription(self._clock_sub)
         self._clock_sub = None
+        self._end_timeout()
+
+    def _end_timeout(self) -> None:
+        node = self._get_node()
+        if node is not None and self._timeout is not None:
+            node.destroy_timer(self._timeout)
+        self._timeout = None
+
+    def _warn(self) -> None:
+        """Warn that no time has come. A message may wait: perhaps the node has not spun until now."""
+        self._end_timeout()
+        node = self._get_node()
+        if node is None or self._clock_sub is None:
+            return
+        if (waiting := self._clock_sub._take()) is not None:
+            self._clock_sub._execute(waiting)
+            return
+        node.get_logger().warning(
+            f"{USE_SIM_TIME_NAME} is true, but {self._clock_sub.topic_name} was silent for {CLOCK_TIMEOUT:g}"
+            f" s: start a simulator, or set {USE_SIM_TIME_NAME} to false"
+        )
 
     def _check(self, parameters: list[Parameter]) -> SetParametersResult:
         """Reject values of `use_sim_time` that are not bool."""

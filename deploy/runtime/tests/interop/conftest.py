@@ -15,10 +15,6 @@ import pytest
 
 SOURCE = Path(__file__).with_name("peer.cpp")
 LIBRARIES = ("-lfastrtps", "-lfastcdr")
-LOOPBACK = (
-    '<CycloneDDS><Domain><General><Interfaces><NetworkInterface name="lo" multicast="true"/></Interfaces>'
-    "</General></Domain></CycloneDDS>"
-)
 
 
 @pytest.fixture(scope="session")
@@ -52,12 +48,6 @@ def peer_program(pytestconfig: pytest.Config, tmp_path_factory: pytest.TempPathF
         # The last step is a rename, so a program of this name is always complete.
         os.replace(shutil.copy(built, program.with_suffix(".new")), program)
     return program
-
-
-@pytest.fixture(autouse=True)
-def loopback(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Bind nodes to loopback, like the peer."""
-    monkeypatch.setenv("CYCLONEDDS_URI", LOOPBACK)
 
 
 class FastPeer:

@@ -1,4 +1,4 @@
-"""The DDS domain of a process: its identifier, interfaces, peers and Cyclone's configuration."""
+"""Cyclone's configuration for the environment, and the errors in the environment."""
 
 from __future__ import annotations
 
@@ -12,15 +12,18 @@ from pathlib import Path
 import pytest
 
 from rclpy._dds import Participant, domain
+from rclpy.context import Context
 from rclpy.exceptions import RCLError
 from rclpy.node import Node
 
 MakeNode = Callable[..., Node]
+RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
+UP, LOOPBACK = 0x1, 0x8  # flags of network interfaces
 
 
 @pytest.fixture(autouse=True)
-def name_lookup(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Resolves every host name except ``nowhere``."""
+def names(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Resolve every host name except ``nowhere``."""
 
     def look_up(name: str, *_: object) -> list[object]:
         if name == "nowhere":
@@ -30,71 +33,129 @@ def name_lookup(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(socket, "getaddrinfo", look_up)
 
 
-def test_a_peer_without_an_address_is_ignored_with_a_warning(capsys: pytest.CaptureFixture[str]) -> None:
-    configuration = domain.configuration({"ROS_STATIC_PEERS": "nowhere;10.0.0.7;robot1:7410"})
-    assert configuration == domain.configuration({"ROS_STATIC_PEERS": "10.0.0.7;robot1:7410"})
-    assert capsys.readouterr().err == (
-        "[WARN] ROS_STATIC_PEERS: 'nowhere' is ignored: Name or service not known\n"
-    )
+@pytest.fixture
+def interfaces(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, int]]:
+    """The network interfaces of the host, which a test may change: lo and eth0."""
+    interfaces = [("lo", UP | LOOPBACK), ("eth0", UP)]
+    monkeypatch.setattr(domain, "_ipv4_interfaces", lambda: interfaces)
+    return interfaces
 
 
-def test_the_domain_id_defaults_to_0() -> None:
+# The domain
+
+
+def test_default_domain_is_zero() -> None:
     assert domain.domain_id_from_environment({}) == 0
+
+
+def test_environment_chooses_the_domain() -> None:
     assert domain.domain_id_from_environment({"ROS_DOMAIN_ID": "42"}) == 42
 
 
 @pytest.mark.parametrize("text", ["-1", "233", "one", "4.2"])
-def test_an_invalid_domain_id_is_refused_in_one_line(text: str) -> None:
+def test_invalid_domain_is_one_line(text: str) -> None:
     with pytest.raises(RCLError, match=r"^ROS_DOMAIN_ID must be a whole number from 0 to 232, not '"):
         domain.domain_id_from_environment({"ROS_DOMAIN_ID": text})
 
 
-def test_localhost_uses_loopback_only() -> None:
-    configuration = domain.configuration({"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"})
-    assert '<NetworkInterface name="lo" multicast="true"/>' in configuration
-    assert '<Peer address="localhost"/>' in configuration
+# Discovery ranges
 
 
-def test_the_deprecated_localhost_only_variable_still_works() -> None:
-    old = domain.configuration({"ROS_LOCALHOST_ONLY": "1"})
-    assert old == domain.configuration({"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"})
+def test_localhost_is_without_multicast() -> None:
+    configuration = domain.configuration({RANGE: "LOCALHOST"})
+    assert "<AllowMulticast>false</AllowMulticast>" in configuration
+    assert "<ParticipantIndex>auto</ParticipantIndex>" in configuration
+
+
+@pytest.mark.parametrize("discovery_range", ["LOCALHOST", "SUBNET"])
+@pytest.mark.parametrize(("domain_id", "last"), [(0, 100), (231, 100), (232, 62)])
+def test_every_index_has_ports(discovery_range: str, domain_id: int, last: int) -> None:
+    configuration = domain.configuration({RANGE: discovery_range}, domain_id)
+    assert f"<MaxAutoParticipantIndex>{last}</MaxAutoParticipantIndex>" in configuration
+
+
+def test_localhost_asks_on_localhost_forever() -> None:
+    configuration = domain.configuration({RANGE: "LOCALHOST"})
+    assert '<Peer address="127.0.0.1" PruneDelay="inf"/>' in configuration
+    assert "<SPDPInterval>8s</SPDPInterval>" in configuration
+
+
+def test_localhost_uses_loopback_and_default_interface(interfaces: list[tuple[str, int]]) -> None:
+    interfaces[:0] = [("eth1", UP)]
+    assert domain.configuration({RANGE: "LOCALHOST"}).count("<NetworkInterface ") == 2
+    assert (
+        '<Interfaces><NetworkInterface name="lo"/><NetworkInterface autodetermine="true"/></Interfaces>'
+        in domain.configuration({RANGE: "LOCALHOST"})
+    )
+
+
+def test_localhost_without_other_interface_uses_loopback(interfaces: list[tuple[str, int]]) -> None:
+    interfaces[:] = [("lo", UP | LOOPBACK), ("lo", UP | LOOPBACK)]
+    configuration = domain.configuration({RANGE: "LOCALHOST"})
+    assert '<Interfaces><NetworkInterface name="lo"/></Interfaces>' in configuration
+
+
+def test_localhost_without_loopback_leaves_choice_to_cyclone(interfaces: list[tuple[str, int]]) -> None:
+    interfaces[:] = [("eth0", UP)]
+    configuration = domain.configuration({RANGE: "LOCALHOST"})
+    assert "<NetworkInterface" not in configuration
+    assert "<ExtendedPacketInfo>false</ExtendedPacketInfo>" in configuration
+
+
+def test_interfaces_of_the_host_are_listed() -> None:
+    found = domain._ipv4_interfaces()
+    assert {name for name, _ in found} <= {name for _, name in socket.if_nameindex()}
+    assert all(flags & UP for _, flags in found)
+    assert [name for name, flags in found if flags & LOOPBACK]
+
+
+def test_localhost_only_variable_means_localhost() -> None:
+    assert domain.configuration({"ROS_LOCALHOST_ONLY": "1"}) == domain.configuration({RANGE: "LOCALHOST"})
 
 
 @pytest.mark.parametrize("discovery_range", ["OFF", "SUBNET", "SYSTEM_DEFAULT"])
-def test_localhost_only_overrides_range_and_peers(discovery_range: str) -> None:
-    new = {"ROS_AUTOMATIC_DISCOVERY_RANGE": discovery_range, "ROS_STATIC_PEERS": "robot1"}
+def test_localhost_only_variable_overrides_range_and_peers(discovery_range: str) -> None:
+    new = {RANGE: discovery_range, "ROS_STATIC_PEERS": "robot1"}
     old = domain.configuration({**new, "ROS_LOCALHOST_ONLY": "1"})
-    assert old == domain.configuration({"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"})
+    assert old == domain.configuration({RANGE: "LOCALHOST"})
     assert domain.configuration({**new, "ROS_LOCALHOST_ONLY": "0"}) == domain.configuration(new)
 
 
-def test_subnet_takes_a_participant_index_and_keeps_multicast() -> None:
+def test_subnet_uses_multicast_and_asks_localhost_at_start() -> None:
     configuration = domain.configuration({})
     assert "<ParticipantIndex>auto</ParticipantIndex>" in configuration
-    assert "<Peer " not in configuration
     assert "Multicast" not in configuration
+    assert '<Peers><Peer address="127.0.0.1"/></Peers>' in configuration
+    assert "<SPDPInterval>" not in configuration
+    assert "<ExtendedPacketInfo>false</ExtendedPacketInfo>" in configuration
 
 
-def test_system_default_configures_nothing() -> None:
-    environment = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "SYSTEM_DEFAULT", "ROS_STATIC_PEERS": "robot1"}
-    assert domain.configuration(environment) == ""
+def test_system_default_leaves_all_to_cyclone() -> None:
+    assert domain.configuration({RANGE: "SYSTEM_DEFAULT", "ROS_STATIC_PEERS": "robot1"}) == ""
 
 
 def test_off_hides_a_process_from_all_others() -> None:
-    configuration = domain.configuration({"ROS_AUTOMATIC_DISCOVERY_RANGE": "OFF"})
+    configuration = domain.configuration({RANGE: "OFF"})
     assert "<AllowMulticast>false</AllowMulticast>" in configuration
     assert "<Tag>ros_discovery_off_" in configuration
 
 
-def test_static_peers_are_added() -> None:
+def test_unknown_range_is_one_line() -> None:
+    with pytest.raises(RCLError, match=r"^ROS_AUTOMATIC_DISCOVERY_RANGE must be one of .*, not 'MOON'$"):
+        domain.configuration({RANGE: "moon"})
+
+
+# Static peers
+
+
+def test_subnet_asks_static_peers() -> None:
     configuration = domain.configuration({"ROS_STATIC_PEERS": "robot1; 10.0.0.7"})
     assert '<Peer address="robot1"/><Peer address="10.0.0.7"/>' in configuration
 
 
-def test_localhost_with_static_peers_uses_any_interface_without_multicast() -> None:
-    environment = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", "ROS_STATIC_PEERS": "robot1"}
-    configuration = domain.configuration(environment)
-    assert '<Peer address="localhost"/><Peer address="robot1"/>' in configuration
+def test_localhost_meets_static_peers_on_any_interface() -> None:
+    configuration = domain.configuration({RANGE: "LOCALHOST", "ROS_STATIC_PEERS": "robot1"})
+    assert '<Peer address="127.0.0.1" PruneDelay="inf"/><Peer address="robot1"/>' in configuration
     assert "<AllowMulticast>false</AllowMulticast>" in configuration
     assert "<ExtendedPacketInfo>false</ExtendedPacketInfo>" in configuration
     assert "<NetworkInterface" not in configuration
@@ -108,20 +169,35 @@ input()
 """
 
 
-def test_localhost_processes_with_and_without_peers_meet(make_node: MakeNode, domain_id: int) -> None:
+def test_process_with_peers_meets_process_without(make_node: MakeNode, domain_id: int) -> None:
     environment = {**os.environ, "ROS_DOMAIN_ID": str(domain_id), "ROS_STATIC_PEERS": "127.0.0.1"}
     with subprocess.Popen([sys.executable, "-c", NODE], env=environment, stdin=subprocess.PIPE) as process:
         assert make_node().wait_for_node("/other", 10)
         process.communicate(b"\n")
 
 
-def test_settings_of_cyclonedds_uri_come_last_and_win() -> None:
-    settings = "<CycloneDDS><Domain/></CycloneDDS>"
-    environment = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", "CYCLONEDDS_URI": settings}
-    assert domain.configuration(environment).endswith(f",{settings}")
+def test_peer_without_address_is_ignored(capsys: pytest.CaptureFixture[str]) -> None:
+    configuration = domain.configuration({"ROS_STATIC_PEERS": "nowhere;10.0.0.7;robot1:7410"})
+    assert configuration == domain.configuration({"ROS_STATIC_PEERS": "10.0.0.7;robot1:7410"})
+    assert capsys.readouterr().err == (
+        "[WARN] ROS_STATIC_PEERS: 'nowhere' is ignored: Name or service not known\n"
+    )
 
 
-LOOPBACK = '<General><Interfaces><NetworkInterface name="lo" multicast="true"/></Interfaces></General>'
+def test_invalid_peers_are_one_line() -> None:
+    with pytest.raises(RCLError, match=r"^ROS_STATIC_PEERS must be addresses or host names"):
+        domain.configuration({"ROS_STATIC_PEERS": '"/><Evil'})
+
+
+# CYCLONEDDS_URI
+
+
+def test_settings_of_the_user_come_last() -> None:
+    own = "<CycloneDDS><Domain/></CycloneDDS>"
+    assert domain.configuration({RANGE: "LOCALHOST", "CYCLONEDDS_URI": own}).endswith(f",{own}")
+
+
+INTERFACES = '<General><Interfaces><NetworkInterface name="lo" multicast="true"/></Interfaces></General>'
 
 
 @pytest.mark.parametrize(
@@ -134,10 +210,10 @@ LOOPBACK = '<General><Interfaces><NetworkInterface name="lo" multicast="true"/><
     ids=["named", "in a comment", "not named"],
 )
 @pytest.mark.parametrize("where", ["text", "file", "file: URI", "second of two"])
-def test_network_interfaces_of_cyclonedds_uri_replace_the_default(
+def test_only_interfaces_of_the_user_are_used(
     form: str, only: bool, where: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, domain_id: int
 ) -> None:
-    text = form.format(LOOPBACK)
+    text = form.format(INTERFACES)
     path = tmp_path / "cyclonedds.xml"
     path.write_text(text)
     uri = {
@@ -147,15 +223,47 @@ def test_network_interfaces_of_cyclonedds_uri_replace_the_default(
         "second of two": f"<CycloneDDS><Domain/></CycloneDDS>, file://{path}",
     }[where]
     monkeypatch.setenv("CYCLONEDDS_URI", uri)
-    assert domain.configuration().removesuffix(uri).count("<NetworkInterface") == (not only)
-    Participant(domain_id, "enclave=/;").close()  # Cyclone refuses an interface that is named twice
+    own = domain.configuration().removesuffix(uri)
+    assert ("<NetworkInterface" in own) == (not only)
+    assert ("<ExtendedPacketInfo>" in own) == only  # or packets to localhost are dropped
+    Participant(domain_id, "enclave=/;").close()  # Cyclone would refuse an interface that is named twice
 
 
-def test_an_unknown_range_is_refused_in_one_line() -> None:
-    with pytest.raises(RCLError, match=r"^ROS_AUTOMATIC_DISCOVERY_RANGE must be one of .*, not 'MOON'$"):
-        domain.configuration({"ROS_AUTOMATIC_DISCOVERY_RANGE": "moon"})
+@pytest.mark.parametrize("transport", ["<Transport>udp6</Transport>", "<UseIPv6>true</UseIPv6>"])
+@pytest.mark.parametrize("discovery_range", ["LOCALHOST", "SUBNET"])
+def test_transport_of_the_user_finds_its_interface(
+    discovery_range: str, transport: str, monkeypatch: pytest.MonkeyPatch, domain_id: int
+) -> None:
+    monkeypatch.setenv(RANGE, discovery_range)
+    uri = f"<CycloneDDS><Domain><General>{transport}</General></Domain></CycloneDDS>"
+    monkeypatch.setenv("CYCLONEDDS_URI", uri)
+    assert "<NetworkInterface" not in domain.configuration()
+    Participant(domain_id, "enclave=/;").close()
 
 
-def test_invalid_peers_are_refused() -> None:
-    with pytest.raises(RCLError, match="ROS_STATIC_PEERS"):
-        domain.configuration({"ROS_STATIC_PEERS": '"/><Evil'})
+# Security
+
+
+@pytest.mark.parametrize("strategy", ["Enforce", "Permissive", None])
+def test_security_is_refused_in_one_line(
+    strategy: str | None, monkeypatch: pytest.MonkeyPatch, domain_id: int
+) -> None:
+    monkeypatch.setenv("ROS_SECURITY_ENABLE", "true")
+    if strategy is not None:
+        monkeypatch.setenv("ROS_SECURITY_STRATEGY", strategy)
+    with pytest.raises(RCLError, match=r"^ROS_SECURITY_ENABLE is true, but .* no DDS security: [^\n]*$"):
+        Context().init(args=[], domain_id=domain_id)
+
+
+@pytest.mark.parametrize("value", ["", "false", "TRUE"])
+def test_security_is_off_unless_true(value: str) -> None:
+    environment = {"ROS_SECURITY_ENABLE": value, "ROS_SECURITY_STRATEGY": "Enforce"}
+    assert domain.configuration(environment) == domain.configuration({})
+
+
+def test_context_forgets_callbacks_of_lost_objects(context: Context) -> None:
+    class Listener:
+        def hear(self) -> None: ...
+
+    context.on_shutdown(Listener().hear)
+    assert context._callbacks == []

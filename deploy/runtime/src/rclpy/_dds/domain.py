@@ -1,11 +1,13 @@
 """Joins DDS domains, with Cyclone DDS configured from the environment variables of ROS 2.
 
-Source: ROS 2 Jazzy, "Improved dynamic discovery": ROS_AUTOMATIC_DISCOVERY_RANGE, ROS_STATIC_PEERS,
-ROS_LOCALHOST_ONLY (deprecated, still obeyed) and ROS_DOMAIN_ID. The settings of Cyclone's CYCLONEDDS_URI win.
+Sources: ROS 2 Jazzy, "Improved dynamic discovery", for ROS_AUTOMATIC_DISCOVERY_RANGE, ROS_STATIC_PEERS,
+ROS_LOCALHOST_ONLY (deprecated, still obeyed) and ROS_DOMAIN_ID; rmw_cyclonedds_cpp 2.2.2 for the settings of
+Cyclone that implement them. The settings of Cyclone's CYCLONEDDS_URI win.
 """
 
 from __future__ import annotations
 
+import ctypes as ct
 import os
 import re
 import sys
@@ -17,11 +19,16 @@ from pathlib import Path
 
 from rclpy.exceptions import RCLError
 
-from .library import PRECONDITION_NOT_MET, blocking, checked
+from .library import PRECONDITION_NOT_MET, NetworkAddress, blocking, checked, libc
 
 RANGES = ("SUBNET", "LOCALHOST", "OFF", "SYSTEM_DEFAULT")
 _COMMENT = re.compile("<!--.*?-->", re.DOTALL)
-_NO_MULTICAST = "<General><AllowMulticast>false</AllowMulticast></General>"
+_CHOICE = re.compile(r"<(networkinterface|transport|useipv6)\b", re.IGNORECASE)  # Cyclone ignores case, too
+_NO_MULTICAST = "<AllowMulticast>false</AllowMulticast>"
+# Packets to localhost arrive on the loopback interface. Otherwise, Cyclone drops them if it does not use it.
+_FROM_ANY_INTERFACE = "<Internal><ExtendedPacketInfo>false</ExtendedPacketInfo></Internal>"
+_AF_INET = 2
+_IFF_UP, _IFF_LOOPBACK = 0x1, 0x8
 
 _lock = threading.Lock()
 _users: dict[int, int] = {}  # domain id -> number of participants of this process
@@ -36,14 +43,12 @@ def domain_id_from_environment(environment: Mapping[str, str] = os.environ) -> i
     return int(text)
 
 
-def configuration(environment: Mapping[str, str] = os.environ) -> str:
-    """Return Cyclone's configuration for the discovery range in the environment. Raises RCLError.
-
-    LOCALHOST uses the loopback interface only. With multicast on it, processes of this runtime discover each
-    other at once. Jazzy nodes do not use multicast there: they probe participant indices on localhost. So
-    this runtime takes an index and probes, too, for up to 100 processes; Jazzy's limit of 33 is too low for a
-    fleet. Static peers may need other interfaces, so with peers the configuration is that of Jazzy.
-    """
+def configuration(environment: Mapping[str, str] = os.environ, domain_id: int = 0) -> str:
+    """Return Cyclone's configuration of a domain. Raises RCLError if the environment is invalid."""
+    if environment.get("ROS_SECURITY_ENABLE") == "true":  # no other spelling counts, as in ROS 2
+        raise RCLError(
+            "ROS_SECURITY_ENABLE is true, but this runtime has no DDS security: unset it, or use ROS 2"
+        )
     discovery_range = environment.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "").strip().upper() or "SUBNET"
     if discovery_range not in RANGES:
         raise RCLError(
@@ -55,31 +60,62 @@ def configuration(environment: Mapping[str, str] = os.environ) -> str:
     uri = environment.get("CYCLONEDDS_URI", "")
     if environment.get("ROS_LOCALHOST_ONLY", "0") == "1":
         discovery_range, peers = "LOCALHOST", []
-    if discovery_range in ("LOCALHOST", "SUBNET"):
+    if discovery_range == "SYSTEM_DEFAULT":
+        return uri
+    if discovery_range == "OFF":
+        own = _off()
+    else:
         peers = [peer for peer in peers if _has_address(peer, only_ipv4=not uri)]
-    general, discovery = "", ""
-    if discovery_range == "LOCALHOST":
-        if peers:
-            # With extended packet information, Cyclone would drop packets from interfaces that it does not
-            # use, such as those that Jazzy nodes send to localhost.
-            general = f"{_NO_MULTICAST}<Internal><ExtendedPacketInfo>false</ExtendedPacketInfo></Internal>"
-        elif not _names_interfaces(uri):
-            interface = '<NetworkInterface name="lo" multicast="true"/>'
-            general = f"<General><Interfaces>{interface}</Interfaces></General>"
-        peers = ["localhost", *peers]
-    elif discovery_range == "OFF":
-        general = _NO_MULTICAST
-        tag = f"<Tag>ros_discovery_off_{os.getpid()}</Tag>"
-        discovery = f"<Discovery><ParticipantIndex>none</ParticipantIndex>{tag}</Discovery>"
-    if discovery_range in ("LOCALHOST", "SUBNET"):
-        addresses = "".join(f'<Peer address="{peer}"/>' for peer in peers)
-        discovery = (
-            "<Discovery><ParticipantIndex>auto</ParticipantIndex>"
-            "<MaxAutoParticipantIndex>99</MaxAutoParticipantIndex>"
-            f"<Peers>{addresses}</Peers></Discovery>"
-        )
-    own = f"<CycloneDDS><Domain>{general}{discovery}</Domain></CycloneDDS>" if discovery else ""
-    return ",".join(part for part in (own, uri) if part)
+        settings = _localhost if discovery_range == "LOCALHOST" else _subnet
+        general, discovery = settings(peers, _choices(uri))
+        own = f"{general}<Discovery>{_index(domain_id)}{discovery}</Discovery>"
+    return f"<CycloneDDS><Domain>{own}</Domain></CycloneDDS>" + (f",{uri}" if uri else "")
+
+
+def _off() -> str:
+    """Return the settings for OFF: no other process discovers this one."""
+    tag = f"<Tag>ros_discovery_off_{os.getpid()}</Tag>"
+    index = "<ParticipantIndex>none</ParticipantIndex>"
+    return f"<General>{_NO_MULTICAST}</General><Discovery>{index}{tag}</Discovery>"
+
+
+def _localhost(peers: list[str], choices: set[str]) -> tuple[str, str]:
+    """Return the settings for LOCALHOST: all nodes of the host meet, and nothing leaves it except to peers.
+
+    Without multicast, a process must ask every participant index on localhost. It never stops: nodes of ROS 2
+    in SUBNET do not ask localhost when they start.
+
+    If Cyclone prefers the loopback interface, it does not reach peers on other hosts. So with peers, the
+    interface is Cyclone's choice, as in ROS 2.
+    """
+    interfaces = "" if peers or choices else _loopback_and_default()
+    general = f"<General>{_NO_MULTICAST}{interfaces}</General>{'' if interfaces else _FROM_ANY_INTERFACE}"
+    # By default, Cyclone 11 asks every 30 s, and only for 30 s.
+    return general, "<SPDPInterval>8s</SPDPInterval>" + _peers(peers, choices, ' PruneDelay="inf"')
+
+
+def _subnet(peers: list[str], choices: set[str]) -> tuple[str, str]:
+    """Return the settings for SUBNET: multicast, and a question to nodes of the host that do not hear it."""
+    return _FROM_ANY_INTERFACE, _peers(peers, choices)
+
+
+def _peers(peers: list[str], choices: set[str], how_long: str = "") -> str:
+    addresses = "".join(f'<Peer address="{peer}"/>' for peer in peers)
+    # With IPv6, 127.0.0.1 would be an error. Where Cyclone cannot use multicast, it adds its own address.
+    if not choices & {"transport", "useipv6"}:
+        addresses = f'<Peer address="127.0.0.1"{how_long}/>{addresses}'
+    return f"<Peers>{addresses}</Peers>"
+
+
+def _index(domain_id: int) -> str:
+    """Return the settings for 100 processes on a host. Jazzy's limit of 32 is too low for a fleet.
+
+    Cyclone does not use the last index. In domain 232, fewer processes have ports.
+    """
+    last = min(100, (65535 - 7411 - 250 * domain_id) // 2)  # DDSI-RTPS 2.5, 9.6.2.3: the ports of an index
+    return (
+        f"<ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>{last}</MaxAutoParticipantIndex>"
+    )
 
 
 @cache
@@ -100,24 +136,55 @@ def _has_address(peer: str, only_ipv4: bool) -> bool:
     return True
 
 
-def _names_interfaces(uri: str) -> bool:
-    """Whether the settings of CYCLONEDDS_URI, inline or in files, name network interfaces.
+def _choices(uri: str) -> set[str]:
+    """Return which elements of CYCLONEDDS_URI, inline or in files, choose network interfaces or a transport.
 
-    If so, only these must be used: Cyclone would add ours, and fail if one is named twice.
+    If any does, this runtime must not name interfaces: Cyclone fails if an interface is named twice, or has
+    no address for the transport.
     """
     settings = [uri]
     for source in uri.split(","):
         with suppress(OSError):  # Cyclone reports unreadable files
             settings.append(Path(source.strip().removeprefix("file://")).read_text(errors="replace"))
-    # Cyclone ignores case in names.
-    return any("<networkinterface" in _COMMENT.sub("", text).lower() for text in settings)
+    return {name.lower() for text in settings for name in _CHOICE.findall(_COMMENT.sub("", text))}
+
+
+def _loopback_and_default() -> str:
+    """Return the settings for the loopback interface and, if there is another one, for Cyclone's choice.
+
+    Cyclone prefers the loopback interface if both sides use it. So processes of this runtime do not notice
+    when the other interface loses its address. Other nodes of the host may use only the other interface.
+    """
+    interfaces = _ipv4_interfaces()
+    loopback = next((name for name, flags in interfaces if flags & _IFF_LOOPBACK), None)
+    if loopback is None:
+        return ""
+    has_others = any(not flags & _IFF_LOOPBACK for _, flags in interfaces)
+    default = '<NetworkInterface autodetermine="true"/>' if has_others else ""
+    return f'<Interfaces><NetworkInterface name="{loopback}"/>{default}</Interfaces>'
+
+
+def _ipv4_interfaces() -> list[tuple[str, int]]:
+    """Return the name and flags of each interface that is up, once for each of its IPv4 addresses."""
+    found = []
+    first = ct.POINTER(NetworkAddress)()
+    if libc.getifaddrs(ct.byref(first)):
+        return []
+    entry = first
+    while entry:
+        address = entry.contents
+        if address.family and address.family[0] == _AF_INET and address.flags & _IFF_UP:
+            found.append((address.name.decode(errors="replace"), address.flags))
+        entry = address.next
+    libc.freeifaddrs(first)
+    return found
 
 
 def enter(domain_id: int) -> None:
     """Configure a domain before the first participant of this process."""
     with _lock:
         if not _users.get(domain_id):
-            handle = blocking.dds_create_domain(domain_id, configuration().encode())
+            handle = blocking.dds_create_domain(domain_id, configuration(domain_id=domain_id).encode())
             # If other code in this process has created the domain, its configuration applies.
             if handle != PRECONDITION_NOT_MET:
                 _handles[domain_id] = checked(handle, f"cannot configure DDS domain {domain_id}")

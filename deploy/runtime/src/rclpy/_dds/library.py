@@ -114,6 +114,18 @@ class BuiltinEndpoint(ct.Structure):
     ]
 
 
+class NetworkAddress(ct.Structure):
+    """struct ifaddrs: an address of a network interface."""
+
+
+NetworkAddress._fields_ = [
+    ("next", ct.POINTER(NetworkAddress)),
+    ("name", ct.c_char_p),
+    ("flags", ct.c_uint),
+    ("family", ct.POINTER(ct.c_ushort)),  # the address begins with it
+]
+
+
 def _path() -> str:
     spec = importlib.util.find_spec("cyclonedds")
     if spec is None or not spec.submodule_search_locations:
@@ -212,9 +224,15 @@ def functions(library: ct.CDLL, signatures: dict[str, tuple[Any, list[Any]]]) ->
     return declared
 
 
+_LIBC: dict[str, tuple[Any, list[Any]]] = {
+    "getifaddrs": (ct.c_int, [ct.POINTER(ct.POINTER(NetworkAddress))]),
+    "freeifaddrs": (None, [ct.POINTER(NetworkAddress)]),
+}
+
 LOCK_KEEPING = ct.PyDLL(_path())
 blocking = functions(ct.CDLL(_path()), _BLOCKING)
 quick = functions(LOCK_KEEPING, _QUICK)
+libc = functions(ct.CDLL(None), _LIBC)
 
 
 def checked(code: int, what: str) -> int:
