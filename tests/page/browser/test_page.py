@@ -134,6 +134,7 @@ def test_keyboard_alone_holds_and_turns_the_engines_on(arm: Arm, hand: HandOnPag
     tab_to(hand, "#hold")
     hand.hold(lambda: keyboard.down(" "), lambda: keyboard.up(" "))
     arm.record.await_beats(time.time(), 12)  # the watchdog samples every 500 ms
+    hand.page.wait_for_selector("#operator[data-state=seen]", timeout=5000)  # the controller needs a presence
     tab_to(hand, "#turn-on")
     keyboard.press("Enter")
     hand.page.wait_for_selector("#engines[data-state=on]", timeout=5000)
