@@ -218,7 +218,11 @@ def test_localhost_and_subnet_meet(ranges: tuple[str, str], host_with_network: H
     assert_meet(first, second)
 
 
-def test_nothing_leaves_the_host_in_localhost(host_with_network: Host) -> None:
+@pytest.mark.parametrize("uri", ["", "<General><AllowMulticast>true</AllowMulticast></General>"])
+def test_nothing_leaves_the_host_in_localhost(
+    uri: str, host_with_network: Host, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("CYCLONEDDS_URI", uri)
     first = host_with_network.start_node("first", "LOCALHOST")
     second = host_with_network.start_node("second", "LOCALHOST")
     assert_meet(first, second)

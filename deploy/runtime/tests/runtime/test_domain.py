@@ -82,17 +82,18 @@ def test_localhost_asks_on_localhost_forever() -> None:
 
 def test_localhost_uses_loopback_and_default_interface(interfaces: list[tuple[str, int]]) -> None:
     interfaces[:0] = [("eth1", UP)]
-    assert domain.configuration({RANGE: "LOCALHOST"}).count("<NetworkInterface ") == 2
+    configuration = domain.configuration({RANGE: "LOCALHOST"})
+    assert configuration.count("<NetworkInterface ") == 2
     assert (
-        '<Interfaces><NetworkInterface name="lo"/><NetworkInterface autodetermine="true"/></Interfaces>'
-        in domain.configuration({RANGE: "LOCALHOST"})
-    )
+        '<Interfaces><NetworkInterface name="lo" allow_multicast="false"/>'
+        '<NetworkInterface autodetermine="true" allow_multicast="false"/></Interfaces>'
+    ) in configuration
 
 
 def test_localhost_without_other_interface_uses_loopback(interfaces: list[tuple[str, int]]) -> None:
     interfaces[:] = [("lo", UP | LOOPBACK), ("lo", UP | LOOPBACK)]
     configuration = domain.configuration({RANGE: "LOCALHOST"})
-    assert '<Interfaces><NetworkInterface name="lo"/></Interfaces>' in configuration
+    assert '<Interfaces><NetworkInterface name="lo" allow_multicast="false"/></Interfaces>' in configuration
 
 
 def test_localhost_without_loopback_leaves_choice_to_cyclone(interfaces: list[tuple[str, int]]) -> None:

@@ -159,9 +159,12 @@ def _loopback_and_default() -> str:
     loopback = next((name for name, flags in interfaces if flags & _IFF_LOOPBACK), None)
     if loopback is None:
         return ""
-    has_others = any(not flags & _IFF_LOOPBACK for _, flags in interfaces)
-    default = '<NetworkInterface autodetermine="true"/>' if has_others else ""
-    return f'<Interfaces><NetworkInterface name="{loopback}"/>{default}</Interfaces>'
+    chosen = [f'name="{loopback}"']
+    if any(not flags & _IFF_LOOPBACK for _, flags in interfaces):
+        chosen.append('autodetermine="true"')
+    # Multicast in CYCLONEDDS_URI must not leave the host by mistake: it must name the interfaces, too.
+    elements = "".join(f'<NetworkInterface {choice} allow_multicast="false"/>' for choice in chosen)
+    return f"<Interfaces>{elements}</Interfaces>"
 
 
 def _ipv4_interfaces() -> list[tuple[str, int]]:
