@@ -45,13 +45,15 @@ def listings(domain_id: int) -> Iterator[dict[str, Any]]:
                 exec(block, names)
         yield names
     finally:
+        for node in [value for value in names.values() if isinstance(value, Node)]:
+            node.destroy_node()
         rclpy.try_shutdown()
 
 
 def test_listings_print_data_and_completion(
     listings: dict[str, Any], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    talker = Node("talker")
+    talker = listings["talker"] = Node("talker")
     publisher = talker.create_publisher(String, "topic", 10)
     printed: set[str] = set()
     deadline = time.monotonic() + 10.0
