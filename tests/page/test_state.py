@@ -208,6 +208,14 @@ def test_heartbeat_of_a_page_is_not_that_of_the_scenario(play: Play) -> None:
     assert switch(play.run(211), "one", 210.1) == {"held": False, "by": None}
 
 
+def test_heartbeat_of_a_page_may_come_after_its_release(play: Play) -> None:
+    play.note(210, state.held(Hold("one", 210.0, alive=True)))
+    play.note(210.01, state.held(Hold()))
+    play.say(210.02, topics.OPERATOR_HEARTBEAT, Bool(data=True))
+
+    assert switch(play.run(211), "one", 210.1) == {"held": False, "by": None}
+
+
 def test_heartbeat_of_scenario_and_terminal_is_shown(play: Play) -> None:
     play.say(210, topics.OPERATOR_HEARTBEAT, Bool(data=True))
     found = play.run(211)

@@ -83,6 +83,8 @@ class PageState(NamedTuple):
     activity: str | None = None
     strikes_left: int | None = None
     hold: Hold = Hold()
+    beaten: float = -math.inf
+    """When the last beat of a page counted; a release does not change it."""
     heartbeat: float = -math.inf
     """When a heartbeat came that is not of a page."""
     pressed: bool = False
@@ -206,7 +208,7 @@ def _speed(state: PageState, message: Timestamp[Any], clock: Clock) -> PageState
 
 def _heartbeat(state: PageState, message: Timestamp[Any], clock: Clock) -> PageState:
     now = clock.now()
-    return state if now - state.hold.seen < ECHO else state._replace(heartbeat=now)
+    return state if now - state.beaten < ECHO else state._replace(heartbeat=now)
 
 
 def _presence(state: PageState, message: Timestamp[Any], clock: Clock) -> PageState:
@@ -319,7 +321,7 @@ def held(hold: Hold) -> Change:
     """The switch after an event of a page."""
 
     def change(state: PageState) -> PageState:
-        state = state._replace(hold=hold)
+        state = state._replace(hold=hold, beaten=max(state.beaten, hold.seen))
         if hold.ended:
             return refuse(hold.ended, BEAT, ENDED)(state)
         return refuse(hold.refused[0], "press", hold.refused[1])(state) if hold.refused else state
