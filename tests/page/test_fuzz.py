@@ -25,7 +25,7 @@ from tests.page.clients import TOKEN, Arm
 from tests.page.noise import noise
 
 SEED = os.environ.get("FUZZ_SEED") or str(time.time_ns())
-HARMLESS = (server.Violation, server.Opened, server.Closed, hold.Release)
+HARMLESS = {server.Violation, server.Opened, server.Closed, hold.Release}
 
 
 @pytest.fixture
@@ -104,10 +104,9 @@ def test_random_requests_do_nothing(arm: Arm) -> None:
             else:
                 client.settimeout(0.02)
                 client.recv(4096)
+    kinds = {type(event) for event in received(arm)}
+    assert kinds == {server.Violation}, f"FUZZ_SEED={SEED}"
     assert_calm(arm, blocks)
-    events = received(arm)
-    assert events, f"FUZZ_SEED={SEED}: the noise misses the protocol"
-    assert all(isinstance(event, server.Violation) for event in events), f"FUZZ_SEED={SEED}"
 
 
 def test_random_frames_do_nothing(arm: Arm) -> None:
@@ -122,10 +121,10 @@ def test_random_frames_do_nothing(arm: Arm) -> None:
                 page.send(json.dumps({"type": "hello", "token": TOKEN}))
             page.socket.sendall(b"".join(frame(chance) for _ in range(20)))
             page.socket.settimeout(0.1)
+    kinds = {type(event) for event in received(arm)}
+    assert server.Opened in kinds
+    assert kinds <= HARMLESS, f"FUZZ_SEED={SEED}"
     assert_calm(arm, blocks)
-    events = received(arm)
-    assert any(isinstance(event, server.Opened) for event in events)
-    assert all(isinstance(event, HARMLESS) for event in events), f"FUZZ_SEED={SEED}"
 
 
 def test_random_messages_of_a_page_move_nothing(arm: Arm) -> None:
@@ -143,7 +142,7 @@ def test_random_messages_of_a_page_move_nothing(arm: Arm) -> None:
         if isinstance(event, hold.Press | hold.Beat):
             assert event.sent == float("-inf"), f"FUZZ_SEED={SEED}: a guess is a nonce"
         else:
-            assert isinstance(event, HARMLESS), f"FUZZ_SEED={SEED}"
+            assert type(event) in HARMLESS, f"FUZZ_SEED={SEED}"
 
 
 def assert_calm(arm: Arm, blocks: int) -> None:
