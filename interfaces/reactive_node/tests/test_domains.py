@@ -17,7 +17,7 @@ def test_domain_is_reserved_once_at_a_time(monkeypatch: pytest.MonkeyPatch) -> N
             pass
 
 
-@pytest.mark.parametrize("offset", [0, 10])
+@pytest.mark.parametrize("offset", [0, 10, 35, 249])
 def test_domain_with_participants_is_not_free(offset: int) -> None:
     with reserved_domain() as free, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as participant:
         assert not domains._has_participants(free)

@@ -32,11 +32,15 @@ def reserved_domain() -> Iterator[int]:
 
 
 def _has_participants(domain: int) -> bool:
-    """Whether a socket listens on a discovery port of the domain (RTPS 9.6.1)."""
-    for offset in (0, 10):
+    """
+    Whether a socket has one of the 250 ports of the domain (RTPS 9.6.1).
+
+    The first ports do not tell: participants keep theirs after those with lower indices have ended.
+    """
+    for port in range(7400 + 250 * domain, 7400 + 250 * (domain + 1)):
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
             try:
-                probe.bind(("", 7400 + 250 * domain + offset))
+                probe.bind(("", port))
             except OSError:
                 return True
     return False
