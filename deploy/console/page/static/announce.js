@@ -2,6 +2,8 @@
 
 import { byId } from "./dom.js";
 
+const SAID = 10_000; // ms after which a text is out of date, and nobody should find it any more
+
 const polite = byId("announce");
 const assertive = byId("alert");
 
@@ -16,6 +18,7 @@ function say(region, text) {
   const line = document.createElement("p");
   line.textContent = text;
   region.replaceChildren(line);
+  setTimeout(() => line.remove(), SAID);
 }
 
 /**

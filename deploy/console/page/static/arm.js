@@ -1,7 +1,7 @@
 /** The arm to scale, with its joint angles, reach and the effector's recent path. */
 
 import { byId, draw, setAttributes, setText } from "./dom.js";
-import { degrees, number } from "./format.js";
+import { degrees, digitsOf, number } from "./format.js";
 import { niceStep } from "./scale.js";
 
 const EDGE = 108; // of the drawing, in its units, from the base
@@ -9,6 +9,7 @@ const EXTENT = 330; // of the grid: a wide window shows more than the square
 const PATH_TIME = 8; // s
 const PATH_PARTS = 5; // of falling opacity
 const SUMMARY_PERIOD = 1; // s
+const LABEL = { width: 48, height: 12 }; // of an angle
 const TOLERANCE = 0.03; // of the reach, between the reported position and the joints'
 
 export class Arm {
@@ -28,8 +29,9 @@ export class Arm {
       const isKnown = Object.values(arm).every((value) => value !== null);
       this._moving.setAttribute("visibility", isKnown ? "visible" : "hidden");
       if (isKnown) this._place(arm, position);
-      setText(byId("x"), number(position?.x));
-      setText(byId("y"), number(position?.y));
+      this._digits = isKnown ? digitsOf(arm.l1 + arm.l2) : 2;
+      setText(byId("x"), number(position?.x, this._digits));
+      setText(byId("y"), number(position?.y, this._digits));
       this._summarize(arm, position, isKnown, time);
     }
     this._drawPath(trace, time);
@@ -82,7 +84,7 @@ export class Arm {
 
     setAttributes(this._reach, { r: (reach * scale).toFixed(2) });
     setAttributes(this._reachLabel, { x: 0, y: (-reach * scale - 3).toFixed(2) });
-    setText(this._reachLabel, `reach ${number(reach, 2)} m`);
+    setText(this._reachLabel, `reach ${number(reach, digitsOf(reach))} m`);
     setAttributes(this._ring, { d: circle(reach * scale) + circle(Math.abs(arm.l1 - arm.l2) * scale) });
 
     line(this._links[0], [0, 0], elbow);
@@ -92,14 +94,9 @@ export class Arm {
     ends(this._extension, elbow, [elbow[0] + beyond * Math.cos(one), elbow[1] - beyond * Math.sin(one)]);
     arc(this._angles[0].arc, [0, 0], 0, one, 20);
     arc(this._angles[1].arc, elbow, one, arm.theta2, 16);
-    // Beside the x axis, where link one is not; beside the elbow, where no link is.
-    label(this._angles[0].label, [38, Math.sin(one) < 0 ? -7 : 9], `θ₁ ${degrees(arm.theta1)}`);
-    const free = one + (wrap(arm.theta2) - Math.PI) / 2 + (wrap(arm.theta2) > 0 ? 0 : Math.PI);
-    label(
-      this._angles[1].label,
-      [elbow[0] + 26 * Math.cos(free), elbow[1] - 13 * Math.sin(free)],
-      `θ₂ ${degrees(arm.theta2)}`,
-    );
+    const [placeOne, placeTwo] = labelPlaces(one, arm.theta2, elbow);
+    label(this._angles[0].label, placeOne, `θ₁ ${degrees(arm.theta1)}`);
+    label(this._angles[1].label, placeTwo, `θ₂ ${degrees(arm.theta2)}`);
 
     const isCurrent = !position || Math.hypot(seen[0] - tip[0], seen[1] - tip[1]) <= TOLERANCE * reach * scale;
     setAttributes(this._svg, { "data-current": isCurrent ? "yes" : "no" });
@@ -114,6 +111,7 @@ export class Arm {
     this._view = reach > 0 ? reach * (this._view ? 1.15 : 1) : 1;
     const scale = EDGE / this._view;
     const stride = niceStep(this._view / 2.5);
+    const digits = Math.max(0, -Math.floor(Math.log10(stride)));
     const half = stride / 2;
     const count = Math.min(80, Math.floor(EXTENT / (half * scale)));
     let grid = "";
@@ -123,7 +121,7 @@ export class Arm {
       grid += `M${at} ${-EXTENT}V${EXTENT}M${-EXTENT} ${at}H${EXTENT}`;
       if (index % 2 || Math.abs(index * half) > this._view) continue;
       const isLast = (index + 2) * half > this._view;
-      const text = `${number(index * half, stride < 1 ? 1 : 0)}${isLast ? " m" : ""}`;
+      const text = `${number(index * half, digits)}${isLast ? " m" : ""}`;
       draw(this._ticks, "text", { x: at, y: 117.5, "text-anchor": "middle" }).textContent = text;
       if (index) draw(this._ticks, "text", { x: -118, y: (2.2 - at).toFixed(2) }).textContent = text;
     }
@@ -156,12 +154,30 @@ export class Arm {
     if (Math.abs(time - this._summarized) < SUMMARY_PERIOD) return;
     this._summarized = time;
     const angles = `${degrees(arm.theta1)} and ${degrees(arm.theta2)}`;
-    const links = `Links of ${number(arm.l1)} and ${number(arm.l2)} metres, joints at ${angles}.`;
-    const effector = position ? ` Effector at x ${number(position.x)}, y ${number(position.y)} metres.` : "";
+    const links = `Links of ${number(arm.l1, digitsOf(arm.l1))} and ${number(arm.l2, digitsOf(arm.l2))} metres, joints at ${angles}.`;
+    const effector = position ? ` Effector at x ${number(position.x, this._digits)}, y ${number(position.y, this._digits)} metres.` : "";
     const isOld = this._svg.dataset.current === "no";
     const lag = isOld ? " This position is old: it does not follow the joints." : "";
     setText(byId("arm-summary"), isKnown ? links + effector + lag : "The configuration is not known yet.");
   }
+}
+
+/**
+ * Where the two angles are written.
+ *
+ * @param {number} one direction of link one [rad]
+ * @param {number} theta2 angle of the second joint [rad]
+ * @param {[number, number]} elbow in units of the drawing
+ */
+export function labelPlaces(one, theta2, elbow) {
+  // Beside the elbow, where no link is.
+  const free = one + (wrap(theta2) - Math.PI) / 2 + (wrap(theta2) > 0 ? 0 : Math.PI);
+  const two = [elbow[0] + 26 * Math.cos(free), elbow[1] - 13 * Math.sin(free)];
+  // Beside the x axis, where link one is not, and not on the other label.
+  const y = Math.sin(one) < 0 ? -7 : 9;
+  const isTaken = Math.abs(two[0] - 38) < LABEL.width && Math.abs(two[1] - y) < LABEL.height;
+  const x = two[0] > 0 ? -LABEL.width : LABEL.width;
+  return [[isTaken ? x : 38, y], two];
 }
 
 function line(link, from, to) {

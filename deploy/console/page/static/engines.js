@@ -22,8 +22,8 @@ export class Engines {
     }
     /** Why this page's last command was refused by the server. */
     this._refused = "";
-    this._changed = onChange((state) => {
-      if (state) (state === "on" ? announce : alert)(`${STATES[state][1]}. ${this._why}`);
+    this._changed = onChange((state, before) => {
+      if (state) (before === null || state === "on" ? announce : alert)(`${STATES[state][1]}. ${this._why}`);
     });
     this._refusedChanged = onChange((why) => why && alert(why));
   }

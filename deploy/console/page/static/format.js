@@ -9,6 +9,9 @@ export function number(value, digits = 2) {
   return Number(text) === 0 ? (0).toFixed(digits) : text.replace("-", "−");
 }
 
+/** The count of digits that shows a hundredth of a length, at least two. */
+export const digitsOf = (length) => (length > 0 ? Math.max(2, 2 - Math.ceil(Math.log10(length))) : 2);
+
 /** An angle [rad] in degrees. */
 export const degrees = (angle) => `${number((angle * 180) / Math.PI, 1)}°`;
 

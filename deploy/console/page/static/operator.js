@@ -17,9 +17,9 @@ const OPERATORS = {
 export class Operator {
   constructor() {
     this._welcome = null;
-    this._changed = onChange((state) => {
+    this._changed = onChange((state, before) => {
       const [, text] = OPERATORS[state] ?? [];
-      if (text) (state === "seen" ? announce : alert)(`${text}.`);
+      if (text) (before === null || state === "seen" ? announce : alert)(`${text}.`);
     });
     this._strikesChanged = onChange((left, before) => {
       if (left !== null && left < before) alert(`${strikesText(left)}.`);
@@ -63,8 +63,8 @@ export class Operator {
     const all = this._welcome?.strikes ?? 3;
     const pips = byId("strike-pips");
     setAttributes(byId("strikes"), { "data-left": left });
-    setText(byId("strikes-text"), left === null ? "" : `${strikesText(left, all)}`);
-    setText(byId("mini-strikes"), left === null ? "" : `${left}/${all} strikes`);
+    setText(byId("strikes-text"), left === null ? "" : strikesText(left, all));
+    setText(byId("mini-strikes"), left === null ? "" : strikesText(left));
     if (pips.childElementCount !== all && all <= MOST_PIPS) {
       pips.replaceChildren();
       for (let index = 0; index < all; index += 1) {
@@ -80,5 +80,5 @@ export class Operator {
 }
 
 function strikesText(left, all = null) {
-  return `${left}${all === null ? "" : ` of ${all}`} ${left === 1 ? "strike" : "strikes"} left`;
+  return `${left}${all === null ? "" : ` of ${all}`} ${(all ?? left) === 1 ? "strike" : "strikes"} left`;
 }

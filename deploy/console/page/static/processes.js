@@ -6,6 +6,7 @@ import { byId, create, setAttributes, setNote, setText } from "./dom.js";
 import { duration, sentence } from "./format.js";
 
 const REMEMBERED = 20; // s for which a row tells that its process came back
+const UNSEEN = { process: null, goodUntil: null, downSince: null, back: null };
 const ACTIONS = {
   kill: "Kill",
   stop: "Stop",
@@ -48,6 +49,8 @@ export class Processes {
     setAttributes(byId("services"), { "data-local": welcome.local ? "yes" : "no" });
     setText(byId("process-help"), welcome.local ? HELP_LOCAL : HELP_REMOTE);
     for (const name of welcome.programs) if (!this._rows.has(name)) this._build(name);
+    // What happened while this page was not connected is not known: nothing has come back.
+    for (const entry of this._rows.values()) Object.assign(entry, UNSEEN);
   }
 
   _build(name) {
@@ -76,15 +79,14 @@ export class Processes {
       create("td", { class: "local", "data-column": "actions" }, ...buttons),
     );
     byId("processes").tBodies[0].append(row);
-    const past = { process: null, goodUntil: null, downSince: null, back: null };
-    this._rows.set(name, { row, sign, state, ...cells, buttons, ...past });
+    this._rows.set(name, { row, sign, state, ...cells, buttons, ...UNSEEN });
   }
 
   _update(entry, process, time) {
     const isGood = process.ok && process.state === "RUNNING";
     if (!isGood) entry.downSince ??= entry.goodUntil;
     else if (entry.downSince !== null) this._healed(entry, process, time - entry.downSince, time);
-    else if (entry.process && entry.process.pid !== process.pid) {
+    else if (entry.goodUntil !== null && entry.process.pid !== process.pid) {
       this._healed(entry, process, time - entry.goodUntil, time);
     }
     if (isGood) entry.goodUntil = time;
