@@ -152,11 +152,11 @@ def _await_services(system: System, member: Member, log_sizes: dict[str, int]) -
 
 
 def _last_words(system: System, program: Program, begin: int) -> str:
-    """The last lines of a program's log after `begin` [bytes]; supervisord's words if there are none."""
+    """The last lines of a program's log after `begin` [bytes], each once; supervisord's words without any."""
     with suppress(OSError), (system.logs / f"{program.name}.log").open("rb") as log:
         log.seek(begin)
-        lines = log.read().decode(errors="replace").splitlines()
-        return "\n".join(lines[-LOG_LINES:]) or program.error
+        lines = dict.fromkeys(log.read().decode(errors="replace").splitlines())  # each attempt says the same
+        return "\n".join(list(lines)[-LOG_LINES:]) or program.error
     return program.error
 
 

@@ -62,7 +62,6 @@ def main() -> int:
         print(f"Set-up failed: {error}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
-        print("\nSet-up interrupted; the next make starts it anew.", file=sys.stderr)
         return 130
     finally:
         signal.signal(signal.SIGINT, signal.SIG_DFL)  # no traceback from an interpreter that ends
@@ -103,7 +102,11 @@ def _update(stamp: Path, fingerprint: str, make: Callable[[], None]) -> bool:
     """Call `make` unless the stamp has this fingerprint; whether it was called."""
     if stamp.exists() and stamp.read_text() == fingerprint:
         return False
-    make()
+    try:
+        make()
+    except KeyboardInterrupt:
+        print("\nSet-up interrupted; the next make starts it anew.", file=sys.stderr)
+        raise
     stamp.write_text(fingerprint)
     return True
 
