@@ -37,9 +37,9 @@ def test_supervisorctl_works(checkout: Checkout, start: Callable[[Checkout], Non
     code, printed = checkout.do_command("supervisorctl", *CONF, "restart", "arm:kinematics")
     assert (code, printed.splitlines()) == (0, ["arm:kinematics: stopped", "arm:kinematics: started"])
     assert checkout.members["kinematics"] != before
-    tail = checkout.begin_command("supervisorctl", *CONF, "tail", "-f", "arm:velocity")
+    tail = checkout.begin_command("supervisorctl", *CONF, "tail", "-f", "arm:operator_watchdog")
     tail.await_line("Press Ctrl-C to exit")
-    with (checkout.run / "logs" / "velocity.log").open("a") as log:
+    with (checkout.run / "logs" / "operator_watchdog.log").open("a") as log:
         log.write("a line of the log\n")
     tail.await_line("a line of the log")
     assert checkout.do("stop")[1].splitlines()[-1] == "All have ended."
