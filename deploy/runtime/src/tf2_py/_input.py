@@ -63,16 +63,18 @@ def problem_of(
             f'TF_NO_FRAME_ID: Ignoring transform with child_frame_id "{child}"  from authority "{authority}"'
             " because frame_id not set"
         )
-    numbers = " ".join(f"{number:f}" for number in rotation)
     if any(map(math.isnan, (*translation, *rotation))):
-        numbers = f"({' '.join(f'{number:f}' for number in translation)}) ({numbers})"
         return (
             f'TF_NAN_INPUT: Ignoring transform for child_frame_id "{child}" from authority "{authority}"'
-            f" because of a nan value in the transform {numbers}"
+            f" because of a nan value in the transform {_text(translation)} {_text(rotation)}"
         )
     if not 0.0 < length < math.inf:
         return (
             f'TF_DENORMALIZED_QUATERNION: Ignoring transform for child_frame_id "{child}" from authority'
-            f' "{authority}" because of an invalid quaternion in the transform ({numbers})'
+            f' "{authority}" because of an invalid quaternion in the transform {_text(rotation)}'
         )
     return ""
+
+
+def _text(numbers: tuple[float, ...]) -> str:
+    return f"({' '.join(f'{number:f}' for number in numbers)})"
