@@ -167,12 +167,16 @@ class BufferCore:
         """
         Return the latest time at which all transforms between the frames are known; 0 if all are static.
 
-        :raises TransformException: if there is none.
+        :raises LookupException: if a frame does not exist.
+        :raises TransformException: if nothing connects the frames.
         """
         with self._lock:
             for frame in (target_frame, source_frame):
                 self._check_frame(frame, "get_latest_common_time")
-            return Time(nanoseconds=latest_common_time(self._frames, target_frame, source_frame))
+            try:
+                return Time(nanoseconds=latest_common_time(self._frames, target_frame, source_frame))
+            except TransformException as error:
+                raise TransformException(str(error)) from None  # of no subclass, as in tf2
 
     def lookupVelocityCore(
         self, tracking_frame: str, observation_frame: str, time: TimeLike, averaging_interval: TimeLike

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import subprocess
 import sys
 from collections.abc import Callable
@@ -28,6 +29,16 @@ def transform(child: str, x: float = 0.0) -> TransformStamped:
     message.child_frame_id = child
     message.transform.translation.x = x
     return message
+
+
+def test_a_chain_has_all_frames_from_the_source_to_the_target() -> None:
+    buffer = Buffer()
+    for child in ("left", "right"):
+        buffer.set_transform_static(transform(child), "test")
+    chain = functools.partial(buffer._chain, target_time=Time(), source_time=Time())
+    assert chain(target_frame="left", source_frame="right", fixed_frame="map") == ["right", "map", "left"]
+    assert chain(target_frame="map", source_frame="right", fixed_frame="map") == ["right", "map"]
+    assert chain(target_frame="left", source_frame="map", fixed_frame="left") == ["map", "left"]
 
 
 def test_a_new_static_transform_replaces_the_old_one(make_node: Callable[..., Node]) -> None:
