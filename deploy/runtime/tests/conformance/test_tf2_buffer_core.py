@@ -257,16 +257,19 @@ def test_a_repeated_transform_is_stored_once(buffer: BufferCore) -> None:
 
 
 def test_the_full_lookup_goes_through_a_frame_that_does_not_move(buffer: BufferCore) -> None:
-    fill(buffer, *(transform("map", "robot", stamp, (10.0 * stamp, 0.0, 0.0)) for stamp in (1.0, 2.0, 3.0)))
+    for stamp in (1.0, 2.0, 3.0):
+        fill(buffer, transform("map", "robot", stamp, (10.0 * stamp, 0.0, 0.0), about_z(30.0 * stamp)))
     arguments: dict[str, Any] = {
         "target_frame": "robot",
         "target_time": at(3.0),
         "source_frame": "robot",
-        "source_time": at(1.5),
+        "source_time": at(1.0),
         "fixed_frame": "map",
     }
     found = buffer.lookup_transform_full_core(**arguments)
-    assert translation(found) == pytest.approx((-15.0, 0.0, 0.0))
+    # 20 m behind the robot, which has turned by 60° and looks along y
+    assert translation(found) == pytest.approx((0.0, 20.0, 0.0))
+    assert rotation(found) == pytest.approx(about_z(-60.0))
     assert seconds(found) == 3.0
     assert (found.header.frame_id, found.child_frame_id) == ("robot", "robot")
     assert buffer.can_transform_full_core(**arguments) == (True, "")
@@ -533,3 +536,10 @@ def test_a_velocity_is_a_mean_over_an_interval(
     assert buffer.lookupVelocityFullCore(*arguments)[1] == pytest.approx(angular, abs=1e-9)
     with pytest.raises(LookupException):
         buffer.lookupVelocityCore("nothing", "map", time, Duration(seconds=0.4))
+
+
+def test_the_interval_of_a_velocity_does_not_begin_before_time_itself(buffer: BufferCore) -> None:
+    for second in range(5):
+        fill(buffer, transform("map", "robot", second, (3.0 * second, 0.0, 0.0)))
+    linear, _ = buffer.lookupVelocityCore("robot", "map", Time(), Duration(seconds=4.001))
+    assert linear == pytest.approx((3.0, 0.0, 0.0), abs=1e-3)

@@ -79,7 +79,7 @@ def test_a_pose_is_rotated_and_translated(turn: TransformStamped) -> None:
     assert stamped.header == turn.header
 
 
-@pytest.mark.parametrize("degrees", [0.0, 45.0, 100.0, 170.0])
+@pytest.mark.parametrize("degrees", [0.0, 45.0, 100.0, 170.0, -100.0, -170.0])
 def test_the_orientation_is_composed(turn: TransformStamped, degrees: float) -> None:
     half = math.radians(degrees) / 2
     pose = Pose(orientation=Quaternion(x=math.sin(half), y=0.0, z=0.0, w=math.cos(half)))
