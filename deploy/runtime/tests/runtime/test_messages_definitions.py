@@ -28,7 +28,7 @@ PACKAGES = sorted(
 )
 MESSAGES = [f"{package}/msg/{name}" for package in PACKAGES for name in interface_names(package, "msg")]
 STORE = get_typestore(Stores.ROS2_JAZZY)
-NOT_INCLUDED = ("rosbag2_interfaces/", "tf2_msgs/")
+NOT_INCLUDED = "rosbag2_interfaces/"
 # rosbags hashes a char as char; rosidl converts it to uint8 first, as the recorded announcements show
 WITH_CHAR = {
     "std_msgs/msg/Char",

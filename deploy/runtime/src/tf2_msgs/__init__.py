@@ -1,0 +1,1 @@
+"""Interfaces of tf2_msgs, as in ROS 2 Jazzy."""

@@ -1,0 +1,5 @@
+"""Actions of tf2_msgs, as in ROS 2 Jazzy."""
+
+from rosidl_runtime_embedded import interfaces
+
+__getattr__, __dir__ = interfaces(__name__)

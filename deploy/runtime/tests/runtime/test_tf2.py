@@ -1,0 +1,137 @@
+"""What tf2 and message_filters of this runtime do better than those of ROS 2, and what they cost."""
+
+from __future__ import annotations
+
+import functools
+import subprocess
+import sys
+import threading
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+import tf2_geometry_msgs
+from geometry_msgs.msg import TransformStamped, Vector3, Vector3Stamped
+from message_filters import SimpleFilter, TimeSynchronizer
+from rclpy.duration import Duration, Infinite
+from rclpy.node import Node
+from rclpy.time import Time
+from sensor_msgs.msg import Imu
+from tf2_ros import Buffer, BufferClient, StaticTransformBroadcaster, TransformBroadcaster, TransformListener
+
+SpinUntil = Callable[..., None]
+
+
+def transform(child: str, x: float = 0.0) -> TransformStamped:
+    message = TransformStamped()
+    message.header.frame_id = "map"
+    message.header.stamp.sec = 1
+    message.child_frame_id = child
+    message.transform.translation.x = x
+    return message
+
+
+def test_a_chain_has_all_frames_from_the_source_to_the_target() -> None:
+    buffer = Buffer()
+    for child in ("left", "right"):
+        buffer.set_transform_static(transform(child), "test")
+    chain = functools.partial(buffer._chain, target_time=Time(), source_time=Time())
+    assert chain(target_frame="left", source_frame="right", fixed_frame="map") == ["right", "map", "left"]
+    assert chain(target_frame="map", source_frame="right", fixed_frame="map") == ["right", "map"]
+    assert chain(target_frame="left", source_frame="map", fixed_frame="left") == ["map", "left"]
+
+
+def test_a_new_static_transform_replaces_the_old_one(make_node: Callable[..., Node]) -> None:
+    broadcaster = StaticTransformBroadcaster(make_node())
+    message = transform("camera", 1.0)
+    broadcaster.sendTransform(message)
+    message.child_frame_id = "lidar"  # the same message for another transform
+    broadcaster.sendTransform(message)
+    assert broadcaster.net_message.transforms == [transform("camera", 1.0), transform("lidar", 1.0)]
+    broadcaster.sendTransform(transform("camera", 2.0))
+    assert broadcaster.net_message.transforms == [transform("camera", 2.0), transform("lidar", 1.0)]
+
+
+def test_transforming_a_vector_leaves_the_transform_as_it_is() -> None:
+    by = transform("robot", 3.0)
+    tf2_geometry_msgs.do_transform_vector3(Vector3Stamped(vector=Vector3(x=1.0)), by)
+    assert by == transform("robot", 3.0)
+
+
+def test_a_cancelled_future_stays_cancelled() -> None:
+    buffer = Buffer()
+    cancelled = buffer.wait_for_transform_async("map", "robot", Time())
+    cancelled.cancel()
+    future = buffer.wait_for_transform_async("map", "robot", Time())
+    buffer.set_transform(transform("robot"), "test")
+    assert cancelled.cancelled()
+    assert future.done()
+
+
+def test_a_wait_without_end_ends_with_the_transform() -> None:
+    asked = threading.Event()
+
+    class Asked(Buffer):
+        def can_transform_core(self, *args: Any) -> tuple[bool, str]:
+            asked.set()
+            return super().can_transform_core(*args)
+
+    buffer = Asked()
+    waiting = threading.Thread(target=buffer.can_transform, args=("map", "robot", Time(), Infinite))
+    waiting.daemon = True
+    waiting.start()
+    assert asked.wait(10)
+    buffer.set_transform(transform("robot"), "test")
+    waiting.join(10)
+    assert not waiting.is_alive()
+
+
+def test_the_padding_of_a_buffer_client_may_be_seconds(make_node: Callable[..., Node]) -> None:
+    client = BufferClient(make_node(), "server", timeout_padding=0.5)
+    assert not client.can_transform("map", "robot", Time(), Duration(seconds=0.1))
+    client.destroy()
+
+
+def test_a_listener_may_spin_its_node_itself(
+    make_node: Callable[..., Node], node: Node, spin_until: SpinUntil
+) -> None:
+    buffer = Buffer()
+    listener = TransformListener(buffer, make_node("listener"), spin_thread=True)
+    broadcaster = TransformBroadcaster(node)
+    spin_until(lambda: broadcaster.pub_tf.get_subscription_count() == 1)
+    broadcaster.sendTransform(transform("robot", 1.0))
+    assert buffer.can_transform("map", "robot", Time(), Duration(seconds=10))
+    listener.executor.shutdown()
+    listener.dedicated_listener_thread.join(10)
+    assert not listener.dedicated_listener_thread.is_alive()
+
+
+def test_the_callback_of_a_synchronizer_may_feed_it() -> None:
+    inputs = [SimpleFilter(), SimpleFilter()]
+    stamps: list[int] = []
+
+    def imu(second: int) -> Imu:
+        message = Imu()
+        message.header.stamp.sec = second
+        return message
+
+    def feed_next(left: Imu, _: Imu) -> None:
+        stamps.append(left.header.stamp.sec)
+        if len(stamps) < 3:
+            for source in inputs:
+                source.signalMessage(imu(left.header.stamp.sec + 1))
+
+    TimeSynchronizer(inputs, 5).registerCallback(feed_next)
+    for source in inputs:
+        source.signalMessage(imu(1))
+    assert stamps == [1, 2, 3]
+
+
+@pytest.mark.parametrize("module", ["rclpy", "rclpy.node", "rclpy.action", "message_filters"])
+def test_programs_without_tf2_do_not_load_it(module: str) -> None:
+    program = (
+        f"import {module}, sys; print([m for m in sys.modules if m.partition('_')[0] in ('numpy', 'tf2')])"
+    )
+    found = subprocess.check_output([sys.executable, "-c", program], text=True, timeout=30)
+    assert found == "[]\n"
