@@ -141,7 +141,7 @@ class ReactiveNode(Node):
         :param options: further arguments of :meth:`rclpy.node.Node.create_client`.
         """
         client = self.create_client(srv_type, srv_name, **options)
-        ready = calls.server_ready(self, client, self.scheduler)
+        ready = calls.server_ready(self, client.service_is_ready, self.scheduler)
         late = rx.throw(TimeoutError(f"no response of {srv_name} within {timeout} s"))
 
         def call(request: Any) -> Observable[Any]:
@@ -150,6 +150,38 @@ class ReactiveNode(Node):
             return result if timeout is None else result.timeout(timeout, late, self.scheduler)
 
         return call
+
+    def create_action_call(
+        self, action_type: Any, action_name: str, **options: Any
+    ) -> Callable[[Any], Observable[Any]]:
+        """
+        Return a function from a goal to an observable of its execution, for ``goals.flat_map(act)``.
+
+        A goal is sent with each subscription, when there is a server; it waits for one and never blocks.
+        The items are the action's feedback messages, then its result message, then the observable completes:
+        ``act(goal).last()`` is the result only. A goal that does not succeed is an error of the observable:
+        :class:`~reactive_node.actions.GoalRejected`, :class:`~reactive_node.actions.GoalAborted`,
+        :class:`~reactive_node.actions.GoalCanceled` (by another client), or
+        :class:`~reactive_node.actions.GoalUnknown` (by a server that has forgotten the goal). Disposing, also
+        by the end of the node, asks the server to cancel the goal, so ``goals.map(act).switch_latest()``
+        replaces it. A server that vanishes is not noticed: limit its silence by
+        ``act(goal).timeout(seconds)``. The observable completes when the node ends.
+
+        :param options: further arguments of :class:`rclpy.action.ActionClient`.
+        """
+        from rclpy.action import ActionClient  # here: few nodes have actions
+
+        from reactive_node import actions
+
+        client = ActionClient(self, action_type, action_name, **options)
+        self._sinks.add(Disposable(client.destroy))
+        ready = calls.server_ready(self, client.server_is_ready, self.scheduler)
+
+        def act(goal: Any) -> Observable[Any]:
+            execution = actions.execution(client, action_name, goal, self.scheduler)
+            return ready.take(1).flat_map(lambda _: execution).take_until(self._end)
+
+        return act
 
     def publish_observable(
         self,
