@@ -14,6 +14,7 @@ from collections.abc import Callable
 from typing import Any
 
 import reactivex as rx
+from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -25,11 +26,12 @@ from reactivex.subject import AsyncSubject
 
 from reactive_node import calls
 from reactive_node.scheduler import NodeScheduler
+from reactive_node.services import Requests
 from reactive_node.shared_reader import SharedReader, retention
 
 
 class ReactiveNode(Node):
-    """A node with observables of topics, parameters, QoS events and calls; it publishes observables."""
+    """A node with observables of topics, parameters, QoS events and calls; it publishes and serves others."""
 
     def __init__(self, node_name: str, **options: Any) -> None:
         """Create a node; the options are those of :class:`rclpy.node.Node`."""
@@ -213,6 +215,53 @@ class ReactiveNode(Node):
             self._sinks.remove(sink)
 
         sink = Disposable(end)
+        self._sinks.add(sink)
+        return sink
+
+    def serve_recipe(
+        self,
+        recipe: Callable[[Observable[Any]], Observable[tuple[Any, Any]]],
+        srv_type: Any,
+        srv_name: str,
+        **options: Any,
+    ) -> abc.DisposableBase:
+        """
+        Answer the requests of a service until the returned disposable is disposed or the node ends.
+
+        The recipe maps the requests to pairs of a request and its response, so it may answer in any order::
+
+            node.serve_recipe(lambda requests: requests.map(lambda r: (r, answer(r))), SetBool, "switch")
+
+        It must answer each request once, with the request itself, not a copy. A request without an answer is
+        kept, and its client waits in vain; others do not. An error of the recipe, its completion, an answer
+        to a request that does not wait, and a response of another type are raised out of the spinning of
+        this node. Then the service ends, too, so clients see that there is no server.
+
+        :param options: further arguments of :meth:`rclpy.node.Node.create_service`, without
+            ``callback_group``: requests arrive by the node's scheduler, also while others wait.
+        """
+        requests = Requests(self, srv_type, srv_name, self.scheduler)
+        sink = CompositeDisposable()
+
+        def fail(error: Exception) -> None:
+            sink.dispose()
+            self.fail(error)
+
+        def completed() -> None:
+            fail(RuntimeError(f"the recipe of {srv_name} completed: nothing answers its requests any more"))
+
+        answers = recipe(requests.observable).do_action(requests.answer)
+        sink.add(answers.subscribe(on_error=fail, on_completed=completed, scheduler=self.scheduler))
+        service = self.create_service(
+            srv_type, srv_name, requests.serve, callback_group=ReentrantCallbackGroup(), **options
+        )
+
+        def end() -> None:
+            requests.close()
+            self.destroy_service(service)
+            self._sinks.remove(sink)
+
+        sink.add(Disposable(end))
         self._sinks.add(sink)
         return sink
 
