@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -330,3 +332,11 @@ def test_goals_run_beside_each_other(node: ReactiveNode, server: Server, spin_un
     spin_until(lambda: watch.completed)
 
     assert watch.items == [result(8), result(7)]
+
+
+def test_node_without_actions_does_not_import_them() -> None:
+    program = "import reactive_node, sys; print('rclpy.action' in sys.modules)"
+
+    run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+
+    assert run.stdout == "False\n"
