@@ -15,11 +15,13 @@ from typing import Any
 import pytest
 import rclpy
 from example_interfaces.action import Fibonacci
+from geometry_msgs.msg import TransformStamped
 from rclpy.action import ActionServer
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from std_msgs.msg import Bool, Float64, Int64, String
 from std_srvs.srv import SetBool
+from tf2_ros import StaticTransformBroadcaster
 
 from reactive_node.testing import MakeNode, SpinUntil
 
@@ -75,7 +77,7 @@ def test_listings_print_data_and_completion(
     assert capsys.readouterr().out == "Completed\n"
 
 
-def test_listings_execute_goal_serve_requests_and_count(
+def test_listings_use_action_service_transform_and_latest(
     listings: dict[str, Any], capsys: pytest.CaptureFixture[str]
 ) -> None:
     peer = listings["peer"] = Node("peer")
@@ -86,6 +88,10 @@ def test_listings_execute_goal_serve_requests_and_count(
 
     server = ActionServer(peer, Fibonacci, "fibonacci", execute)
     client = peer.create_client(SetBool, "switch")
+    tool = TransformStamped(child_frame_id="tool")
+    tool.header.frame_id = "map"
+    tool.transform.translation.x = 1.5
+    StaticTransformBroadcaster(peer).sendTransform(tool)
     publisher = peer.create_publisher(String, "topic", 10)
     counts: list[int] = []
     peer.create_subscription(Int64, "count", lambda message: counts.append(message.data), 10)
@@ -102,11 +108,18 @@ def test_listings_execute_goal_serve_requests_and_count(
             if response is None and client.service_is_ready():
                 response = client.call_async(SetBool.Request(data=True))
             printed += capsys.readouterr().out
-            if counts and "Sequence" in printed and response is not None and response.done():
+            if (
+                counts
+                and "Sequence" in printed
+                and "Tool" in printed
+                and response is not None
+                and response.done()
+            ):
                 break
     server.destroy()
 
     assert "Sequence: [0, 1, 1, 2]" in printed
+    assert "Tool: 1.5 m" in printed
     assert response is not None
     assert response.result().success is True
     assert counts[0] == len("hello")

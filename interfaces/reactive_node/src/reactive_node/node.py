@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import reactivex as rx
 from rclpy.callback_groups import ReentrantCallbackGroup
@@ -29,15 +29,19 @@ from reactive_node.scheduler import NodeScheduler
 from reactive_node.services import Requests
 from reactive_node.shared_reader import SharedReader, retention
 
+if TYPE_CHECKING:
+    from reactive_node.transforms import Transforms
+
 
 class ReactiveNode(Node):
-    """A node with observables of topics, parameters, QoS events and calls; it publishes and serves others."""
+    """A node whose topics, parameters, events, calls and transforms are observables; it publishes others."""
 
     def __init__(self, node_name: str, **options: Any) -> None:
         """Create a node; the options are those of :class:`rclpy.node.Node`."""
         super().__init__(node_name, **options)
         self._end: AsyncSubject[None] = AsyncSubject()
         self._sinks = CompositeDisposable()
+        self._transforms: Transforms | None = None
         self.scheduler = NodeScheduler(self)
         """Schedules on the executor and clock of this node; for ``observable.subscribe(…, scheduler=…)``."""
 
@@ -129,6 +133,23 @@ class ReactiveNode(Node):
 
         reader = SharedReader(self, create_reader, scheduler=self.scheduler, end=self._end)
         return Observable(reader.subscribe)
+
+    def create_transform_observable(self, target_frame: str, source_frame: str) -> Observable[Any]:
+        """
+        Return the transforms that turn coordinates in the source frame into those in the target frame.
+
+        The items are ``geometry_msgs/msg/TransformStamped``: the latest transform as soon as it is known, at
+        once for a late observer, and then each new one. Its stamp is the latest time for which all transforms
+        in between are known. All observers share one buffer of tf2 and the readers of ``/tf`` and
+        ``/tf_static``, which exist while there are observers. An invalid name of a frame is an error of the
+        observable. It completes when the node ends. It needs the package ``tf2_ros``, which nothing else of
+        this package imports.
+        """
+        if self._transforms is None:
+            from reactive_node.transforms import Transforms  # here: tf2 is optional
+
+            self._transforms = Transforms(self.create_observable, self.get_clock())
+        return self._transforms.between(target_frame, source_frame)
 
     def create_call(
         self, srv_type: Any, srv_name: str, *, timeout: float | None = None, **options: Any
