@@ -14,9 +14,14 @@ from typing import Any
 
 import pytest
 import rclpy
+from example_interfaces.action import Fibonacci
+from geometry_msgs.msg import TransformStamped
+from rclpy.action import ActionServer
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from std_msgs.msg import Bool, Float64, String
+from std_msgs.msg import Bool, Float64, Int64, String
+from std_srvs.srv import SetBool
+from tf2_ros import StaticTransformBroadcaster
 
 from reactive_node.testing import MakeNode, SpinUntil
 
@@ -72,6 +77,54 @@ def test_listings_print_data_and_completion(
     assert capsys.readouterr().out == "Completed\n"
 
 
+def test_listings_use_action_service_transform_and_latest(
+    listings: dict[str, Any], capsys: pytest.CaptureFixture[str]
+) -> None:
+    peer = listings["peer"] = Node("peer")
+
+    def execute(goal: Any) -> Any:
+        goal.succeed()
+        return Fibonacci.Result(sequence=[0, 1, 1, 2])
+
+    server = ActionServer(peer, Fibonacci, "fibonacci", execute)
+    client = peer.create_client(SetBool, "switch")
+    tool = TransformStamped(child_frame_id="tool")
+    tool.header.frame_id = "map"
+    tool.transform.translation.x = 1.5
+    StaticTransformBroadcaster(peer).sendTransform(tool)
+    publisher = peer.create_publisher(String, "topic", 10)
+    counts: list[int] = []
+    peer.create_subscription(Int64, "count", lambda message: counts.append(message.data), 10)
+    response = None
+    printed = ""
+    deadline = time.monotonic() + 10.0
+
+    with SingleThreadedExecutor() as executor:
+        executor.add_node(peer)
+        executor.add_node(listings["reactive"])
+        while time.monotonic() < deadline:
+            executor.spin_once(timeout_sec=0.1)
+            publisher.publish(String(data="hello"))
+            if response is None and client.service_is_ready():
+                response = client.call_async(SetBool.Request(data=True))
+            printed += capsys.readouterr().out
+            if (
+                counts
+                and "Sequence" in printed
+                and "Tool" in printed
+                and response is not None
+                and response.done()
+            ):
+                break
+    server.destroy()
+
+    assert "Sequence: [0, 1, 1, 2]" in printed
+    assert "Tool: 1.5 m" in printed
+    assert response is not None
+    assert response.result().success is True
+    assert counts[0] == len("hello")
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=lambda number: number.name)
 def test_program_publishes_alarm_until_signal(
     files: Path, make_node: MakeNode, spin_until: SpinUntil, number: signal.Signals
@@ -104,4 +157,4 @@ def test_virtual_time_test_passes(files: Path) -> None:
     run = subprocess.run(command, cwd=files, env=environment, capture_output=True, text=True)
 
     assert run.returncode == 0, run.stdout
-    assert run.stdout.splitlines()[-1].startswith("2 passed")
+    assert run.stdout.splitlines()[-1].startswith("3 passed")

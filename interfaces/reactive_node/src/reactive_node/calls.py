@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from rclpy.client import Client
@@ -15,12 +16,12 @@ _SERVER_POLL = 0.05  # [s]: ROS has no event for a server that appears
 _STEADY = Clock(clock_type=ClockType.STEADY_TIME)
 
 
-def server_ready(node: Node, client: Client, scheduler: abc.SchedulerBase) -> Observable[None]:
-    """Emit while there is a server; polls in real time, also while ROS time is simulated."""
+def server_ready(node: Node, is_ready: Callable[[], bool], scheduler: abc.SchedulerBase) -> Observable[None]:
+    """Emit while there is a server; asks in real time, also while ROS time is simulated."""
 
     def subscribe(observer: abc.ObserverBase[None], _: abc.SchedulerBase | None = None) -> abc.DisposableBase:
         def poll() -> None:
-            if client.service_is_ready():
+            if is_ready():
                 observer.on_next(None)
 
         timer = node.create_timer(_SERVER_POLL, poll, clock=_STEADY)

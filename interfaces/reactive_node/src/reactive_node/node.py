@@ -11,9 +11,10 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import reactivex as rx
+from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -25,17 +26,22 @@ from reactivex.subject import AsyncSubject
 
 from reactive_node import calls
 from reactive_node.scheduler import NodeScheduler
+from reactive_node.services import Requests
 from reactive_node.shared_reader import SharedReader, retention
+
+if TYPE_CHECKING:
+    from reactive_node.transforms import Transforms
 
 
 class ReactiveNode(Node):
-    """A node with observables of topics, parameters, QoS events and calls; it publishes observables."""
+    """A node whose topics, parameters, events, calls and transforms are observables; it publishes others."""
 
     def __init__(self, node_name: str, **options: Any) -> None:
         """Create a node; the options are those of :class:`rclpy.node.Node`."""
         super().__init__(node_name, **options)
         self._end: AsyncSubject[None] = AsyncSubject()
         self._sinks = CompositeDisposable()
+        self._transforms: Transforms | None = None
         self.scheduler = NodeScheduler(self)
         """Schedules on the executor and clock of this node; for ``observable.subscribe(…, scheduler=…)``."""
 
@@ -128,6 +134,23 @@ class ReactiveNode(Node):
         reader = SharedReader(self, create_reader, scheduler=self.scheduler, end=self._end)
         return Observable(reader.subscribe)
 
+    def create_transform_observable(self, target_frame: str, source_frame: str) -> Observable[Any]:
+        """
+        Return the transforms that turn coordinates in the source frame into those in the target frame.
+
+        The items are ``geometry_msgs/msg/TransformStamped``: the latest transform as soon as it is known, at
+        once for a late observer, and then each new one. Its stamp is the latest time for which all transforms
+        in between are known. All observers share one buffer of tf2 and the readers of ``/tf`` and
+        ``/tf_static``, which exist while there are observers. An invalid name of a frame is an error of the
+        observable. It completes when the node ends. It needs the package ``tf2_ros``, which nothing else of
+        this package imports.
+        """
+        if self._transforms is None:
+            from reactive_node.transforms import Transforms  # here: tf2 is optional
+
+            self._transforms = Transforms(self.create_observable, self.get_clock())
+        return self._transforms.between(target_frame, source_frame)
+
     def create_call(
         self, srv_type: Any, srv_name: str, *, timeout: float | None = None, **options: Any
     ) -> Callable[[Any], Observable[Any]]:
@@ -141,7 +164,7 @@ class ReactiveNode(Node):
         :param options: further arguments of :meth:`rclpy.node.Node.create_client`.
         """
         client = self.create_client(srv_type, srv_name, **options)
-        ready = calls.server_ready(self, client, self.scheduler)
+        ready = calls.server_ready(self, client.service_is_ready, self.scheduler)
         late = rx.throw(TimeoutError(f"no response of {srv_name} within {timeout} s"))
 
         def call(request: Any) -> Observable[Any]:
@@ -150,6 +173,38 @@ class ReactiveNode(Node):
             return result if timeout is None else result.timeout(timeout, late, self.scheduler)
 
         return call
+
+    def create_action_call(
+        self, action_type: Any, action_name: str, **options: Any
+    ) -> Callable[[Any], Observable[Any]]:
+        """
+        Return a function from a goal to an observable of its execution, for ``goals.flat_map(act)``.
+
+        A goal is sent with each subscription, when there is a server; it waits for one and never blocks.
+        The items are the action's feedback messages, then its result message, then the observable completes:
+        ``act(goal).last()`` is the result only. A goal that does not succeed is an error of the observable:
+        :class:`~reactive_node.actions.GoalRejected`, :class:`~reactive_node.actions.GoalAborted`,
+        :class:`~reactive_node.actions.GoalCanceled` (by another client), or
+        :class:`~reactive_node.actions.GoalUnknown` (by a server that has forgotten the goal). Disposing, also
+        by the end of the node, asks the server to cancel the goal, so ``goals.map(act).switch_latest()``
+        replaces it. A server that vanishes is not noticed: limit its silence by
+        ``act(goal).timeout(seconds)``. The observable completes when the node ends.
+
+        :param options: further arguments of :class:`rclpy.action.ActionClient`.
+        """
+        from rclpy.action import ActionClient  # here: few nodes have actions
+
+        from reactive_node import actions
+
+        client = ActionClient(self, action_type, action_name, **options)
+        self._sinks.add(Disposable(client.destroy))
+        ready = calls.server_ready(self, client.server_is_ready, self.scheduler)
+
+        def act(goal: Any) -> Observable[Any]:
+            execution = actions.execution(client, action_name, goal, self.scheduler)
+            return ready.take(1).flat_map(lambda _: execution).take_until(self._end)
+
+        return act
 
     def publish_observable(
         self,
@@ -181,6 +236,53 @@ class ReactiveNode(Node):
             self._sinks.remove(sink)
 
         sink = Disposable(end)
+        self._sinks.add(sink)
+        return sink
+
+    def serve_recipe(
+        self,
+        recipe: Callable[[Observable[Any]], Observable[tuple[Any, Any]]],
+        srv_type: Any,
+        srv_name: str,
+        **options: Any,
+    ) -> abc.DisposableBase:
+        """
+        Answer the requests of a service until the returned disposable is disposed or the node ends.
+
+        The recipe maps the requests to pairs of a request and its response, so it may answer in any order::
+
+            node.serve_recipe(lambda requests: requests.map(lambda r: (r, answer(r))), SetBool, "switch")
+
+        It must answer each request once, with the request itself, not a copy. A request without an answer is
+        kept, and its client waits in vain; others do not. An error of the recipe, its completion, an answer
+        to a request that does not wait, and a response of another type are raised out of the spinning of
+        this node. Then the service ends, too, so clients see that there is no server.
+
+        :param options: further arguments of :meth:`rclpy.node.Node.create_service`, without
+            ``callback_group``: requests arrive by the node's scheduler, also while others wait.
+        """
+        requests = Requests(self, srv_type, srv_name, self.scheduler)
+        sink = CompositeDisposable()
+
+        def fail(error: Exception) -> None:
+            sink.dispose()
+            self.fail(error)
+
+        def completed() -> None:
+            fail(RuntimeError(f"the recipe of {srv_name} completed: nothing answers its requests any more"))
+
+        answers = recipe(requests.observable).do_action(requests.answer)
+        sink.add(answers.subscribe(on_error=fail, on_completed=completed, scheduler=self.scheduler))
+        service = self.create_service(
+            srv_type, srv_name, requests.serve, callback_group=ReentrantCallbackGroup(), **options
+        )
+
+        def end() -> None:
+            requests.close()
+            self.destroy_service(service)
+            self._sinks.remove(sink)
+
+        sink.add(Disposable(end))
         self._sinks.add(sink)
         return sink
 

@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass
+from datetime import datetime
 from typing import Any, Generic, TypeVar
 
 import pytest
@@ -17,7 +18,9 @@ from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from reactivex import Observable
+from reactivex.abc import DisposableBase
 from reactivex.notification import OnNext
+from reactivex.scheduler.scheduler import Scheduler
 from reactivex.testing import Recorded, TestScheduler
 
 from reactive_node.domains import reserved_domain
@@ -74,6 +77,32 @@ class VirtualTime(TestScheduler):
         self.advance_to(until)
         subscription.dispose()
         return Recording(observer.messages)
+
+    def worker(self, seconds: float) -> Scheduler:
+        """Return a scheduler for slow work: its actions run beside each other and end after ``seconds``."""
+        return _SlowWorker(self, seconds)
+
+
+class _SlowWorker(Scheduler):
+    """Runs actions late, when they would have ended."""
+
+    def __init__(self, time: VirtualTime, seconds: float) -> None:
+        super().__init__()
+        self._time = time
+        self._seconds = seconds
+
+    @property
+    def now(self) -> datetime:
+        return self._time.now
+
+    def schedule(self, action: Any, state: Any = None) -> DisposableBase:
+        return self.schedule_relative(0.0, action, state)
+
+    def schedule_relative(self, duetime: Any, action: Any, state: Any = None) -> DisposableBase:
+        return self._time.schedule_relative(self.to_seconds(duetime) + self._seconds, action, state)
+
+    def schedule_absolute(self, duetime: Any, action: Any, state: Any = None) -> DisposableBase:
+        return self._time.schedule_absolute(self.to_seconds(duetime) + self._seconds, action, state)
 
 
 @pytest.fixture

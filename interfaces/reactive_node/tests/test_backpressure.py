@@ -1,0 +1,282 @@
+"""Slow work beside the node's thread: only the newest item waits."""
+
+from __future__ import annotations
+
+import threading
+import weakref
+from typing import Any
+
+import pytest
+import reactivex as rx
+from rclpy.node import Node
+from reactivex.scheduler import ImmediateScheduler, ThreadPoolScheduler
+from reactivex.subject import Subject
+from reactivex.testing import ReactiveTest
+from std_msgs.msg import Int64
+
+from reactive_node import ReactiveNode, latest
+from reactive_node.testing import SpinFor, SpinUntil, VirtualTime
+
+on_next, on_error, on_completed = ReactiveTest.on_next, ReactiveTest.on_error, ReactiveTest.on_completed
+subscribe = ReactiveTest.subscribe
+WORK = 2.0  # [s]
+
+
+class Work:
+    """Returns each item in upper case, and keeps a list of them."""
+
+    def __init__(self) -> None:
+        self.items: list[str] = []
+
+    def __call__(self, item: str) -> str:
+        self.items.append(item)
+        if item == "bad":
+            raise ValueError("planted")
+        return item.upper()
+
+
+@pytest.fixture
+def work() -> Work:
+    return Work()
+
+
+# In virtual time
+
+
+def test_each_item_is_worked_on_if_there_is_time(scheduler: VirtualTime, work: Work) -> None:
+    items = scheduler.hot((1, "a"), (3, "b"), (7, "c"))
+
+    recording = scheduler.record(items.pipe(latest(work, scheduler.worker(WORK))), until=10)
+
+    assert recording.items == [(3, "A"), (5, "B"), (9, "C")]
+
+
+def test_newest_item_replaces_those_that_wait(scheduler: VirtualTime, work: Work) -> None:
+    items = scheduler.hot((1, "a"), (1.5, "b"), (2, "c"), (2.5, "d"), (4, "e"), (20, "f"))
+
+    recording = scheduler.record(items.pipe(latest(work, scheduler.worker(WORK))), until=30)
+
+    assert recording.items == [(3, "A"), (5, "D"), (7, "E"), (22, "F")]
+    assert work.items == ["a", "d", "e", "f"]
+
+
+def test_none_is_an_item(scheduler: VirtualTime) -> None:
+    items = scheduler.hot((1, "a"), (2, None))
+
+    recording = scheduler.record(items.pipe(latest(repr, scheduler.worker(WORK))), until=10)
+
+    assert recording.items == [(3, "'a'"), (5, "None")]
+
+
+def test_completion_waits_for_work_and_newest_item(scheduler: VirtualTime, work: Work) -> None:
+    items = scheduler.create_hot_observable(
+        on_next(1, "a"), on_next(1.5, "b"), on_next(2, "c"), on_completed(2.5)
+    )
+
+    recording = scheduler.record(items.pipe(latest(work, scheduler.worker(WORK))), until=10)
+
+    assert recording.messages == [on_next(3, "A"), on_next(5, "C"), on_completed(5)]
+    assert items.subscriptions == [subscribe(0, 2.5)]
+
+
+def test_completion_of_idle_source_is_immediate(scheduler: VirtualTime, work: Work) -> None:
+    items = scheduler.create_hot_observable(on_next(1, "a"), on_completed(4))
+
+    recording = scheduler.record(items.pipe(latest(work, scheduler.worker(WORK))), until=10)
+
+    assert recording.messages == [on_next(3, "A"), on_completed(4)]
+
+
+def test_error_of_work_ends_observable_and_work(scheduler: VirtualTime, work: Work) -> None:
+    items = scheduler.hot((1, "bad"), (2, "b"), (4, "c"))
+
+    recording = scheduler.record(items.pipe(latest(work, scheduler.worker(WORK))), until=10)
+
+    assert recording.messages == [on_error(3, ValueError("planted"))]
+    assert work.items == ["bad"]
+    assert items.subscriptions == [subscribe(0, 3)]
+
+
+def test_error_of_source_is_immediate_and_ends_work(scheduler: VirtualTime, work: Work) -> None:
+    items = scheduler.create_hot_observable(
+        on_next(1, "a"), on_next(1.5, "b"), on_error(2, ValueError("planted"))
+    )
+
+    recording = scheduler.record(items.pipe(latest(work, scheduler.worker(WORK))), until=10)
+
+    assert recording.messages == [on_error(2, ValueError("planted"))]
+    assert work.items == []  # the worker's actions take effect when they end
+
+
+def test_disposing_begins_no_work_any_more(scheduler: VirtualTime, work: Work) -> None:
+    items = scheduler.hot((1, "a"), (2, "b"), (3.5, "c"))
+
+    recording = scheduler.record(items.pipe(latest(work, scheduler.worker(WORK))), until=4)
+    scheduler.advance_to(10)
+
+    assert recording.messages == [on_next(3, "A")]
+    assert work.items == ["a"]
+    assert items.subscriptions == [subscribe(0, 4)]
+
+
+def test_observer_that_leaves_with_result_begins_no_work(scheduler: VirtualTime, work: Work) -> None:
+    items = scheduler.hot((1, "a"), (2, "b"))
+
+    recording = scheduler.record(items.pipe(latest(work, scheduler.worker(WORK))).take(1), until=10)
+
+    assert recording.messages == [on_next(3, "A"), on_completed(3)]
+    assert work.items == ["a"]
+
+
+def test_each_subscription_works_for_itself(scheduler: VirtualTime, work: Work) -> None:
+    results = scheduler.hot((1, "a"), (2, "b")).pipe(latest(work, scheduler.worker(WORK)))
+
+    recording = scheduler.record(rx.merge(results, results), until=10)
+
+    assert recording.items == [(3, "A"), (3, "A"), (5, "B"), (5, "B")]
+
+
+def test_subscription_without_scheduler_is_error(scheduler: VirtualTime, work: Work) -> None:
+    errors: list[Exception] = []
+
+    scheduler.hot().pipe(latest(work, scheduler.worker(WORK))).subscribe(on_error=errors.append)
+
+    assert "scheduler=node.scheduler" in str(errors[0])
+
+
+# With threads
+
+
+class Gate:
+    """Work on a thread of its own that waits until it is let through."""
+
+    def __init__(self) -> None:
+        self.began = threading.Event()
+        self.opened = threading.Event()
+        self.threads: set[int] = set()
+
+    def __call__(self, item: Any) -> Any:
+        self.threads.add(threading.get_ident())
+        self.began.set()
+        assert self.opened.wait(30)
+        return item
+
+
+@pytest.fixture
+def gate() -> Any:
+    gate = Gate()
+    yield gate
+    gate.opened.set()
+
+
+@pytest.fixture
+def pool() -> Any:
+    pool = ThreadPoolScheduler(1)
+    yield pool
+    pool.executor.shutdown()
+
+
+def test_node_goes_on_while_work_runs_on_another_thread(
+    node: ReactiveNode, peer: Node, spin_until: SpinUntil, gate: Gate, pool: ThreadPoolScheduler
+) -> None:
+    results: list[tuple[int, int]] = []
+    ticks: list[int] = []
+    numbers = node.create_observable(Int64, "numbers").map(lambda message: message.data)
+    numbers.pipe(latest(gate, pool)).subscribe(
+        lambda number: results.append((number, threading.get_ident())), scheduler=node.scheduler
+    )
+    received: list[int] = []
+    numbers.subscribe(received.append, scheduler=node.scheduler)
+    publisher = peer.create_publisher(Int64, "numbers", 10)
+    spin_until(lambda: publisher.get_subscription_count() == 1)
+
+    publisher.publish(Int64(data=1))
+    spin_until(gate.began.is_set)
+    rx.interval(0.001).subscribe(ticks.append, scheduler=node.scheduler)
+    for number in (2, 3, 4):
+        publisher.publish(Int64(data=number))
+    spin_until(lambda: len(ticks) >= 3 and received == [1, 2, 3, 4])
+    assert results == []
+    gate.opened.set()
+    spin_until(lambda: len(results) == 2)
+
+    here = threading.get_ident()
+    assert results == [(1, here), (4, here)]
+    assert here not in gate.threads
+
+
+def test_disposing_loses_result_of_running_work(
+    node: ReactiveNode, spin_for: SpinFor, gate: Gate, pool: ThreadPoolScheduler
+) -> None:
+    results: list[int] = []
+    numbers: Subject[int] = Subject()
+    subscription = numbers.pipe(latest(gate, pool)).subscribe(results.append, scheduler=node.scheduler)
+
+    numbers.on_next(1)
+    numbers.on_next(2)
+    assert gate.began.wait(10)
+    subscription.dispose()
+    gate.opened.set()
+    pool.executor.shutdown()
+    spin_for(0.05)
+
+    assert results == []
+
+
+def test_unobserved_error_of_work_is_raised_by_spin(
+    node: ReactiveNode, spin_until: SpinUntil, pool: ThreadPoolScheduler
+) -> None:
+    numbers: Subject[int] = Subject()
+    node.publish_observable(numbers.pipe(latest(lambda number: 1 / number, pool)), Int64, "inverses")
+
+    numbers.on_next(0)
+
+    with pytest.raises(ZeroDivisionError):
+        spin_until(lambda: False)
+
+
+# A flood
+
+
+class Item:
+    """A value that can be counted while it is alive."""
+
+    def __init__(self, value: int) -> None:
+        self.value = value
+
+
+def test_flood_keeps_two_items_alive(
+    node: ReactiveNode, spin_until: SpinUntil, gate: Gate, pool: ThreadPoolScheduler
+) -> None:
+    alive: weakref.WeakSet[Item] = weakref.WeakSet()
+    results: list[int] = []
+    items: Subject[Item] = Subject()
+    items.pipe(latest(gate, pool)).subscribe(
+        lambda item: results.append(item.value), scheduler=node.scheduler
+    )
+
+    most = 0
+    for value in range(10_000):
+        item = Item(value)
+        alive.add(item)
+        items.on_next(item)
+        del item
+        most = max(most, len(alive))
+    gate.opened.set()
+    spin_until(lambda: len(results) == 2)
+
+    assert results == [0, 9_999]
+    assert most == 2
+
+
+def test_quick_work_does_not_pile_up_results(node: ReactiveNode, spin_until: SpinUntil, work: Work) -> None:
+    results: list[str] = []
+    items: Subject[str] = Subject()
+    items.pipe(latest(work, ImmediateScheduler())).subscribe(results.append, scheduler=node.scheduler)
+
+    for number in range(100):  # while the executor is busy elsewhere
+        items.on_next(f"item {number}")
+    assert work.items == ["item 0"]
+    spin_until(lambda: len(results) == 2)
+
+    assert results == ["ITEM 0", "ITEM 99"]
