@@ -16,7 +16,7 @@ STAMP := .venv/made-from
 HOLD := $(shell env --block-signal=INT echo env --block-signal=INT 2>/dev/null)
 export PYTHON SCENARIO PARAMETERS WEB
 
-.PHONY: help setup run start stop status logs console chaos test check bench
+.PHONY: help setup run start stop status logs record console chaos test check bench
 
 help:
 	@echo "make run      start the system, show it in this terminal, stop it with Ctrl-C"
@@ -25,6 +25,7 @@ help:
 	@echo "make console  attach this terminal to it"
 	@echo "make status   its services: state, pid, uptime, restarts, last output"
 	@echo "make logs     follow their logs"
+	@echo "make record   record its messages until Ctrl-C     (MCAP for Foxglove and ros2 bag, in .run/records)"
 	@echo "make stop     stop it"
 	@echo "make chaos    break a system on purpose and check its promises  (MINUTES=5 SEED= CHAOS=--help for more)"
 	@echo "make test     run the tests                       (TESTS=tests/component for a part)"
@@ -38,7 +39,7 @@ setup:
 run start: setup
 	@exec $(HOLD) $(PY) -m deploy.commands.launcher $@ "$$SCENARIO" "$$PARAMETERS"
 
-console status logs:
+console status logs record:
 	@test -e $(STAMP) || { echo ".venv is not set up: make setup (make stop works without it)" >&2; exit 1; }
 	@exec $(HOLD) $(PY) -m deploy.commands.launcher $@
 

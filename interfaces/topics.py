@@ -16,7 +16,9 @@ from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PointStamped
 from rclpy.duration import Duration
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64, Header, String
+from tf2_msgs.msg import TFMessage
 
 TURN_ON, TURN_OFF = "turn_on", "turn_off"
 ON, OFF = "on", "off"
@@ -114,6 +116,31 @@ EFFECTOR_SPEED = Topic(
     _not_a_length,
     follows=EFFECTOR_POSITION.name,
 )
+JOINT_STATES = Topic(
+    "joint_states",
+    JointState,
+    _EVENTS,
+    "rad",
+    ("robot_state",),
+    "angles of the joints `theta1` and `theta2`",
+)
+ROBOT_DESCRIPTION = Topic(
+    "robot_description",
+    String,
+    _STATE,
+    "m",
+    ("robot_state",),
+    "URDF of the arm; a new one when `l1` or `l2` has changed",
+    longest_gap=math.inf,
+)
+TF = Topic(
+    "/tf",
+    TFMessage,
+    _qos(100),  # as of tf2_ros
+    "m, rad",
+    ("robot_state",),
+    f"from `{FRAME}` to `link1`, `link2` and `effector`",
+)
 OPERATOR_HEARTBEAT = Topic(
     "operator_heartbeat",
     Bool,
@@ -181,6 +208,9 @@ CONTRACT = (
     THETA2,
     EFFECTOR_POSITION,
     EFFECTOR_SPEED,
+    JOINT_STATES,
+    ROBOT_DESCRIPTION,
+    TF,
     OPERATOR_HEARTBEAT,
     OPERATOR_PRESENCE,
     OPERATOR_ACTIVITY,

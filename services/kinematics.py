@@ -14,8 +14,9 @@ from reactivex import Observable
 from std_msgs.msg import Header
 
 from interfaces import service
+from interfaces.robot_model import BASE, frame_id
 from interfaces.service import ServiceNode
-from interfaces.topics import EFFECTOR_POSITION, FRAME, L1, L2, THETA1, THETA2
+from interfaces.topics import EFFECTOR_POSITION, L1, L2, THETA1, THETA2
 
 
 def forward_kinematics(l1: float, l2: float, theta1: float, theta2: float) -> tuple[float, float]:
@@ -43,9 +44,11 @@ def effector_position(
 def wire(node: ServiceNode) -> None:
     """Connect the recipe with its topics."""
 
+    frame = frame_id(BASE, node.get_namespace())
+
     def message(position: tuple[float, float]) -> PointStamped:
         x, y = position
-        header = Header(stamp=node.get_clock().now().to_msg(), frame_id=FRAME)
+        header = Header(stamp=node.get_clock().now().to_msg(), frame_id=frame)
         return PointStamped(header=header, point=Point(x=x, y=y))
 
     l1, l2, theta1, theta2 = (

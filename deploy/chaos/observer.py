@@ -23,16 +23,12 @@ import rclpy
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.qos import QoSProfile
 from rclpy.signals import SignalHandlerOptions
 
 from deploy.chaos.history import NO_TARGET, OVERLOAD, InjectedFault, Life
 from deploy.chaos.process_monitor import ProcessMonitor
-from deploy.chaos.record import FAULTS, PROCESSES, Recorder, qos_profiles
-from interfaces import topics
-
-DEPTH = 200  # messages that may wait while the observer is not scheduled
-HEARTBEAT_DEPTH = 10  # a flood of heartbeats need not be recorded in full
+from deploy.chaos.record import FAULTS, PROCESSES
+from deploy.recording.recorder import Recorder, record
 
 
 @contextmanager
@@ -50,14 +46,13 @@ def _on_thread(work: Callable[[threading.Event], None]) -> Iterator[None]:
 
 @contextmanager
 def _recording(namespace: str, domain: int, recorder: Recorder) -> Iterator[None]:
-    """Record the messages of an arm on a thread."""
+    """Record the messages of an arm on a thread; print `seen NAME` at the first message of each topic."""
     context = Context()
     rclpy.init(args=[], context=context, domain_id=domain, signal_handler_options=SignalHandlerOptions.NO)
     executor = SingleThreadedExecutor(context=context)
     node = Node(f"observer_{os.getpid()}", context=context, namespace=namespace)
     executor.add_node(node)
-    for topic in topics.CONTRACT:
-        _record(node, topic, recorder)
+    record(node, recorder, _report_first)
 
     def spin(ended: threading.Event) -> None:
         while not ended.is_set():
@@ -70,25 +65,9 @@ def _recording(namespace: str, domain: int, recorder: Recorder) -> Iterator[None
     rclpy.try_shutdown(context=context)
 
 
-def _record(node: Node, topic: topics.Topic, recorder: Recorder) -> None:
-    """Record a topic; print `seen NAME` at its first message."""
-    name = node.resolve_topic_name(topic.name)
-    offered = qos_profiles(topic)
-    seen = False
-
-    def write(data: bytes, info: Any) -> None:
-        nonlocal seen
-        if not seen:
-            seen = True
-            sys.stdout.write(f"seen {name}\n")  # in one write: other threads report other arms
-            sys.stdout.flush()
-        now = time.monotonic_ns()
-        age = time.time_ns() - info["source_timestamp"]
-        recorder.message(name, topic.type_name, offered, data, now, now - age)
-
-    depth = HEARTBEAT_DEPTH if topic is topics.OPERATOR_HEARTBEAT else DEPTH
-    qos = QoSProfile(depth=depth, reliability=topic.qos.reliability, durability=topic.qos.durability)
-    node.create_subscription(topic.type, name, write, qos, raw=True)
+def _report_first(name: str) -> None:
+    sys.stdout.write(f"seen {name}\n")  # in one write: other threads report other arms
+    sys.stdout.flush()
 
 
 def main(arguments: list[str]) -> int:

@@ -1,105 +1,26 @@
-"""The file of a record: an MCAP of ROS 2 messages, which Foxglove and `ros2 bag` open.
-
-The log time of a message is its reception by the observer, the publish time its DDS source time. Processes
-and faults are recorded as JSON in std_msgs/String.
-"""
+"""Reads the record of the observer: an MCAP with processes and faults as JSON in std_msgs/String."""
 
 from __future__ import annotations
 
 import json
 import struct
-import threading
-from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-import yaml
 from mcap.exceptions import McapError
 from mcap.reader import McapReader, make_reader
-from mcap.writer import Writer
-from rclpy.serialization import deserialize_message, serialize_message
-from rosbags.typesys import Stores, get_typestore
+from rclpy.serialization import deserialize_message
 from std_msgs.msg import String
 
 from deploy.chaos.babbler import is_babble
 from deploy.chaos.history import History, InjectedFault, Life, Sample
+from deploy.recording.recorder import METADATA
 from deploy.supervision.system import DeploymentError
 from interfaces import topics
 
 PROCESSES, FAULTS = "/chaos/processes", "/chaos/faults"  # topics
-METADATA = "reactive-arm"
-
-
-class Recorder:
-    """Writes a record. Thread-safe."""
-
-    def __init__(self, path: Path, monotonic: int, epoch: int) -> None:
-        """:param monotonic, epoch: the same moment on the monotonic clock and since 1970 [ns]."""
-        self._file = path.open("xb")
-        self._writer = Writer(self._file)
-        self._writer.start(profile="ros2", library="reactive-arm")
-        self._origin = monotonic
-        self._offset = epoch - monotonic
-        self._types = get_typestore(Stores.ROS2_JAZZY)
-        self._lock = threading.Lock()
-        self._schemas: dict[str, int] = {}
-        self._channels: dict[str, int] = {}
-        self._counts: Counter[str] = Counter()
-        self._writer.add_metadata(METADATA, {"origin": str(self._origin + self._offset)})
-
-    def message(self, topic: str, type_name: str, qos: str, data: bytes, received: int, sent: int) -> None:
-        """Record a serialized message; without effect after :meth:`close`. Times: monotonic clock [ns]."""
-        with self._lock:
-            if self._file.closed:
-                return
-            if topic not in self._channels:
-                self._add(topic, type_name, qos)
-            self._counts[topic] += 1
-            self._writer.add_message(
-                self._channels[topic],
-                log_time=received + self._offset,
-                data=data,
-                publish_time=max(0, sent + self._offset),
-                sequence=self._counts[topic],
-            )
-
-    def event(self, topic: str, time: int, event: Mapping[str, object]) -> None:
-        """Record an event of a process, or a fault, as JSON."""
-        data = serialize_message(String(data=json.dumps(event)))
-        self.message(topic, "std_msgs/msg/String", "", data, time, time)
-
-    def close(self) -> None:
-        """Complete the file."""
-        with self._lock:
-            self._writer.finish()  # type: ignore[no-untyped-call]
-            self._file.close()
-
-    def _add(self, topic: str, type_name: str, qos: str) -> None:
-        if type_name not in self._schemas:
-            definition, _ = self._types.generate_msgdef(type_name, ros_version=2)
-            self._schemas[type_name] = self._writer.register_schema(type_name, "ros2msg", definition.encode())
-        self._channels[topic] = self._writer.register_channel(
-            topic, "cdr", self._schemas[type_name], {"offered_qos_profiles": qos}
-        )
-
-
-def qos_profiles(topic: topics.Topic) -> str:
-    """Return the QoS of a topic in the form of rosbag2."""
-    latched, lifespan = topics.is_latched(topic.qos), topic.qos.lifespan.nanoseconds
-    profile = {
-        "history": 1,
-        "depth": topic.qos.depth,
-        "reliability": int(topic.qos.reliability),
-        "durability": 1 if latched else 2,
-        "deadline": {"sec": 0, "nsec": 0},
-        "lifespan": {"sec": lifespan // 10**9, "nsec": lifespan % 10**9},
-        "liveliness": 1,
-        "liveliness_lease_duration": {"sec": 0, "nsec": 0},
-        "avoid_ros_namespace_conventions": False,
-    }
-    return str(yaml.safe_dump([profile]))
 
 
 @contextmanager

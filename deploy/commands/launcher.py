@@ -1,4 +1,4 @@
-"""The commands behind `make run`, `start`, `console`, `status` and `logs`."""
+"""The commands behind `make run`, `start`, `console`, `status`, `logs` and `record`."""
 
 from __future__ import annotations
 
@@ -24,6 +24,7 @@ START_LIMIT = 60.0  # s until all services have to report their health
 BEGIN_LIMIT = 5.0  # s that the services have to confirm the origin of the scenario
 STATUS_LIMIT = 1.5  # s for the health of services that are up: they report at 1 Hz
 START_ATTEMPTS = 3  # of a service that dies so slowly that supervisord does not count it as an early death
+RECORDS = "records"  # in the run directory
 LOG_LINES = 15  # of a service that does not start
 # Variables that a command takes over from the running system.
 ADOPTED = (
@@ -101,6 +102,17 @@ def logs(system: System) -> None:
                     tail.wait(0.1)
         finally:
             tail.terminate()
+
+
+def record(system: System) -> None:
+    """Record the messages of a running system until Ctrl-C or its end."""
+    if not _adopt_environment(system):
+        raise DeploymentError("Nothing runs: make start")
+    from deploy.commands import record
+    from deploy.commands.member import Member
+
+    with Member() as member:
+        record.write(system.run / RECORDS, member, system.supervisor_has_ended)
 
 
 @contextmanager
@@ -209,7 +221,7 @@ def main(arguments: list[str]) -> int:
         command = commands.add_parser(name)
         command.add_argument("scenario")
         command.add_argument("parameter_file", nargs="?", default="")
-    for name in ("console", "status", "logs"):
+    for name in ("console", "status", "logs", "record"):
         commands.add_parser(name)
     options = parser.parse_args(arguments)
 
@@ -227,6 +239,8 @@ def main(arguments: list[str]) -> int:
                 status(system)
             case "logs":
                 logs(system)
+            case "record":
+                record(system)
     except interruption.Interrupted:
         return 0
     except BrokenPipeError:  # the reader has gone, as in `make run | head`

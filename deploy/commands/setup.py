@@ -119,11 +119,12 @@ def make(ros: str) -> None:
         package = f"python{sys.version_info[0]}.{sys.version_info[1]}-venv"
         raise SetupError(f"Python {version} ({sys.executable}) lacks ensurepip: apt-get install {package}")
     if ros:
-        needed = "import rclpy, diagnostic_msgs.msg, geometry_msgs.msg, std_msgs.msg"
+        messages = ("diagnostic_msgs", "geometry_msgs", "sensor_msgs", "std_msgs", "tf2_msgs")
+        needed = f"import rclpy, {', '.join(f'{package}.msg' for package in messages)}"
         check = subprocess.run([sys.executable, "-c", needed], capture_output=True, text=True)
         if check.returncode:
             raise SetupError(
-                f"ROS 2 is sourced, but its rclpy ({ros}) or common_interfaces do not work with"
+                f"ROS 2 is sourced, but its rclpy ({ros}) or message packages do not work with"
                 f" {sys.executable}: {check.stderr.strip().splitlines()[-1]}\n"
                 "Choose its interpreter (make setup PYTHON=/usr/bin/python3), install what is missing, or"
                 " use a shell without ROS 2"

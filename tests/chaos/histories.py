@@ -45,6 +45,7 @@ def good() -> History:
         if None not in values:
             streams["effector/position"].append(Sample(t, t + 0.001, forward_kinematics(*values)))
             streams["effector/speed"].append(Sample(t, t + 0.001, 0.5))
+    streams["joint_states"] = [Sample(t, t + 0.001, None) for t in _times(25.0)]
     streams["engines"] = [Sample(4.95, 4.951, topics.TURN_ON)]
     streams["/diagnostics"] = sorted(
         Sample(t, t + 0.001, (name, 100 + index)) for t in _times(1.0) for index, name in enumerate(PROGRAMS)

@@ -322,7 +322,7 @@ def test_l1_released_switch_is_no_case() -> None:
 
 def test_l2_holds_if_the_other_streams_flow() -> None:
     finding = CHECKERS["L2"](killed(good(), "kinematics", 20.0, 0.6))
-    assert (finding.verdict, finding.cases) == (HOLDS, 6)
+    assert (finding.verdict, finding.cases) == (HOLDS, 7)
 
 
 def test_l2_detects_a_stream_that_pauses() -> None:
@@ -365,7 +365,7 @@ def test_l2_pause_of_the_machine_does_not_hide_another_pause() -> None:
     assert verdict("L2", faulty(history, InjectedFault("overload", NO_TARGET, 20.05, 20.12))) == VIOLATED
     stalled = faulty(history, InjectedFault("overload", NO_TARGET, 20.05, 20.4))
     finding = CHECKERS["L2"](stalled)
-    assert (finding.verdict, finding.cases, finding.unknown) == (HOLDS, 5, 1)
+    assert (finding.verdict, finding.cases, finding.unknown) == (HOLDS, 6, 1)
     (evidence,) = CHECKERS["L2"](silent(stalled, "l1", 20.41, 20.79)).evidence
     assert "config_l1 is silent" in evidence.text
 

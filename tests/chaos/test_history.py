@@ -18,6 +18,7 @@ EXPECTED = {
     "dead_mans_switch": topics.OPERATOR_HEARTBEAT,
     "kinematics": topics.EFFECTOR_POSITION,
     "velocity": topics.EFFECTOR_SPEED,
+    "robot_state": topics.JOINT_STATES,
     "operator_watchdog": topics.OPERATOR_PRESENCE,
     "engine_controller": topics.ENGINES_STATE,
 }

@@ -15,7 +15,8 @@ from rosbags.typesys import Stores, get_typestore
 from std_msgs.msg import Float64
 
 from deploy.chaos.history import Life
-from deploy.chaos.record import PROCESSES, Recorder, qos_profiles
+from deploy.chaos.record import PROCESSES
+from deploy.recording.recorder import Recorder, qos_profiles
 from deploy.supervision import processes
 from interfaces import topics
 

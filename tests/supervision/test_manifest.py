@@ -33,7 +33,7 @@ def test_a_program_has_its_module_and_arguments() -> None:
 @pytest.mark.parametrize("name", SECTIONS)
 def test_a_program_is_a_module_and_no_shell_stands_before_it(name: str) -> None:
     python, option, module, *_ = shlex.split(SECTIONS[name]["command"])
-    assert (python, option) == ("python", "-m")
+    assert (python, option) == ("python3", "-m")
     assert (ROOT / module.replace(".", "/")).with_suffix(".py").is_file()
     assert name.startswith("config_") or module.endswith(f".{name}")
 

@@ -1,0 +1,1 @@
+"""reactive-arm as a package of a ROS 2 workspace."""

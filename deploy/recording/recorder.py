@@ -1,0 +1,132 @@
+"""Writes the messages of an arm to an MCAP of ROS 2 messages, which Foxglove and `ros2 bag` open.
+
+The log time of a message is its reception, the publish time its DDS source time.
+"""
+
+from __future__ import annotations
+
+import json
+import threading
+import time
+from collections import Counter
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import yaml
+from mcap.writer import Writer
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from rclpy.serialization import serialize_message
+from rosbags.typesys import Stores, get_typestore
+from std_msgs.msg import String
+
+from interfaces import topics
+
+METADATA = "reactive-arm"
+DEPTH = 200  # messages that may wait while the recorder is not scheduled
+HEARTBEAT_DEPTH = 10  # a flood of heartbeats need not be recorded in full
+
+
+class Recorder:
+    """A file of messages. Thread-safe."""
+
+    def __init__(self, path: Path, monotonic: int, epoch: int) -> None:
+        """:param monotonic, epoch: the same moment on the monotonic clock and since 1970 [ns]."""
+        self._file = path.open("xb")
+        self._writer = Writer(self._file)
+        self._writer.start(profile="ros2", library="reactive-arm")
+        self._origin = monotonic
+        self._offset = epoch - monotonic
+        self._types = get_typestore(Stores.ROS2_JAZZY)
+        self._lock = threading.Lock()
+        self._schemas: dict[str, int] = {}
+        self._channels: dict[str, int] = {}
+        self._counts: Counter[str] = Counter()
+        self._writer.add_metadata(METADATA, {"origin": str(self._origin + self._offset)})
+
+    def message(self, topic: str, type_name: str, qos: str, data: bytes, received: int, sent: int) -> None:
+        """Record a serialized message; without effect after :meth:`close`. Times: monotonic clock [ns]."""
+        with self._lock:
+            if self._file.closed:
+                return
+            if topic not in self._channels:
+                self._add(topic, type_name, qos)
+            self._counts[topic] += 1
+            self._writer.add_message(
+                self._channels[topic],
+                log_time=received + self._offset,
+                data=data,
+                publish_time=max(0, sent + self._offset),
+                sequence=self._counts[topic],
+            )
+
+    def event(self, topic: str, time: int, event: Mapping[str, object]) -> None:
+        """Record an event as JSON in std_msgs/String."""
+        data = serialize_message(String(data=json.dumps(event)))
+        self.message(topic, "std_msgs/msg/String", "", data, time, time)
+
+    @property
+    def count(self) -> int:
+        """The number of recorded messages."""
+        return self._counts.total()
+
+    def close(self) -> None:
+        """Complete the file."""
+        with self._lock:
+            self._writer.finish()  # type: ignore[no-untyped-call]
+            self._file.close()
+
+    def _add(self, topic: str, type_name: str, qos: str) -> None:
+        if type_name not in self._schemas:
+            definition, _ = self._types.generate_msgdef(type_name, ros_version=2)
+            self._schemas[type_name] = self._writer.register_schema(type_name, "ros2msg", definition.encode())
+        self._channels[topic] = self._writer.register_channel(
+            topic, "cdr", self._schemas[type_name], {"offered_qos_profiles": qos}
+        )
+
+
+def qos_profiles(topic: topics.Topic) -> str:
+    """Return the QoS of a topic in the form of rosbag2."""
+    latched, lifespan = topics.is_latched(topic.qos), topic.qos.lifespan.nanoseconds
+    profile = {
+        "history": 1,
+        "depth": topic.qos.depth,
+        "reliability": int(topic.qos.reliability),
+        "durability": 1 if latched else 2,
+        "deadline": {"sec": 0, "nsec": 0},
+        "lifespan": {"sec": lifespan // 10**9, "nsec": lifespan % 10**9},
+        "liveliness": 1,
+        "liveliness_lease_duration": {"sec": 0, "nsec": 0},
+        "avoid_ros_namespace_conventions": False,
+    }
+    return str(yaml.safe_dump([profile]))
+
+
+def record(node: Node, recorder: Recorder, first: Callable[[str], None] = lambda name: None) -> None:
+    """
+    Record all topics of the contract in the namespace of a node, for as long as the node is spun.
+
+    :param first: is called with the name of each topic at its first message.
+    """
+    for topic in topics.CONTRACT:
+        _record(node, topic, recorder, first)
+
+
+def _record(node: Node, topic: topics.Topic, recorder: Recorder, first: Callable[[str], None]) -> None:
+    name = node.resolve_topic_name(topic.name)
+    offered = qos_profiles(topic)
+    seen = False
+
+    def write(data: bytes, info: Any) -> None:
+        nonlocal seen
+        if not seen:
+            seen = True
+            first(name)
+        now = time.monotonic_ns()
+        age = time.time_ns() - info["source_timestamp"]
+        recorder.message(name, topic.type_name, offered, data, now, now - age)
+
+    depth = HEARTBEAT_DEPTH if topic is topics.OPERATOR_HEARTBEAT else DEPTH
+    qos = QoSProfile(depth=depth, reliability=topic.qos.reliability, durability=topic.qos.durability)
+    node.create_subscription(topic.type, name, write, qos, raw=True)

@@ -1,0 +1,99 @@
+"""The arm for tools that show robots in 3D: its joints, the transforms of its frames, and its description.
+
+User story (ours): as a robot operator, I am able to see the arm move in RViz or Foxglove, without further
+set-up.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import reactivex as rx
+from builtin_interfaces.msg import Time
+from geometry_msgs.msg import TransformStamped
+from reactivex import Observable
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Header, String
+from tf2_msgs.msg import TFMessage
+
+from interfaces import robot_model, service
+from interfaces.robot_model import JOINTS, frame_id, urdf
+from interfaces.service import ServiceNode, parameter
+from interfaces.topics import JOINT_STATES, L1, L2, ROBOT_DESCRIPTION, TF, THETA1, THETA2
+
+REPEAT = 0.1  # s: transforms are volatile, and a listener that asks for the present needs young ones
+DESCRIPTION_PERIOD = 1.0  # s: tools build the model anew for each description
+
+
+class Configuration(NamedTuple):
+    """The lengths of the links [m] and the angles of the joints [rad]."""
+
+    l1: float
+    l2: float
+    theta1: float
+    theta2: float
+
+
+def configurations(
+    l1: Observable[float],
+    l2: Observable[float],
+    theta1: Observable[float],
+    theta2: Observable[float],
+    rate: float = 30.0,
+) -> Observable[Configuration]:
+    """Emit the configuration after changes, at most at ``rate`` [Hz], and repeat it while nothing changes."""
+
+    def repeated(changes: Observable[Configuration]) -> Observable[Configuration]:
+        again = rx.interval(REPEAT).with_latest_from(changes).map(lambda pair: pair[1])
+        return rx.merge(changes, again).throttle_first(1 / rate)  # the last change comes with the repetition
+
+    return rx.combine_latest(l1, l2, theta1, theta2).starmap(Configuration).publish(repeated)
+
+
+def lengths(configurations: Observable[Configuration]) -> Observable[tuple[float, float]]:
+    """Emit the lengths of both links [m] when they have changed, at most once a second."""
+    return configurations.map(lambda it: (it.l1, it.l2)).distinct_until_changed().sample(DESCRIPTION_PERIOD)
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """Parameters that a user may set."""
+
+    rate: float = parameter(30.0, (5.0, 100.0), "Hz", "`joint_states` and `/tf` come at most this often")
+
+
+def wire(node: ServiceNode) -> None:
+    """Connect the recipe with its topics."""
+    namespace = node.get_namespace()
+
+    def joint_state(stamp: Time, it: Configuration) -> JointState:
+        return JointState(header=Header(stamp=stamp), name=list(JOINTS), position=[it.theta1, it.theta2])
+
+    def transforms(stamp: Time, it: Configuration) -> TFMessage:
+        return TFMessage(
+            transforms=[
+                TransformStamped(
+                    header=Header(stamp=stamp, frame_id=frame_id(parent, namespace)),
+                    child_frame_id=frame_id(child, namespace),
+                    transform=transform,
+                )
+                for parent, child, transform in robot_model.transforms(*it)
+            ]
+        )
+
+    def description(l1: float, l2: float) -> String:
+        return String(data=urdf(l1, l2, namespace))
+
+    l1, l2, theta1, theta2 = (
+        node.observe(topic).map(lambda message: message.data) for topic in (L1, L2, THETA1, THETA2)
+    )
+    states = configurations(l1, l2, theta1, theta2, node.declare(Parameters).rate).share()
+    stamped = states.map(lambda it: (node.get_clock().now().to_msg(), it)).share()
+    node.publish(JOINT_STATES, stamped.starmap(joint_state))
+    node.publish(TF, stamped.starmap(transforms))
+    node.publish(ROBOT_DESCRIPTION, lengths(states).starmap(description))
+
+
+if __name__ == "__main__":
+    service.run("robot_state", wire)

@@ -1,0 +1,170 @@
+"""The arm for 3D tools: the recipe of its state, its transforms and its URDF."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import re
+from collections.abc import Callable
+from typing import Any
+from xml.etree import ElementTree
+
+import pytest
+from geometry_msgs.msg import Transform
+from hypothesis import given
+from hypothesis import strategies as st
+from rclpy.node import Node
+from std_msgs.msg import Float64
+
+from interfaces import robot_model
+from interfaces.robot_model import BASE, EFFECTOR, LINK1, LINK2, frame_id, transforms, urdf
+from interfaces.service import ServiceNode
+from interfaces.topics import CONFIGURATION, JOINT_STATES, ROBOT_DESCRIPTION, TF
+from reactive_node.testing import MakeNode, SpinUntil, VirtualTime
+from services.kinematics import forward_kinematics
+from services.robot_state import Configuration, configurations, lengths, wire
+
+link_lengths = st.floats(0, 1e3)
+angles = st.floats(-1e3, 1e3)
+
+
+def test_configuration_follows_changes_at_most_at_the_rate(scheduler: VirtualTime) -> None:
+    still = [scheduler.hot((0.0, value)) for value in (2.0, 3.0, 0.1)]
+    theta2 = scheduler.hot(*((0.451 + at / 1000, float(at)) for at in range(200)))
+
+    recording = scheduler.record(configurations(*still, theta2, rate=20.0), until=0.81)
+
+    times = [time for time, _ in recording.items]
+    assert times == pytest.approx([0.451, 0.501, 0.551, 0.601, 0.7, 0.8], abs=0.004)
+    newest = [it.theta2 for _, it in recording.items]
+    assert newest == pytest.approx([0, 50, 100, 150, 199, 199], abs=4)
+    assert newest[-1] == 199
+    assert {it[:3] for _, it in recording.items} == {(2.0, 3.0, 0.1)}
+
+
+def test_configuration_is_repeated_while_nothing_changes(scheduler: VirtualTime) -> None:
+    still = [scheduler.hot((0.01, value)) for value in (2.0, 3.0, 0.1, 0.2)]
+
+    recording = scheduler.record(configurations(*still, rate=100.0), until=2.0)
+
+    times = [time for time, _ in recording.items]
+    assert {it for _, it in recording.items} == {Configuration(2.0, 3.0, 0.1, 0.2)}
+    assert max(later - time for time, later in itertools.pairwise(times)) <= 0.111
+    assert len(times) <= 21
+
+
+def test_lengths_are_emitted_on_change_at_most_once_a_second(scheduler: VirtualTime) -> None:
+    sweep = ((0.1 * at, Configuration(2.0 + min(at, 25), 3.0, 0.1 * at, 0.0)) for at in range(60))
+
+    recording = scheduler.record(lengths(scheduler.hot(*sweep)), until=6.0)
+
+    assert recording.items == [(1, (12.0, 3.0)), (2, (22.0, 3.0)), (3, (27.0, 3.0))]
+
+
+def _after(pose: tuple[float, float, float], x: float, yaw: float) -> tuple[float, float, float]:
+    """Return the pose x, y, heading behind a translation along x and a turn about z."""
+    return pose[0] + x * math.cos(pose[2]), pose[1] + x * math.sin(pose[2]), pose[2] + yaw
+
+
+def _xyz(element: ElementTree.Element | None) -> list[float]:
+    assert element is not None
+    return [float(number) for number in element.attrib["xyz"].split()]
+
+
+def _effector_of(description: str, angles: dict[str, float]) -> tuple[float, float]:
+    """Return the effector's position by the URDF's joints: parent, child, origin and axis of each."""
+    robot = ElementTree.fromstring(description)
+    joints = {joint.find("child").attrib["link"]: joint for joint in robot.iter("joint")}  # type: ignore[union-attr]
+    chain, link = [], EFFECTOR
+    while link in joints:
+        chain.append(joints[link])
+        link = joints[link].find("parent").attrib["link"]  # type: ignore[union-attr]
+    pose = (0.0, 0.0, 0.0)
+    for joint in reversed(chain):
+        x, *rest = _xyz(joint.find("origin"))
+        assert rest == [0.0, 0.0]
+        if joint.attrib["type"] == "continuous":
+            assert _xyz(joint.find("axis")) == [0.0, 0.0, 1.0]
+        pose = _after(pose, x, angles.get(joint.attrib["name"], 0.0))
+    return pose[:2]
+
+
+@given(link_lengths, link_lengths, angles, angles)
+def test_urdf_has_the_kinematics_of_the_arm(l1: float, l2: float, theta1: float, theta2: float) -> None:
+    position = _effector_of(urdf(l1, l2), {"theta1": theta1, "theta2": theta2})
+    assert position == pytest.approx(forward_kinematics(l1, l2, theta1, theta2), rel=1e-9, abs=1e-6)
+
+
+@given(link_lengths, link_lengths, angles, angles)
+def test_transforms_have_the_kinematics_of_the_arm(
+    l1: float, l2: float, theta1: float, theta2: float
+) -> None:
+    pose, frame = (0.0, 0.0, 0.0), BASE
+    for parent, child, transform in transforms(l1, l2, theta1, theta2):
+        assert parent == frame
+        pose, frame = _after(pose, transform.translation.x, _yaw(transform)), child
+    assert frame == EFFECTOR
+    assert pose[:2] == pytest.approx(forward_kinematics(l1, l2, theta1, theta2), rel=1e-9, abs=1e-6)
+
+
+def _yaw(transform: Transform) -> float:
+    turn = transform.rotation
+    assert (turn.x, turn.y, transform.translation.y, transform.translation.z) == (0, 0, 0, 0)
+    assert math.hypot(turn.z, turn.w) == pytest.approx(1.0)
+    return 2 * math.atan2(turn.z, turn.w)
+
+
+def test_pictured_links_reach_from_joint_to_joint() -> None:
+    robot = ElementTree.fromstring(urdf(2.5, 0.75))
+    pictured = {}
+    for link in robot.iter("link"):
+        if (box := link.find("visual/geometry/box")) is not None:
+            pictured[link.attrib["name"]] = box.attrib["size"].split()[0], _xyz(link.find("visual/origin"))[0]
+    assert pictured == {LINK1: ("2.5", 1.25), LINK2: ("0.75", 0.375)}
+
+
+@pytest.mark.parametrize(
+    ("namespace", "prefix"), [("/", ""), ("/arm1", "arm1/"), ("/site/arm1", "site/arm1/")]
+)
+def test_frames_of_a_namespace_carry_its_name(namespace: str, prefix: str) -> None:
+    frames = [f"{prefix}{frame}" for frame in (BASE, LINK1, LINK2, EFFECTOR)]
+    assert [frame_id(frame, namespace) for frame in (BASE, LINK1, LINK2, EFFECTOR)] == frames
+    robot = ElementTree.fromstring(urdf(2.0, 3.0, namespace))
+    assert [link.attrib["name"] for link in robot.iter("link")] == frames
+    assert {link.attrib["link"] for link in robot.iter() if "link" in link.attrib} == set(frames)
+
+
+def test_node_in_a_namespace_describes_its_arm(make_node: MakeNode, spin_until: SpinUntil) -> None:
+    wire(make_node("robot_state", kind=ServiceNode, namespace="/arm1"))
+    peer = make_node("peer", kind=Node, namespace="/arm1")
+    last: dict[str, Any] = {}
+    for topic in (JOINT_STATES, TF, ROBOT_DESCRIPTION):
+        name = topic.name
+        keep: Callable[[Any], None] = lambda message, name=name: last.update({name: message})  # noqa: E731
+        peer.create_subscription(topic.type, name, keep, topic.qos)
+    values = {"l1": 2.0, "l2": 3.0, "theta1": 0.5, "theta2": -0.25}
+    publishers = {
+        name: peer.create_publisher(topic.type, name, topic.qos) for name, topic in CONFIGURATION.items()
+    }
+    for name, publisher in publishers.items():
+        publisher.publish(Float64(data=values[name]))
+
+    spin_until(lambda: len(last) == 3)
+    state, tf = last[JOINT_STATES.name], last[TF.name]
+    assert dict(zip(state.name, state.position, strict=True)) == {"theta1": 0.5, "theta2": -0.25}
+    assert [(it.header.frame_id, it.child_frame_id) for it in tf.transforms] == [
+        ("arm1/base", "arm1/link1"),
+        ("arm1/link1", "arm1/link2"),
+        ("arm1/link2", "arm1/effector"),
+    ]
+    assert len({(it.header.stamp.sec, it.header.stamp.nanosec) for it in tf.transforms}) == 1
+    assert last[ROBOT_DESCRIPTION.name].data == urdf(2.0, 3.0, "/arm1")
+
+    publishers["l1"].publish(Float64(data=4.0))
+    spin_until(lambda: last[ROBOT_DESCRIPTION.name].data == urdf(4.0, 3.0, "/arm1"))
+    spin_until(lambda: last[TF.name].transforms[1].transform.translation.x == 4.0)
+
+
+def test_joints_are_named_after_the_topics_of_their_angles() -> None:
+    moving = re.findall(r'<joint name="(\w+)" type="continuous">', urdf(2.0, 3.0))
+    assert moving == list(robot_model.JOINTS) == ["theta1", "theta2"]

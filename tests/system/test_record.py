@@ -1,0 +1,80 @@
+"""`make record`: the messages of a running arm in a file."""
+
+from __future__ import annotations
+
+import re
+import signal
+import time
+from pathlib import Path
+from typing import Any
+
+from rosbags.highlevel import AnyReader
+from rosbags.typesys import Stores, get_typestore
+
+from interfaces import topics
+from tests.system.sites import LIMIT, Command, Site
+
+TYPES = {
+    topic.name if topic.name.startswith("/") else f"/arm1/{topic.name}": topic.type_name
+    for topic in topics.CONTRACT
+}
+EVENTS = {"/arm1/engines", "/arm1/operator_activity", "/arm1/operator_presence", "/arm1/operator_heartbeat"}
+"""Topics that may stay silent while the record lasts."""
+LATCHED = {f"/arm1/{topic.name}" for topic in topics.CONTRACT if topics.is_latched(topic.qos)}
+SUMMARY = r"(/.*\.mcap): ([\d.]+) s, (\d+) messages, ([\d.]+) MB"
+
+
+def record(site: Site) -> Command:
+    command = site.begin("record")
+    command.await_line(r"Recording to /.*\.mcap until Ctrl-C")
+    return command
+
+
+def durability(connection: Any) -> str:
+    name: str = connection.ext.offered_qos_profiles[0].durability.name
+    return name
+
+
+def test_ctrl_c_completes_a_record_of_all_topics_in_the_namespace(site: Site) -> None:
+    site.namespace = "/arm1"
+    assert site.do("start", "demo")[0] == 0
+    deadline, seconds, seen = time.monotonic() + 2 * LIMIT, 1.0, set[str]()
+    while not seen >= TYPES.keys() - EVENTS:  # discovery takes its time
+        assert time.monotonic() < deadline, TYPES.keys() - EVENTS - seen
+        command = record(site)
+        time.sleep(seconds)
+        seconds *= 2
+        command.signal(signal.SIGINT)
+        assert command.wait() == 0
+        path, shown_seconds, count, size = command.await_line(SUMMARY).groups()
+        with AnyReader([Path(path)], default_typestore=get_typestore(Stores.ROS2_JAZZY)) as reader:
+            messages = [(it.topic, reader.deserialize(data, it.msgtype)) for it, _, data in reader.messages()]
+            assert {it.topic: it.msgtype for it in reader.connections}.items() <= TYPES.items()
+            latched = {it.topic for it in reader.connections if durability(it) == "TRANSIENT_LOCAL"}
+            assert latched <= LATCHED
+        seen = {topic for topic, _ in messages}
+
+    assert latched == LATCHED
+    assert Path(path).parent == site.run / "records"
+    assert len(messages) == int(count)
+    assert float(shown_seconds) >= seconds / 2
+    assert float(size) == round(Path(path).stat().st_size / 1e6, 2)
+    frames = {it.child_frame_id for topic, tf in messages if topic == "/tf" for it in tf.transforms}
+    assert frames == {"arm1/link1", "arm1/link2", "arm1/effector"}
+    (description,) = {message.data for topic, message in messages if topic == "/arm1/robot_description"}
+    assert re.search(r'<link name="arm1/base">', description)
+
+
+def test_record_is_complete_when_the_system_ends(site: Site) -> None:
+    assert site.do("start", "demo")[0] == 0
+    command = record(site)
+    assert site.do("stop")[0] == 0
+    assert command.wait() == 0
+    command.await_line("The system has ended")
+    path = Path(command.await_line(SUMMARY)[1])
+    with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_JAZZY)) as reader:
+        assert reader.message_count == int(command.await_line(SUMMARY)[3])
+
+
+def test_record_of_nothing_is_refused(site: Site) -> None:
+    assert site.do("record") == (1, "Nothing runs: make start")
