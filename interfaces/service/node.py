@@ -18,6 +18,7 @@ from rcl_interfaces.msg import (
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.serialization import deserialize_message
 from reactivex import Observable, abc
 from reactivex.disposable import CompositeDisposable
 
@@ -86,7 +87,7 @@ class ServiceNode(ReactiveNode):
         if is_latched(topic.qos):
             items = self._from_every_publisher(topic)
         else:
-            items = self.create_observable(topic.type, topic.name, topic.qos, timestamped=True)
+            items = self._readable(topic, topic.qos)
 
         def is_good(item: Timestamp[Any]) -> bool:
             return self._is_good(topic, item.value) and (
@@ -95,6 +96,23 @@ class ServiceNode(ReactiveNode):
 
         good = items.filter(is_good)
         return good if timestamped else good.map(lambda item: item.value)
+
+    def _readable(self, topic: Topic, qos: QoSProfile, **options: Any) -> Observable[Timestamp[Any]]:
+        """
+        Return the messages of a reader; what cannot be read is dropped and reported.
+
+        The reader is raw, because rclpy on Cyclone DDS delivers a truncated message as one of zeros.
+        """
+
+        def message(sample: Timestamp[Any]) -> Timestamp[Any] | None:
+            try:
+                return Timestamp(deserialize_message(sample.value, topic.type), sample.timestamp)
+            except RuntimeError:  # RMWError, which the rclpy of ROS 2 does not export
+                self.health.drop(topic.name, f"{len(sample.value)} octets are no {topic.type_name}")
+                return None
+
+        samples = self.create_observable(topic.type, topic.name, qos, timestamped=True, raw=True, **options)
+        return samples.map(message).filter(lambda item: item is not None)
 
     def _from_every_publisher(self, topic: Topic) -> Observable[Timestamp[Any]]:
         """
@@ -117,7 +135,7 @@ class ServiceNode(ReactiveNode):
                     observer.on_next(item)
 
             def add(qos: QoSProfile, **options: Any) -> None:
-                messages = self.create_observable(topic.type, topic.name, qos, timestamped=True, **options)
+                messages = self._readable(topic, qos, **options)
                 readers.add(messages.subscribe(forward, observer.on_error, observer.on_completed))
 
             def on_incompatible_qos(_: Any) -> None:

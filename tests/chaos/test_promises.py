@@ -1,10 +1,13 @@
 """The promises of the design, checked in two experiments with real systems; `make chaos` runs longer ones.
 
-The first experiment has two arms at once, because they leave the processor idle. The second floods a topic,
-which would take the processor from a second arm.
+The first experiment has two arms at once if the processor can carry them. The second floods a topic, which
+would take the processor from a second arm.
 """
 
 from __future__ import annotations
+
+import importlib.util
+import os
 
 import pytest
 
@@ -16,7 +19,11 @@ from interfaces.topics import DRIVE_TIMEOUT, EFFECTOR_POSITION, ENGINES, OPERATO
 
 from .experiments import Experiment, experiment, unleash
 
-ARMS = ("/arm1", "/arm2")
+# Cores of one arm, with observer and faults: mostly the starts of killed programs, which import rclpy.
+COST = 1.0 if importlib.util.find_spec("rosidl_runtime_embedded") else 1.2
+FLEET = ("/arm1", "/arm2")
+ARMS = FLEET if (os.cpu_count() or 1) >= COST * len(FLEET) else ("/",)
+BRIEFLY = f"briefly {ARMS[0]}"
 EXPERIMENTS = (*(f"briefly {namespace}" for namespace in ARMS), "variously")
 pytestmark = pytest.mark.timeout(420)
 
@@ -25,9 +32,9 @@ pytestmark = pytest.mark.timeout(420)
 def experiments(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Experiment]:
     """The result of each experiment, for each arm."""
     run = tmp_path_factory.mktemp("briefly")
-    end = unleash(run, "--scenario", "briefly", "--arms", "2")
-    fleet = {f"briefly {namespace}": Experiment(run, *end, namespace) for namespace in ARMS}
-    return fleet | {"variously": experiment(tmp_path_factory.mktemp("variously"), "--scenario", "variously")}
+    end = unleash(run, "--scenario", "briefly", "--arms", str(len(ARMS)))
+    arms = {f"briefly {namespace}": Experiment(run, *end, namespace) for namespace in ARMS}
+    return arms | {"variously": experiment(tmp_path_factory.mktemp("variously"), "--scenario", "variously")}
 
 
 def asleep(result: Experiment) -> tuple[float, float]:
@@ -45,9 +52,7 @@ def test_no_promise_is_violated(experiments: dict[str, Experiment], name: str, p
 
 
 @pytest.mark.parametrize("namespace", ARMS)
-def test_each_arm_of_a_fleet_runs_until_its_record_ends(
-    experiments: dict[str, Experiment], namespace: str
-) -> None:
+def test_each_arm_runs_until_its_record_ends(experiments: dict[str, Experiment], namespace: str) -> None:
     history = experiments[f"briefly {namespace}"].history
     assert history.end - history.stream(EFFECTOR_POSITION)[-1].sent < 1.0
 
@@ -59,13 +64,13 @@ def test_every_promise_is_exercised(experiments: dict[str, Experiment], promise:
 
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_killed_program_is_back_within_two_seconds(experiments: dict[str, Experiment], program: str) -> None:
-    assert max(experiments["briefly /arm1"].finding("L1").times[program]) <= 2.0
+    assert max(experiments[BRIEFLY].finding("L1").times[program]) <= 2.0
 
 
 def test_killing_the_watchdog_every_2_s_does_not_delay_turn_off(
     experiments: dict[str, Experiment],
 ) -> None:
-    result = experiments["briefly /arm1"]
+    result = experiments[BRIEFLY]
     begin, off = asleep(result)
     assert not between(result.history.stream(ENGINES), begin, off)  # the watchdog never commands it
     assert PRESENCE_TIMEOUT - SAMPLING - TRANSPORT < off - begin <= OFF_WITHIN
@@ -111,7 +116,8 @@ def test_exit_code_and_page_show_the_verdict(experiments: dict[str, Experiment],
     assert not any(word in page for word in ("http:", "https:", "src="))
 
 
+@pytest.mark.skipif(ARMS != FLEET, reason="platform: too few cores for two arms at once")
 def test_output_shows_cost_and_verdict_of_a_fleet(experiments: dict[str, Experiment]) -> None:
-    output = experiments["briefly /arm1"].output
+    output = experiments[BRIEFLY].output
     assert f") in {len(PROGRAMS) + 1} processes per arm" in output
     assert output.endswith("2 arms: no promise is violated\n")

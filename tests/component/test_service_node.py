@@ -18,6 +18,7 @@ from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValu
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
+from rclpy.serialization import serialize_message
 from rclpy.time import Time
 from reactivex.subject import Subject
 from std_msgs.msg import Bool, Float64, Header, String
@@ -144,6 +145,41 @@ def test_bad_messages_are_dropped_and_reported(
     following = health()
     assert (following["level"], following["message"]) == (DiagnosticStatus.OK, "running")
     assert following["dropped"] == str(len(bad))
+
+
+TRUNCATED = [
+    (topics.L1, number(2.5)),
+    (topics.EFFECTOR_POSITION, position(-1.0, 2.0)),
+    (topics.EFFECTOR_SPEED, number(0.5)),
+    (topics.OPERATOR_PRESENCE, Header(frame_id="base")),
+    (topics.ENGINES, String(data="turn_off")),
+]
+
+
+@pytest.mark.parametrize(("topic", "message"), TRUNCATED, ids=lambda value: getattr(value, "name", ""))
+def test_truncated_messages_are_dropped_and_reported(
+    service: ServiceNode,
+    peer: Node,
+    spin_until: SpinUntil,
+    health: Callable[[], dict[str, Any]],
+    topic: topics.Topic,
+    message: Any,
+) -> None:
+    received: list[Any] = []
+    service.observe(topic).subscribe(received.append)
+    publisher = peer.create_publisher(topic.type, topic.name, topic.qos)
+    spin_until(lambda: publisher.get_subscription_count() == 1)
+    whole = bytes(serialize_message(message))
+
+    for length in range(8, len(whole), 4):  # DDS pads to four octets
+        before = service.health._dropped
+        publisher.publish(whole[:length])
+        spin_until(lambda before=before: service.health._dropped == before + 1)
+    publisher.publish(whole)
+    spin_until(lambda: received)
+
+    assert received == [message]
+    assert f"{topic.name}: 8 octets are no {topic.type_name}" in health()["message"]
 
 
 def test_publisher_of_another_type_is_reported(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 
 import pytest
+import reactivex as rx
 from rclpy.exceptions import ParameterNotDeclaredException
 from rclpy.parameter import Parameter
 
@@ -43,6 +44,19 @@ def test_observers_agree_when_one_of_them_sets_parameter(node: ReactiveNode) -> 
 
     assert node.get_parameter("speed").value == 2.0
     assert [values[-1] for values in seen.values()] == [2.0, 2.0]
+
+
+def test_disposing_during_a_change_hides_it_from_no_callback(node: ReactiveNode) -> None:
+    node.declare_parameter("gain", 1.0)
+    node.declare_parameter("on", True)
+    changed: list[str] = []
+    node.add_post_set_parameters_callback(lambda each: changed.extend(parameter.name for parameter in each))
+    gain, on = (node.create_parameter_observable(name) for name in ("gain", "on"))
+    on.switch_map(lambda on: gain if on else rx.never()).subscribe()
+
+    node.set_parameters([Parameter("on", value=False)])
+
+    assert changed == ["on"]
 
 
 def test_observer_may_set_parameter_when_it_gets_present_value(node: ReactiveNode) -> None:

@@ -102,7 +102,13 @@ class ReactiveNode(Node):
                         # Not the value in `parameters`: an earlier observer may have set another one since.
                         observer.on_next(self.get_parameter(name).value)
 
-            end = Disposable(lambda: self.remove_post_set_parameters_callback(changed))
+            def remove(*_: Any) -> None:
+                self.remove_post_set_parameters_callback(changed)
+
+            def remove_later() -> None:  # rclpy skips a callback if one is removed while it calls them
+                self.scheduler.schedule(remove)
+
+            end = Disposable(remove_later)
             with lock:
                 self.add_post_set_parameters_callback(changed)
                 try:
