@@ -19,6 +19,8 @@ def main() -> int:
         number of the signal that ended it: 2 for Ctrl-C, 15 for SIGTERM.
     """
     try:
+        signal.signal(signal.SIGTERM, lambda *_: sys.exit(signal.SIGTERM))
+        signal.signal(signal.SIGINT, signal.default_int_handler)  # a script's background jobs ignore it
         cast("TextIOWrapper", sys.stdout).reconfigure(line_buffering=True)
         return _run()
     except KeyboardInterrupt:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import signal
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -39,23 +38,20 @@ def node(
     name: str | None = None,
     use_sim_time: bool = False,
     arguments: list[str] | None = None,
-    handle_signals: bool = True,
 ) -> Iterator[Node]:
     """
     Create a node, by default a hidden one, and shut everything down at the end.
 
     :param spin_time: how long it looks for other nodes at first [s].
     :param arguments: ROS arguments of the node.
-    :param handle_signals: whether Ctrl-C and SIGTERM shut the context down, besides ending the command.
     """
     import rclpy
     from rclpy.exceptions import NameValidationException
-    from rclpy.executors import ExternalShutdownException
     from rclpy.parameter import Parameter
     from rclpy.signals import SignalHandlerOptions
 
-    options = SignalHandlerOptions.ALL if handle_signals else SignalHandlerOptions.NO
-    rclpy.init(args=[], signal_handler_options=options)
+    # Signals end the command by an exception (cli.py), which finds the node still usable.
+    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     try:
         node = rclpy.create_node(
             name or f"{NODE_NAME_PREFIX}_{os.getpid()}",
@@ -67,14 +63,6 @@ def node(
         yield node
     except NameValidationException as error:
         raise click.ClickException(str(error)) from None
-    except ExternalShutdownException:
-        raise click.exceptions.Exit(signal.SIGTERM) from None
-    except click.exceptions.Exit:
-        raise
-    except RuntimeError:  # of a use of the node after SIGTERM has shut it down
-        if rclpy.ok():
-            raise
-        raise click.exceptions.Exit(signal.SIGTERM) from None
     finally:
         rclpy.try_shutdown()
 
@@ -154,7 +142,7 @@ def interface_class(kind: str, name: str, problem: str) -> Any:
 
     try:
         return getattr(utilities, f"get_{kind}")(name)
-    except (AttributeError, ModuleNotFoundError, TypeError, ValueError):
+    except (AttributeError, ModuleNotFoundError, TypeError, ValueError):  # TypeError: "/std_msgs/String"
         raise click.ClickException(problem) from None
 
 
@@ -177,5 +165,3 @@ def spin(node: Node, until: Future | None = None, timeout: float | None = None) 
     with SingleThreadedExecutor() as executor:
         executor.add_node(node)
         executor.spin_until_future_complete(until or Future(), timeout)
-        if not executor.context.ok():
-            raise click.exceptions.Exit(signal.SIGTERM)

@@ -40,8 +40,7 @@ def send_goal(action_name: str, action_type: str, goal: str, feedback: bool) -> 
         click.echo(f"Feedback:\n    {message_to_yaml(message.feedback)}")
 
     name = f"{graph.NODE_NAME_PREFIX}_send_goal_{action_type.replace('/', '_')}"
-    # Signals end the wait only, so that the goal can still be canceled.
-    with graph.node(name=name, handle_signals=False) as node:
+    with graph.node(name=name) as node:
         client = ActionClient(node, class_, action_name)
         click.echo("Waiting for an action server to become available...")
         while not client.wait_for_server(timeout_sec=1.0):

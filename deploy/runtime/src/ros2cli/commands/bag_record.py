@@ -114,7 +114,7 @@ def record(
                 node.create_timer(options["polling_interval"] / 1000.0, recorder.subscribe)
             node.get_logger().info("Recording...")
             graph.spin(node)
-        except (KeyboardInterrupt, click.exceptions.Exit):
+        except (KeyboardInterrupt, SystemExit):
             pass  # Ctrl-C or SIGTERM
         finally:
             writer.close()

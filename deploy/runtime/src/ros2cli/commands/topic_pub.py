@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +21,9 @@ from ros2cli.options import (
 
 if TYPE_CHECKING:
     from rclpy.publisher import Publisher
+
+_PERIOD = 0.02
+"""Period at which matching subscriptions are counted [s]."""
 
 
 @click.command
@@ -138,17 +142,16 @@ def pub(
 
 
 def _await_subscriptions(publisher: Publisher, wanted: int, longest: float | None) -> None:
-    """Wait for matching subscriptions, and say so every second."""
-    began = time.monotonic()
-    while True:
-        if publisher.get_subscription_count() >= wanted:
-            return
-        click.echo(f"Waiting for at least {wanted} matching subscription(s)...")
-        left = 1.0 if longest is None else began + longest - time.monotonic()
-        if graph.wait_for(lambda: publisher.get_subscription_count() >= wanted, max(0.0, min(1.0, left))):
-            return
-        if left <= 1.0 and longest is not None:
+    """Wait for matching subscriptions, at most `longest` [s], and say so every second."""
+    began, said = time.monotonic(), -math.inf
+    while (count := publisher.get_subscription_count()) < wanted:
+        now = time.monotonic()
+        if now >= said + 1.0:
+            click.echo(f"Waiting for at least {wanted} matching subscription(s)...")
+            said = now
+        if longest is not None and now >= began + longest:
             raise click.ClickException(
                 f"Timed out waiting for subscribers: Expected {wanted} subcribers"
-                f" but only got {publisher.get_subscription_count()} subscribers"
+                f" but only got {count} subscribers"
             )
+        time.sleep(_PERIOD)
