@@ -49,6 +49,7 @@ from reactive_node.domains import reserved_domain
 Action = Callable[[], tuple[float, Undo] | None]
 """Returns when and how to end what it began, or ``None``."""
 
+FURTHER_ARM = 2.5  # s from the start of an arm to that of the next
 START_TIMEOUT = 60.0  # s until an arm must have output from every program
 RECORD_TIMEOUT = 30.0  # s in which the observer must complete its record
 
@@ -86,6 +87,7 @@ class Testbed:
         """
         self.record = directory / "record.mcap"
         self.arms = [Arm(name, System(directory / f"run{file_suffix(name)}")) for name in namespaces]
+        self.lead += FURTHER_ARM * (len(namespaces) - 1)
         self.faults = FAULT_KINDS
         self.observe_within: Sequence[str] = ()  # a command in front of the observer's
         self._directory = directory
@@ -180,7 +182,8 @@ class Testbed:
             conditions.append(InjectedFault(LOSS, NO_TARGET, self._epoch - self.lead, begin + duration))
         pressed, day = self._scenario["operator"]["pressed"][-1], self._scenario.get("repeat")
         if day and "to" in pressed:
-            first, last = (int((time - self._epoch) // day) for time in (begin, begin + duration))
+            # A day may begin at `begin`, but for the error of floating point.
+            first, last = (int((time - self._epoch + 0.001) // day) for time in (begin, begin + duration))
             for morning in (self._epoch + number * day for number in range(first, last + 1)):
                 asleep = InjectedFault(SILENCE, OPERATOR, morning + pressed["to"], morning + day)
                 conditions.append(asleep)
