@@ -160,11 +160,10 @@ def test_a_future_completed_on_another_thread_ends_spinning_at_once(
 
 
 def test_spinning_once_runs_a_pending_task_without_waiting(executor: SingleThreadedExecutor) -> None:
-    order: list[int] = []
-    for number in range(4):
-        executor.create_task(order.append, number)
-        executor.spin_once(timeout_sec=0)
-        assert order == [*range(number + 1)]
+    done: list[bool] = []
+    executor.create_task(done.append, True)
+    executor.spin_once(timeout_sec=0)
+    assert done == [True]
 
 
 def test_tasks_run_before_data_and_data_in_the_order_of_creation(

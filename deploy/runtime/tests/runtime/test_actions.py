@@ -304,3 +304,19 @@ def test_programs_without_actions_import_none_and_those_with_them_no_numpy(domai
     command = [sys.executable, "-c", PROGRAM]
     environment = os.environ | {"ROS_DOMAIN_ID": str(domain_id)}
     assert subprocess.check_output(command, env=environment, text=True, timeout=60) == "4 False\n"
+
+
+def test_a_destroyed_node_takes_its_goals_along(
+    make_node: MakeNode, node: Node, executor: SingleThreadedExecutor, spin_until: SpinUntil
+) -> None:
+    there = make_node("there")
+    executor.add_node(there)
+    accepted: list[ServerGoalHandle] = []
+    ActionServer(there, Fibonacci, "fibonacci", succeed, handle_accepted_callback=accepted.append)
+    client = ActionClient(node, Fibonacci, "fibonacci")
+    assert client.wait_for_server(timeout_sec=10)
+    client.send_goal_async(Fibonacci.Goal())
+    spin_until(lambda: accepted)
+    there.destroy_node()
+    spin_until(lambda: not client.server_is_ready())
+    client.destroy()

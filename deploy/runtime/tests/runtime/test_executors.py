@@ -142,6 +142,14 @@ def test_a_blocking_callback_on_another_thread_allows_shutdown(domain_id: int) -
     assert outcome == [True]
 
 
+def test_spinning_once_again_runs_the_next_task_without_waiting(executor: SingleThreadedExecutor) -> None:
+    order: list[int] = []
+    for number in range(4):
+        executor.create_task(order.append, number)
+        executor.spin_once(timeout_sec=0)
+        assert order == [*range(number + 1)]
+
+
 def test_a_thousand_entities_under_traffic_leave_nothing_behind(
     context: Context, executor: SingleThreadedExecutor, node: Node
 ) -> None:
