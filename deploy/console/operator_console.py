@@ -95,7 +95,7 @@ def wire(node: ServiceNode) -> None:
         switch.pressed.map(state.held_by_terminal),
         turn_offs.map(lambda _: state.turned_off(clock.now())),
         configuration.followers(parameter_events, is_open),
-        configuration.refusals(asked),
+        configuration.outcomes(asked),
         signals.flat_map(lambda it: requests.send_signal(it, newest.value.programs)),
     )
     states = state.page_states(changes, newest.value)

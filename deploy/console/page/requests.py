@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 
 import reactivex as rx
@@ -36,8 +37,8 @@ class Configuration:
         self._programs = {topic.publishers[0]: name for name, topic in topics.CONFIGURATION.items()}
         self._sources = {name: RemoteParameters(node, program) for program, name in self._programs.items()}
 
-    def refusals(self, requests: Observable[Request]) -> Observable[Change]:
-        """Set the sources as pages ask; emit what is refused."""
+    def outcomes(self, requests: Observable[Request]) -> Observable[Change]:
+        """Set the sources as pages ask; emit what has come of it."""
         ours = requests.filter(lambda it: isinstance(it.message, protocol.Set | protocol.FollowScenario))
         # A slider that moves asks faster than its source answers: the newest value counts.
         by_source = ours.group_by(lambda it: getattr(it.message, "name", ""))
@@ -46,12 +47,21 @@ class Configuration:
     def _carry_out(self, request: Request) -> Observable[Change]:
         match request.message:
             case protocol.Set(name, value):
-                kind, answers = "set", self._sources[name].set(VALUE, value)
+                kind, settings = "set", [(name, VALUE, value)]
             case _:
-                returns = (source.set(FOLLOW_SCENARIO, True) for source in self._sources.values())
-                kind, answers = "follow_scenario", rx.merge(*returns)
-        reasons = answers.catch(lambda error, _: rx.just(str(error))).filter(bool).take(1)
-        return reasons.map(lambda reason: refuse(request.page, kind, reason))
+                kind, settings = "follow_scenario", [(name, FOLLOW_SCENARIO, True) for name in self._sources]
+
+        def outcome(name: str, parameter: str, reason: str) -> Change:
+            if reason:
+                return refuse(request.page, kind, reason)
+            # The event of the same change may come before its reader has met the source.
+            return follows_scenario(name, parameter == FOLLOW_SCENARIO)
+
+        outcomes = (
+            self._sources[name].set(parameter, value).map(partial(outcome, name, parameter))
+            for name, parameter, value in settings
+        )
+        return rx.merge(*outcomes).catch(lambda error, _: rx.just(refuse(request.page, kind, str(error))))
 
     def followers(
         self, changes: Observable[ParameterChange], is_open: Observable[bool]
