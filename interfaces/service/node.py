@@ -84,59 +84,59 @@ class ServiceNode(ReactiveNode):
         :param max_age: a message that is older [s], or this much ahead of the local clock, is not good.
         """
         self._observed.append(topic)
-        if is_latched(topic.qos):
-            items = self._from_every_publisher(topic)
-        else:
-            items = self._readable(topic, topic.qos)
+        samples = (
+            self._from_every_publisher(topic) if is_latched(topic.qos) else self._samples(topic, topic.qos)
+        )
 
-        def is_good(item: Timestamp[Any]) -> bool:
-            return self._is_good(topic, item.value) and (
-                max_age is None or self._is_fresh(topic, item.timestamp, max_age)
-            )
+        def read(sample: Timestamp[bytes]) -> Any | None:
+            message = self._read(topic, sample, max_age)
+            return Timestamp(message, sample.timestamp) if timestamped and message is not None else message
 
-        good = items.filter(is_good)
-        return good if timestamped else good.map(lambda item: item.value)
+        return samples.map(read).filter(lambda item: item is not None)
 
-    def _readable(self, topic: Topic, qos: QoSProfile, **options: Any) -> Observable[Timestamp[Any]]:
+    def _samples(self, topic: Topic, qos: QoSProfile, **options: Any) -> Observable[Timestamp[bytes]]:
         """
-        Return the messages of a reader; what cannot be read is dropped and reported.
+        Return the messages of a reader as they came.
 
-        The reader is raw, because rclpy on Cyclone DDS delivers a truncated message as one of zeros.
+        rclpy on Cyclone DDS would deliver a truncated message as one of zeros.
         """
+        return self.create_observable(topic.type, topic.name, qos, timestamped=True, raw=True, **options)
 
-        def message(sample: Timestamp[Any]) -> Timestamp[Any] | None:
-            try:
-                return Timestamp(deserialize_message(sample.value, topic.type), sample.timestamp)
-            except RuntimeError:  # RMWError, which the rclpy of ROS 2 does not export
-                self.health.drop(topic.name, f"{len(sample.value)} octets are no {topic.type_name}")
-                return None
+    def _read(self, topic: Topic, sample: Timestamp[bytes], max_age: float | None) -> Any | None:
+        """Return the message of a sample; ``None`` if it is not good, which is reported."""
+        try:
+            message = deserialize_message(sample.value, topic.type)
+        except RuntimeError:  # RMWError, which the rclpy of ROS 2 does not export
+            self.health.drop(topic.name, f"{len(sample.value)} octets are no {topic.type_name}")
+            return None
+        is_good = self._is_good(topic, message) and (
+            max_age is None or self._is_fresh(topic, sample.timestamp, max_age)
+        )
+        return message if is_good else None
 
-        samples = self.create_observable(topic.type, topic.name, qos, timestamped=True, raw=True, **options)
-        return samples.map(message).filter(lambda item: item is not None)
-
-    def _from_every_publisher(self, topic: Topic) -> Observable[Timestamp[Any]]:
+    def _from_every_publisher(self, topic: Topic) -> Observable[Timestamp[bytes]]:
         """
-        Return the messages of a latched topic, also those of publishers that are not latched.
+        Return the samples of a latched topic, also those of publishers that are not latched.
 
         A transient-local reader receives nothing from a volatile publisher, such as ``ros2 topic pub``; if
         there is one, a volatile reader listens as well.
         """
 
         def subscribe(
-            observer: abc.ObserverBase[Timestamp[Any]], scheduler: abc.SchedulerBase | None = None
+            observer: abc.ObserverBase[Timestamp[bytes]], scheduler: abc.SchedulerBase | None = None
         ) -> abc.DisposableBase:
             readers = CompositeDisposable()
             recent: deque[datetime] = deque(maxlen=_RECENT)
             has_volatile_reader = False
 
-            def forward(item: Timestamp[Any]) -> None:
-                if item.timestamp not in recent:
-                    recent.append(item.timestamp)
-                    observer.on_next(item)
+            def forward(sample: Timestamp[bytes]) -> None:
+                if sample.timestamp not in recent:
+                    recent.append(sample.timestamp)
+                    observer.on_next(sample)
 
             def add(qos: QoSProfile, **options: Any) -> None:
-                messages = self._readable(topic, qos, **options)
-                readers.add(messages.subscribe(forward, observer.on_error, observer.on_completed))
+                samples = self._samples(topic, qos, **options)
+                readers.add(samples.subscribe(forward, observer.on_error, observer.on_completed))
 
             def on_incompatible_qos(_: Any) -> None:
                 nonlocal has_volatile_reader
@@ -202,8 +202,12 @@ class ServiceNode(ReactiveNode):
 
     def _remark_other_types(self) -> None:
         """Remark publishers that use an observed topic with another type: nothing arrives from them."""
+        types = dict(self.get_topic_names_and_types())
         for topic in self._observed:
-            for publisher in self.get_publishers_info_by_topic(self.resolve_topic_name(topic.name)):
+            name = self.resolve_topic_name(topic.name)
+            if types.get(name, [topic.type_name]) == [topic.type_name]:
+                continue
+            for publisher in self.get_publishers_info_by_topic(name):
                 if publisher.topic_type != topic.type_name:
                     self.remark(topic.name, f"{publisher.node_name} publishes {publisher.topic_type}")
 
