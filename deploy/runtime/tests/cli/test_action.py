@@ -26,7 +26,9 @@ class Server(Node):
 
     def __init__(self, context: Context) -> None:
         super().__init__("server", context=context)
+        self.begun = threading.Event()
         self.canceled = threading.Event()
+        self.is_ending = False
         ActionServer(
             self,
             Fibonacci,
@@ -41,8 +43,9 @@ class Server(Node):
         if goal.request.order == 1:
             goal.abort()
         elif goal.request.order == 99:
-            while not goal.is_cancel_requested:
-                threading.Event().wait(0.01)
+            self.begun.set()
+            while not goal.is_cancel_requested and not self.is_ending:
+                self.canceled.wait(0.01)
             goal.canceled()
             self.canceled.set()
         else:
@@ -62,6 +65,7 @@ def server(module_domain_id: int) -> Iterator[Server]:
     thread = threading.Thread(target=executor.spin)
     thread.start()
     yield node
+    node.is_ending = True
     executor.shutdown()
     thread.join()
     node.destroy_node()
@@ -108,15 +112,21 @@ def test_goal_may_be_rejected_or_aborted(server: Server, ros2: Any, order: int, 
 
 
 @pytest.mark.embedded  # in ROS 2, the signal ends the node before the goal is canceled
-def test_ctrl_c_cancels_the_goal(server: Server, start: Any) -> None:
+@pytest.mark.parametrize("line", ["Sending goal:", "Goal accepted"])
+def test_ctrl_c_cancels_the_goal(server: Server, start: Any, line: str) -> None:
+    server.begun.clear()
+    server.canceled.clear()
     process = start("action", "send_goal", "/fibonacci", "example_interfaces/Fibonacci", "{order: 99}")
-    while not process.stdout.readline().startswith("Goal accepted"):
-        pass
+    while not (read := process.stdout.readline()).startswith(line):
+        assert read, process.stderr.read()
     process.send_signal(signal.SIGINT)
-    assert process.stdout.read() == "\nCanceling goal...\nGoal canceled.\n"
+    rest = process.stdout.read()
     assert process.stderr.read() == ""
-    assert server.canceled.wait(10)
     assert process.wait(10) == 2
+    if line == "Goal accepted" or server.begun.is_set():  # Ctrl-C may come before the goal is sent
+        assert rest.endswith("Canceling goal...\nGoal canceled.\n")
+        assert server.canceled.wait(10)
+    assert server.begun.is_set() == server.canceled.is_set()
 
 
 @pytest.mark.parametrize(
