@@ -13,10 +13,12 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
-# These tests need the embedded runtime, which is not installed beside ROS 2's rclpy.
-collect_ignore = (
-    [] if importlib.util.find_spec("rosidl_runtime_embedded") else ["deploy/runtime/tests/runtime"]
-)
+# The embedded runtime is not installed beside ROS 2's rclpy, and not every ROS 2 has the command line.
+_NEEDED_BY = {
+    "rosidl_runtime_embedded": "deploy/runtime/tests/runtime",
+    "ros2cli": "deploy/runtime/tests/cli",
+}
+collect_ignore = [tests for needed, tests in _NEEDED_BY.items() if not importlib.util.find_spec(needed)]
 
 settings.register_profile("reactive-arm", deadline=None)  # a busy machine is no defect
 settings.load_profile("reactive-arm")

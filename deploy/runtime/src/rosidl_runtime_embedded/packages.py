@@ -68,6 +68,8 @@ class _UserPackages:
         package, _, kind = name.partition(".")
         kind, _, module = kind.partition(".")
         if module:
+            if kind in KINDS and (found := PathFinder.find_spec(name, path, target)):
+                return found  # of a ROS 2 that is sourced beside this distribution
             names = interface_names(package, kind) if kind in KINDS else []
             known = any(f"_{_snake_case(interface)}" == module for interface in names)
             return ModuleSpec(name, cast("Loader", self)) if known else None

@@ -147,6 +147,19 @@ def test_a_users_package_yields_to_an_ordinary_python_module(
     assert importlib.import_module(module).msg == "module"
 
 
+def test_a_package_that_ros_2_has_built_keeps_its_own_classes(
+    define: Define, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    package = define({"Joint.msg": "string name"})
+    built = tmp_path / "python" / package / "msg"
+    built.mkdir(parents=True)
+    (built.parent / "__init__.py").touch()
+    (built / "__init__.py").write_text(f"from {package}.msg._joint import Joint")
+    (built / "_joint.py").write_text("class Joint: built = True")
+    monkeypatch.syspath_prepend(tmp_path / "python")
+    assert load(package, "Joint").built
+
+
 def test_every_kind_of_type_is_supported(define: Define) -> None:
     package = define(
         {

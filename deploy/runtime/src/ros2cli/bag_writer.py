@@ -1,0 +1,88 @@
+"""Writes a bag: one MCAP file with the messages, and the metadata at its end."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from mcap.writer import CompressionType, Writer
+
+from ros2cli import rosbag2
+
+_PRESETS: dict[str, dict[str, Any]] = {
+    "none": {"compression": CompressionType.NONE},
+    "fastwrite": {"compression": CompressionType.NONE, "use_chunking": False},
+    "zstd_fast": {"compression": CompressionType.ZSTD},
+    "zstd_small": {"compression": CompressionType.ZSTD, "chunk_size": 4 * 1024 * 1024},
+}
+"""Options of MCAP's writer for rosbag2's storage preset profiles."""
+
+
+class BagWriter:
+    """A bag that is being recorded."""
+
+    def __init__(self, directory: Path, preset: str, custom_data: dict[str, str]) -> None:
+        """Create the directory and its file. Raises OSError."""
+        directory.mkdir(parents=True)
+        file = f"{directory.name}_0.mcap"
+        self._metadata = rosbag2.Metadata(directory, [file], [], custom_data=custom_data)
+        self._metadata.ros_distro = "jazzy"
+        self._file = (directory / file).open("wb")
+        self._writer = Writer(self._file, **_PRESETS[preset])
+        self._writer.start(profile="ros2", library="reactive-arm-runtime")
+        self._schemas: dict[str, int] = {}
+
+    def add_topic(self, topic: rosbag2.Topic) -> Callable[[bytes, int, int], None]:
+        """Return the function that writes a message: its CDR, and times of reception and publishing [ns]."""
+        if topic.type not in self._schemas:
+            encoding, text = definition(topic.type)
+            self._schemas[topic.type] = self._writer.register_schema(topic.type, encoding, text.encode())
+        channel = self._writer.register_channel(
+            topic.name,
+            "cdr",
+            self._schemas[topic.type],
+            {"offered_qos_profiles": rosbag2.qos_to_yaml(topic.offered), "topic_type_hash": topic.type_hash},
+        )
+        self._metadata.topics.append(topic)
+
+        def write(data: bytes, received: int, published: int) -> None:
+            self._writer.add_message(channel, received, data, published)
+            metadata = self._metadata
+            end = max(metadata.start + metadata.duration, received)
+            metadata.start = min(metadata.start or received, received)
+            metadata.duration = end - metadata.start
+            topic.count += 1
+
+        return write
+
+    def close(self) -> None:
+        """Complete the file and write the metadata."""
+        self._writer.add_metadata("rosbag2", {"serialized_metadata": rosbag2.to_yaml(self._metadata)})
+        self._writer.finish()  # type: ignore[no-untyped-call]
+        self._file.close()
+        rosbag2.write(self._metadata)
+
+
+def definition(type_name: str) -> tuple[str, str]:
+    """
+    Return the encoding and the text of the definition of a message, followed by those of its fields.
+
+    Parts of services and actions have no file of their own: their encoding is ``unknown``, as in rosbag2.
+    """
+    from rosidl_runtime_embedded.definition_files import definition_source, message_definition
+
+    if "/msg/" not in type_name:
+        return "unknown", ""
+    seen = {type_name}
+
+    def text(name: str) -> str:
+        parts = [definition_source(name)[1]]
+        used = {one.type.base for one in message_definition(name).fields if one.type.is_message}
+        for nested in sorted(used):
+            if nested not in seen:
+                seen.add(nested)
+                parts.append(f"{'=' * 80}\nMSG: {nested.replace('/msg/', '/')}\n{text(nested)}")
+        return "\n".join(parts)
+
+    return "ros2msg", text(type_name)

@@ -1,0 +1,229 @@
+"""`ros2 bag play`."""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from ros2cli import graph, rosbag2
+from ros2cli.options import (
+    NON_NEGATIVE_INT,
+    POSITIVE_FLOAT,
+    ManyValues,
+    VerbWithManyValues,
+    bag_argument,
+    qos_overrides_option,
+    regular_expression,
+)
+
+if TYPE_CHECKING:
+    from mcap.records import Message
+
+    from rclpy.executors import Executor
+    from rclpy.node import Node
+    from rclpy.publisher import Publisher
+    from rclpy.qos import QoSProfile
+
+_SPIN_TIME = 0.5
+"""How long it looks for subscriptions before it plays [s]."""
+
+
+@click.command(cls=VerbWithManyValues)
+@bag_argument
+@click.option(
+    "-r", "--rate", type=POSITIVE_FLOAT, default=1.0, show_default=True, help="Rate at which to play back."
+)
+@click.option("--topics", cls=ManyValues, metavar="TOPIC...", help="Topics to play.")
+@click.option(
+    "-e", "--regex", callback=regular_expression, help="Play only topics that match this expression."
+)
+@click.option(
+    "-x", "--exclude-regex", callback=regular_expression, help="Do not play topics that match this."
+)
+@click.option("--exclude-topics", cls=ManyValues, metavar="TOPIC...", help="Topics not to play.")
+@qos_overrides_option
+@click.option("-l", "--loop", is_flag=True, help="Start again at the end, until Ctrl-C.")
+@click.option("-m", "--remap", cls=ManyValues, metavar="OLD:=NEW...", help="Topics to be remapped.")
+@click.option(
+    "--clock",
+    type=POSITIVE_FLOAT,
+    is_flag=False,
+    flag_value=40.0,
+    help="Publish to /clock at this frequency in Hz (40 without a value); a recorded /clock is not played.",
+)
+@click.option(
+    "-d", "--delay", type=click.FloatRange(min=0), default=0.0, help="Sleep before each play, in seconds."
+)
+@click.option("--playback-duration", type=float, default=-1.0, help="Playback duration in seconds.")
+@click.option(
+    "--playback-until-sec", type=float, default=-1.0, help="Playback until this time in seconds since epoch."
+)
+@click.option("--playback-until-nsec", type=int, default=-1, help="The same in nanoseconds since epoch.")
+@click.option(
+    "--start-offset", type=click.FloatRange(min=0), default=0.0, help="Start this many seconds into the bag."
+)
+@click.option(
+    "--wait-for-all-acked",
+    metavar="TIMEOUT",
+    type=NON_NEGATIVE_INT,
+    default=500,
+    show_default=True,
+    help="Wait at the end until reliable subscriptions have all, at most this time in ms; 0: for ever.",
+)
+def play(
+    bag_path: str,
+    clock: float | None,
+    delay: float,
+    loop: bool,
+    remap: tuple[str, ...],
+    wait_for_all_acked: int,
+    **options: Any,
+) -> None:
+    """Play back ROS data from a bag, at the pace at which it was recorded."""
+    from rclpy.duration import Duration
+    from rclpy.executors import SingleThreadedExecutor
+
+    metadata = rosbag2.read(Path(bag_path))
+    overrides = rosbag2.qos_overrides(options["qos_profile_overrides_path"])
+    arguments = ["--ros-args", *(word for rule in remap for word in ("--remap", rule))]
+    with (
+        graph.node(_SPIN_TIME, name="rosbag2_player", arguments=arguments) as node,
+        SingleThreadedExecutor() as executor,
+    ):
+        executor.add_node(node)
+        topics = [topic for topic in metadata.topics if _is_wanted(topic.name, options, bool(clock))]
+        publishers = _publishers(node, topics, overrides)
+        graph.wait_for(lambda: _are_matched(node, publishers), _SPIN_TIME)
+        player = _Player(executor, metadata, publishers, options)
+        if clock:
+            player.publish_clock(node, clock)
+        try:
+            while True:
+                player.wait(delay)
+                player.play()
+                if not loop:
+                    break
+        except KeyboardInterrupt:
+            return
+        timeout = Duration(nanoseconds=wait_for_all_acked * 10**6 or -1)
+        for publisher in publishers.values():
+            publisher.wait_for_all_acked(timeout)
+
+
+def _is_wanted(topic: str, options: dict[str, Any], has_clock: bool) -> bool:
+    included, regex = options["topics"], options["regex"]
+    if (included or regex) and topic not in included and not (regex and re.search(regex, topic)):
+        return False
+    excluded = options["exclude_regex"] and re.search(options["exclude_regex"], topic)
+    return not excluded and topic not in options["exclude_topics"] and not (has_clock and topic == "/clock")
+
+
+def _publishers(
+    node: Node, topics: list[rosbag2.Topic], overrides: dict[str, QoSProfile]
+) -> dict[str, Publisher]:
+    made = {}
+    for topic in topics:
+        try:
+            class_ = graph.interface_class("message", topic.type, f"its type '{topic.type}' is unknown")
+        except click.ClickException as error:
+            node.get_logger().warn(f"Ignoring a topic '{topic.name}', reason: {error}.")
+            continue
+        profile = overrides.get(topic.name) or _adapted(node, topic)
+        made[topic.name] = node.create_publisher(class_, topic.name, profile)
+    return made
+
+
+def _adapted(node: Node, topic: rosbag2.Topic) -> QoSProfile:
+    """The QoS of the recorded publishers if it was the same for all, otherwise the default."""
+    from rclpy.qos import HistoryPolicy, QoSProfile
+
+    relevant = ("reliability", "durability", "deadline", "liveliness", "liveliness_lease_duration")
+    first, *others = topic.offered or [QoSProfile(depth=10)]
+    if any(getattr(other, policy) != getattr(first, policy) for other in others for policy in relevant):
+        node.get_logger().warn(
+            f"Not all original publishers on topic {topic.name} offered the same QoS profiles."
+            " Falling back to the default publisher offer."
+        )
+        first = QoSProfile(depth=10)
+    first.history, first.depth = HistoryPolicy.KEEP_LAST, 10
+    return first
+
+
+def _are_matched(node: Node, publishers: dict[str, Publisher]) -> bool:
+    """Whether all known subscriptions have matched, so that they miss no message."""
+    return all(
+        publisher.get_subscription_count() >= node.count_subscribers(publisher.topic_name)
+        for publisher in publishers.values()
+    )
+
+
+class _Player:
+    """Publishes recorded messages at the pace of their log times."""
+
+    def __init__(
+        self,
+        executor: Executor,
+        metadata: rosbag2.Metadata,
+        publishers: dict[str, Publisher],
+        options: dict[str, Any],
+    ) -> None:
+        self._executor = executor
+        self._files = metadata.paths()
+        self._publishers = publishers
+        self._rate = options["rate"]
+        self._start = metadata.start + int(options["start_offset"] * 1e9)
+        duration, until = options["playback_duration"], options["playback_until_nsec"]
+        if options["playback_until_sec"] >= 0:
+            until = int(options["playback_until_sec"] * 1e9)
+        ends = [self._start + int(duration * 1e9)] if duration >= 0 else []
+        ends += [until] if until >= 0 else []
+        self._end = max(ends, default=metadata.start + metadata.duration)
+        self._began = time.monotonic()
+
+    def publish_clock(self, node: Node, frequency: float) -> None:
+        """Publish the time of the record on ``/clock``, at a frequency [Hz] of real time."""
+        from rclpy.clock import Clock, ClockType
+        from rclpy.time import Time
+        from rosgraph_msgs.msg import Clock as ClockMessage
+
+        publisher = node.create_publisher(ClockMessage, "/clock", 1)
+
+        def publish() -> None:
+            now = self._start + int((time.monotonic() - self._began) * self._rate * 1e9)
+            publisher.publish(ClockMessage(clock=Time(nanoseconds=min(now, self._end)).to_msg()))
+
+        node.create_timer(1.0 / frequency, publish, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    def play(self) -> None:
+        """Play once."""
+        self._began = time.monotonic()
+        for topic, message in self._messages():
+            due = self._began + (message.log_time - self._start) / (self._rate * 1e9)
+            self.wait(due - time.monotonic())
+            self._publishers[topic].publish(message.data)
+
+    def wait(self, duration: float) -> None:
+        """Wait [s], and run timers meanwhile."""
+        end = time.monotonic() + duration
+        while (left := end - time.monotonic()) > 0:
+            self._executor.spin_once(left)
+
+    def _messages(self) -> Iterator[tuple[str, Message]]:
+        from mcap.exceptions import McapError
+        from mcap.reader import make_reader
+
+        for path in self._files:
+            try:
+                with path.open("rb") as file:
+                    found = make_reader(file).iter_messages(
+                        list(self._publishers), self._start, self._end + 1, log_time_order=True
+                    )
+                    for _, channel, message in found:
+                        yield channel.topic, message
+            except (OSError, McapError) as error:
+                raise click.ClickException(f"'{path}' cannot be read: {error!r}") from None

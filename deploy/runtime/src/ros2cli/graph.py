@@ -1,0 +1,167 @@
+"""The node of a command, and what it finds in the graph."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import click
+
+if TYPE_CHECKING:
+    from rclpy.node import Node
+    from rclpy.task import Future
+
+NODE_NAME_PREFIX = "_ros2cli"
+_PERIOD = 0.02
+"""Period at which the graph is looked at [s]."""
+_CALM = 0.2
+"""The graph is complete if nothing appeared for this long [s]."""
+_LONGEST = 5.0
+"""A graph that never rests is looked at for so much longer than asked for [s]."""
+
+
+class NodeName(NamedTuple):
+    """The name of a node, its namespace, and both."""
+
+    name: str
+    namespace: str
+    full_name: str
+
+
+@contextmanager
+def node(
+    spin_time: float = 0.0,
+    *,
+    name: str | None = None,
+    use_sim_time: bool = False,
+    arguments: list[str] | None = None,
+) -> Iterator[Node]:
+    """
+    Create a node, by default a hidden one, and shut everything down at the end.
+
+    :param spin_time: how long it looks for other nodes at first [s].
+    :param arguments: ROS arguments of the node.
+    """
+    import rclpy
+    from rclpy.exceptions import NameValidationException
+    from rclpy.parameter import Parameter
+    from rclpy.signals import SignalHandlerOptions
+
+    # Signals end the command by an exception (cli.py), which finds the node still usable.
+    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        node = rclpy.create_node(
+            name or f"{NODE_NAME_PREFIX}_{os.getpid()}",
+            cli_args=arguments,
+            start_parameter_services=False,
+            parameter_overrides=[Parameter("use_sim_time", value=use_sim_time)],
+        )
+        discover(node, spin_time)
+        yield node
+    except NameValidationException as error:
+        raise click.ClickException(str(error)) from None
+    finally:
+        rclpy.try_shutdown()
+
+
+def discover(node: Node, spin_time: float) -> None:
+    """Look for ``spin_time`` [s], and longer while more nodes and topics appear."""
+    began = time.monotonic()
+    changed, known = began, (0, 0)
+    while (now := time.monotonic()) < began + spin_time or (
+        spin_time > 0 and now < min(changed + _CALM, began + spin_time + _LONGEST)
+    ):
+        time.sleep(min(_PERIOD, spin_time))
+        found = len(node.get_node_names()), len(node.get_topic_names_and_types(no_demangle=True))
+        if found != known:
+            changed, known = time.monotonic(), found
+
+
+def wait_for(condition: Callable[[], bool], timeout: float) -> bool:
+    """Wait until ``condition`` is true, at most ``timeout`` [s]; negative: for ever. Return whether it is."""
+    deadline = time.monotonic() + timeout
+    while not condition():
+        if timeout >= 0 and deadline < time.monotonic():
+            return False
+        time.sleep(_PERIOD)
+    return True
+
+
+def is_hidden(name: str) -> bool:
+    """Whether a part of the name of a topic, service or action begins with an underscore."""
+    from rclpy.topic_or_service_is_hidden import topic_or_service_is_hidden
+
+    return topic_or_service_is_hidden(name)
+
+
+def node_names(node: Node, *, include_hidden: bool) -> list[NodeName]:
+    """Return the names of the nodes in the graph."""
+    found = [
+        NodeName(name, namespace, f"{namespace.rstrip('/')}/{name}")
+        for name, namespace in node.get_node_names_and_namespaces()
+    ]
+    return [one for one in found if include_hidden or not one.name.startswith("_")]
+
+
+def full_topic_name(node: Node, topic: str) -> str:
+    """Return the full name of a topic or action. Raises ClickException if it is invalid."""
+    from rclpy.exceptions import InvalidTopicNameException
+    from rclpy.expand_topic_name import expand_topic_name
+    from rclpy.validate_full_topic_name import validate_full_topic_name
+
+    try:
+        name = expand_topic_name(topic, node.get_name(), node.get_namespace())
+        validate_full_topic_name(name)
+    except (ValueError, InvalidTopicNameException) as error:
+        raise click.ClickException(str(error)) from None
+    return name
+
+
+def message_class(node: Node, topic: str) -> Any:
+    """
+    Return the class of a topic's messages; ``None`` if nobody publishes or subscribes to the topic.
+
+    :raises ClickException: if the name is invalid, or the type is unknown or not the only one.
+    """
+    types = dict(node.get_topic_names_and_types()).get(full_topic_name(node, topic))
+    if types is None:
+        return None
+    if len(types) > 1:
+        raise click.ClickException(
+            f"Cannot echo topic '{topic}', as it contains more than one type: [{', '.join(types)}]"
+        )
+    return interface_class("message", types[0], f"The message type '{types[0]}' is invalid")
+
+
+def interface_class(kind: str, name: str, problem: str) -> Any:
+    """Return the class of a message, service or action; ClickException with `problem` if there is none."""
+    from rosidl_runtime_py import utilities
+
+    try:
+        return getattr(utilities, f"get_{kind}")(name)
+    except (AttributeError, ModuleNotFoundError, TypeError, ValueError):  # TypeError: "/std_msgs/String"
+        raise click.ClickException(problem) from None
+
+
+def await_message_class(node: Node, topic: str) -> Any:
+    """Return the class of a topic's messages, and wait for the topic; errors as `message_class`."""
+    found = message_class(node, topic)
+    if found is None:
+        click.echo(f"WARNING: topic [{topic}] does not appear to be published yet")
+    while found is None:
+        time.sleep(_PERIOD)
+        found = message_class(node, topic)
+    return found
+
+
+def spin(node: Node, until: Future | None = None, timeout: float | None = None) -> None:
+    """Run the callbacks of a node until a future is done, or for a time [s], or for ever."""
+    from rclpy.executors import SingleThreadedExecutor
+    from rclpy.task import Future
+
+    with SingleThreadedExecutor() as executor:
+        executor.add_node(node)
+        executor.spin_until_future_complete(until or Future(), timeout)

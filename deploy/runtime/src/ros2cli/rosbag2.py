@@ -1,0 +1,252 @@
+"""The format of ROS 2's bags: a directory with ``metadata.yaml`` (version 9) and MCAP files.
+
+Sources: rosbag2_storage and rosbag2_storage_mcap of ROS 2 Jazzy, the MCAP specification's profile ``ros2``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+import yaml
+
+if TYPE_CHECKING:
+    from rclpy.qos import QoSProfile
+
+METADATA_FILE = "metadata.yaml"
+_DURATIONS = ("deadline", "lifespan", "liveliness_lease_duration")
+
+
+@dataclass
+class Topic:
+    """A recorded topic, with the QoS that its publishers offered."""
+
+    name: str
+    type: str
+    offered: list[QoSProfile] = field(default_factory=list)
+    type_hash: str = ""
+    count: int = 0
+
+    def is_service_event(self) -> bool:
+        """Whether it records the calls of a service."""
+        return "/srv/" in self.type and self.type.endswith("_Event") and self.name.endswith("/_service_event")
+
+
+@dataclass
+class Metadata:
+    """What ``metadata.yaml`` says about a bag; times [ns]."""
+
+    directory: Path
+    files: list[str]
+    topics: list[Topic]
+    start: int = 0
+    duration: int = 0
+    storage: str = "mcap"
+    ros_distro: str = ""
+    custom_data: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def count(self) -> int:
+        """The number of messages."""
+        return sum(topic.count for topic in self.topics)
+
+    def paths(self) -> list[Path]:
+        """Return the files of the bag."""
+        return [self.directory / file for file in self.files]
+
+
+def to_yaml(metadata: Metadata) -> str:
+    """Return the content of ``metadata.yaml`` below its only key."""
+
+    def extent() -> dict[str, Any]:  # a new one each time: YAML would refer to the first
+        return {
+            "duration": {"nanoseconds": metadata.duration},
+            "starting_time": {"nanoseconds_since_epoch": metadata.start},
+            "message_count": metadata.count,
+        }
+
+    topics = [
+        {
+            "topic_metadata": {
+                "name": topic.name,
+                "type": topic.type,
+                "serialization_format": "cdr",
+                "offered_qos_profiles": [_qos_to_dict(profile) for profile in topic.offered],
+                "type_description_hash": topic.type_hash,
+            },
+            "message_count": topic.count,
+        }
+        for topic in metadata.topics
+    ]
+    document = {
+        "version": 9,
+        "storage_identifier": metadata.storage,
+        **extent(),
+        "topics_with_message_count": topics,
+        "compression_format": "",
+        "compression_mode": "",
+        "relative_file_paths": metadata.files,
+        "files": [{"path": file, **extent()} for file in metadata.files],
+        "custom_data": metadata.custom_data,
+        "ros_distro": metadata.ros_distro,
+    }
+    return yaml.safe_dump(document, sort_keys=False)
+
+
+def write(metadata: Metadata) -> None:
+    """Write ``metadata.yaml``."""
+    text = to_yaml(metadata).replace("\n", "\n  ").rstrip(" ")
+    (metadata.directory / METADATA_FILE).write_text(f"rosbag2_bagfile_information:\n  {text}")
+
+
+def read(path: Path) -> Metadata:
+    """
+    Read the metadata of a bag, or of a single MCAP file.
+
+    :raises ClickException: if it is no bag, damaged, or not in MCAP.
+    """
+    if path.is_file():
+        return _of_file(path)
+    try:
+        document = yaml.safe_load((path / METADATA_FILE).read_text())["rosbag2_bagfile_information"]
+        metadata = _from_dict(path, document)
+    except FileNotFoundError:
+        raise click.ClickException(f"'{path}' is no bag: it has no {METADATA_FILE}") from None
+    except (yaml.YAMLError, LookupError, TypeError, ValueError) as error:
+        raise click.ClickException(f"'{path / METADATA_FILE}' is damaged: {error!r}") from None
+    if metadata.storage != "mcap":
+        raise click.ClickException(
+            f"'{path}' is stored as {metadata.storage}, but only mcap is supported: convert it on ROS 2"
+            " with `ros2 bag convert`"
+        )
+    return metadata
+
+
+def _from_dict(directory: Path, document: dict[str, Any]) -> Metadata:
+    return Metadata(
+        directory=directory,
+        files=[Path(file).name for file in document["relative_file_paths"]],
+        topics=[
+            Topic(
+                name=topic["topic_metadata"]["name"],
+                type=topic["topic_metadata"]["type"],
+                offered=qos_from_yaml(topic["topic_metadata"].get("offered_qos_profiles")),
+                type_hash=topic["topic_metadata"].get("type_description_hash", ""),
+                count=topic["message_count"],
+            )
+            for topic in document["topics_with_message_count"] or []
+        ],
+        start=document["starting_time"]["nanoseconds_since_epoch"],
+        duration=document["duration"]["nanoseconds"],
+        storage=document["storage_identifier"],
+        ros_distro=document.get("ros_distro") or "",
+        custom_data=document.get("custom_data") or {},
+    )
+
+
+def _of_file(path: Path) -> Metadata:
+    """The metadata in the summary of an MCAP file."""
+    from mcap.exceptions import McapError
+    from mcap.reader import make_reader
+
+    try:
+        with path.open("rb") as file:
+            summary = make_reader(file).get_summary()
+    except McapError as error:
+        raise click.ClickException(f"'{path}' is no complete MCAP file: {error!r}") from None
+    if summary is None or summary.statistics is None:
+        raise click.ClickException(f"'{path}' has no summary: its recording did not end in order")
+    counts = summary.statistics.channel_message_counts
+    topics = [
+        Topic(
+            name=channel.topic,
+            type=summary.schemas[channel.schema_id].name,
+            offered=qos_from_yaml(channel.metadata.get("offered_qos_profiles")),
+            type_hash=channel.metadata.get("topic_type_hash", ""),
+            count=counts.get(number, 0),
+        )
+        for number, channel in summary.channels.items()
+    ]
+    start, end = summary.statistics.message_start_time, summary.statistics.message_end_time
+    return Metadata(path.parent, [path.name], topics, start, end - start)
+
+
+def qos_to_yaml(profiles: list[QoSProfile]) -> str:
+    """Return profiles as a channel's metadata has them."""
+    return yaml.safe_dump([_qos_to_dict(profile) for profile in profiles], sort_keys=False)
+
+
+def _qos_to_dict(profile: QoSProfile) -> dict[str, Any]:
+    def duration(name: str) -> dict[str, int]:
+        seconds, nanoseconds = divmod(getattr(profile, name).nanoseconds, 10**9)
+        return {"sec": seconds, "nsec": nanoseconds}
+
+    return {
+        "history": profile.history.short_key,
+        "depth": profile.depth,
+        "reliability": profile.reliability.short_key,
+        "durability": profile.durability.short_key,
+        "deadline": duration("deadline"),
+        "lifespan": duration("lifespan"),
+        "liveliness": profile.liveliness.short_key,
+        "liveliness_lease_duration": duration("liveliness_lease_duration"),
+        "avoid_ros_namespace_conventions": profile.avoid_ros_namespace_conventions,
+    }
+
+
+def qos_from_yaml(profiles: str | list[dict[str, Any]] | None) -> list[QoSProfile]:
+    """Return recorded profiles; policies are names, or numbers before version 9. Raises ValueError."""
+    parsed = yaml.safe_load(profiles) if isinstance(profiles, str) else profiles
+    return [qos_from_dict(profile) for profile in parsed or []]
+
+
+def qos_from_dict(policies: dict[str, Any]) -> QoSProfile:
+    """
+    Return the profile with these policies, as in a file for ``--qos-profile-overrides-path``.
+
+    :raises ValueError: for an unknown policy or value.
+    """
+    from rclpy import qos
+    from rclpy.duration import Duration
+
+    def duration(value: dict[str, int]) -> Duration:
+        return Duration(seconds=value["sec"], nanoseconds=value["nsec"])
+
+    def policy(kind: Any) -> Callable[[str | int], Any]:
+        return lambda value: kind(value) if isinstance(value, int) else kind.get_from_short_key(value)
+
+    convert: dict[str, Callable[[Any], Any]] = {
+        "history": policy(qos.HistoryPolicy),
+        "depth": int,
+        "reliability": policy(qos.ReliabilityPolicy),
+        "durability": policy(qos.DurabilityPolicy),
+        "liveliness": policy(qos.LivelinessPolicy),
+        "avoid_ros_namespace_conventions": bool,
+        **dict.fromkeys(_DURATIONS, duration),
+    }
+    made = {}
+    for name, value in policies.items():
+        if name not in convert:
+            raise ValueError(f"Unexpected key `{name}` for QoS profile.")
+        try:
+            made[name] = convert[name](value)
+        except (LookupError, TypeError, ValueError):
+            raise ValueError(f"Unexpected value `{value}` of `{name}` for QoS profile.") from None
+    try:
+        return qos.QoSProfile(**made)
+    except qos.InvalidQoSProfileException as error:
+        raise ValueError(str(error)) from None
+
+
+def qos_overrides(path: str | None) -> dict[str, QoSProfile]:
+    """Read the profiles in a file for ``--qos-profile-overrides-path``, by topic. Raises ClickException."""
+    if path is None:
+        return {}
+    try:
+        document = yaml.safe_load(Path(path).read_text())
+        return {topic: qos_from_dict(policies) for topic, policies in document.items()}
+    except (OSError, AttributeError, ValueError, yaml.YAMLError) as error:
+        raise click.ClickException(f"[ERROR] [ros2bag]: {path}: {error}") from None

@@ -1,0 +1,69 @@
+"""Sets the fields of messages from plain values, such as those of a YAML file."""
+
+from __future__ import annotations
+
+import array
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+from rosidl_parser.definition import AbstractNestedType, NamespacedType
+from rosidl_runtime_py.convert import get_message_slot_types
+from rosidl_runtime_py.import_message import import_message_from_namespaced_type
+
+_HEADER = ("std_msgs", "msg", "Header")
+_TIME = ("builtin_interfaces", "msg", "Time")
+
+
+def set_message_fields(
+    msg: Any, values: dict[str, Any], expand_header_auto: bool = False, expand_time_now: bool = False
+) -> list[Callable[[Any], None]]:
+    """
+    Set fields of a message from a dictionary by their names.
+
+    :param expand_header_auto: whether a ``std_msgs/Header`` may be ``auto``: its stamp is set later.
+    :param expand_time_now: whether a ``builtin_interfaces/Time`` may be ``now``: it is set later.
+    :return: functions that set the times that are set later, each to its argument.
+    :raises AttributeError: if the message has no such field.
+    :raises TypeError, ValueError: if a value does not fit its field.
+    """
+    if not isinstance(values, dict):
+        kind = type(values).__name__
+        raise TypeError(f"Value '{values}' is expected to be a dictionary but is a {kind}")
+    later: list[Callable[[Any], None]] = []
+
+    def message(type_: Any, fields: Any) -> Any:
+        made = type_()
+        later.extend(set_message_fields(made, fields, expand_header_auto, expand_time_now))
+        return made
+
+    types = get_message_slot_types(msg)
+    for name, value in values.items():
+        current = getattr(msg, name)
+        slot = types.get(name)
+        is_time = isinstance(slot, NamespacedType) and slot.namespaced_name() == _TIME
+        is_header = isinstance(slot, NamespacedType) and slot.namespaced_name() == _HEADER
+        if is_header and expand_header_auto and value == "auto":
+            later.append(partial(setattr, current, "stamp"))
+        elif is_time and expand_time_now and value == "now":
+            later.append(partial(setattr, msg, name))
+        elif isinstance(slot, NamespacedType):
+            given = isinstance(value, type(current))
+            setattr(msg, name, value if given else message(type(current), value))
+        elif isinstance(slot, AbstractNestedType) and isinstance(slot.value_type, NamespacedType):
+            element = import_message_from_namespaced_type(slot.value_type)
+            setattr(msg, name, [message(element, fields) for fields in value])
+        else:
+            setattr(msg, name, _converted(value, current))
+    return later
+
+
+def _converted(value: Any, current: Any) -> Any:
+    """The value as the type that the field has now."""
+    if isinstance(current, array.array):
+        return array.array(current.typecode, value)
+    if type(current).__name__ == "ndarray":
+        import numpy
+
+        return numpy.array(value, dtype=current.dtype)
+    return value if type(value) is type(current) else type(current)(value)

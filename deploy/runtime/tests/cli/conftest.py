@@ -1,0 +1,142 @@
+"""A graph, and commands that run as processes beside it.
+
+These tests pass on ROS 2's own ros2cli, too, except for those marked `embedded`: they need what ROS 2 does
+differently (its daemon, tracebacks) or what its installation may lack.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+
+from geometry_msgs.msg import PointStamped
+from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_sensor_data
+from std_msgs.msg import Float64, Header, String
+from std_srvs.srv import SetBool
+
+PROGRAM = "import sys; sys.argv[0] = 'ros2'; from ros2cli.cli import main; sys.exit(main())"
+TIMEOUT = 60.0
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Register the mark `embedded`."""
+    config.addinivalue_line("markers", "embedded: needs the command line of the embedded runtime")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Skip tests marked `embedded` on ROS 2."""
+    if importlib.util.find_spec("rosidl_runtime_embedded"):
+        return
+    for item in items:
+        if item.get_closest_marker("embedded"):
+            item.add_marker(pytest.mark.skip(reason="platform: needs the embedded runtime"))
+
+
+class Lab(Node):
+    """A node with one of everything that commands show."""
+
+    def __init__(self, context: Context) -> None:
+        super().__init__("lab", namespace="/arm", context=context)
+        described = ParameterDescriptor(
+            description="length of a link [m]",
+            floating_point_range=[FloatingPointRange(from_value=0.0, to_value=10.0)],
+        )
+        self.declare_parameter("length", 2.0, described)
+        self.declare_parameter("names", ["a", "b"])
+        self.declare_parameter("limits.speed", 3)
+        latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        self.create_publisher(PointStamped, "point", latched).publish(
+            PointStamped(header=Header(frame_id="base"))
+        )
+        chatter = self.create_publisher(String, "chatter", 10)
+        self.create_timer(0.05, lambda: chatter.publish(String(data="hello")))
+        self.create_publisher(Float64, "_hidden", 10)
+        self.create_subscription(Float64, "speed", lambda _: None, qos_profile_sensor_data)
+        self.create_service(SetBool, "switch", self._switch)
+
+    @staticmethod
+    def _switch(request: Any, response: Any) -> Any:
+        response.success, response.message = request.data, "switched"
+        return response
+
+
+@pytest.fixture(scope="module")
+def lab(module_domain_id: int) -> Iterator[Lab]:
+    """A node in the domain of the module, which a thread spins."""
+    context = Context()
+    context.init([], domain_id=module_domain_id)
+    node = Lab(context)
+    executor = SingleThreadedExecutor(context=context)
+    executor.add_node(node)
+    thread = threading.Thread(target=executor.spin)
+    thread.start()
+    yield node
+    executor.shutdown()
+    thread.join()
+    node.destroy_node()
+    context.try_shutdown()
+
+
+Ros2 = Callable[..., "subprocess.CompletedProcess[str]"]
+Start = Callable[..., "subprocess.Popen[str]"]
+
+
+@pytest.fixture
+def start(module_domain_id: int) -> Iterator[Start]:
+    """Starts a command in the domain of the module; the test's end kills it."""
+    started: list[subprocess.Popen[str]] = []
+
+    def start(*arguments: str, **options: Any) -> subprocess.Popen[str]:
+        environment = os.environ | {
+            "ROS_DOMAIN_ID": str(module_domain_id),
+            "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+        }
+        pipes = {"stdin": subprocess.DEVNULL, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+        command = [sys.executable, "-c", PROGRAM, *arguments]
+        process = subprocess.Popen(command, text=True, env=environment, **{**pipes, **options})
+        started.append(process)
+        return process
+
+    yield start
+    for process in started:
+        if process.poll() is None:
+            process.kill()
+        process.communicate()
+
+
+@pytest.fixture
+def ros2(start: Start) -> Ros2:
+    """Runs a command to its end."""
+
+    def run(*arguments: str, input: str | None = None) -> subprocess.CompletedProcess[str]:
+        options = {} if input is None else {"stdin": subprocess.PIPE}
+        process = start(*arguments, **options)
+        out, err = process.communicate(input, timeout=TIMEOUT)
+        return subprocess.CompletedProcess(arguments, process.returncode, out, err)
+
+    return run
+
+
+@pytest.fixture
+def wait_until() -> Callable[[Callable[[], object]], None]:
+    """Waits until a condition holds."""
+
+    def wait(condition: Callable[[], object]) -> None:
+        deadline = time.monotonic() + TIMEOUT
+        while not condition():
+            assert time.monotonic() < deadline
+            time.sleep(0.01)
+
+    return wait

@@ -1,0 +1,179 @@
+"""`ros2 bag record`, `info` and `play`: bags that ROS 2's tools and Foxglove read."""
+
+from __future__ import annotations
+
+import re
+import signal
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from mcap.reader import make_reader
+from rosbags.highlevel import AnyReader
+
+from geometry_msgs.msg import PointStamped
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from std_msgs.msg import String
+
+pytestmark = pytest.mark.embedded  # ROS 2's is C++; its bags have the same format
+
+Wait = Callable[[Callable[[], object]], None]
+Record = Callable[..., Path]
+
+
+@pytest.fixture
+def record(lab: Any, start: Any, tmp_path: Path) -> Record:
+    """Records topics until the file has data for a while, and returns the bag."""
+
+    def record(*arguments: str, number: signal.Signals = signal.SIGINT, seconds: float = 1.0) -> Path:
+        bag = tmp_path / "bag"
+        process = start("bag", "record", "-o", str(bag), *arguments)
+        while "Subscribed to topic '/arm/chatter'" not in process.stderr.readline():
+            assert process.poll() is None
+        time.sleep(seconds)  # the length of the record; no result depends on it
+        process.send_signal(number)
+        assert process.stderr.read().endswith("[rosbag2_recorder]: Recording stopped\n")
+        assert process.wait(30) == 0
+        return bag
+
+    return record
+
+
+def test_other_readers_understand_a_bag(record: Record) -> None:
+    bag = record("-a")
+    with AnyReader([bag]) as reader:
+        messages = [
+            (connection.topic, reader.deserialize(data, connection.msgtype))
+            for connection, _, data in reader.messages()
+        ]
+        counts = {topic: info.msgcount for topic, info in reader.topics.items()}
+    (point,) = [message for topic, message in messages if topic == "/arm/point"]
+    assert point.header.frame_id == "base"
+    assert {message.data for topic, message in messages if topic == "/arm/chatter"} == {"hello"}
+    assert counts["/arm/chatter"] >= 10
+    assert "/arm/_hidden" not in counts
+
+
+def test_file_has_the_profile_ros2_with_schemas_and_qos(record: Record) -> None:
+    bag = record("/arm/point", "/arm/chatter", number=signal.SIGTERM)
+    with (bag / "bag_0.mcap").open("rb") as file:
+        reader = make_reader(file)
+        assert reader.get_header().profile == "ros2"
+        summary = reader.get_summary()
+        (metadata,) = reader.iter_metadata()
+    assert summary is not None
+    channels = {channel.topic: channel for channel in summary.channels.values()}
+    assert channels.keys() == {"/arm/point", "/arm/chatter"}
+    channel = channels["/arm/point"]
+    assert channel.message_encoding == "cdr"
+    (offered,) = yaml.safe_load(channel.metadata["offered_qos_profiles"])
+    assert (offered["durability"], offered["reliability"]) == ("transient_local", "reliable")
+    assert offered["deadline"] == {"sec": 9223372036, "nsec": 854775807}
+    assert channel.metadata["topic_type_hash"].startswith("RIHS01_")
+    schema = summary.schemas[channel.schema_id]
+    assert (schema.name, schema.encoding) == ("geometry_msgs/msg/PointStamped", "ros2msg")
+    delimiters = re.findall(r"^={80}\nMSG: (\S+)$", schema.data.decode(), re.MULTILINE)
+    assert delimiters == ["geometry_msgs/Point", "std_msgs/Header", "builtin_interfaces/Time"]
+    assert metadata.name == "rosbag2"
+    written = yaml.safe_load((bag / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
+    assert yaml.safe_load(metadata.metadata["serialized_metadata"]) == written
+    assert (written["version"], written["storage_identifier"]) == (9, "mcap")
+
+
+def test_info_describes_a_bag_and_a_file(record: Record, ros2: Any) -> None:
+    bag = record("--topics", "/arm/chatter", "/arm/point", "--storage-preset-profile", "zstd_fast")
+    out = ros2("bag", "info", str(bag)).stdout
+    date = r"[A-Z][a-z]{2} [ \d]\d \d{4} \d\d:\d\d:\d\d\.\d{9} \(\d{10}\.\d{9}\)"
+    indent = " " * 19
+    assert re.fullmatch(
+        r"\nFiles:             bag_0\.mcap\nBag size:          \d+\.\d KiB\n"
+        r"Storage id:        mcap\nROS Distro:        jazzy\nDuration:          \d+\.\d{9}s\n"
+        rf"Start:             {date}\nEnd:               {date}\nMessages:          \d+\n"
+        r"Topic information: Topic: /arm/chatter \| Type: std_msgs/msg/String \| Count: \d+"
+        r" \| Serialization Format: cdr\n"
+        rf"{indent}Topic: /arm/point \| Type: geometry_msgs/msg/PointStamped \| Count: 1"
+        r" \| Serialization Format: cdr\n"
+        r"Service:           0\nService information: \n\n",
+        out,
+    )
+    assert ros2("bag", "info", "-t", str(bag)).stdout == "/arm/chatter\n/arm/point\n"
+    of_file = ros2("bag", "info", str(bag / "bag_0.mcap")).stdout
+    assert of_file == out.replace("jazzy", "unknown")
+
+
+def test_filters_select_topics(record: Record, ros2: Any) -> None:
+    bag = record("-e", "/arm/", "--exclude-regex", "poi", "--include-unpublished-topics", seconds=0.3)
+    assert ros2("bag", "info", "-t", str(bag)).stdout == "/arm/chatter\n/arm/speed\n"
+
+
+def test_play_keeps_the_pace_and_the_qos(
+    lab: Any, record: Record, start: Any, ros2: Any, wait_until: Wait
+) -> None:
+    bag = record("/arm/chatter", "/arm/point", seconds=2.0)
+    arrivals: list[float] = []
+    points: list[PointStamped] = []
+    latched = QoSProfile(
+        depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL, reliability=ReliabilityPolicy.RELIABLE
+    )
+    subscriptions = [
+        lab.create_subscription(String, "/replay", lambda _: arrivals.append(time.monotonic()), 10),
+        lab.create_subscription(PointStamped, "/replayed_point", points.append, latched),
+    ]
+    done = ros2(
+        *("bag", "play", str(bag), "-r", "2.0"),
+        *("--remap", "/arm/chatter:=/replay", "/arm/point:=/replayed_point"),
+    )
+    assert (done.stderr, done.returncode) == ("", 0)
+    wait_until(lambda: len(points) == 1)
+    metadata = yaml.safe_load((bag / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
+    counts = {t["topic_metadata"]["name"]: t["message_count"] for t in metadata["topics_with_message_count"]}
+    wait_until(lambda: len(arrivals) == counts["/arm/chatter"])
+    # a message may be late on a busy machine, but none is early: the whole lasts at least half the record
+    with (bag / "bag_0.mcap").open("rb") as file:
+        logged = [m.log_time for _, _, m in make_reader(file).iter_messages(["/arm/chatter"])]
+    assert arrivals[-1] - arrivals[0] > (logged[-1] - logged[0]) / 1e9 / 2.0 - 0.2
+    for subscription in subscriptions:
+        lab.destroy_subscription(subscription)
+
+
+def test_play_filters_topics_and_parts(record: Record, start: Any, ros2: Any) -> None:
+    bag = record("/arm/chatter", "/arm/point", seconds=2.0)
+    began = time.monotonic()
+    done = ros2("bag", "play", str(bag), "--exclude-topics", "/arm/chatter")
+    assert done.returncode == 0
+    echo = start(
+        "topic", "echo", "/clock", "rosgraph_msgs/msg/Clock", "--once", "--qos-reliability", "reliable"
+    )
+    played = start("bag", "play", str(bag), "--loop", "--clock", "100", "--topics", "/arm/chatter")
+    assert echo.stdout.readline() == "clock:\n"
+    assert echo.stdout.readline().startswith("  sec: ")
+    assert played.poll() is None
+    played.send_signal(signal.SIGINT)
+    assert played.wait(30) == 0
+    assert time.monotonic() - began < 60.0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error"),
+    [
+        (["record"], "[ERROR] [ros2bag]: Need to specify at least one option out of"),
+        (["record", "-a", "-o", "."], "[ERROR] [ros2bag]: Output folder '.' already exists."),
+        (["record", "/x", "--exclude-regex", "y"], "[ERROR] [ros2bag]: --exclude-regex argument requires"),
+        (["info", "."], "'.' is no bag: it has no metadata.yaml"),
+        (["play", __file__], f"'{__file__}' is no complete MCAP file: "),
+    ],
+)
+def test_wrong_bags_are_one_line(ros2: Any, arguments: list[str], error: str) -> None:
+    done = ros2("bag", *arguments)
+    assert done.stderr.startswith(error)
+    assert done.stderr.count("\n") == 1
+    assert done.returncode == 1
+
+
+def test_missing_bag_and_wrong_expression_are_wrong_arguments(ros2: Any) -> None:
+    assert ros2("bag", "info", "/nowhere").returncode == 2
+    assert ros2("bag", "record", "-e", "(").returncode == 2
+    assert ros2("bag", "record", "--topics").returncode == 2
