@@ -107,7 +107,7 @@ def node_names(node: Node, *, include_hidden: bool) -> list[NodeName]:
 
 
 def full_topic_name(node: Node, topic: str) -> str:
-    """Return the full name of a topic or action. Raises ClickException if it is invalid."""
+    """Return the full name of a topic or action. Raises RuntimeError if it is invalid."""
     from rclpy.exceptions import InvalidTopicNameException
     from rclpy.expand_topic_name import expand_topic_name
     from rclpy.validate_full_topic_name import validate_full_topic_name
@@ -116,24 +116,8 @@ def full_topic_name(node: Node, topic: str) -> str:
         name = expand_topic_name(topic, node.get_name(), node.get_namespace())
         validate_full_topic_name(name)
     except (ValueError, InvalidTopicNameException) as error:
-        raise click.ClickException(str(error)) from None
+        raise RuntimeError(error) from None
     return name
-
-
-def message_class(node: Node, topic: str) -> Any:
-    """
-    Return the class of a topic's messages; ``None`` if nobody publishes or subscribes to the topic.
-
-    :raises ClickException: if the name is invalid, or the type is unknown or not the only one.
-    """
-    types = dict(node.get_topic_names_and_types()).get(full_topic_name(node, topic))
-    if types is None:
-        return None
-    if len(types) > 1:
-        raise click.ClickException(
-            f"Cannot echo topic '{topic}', as it contains more than one type: [{', '.join(types)}]"
-        )
-    return interface_class("message", types[0], f"The message type '{types[0]}' is invalid")
 
 
 def interface_class(kind: str, name: str, problem: str) -> Any:
@@ -144,17 +128,6 @@ def interface_class(kind: str, name: str, problem: str) -> Any:
         return getattr(utilities, f"get_{kind}")(name)
     except (AttributeError, ModuleNotFoundError, TypeError, ValueError):  # TypeError: "/std_msgs/String"
         raise click.ClickException(problem) from None
-
-
-def await_message_class(node: Node, topic: str) -> Any:
-    """Return the class of a topic's messages, and wait for the topic; errors as `message_class`."""
-    found = message_class(node, topic)
-    if found is None:
-        click.echo(f"WARNING: topic [{topic}] does not appear to be published yet")
-    while found is None:
-        time.sleep(_PERIOD)
-        found = message_class(node, topic)
-    return found
 
 
 def spin(node: Node, until: Future | None = None, timeout: float | None = None) -> None:

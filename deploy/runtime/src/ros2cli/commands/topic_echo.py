@@ -17,6 +17,7 @@ from ros2cli.options import (
     qos_profile,
     strategy_options,
 )
+from ros2topic.api import get_msg_class
 
 if TYPE_CHECKING:
     from rclpy.event_handler import QoSMessageLostInfo
@@ -73,9 +74,8 @@ def echo(
     with graph.node(spin_time, use_sim_time=use_sim_time) as node:
         chosen = qos_profile(options) if has_qos_policies(options) else _matching(node, topic_name, options)
         if message_type is None:
-            class_ = graph.message_class(node, topic_name)
+            class_ = get_msg_class(node, topic_name, include_hidden_topics=True)
             if class_ is None:
-                click.echo(f"WARNING: topic [{topic_name}] does not appear to be published yet")
                 raise click.ClickException("Could not determine the type for the passed topic")
         else:
             class_ = graph.interface_class("message", message_type, "The passed message type is invalid")
