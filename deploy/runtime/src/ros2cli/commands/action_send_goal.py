@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import signal
 from collections.abc import Callable
-from types import FrameType
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -53,8 +52,15 @@ def send_goal(action_name: str, action_type: str, goal: str, feedback: bool) -> 
             pass
         click.echo(f"Sending goal:\n     {message_to_yaml(message)}")
         sent: list[Future] = []
+
+        def send() -> None:
+            try:
+                sent.append(client.send_goal_async(message, report if feedback else None))
+            except (TypeError, ValueError) as error:
+                raise click.ClickException(f"Failed to populate message fields: {error!r}") from None
+
         try:
-            _uninterrupted(lambda: sent.append(client.send_goal_async(message, report if feedback else None)))
+            _uninterrupted(send)
             graph.spin(node, sent[0])
             handle = sent[0].result()
             if not handle.accepted:
@@ -63,8 +69,6 @@ def send_goal(action_name: str, action_type: str, goal: str, feedback: bool) -> 
             click.echo(f"Goal accepted with ID: {bytes(handle.goal_id.uuid).hex()}\n")
             ending = handle.get_result_async()
             graph.spin(node, ending)
-        except (TypeError, ValueError) as error:
-            raise click.ClickException(f"Failed to populate message fields: {error!r}") from None
         except BaseException:  # Ctrl-C above all: whenever it comes, the goal must not go on
             if sent:
                 _cancel(node, sent[0])
@@ -78,16 +82,16 @@ def send_goal(action_name: str, action_type: str, goal: str, feedback: bool) -> 
 
 def _uninterrupted(action: Callable[[], object]) -> None:
     """Run an action to its end; a signal that ends the command waits for that."""
-    came: list[tuple[int, FrameType | None]] = []
+    came: list[int] = []
     signals = (signal.SIGINT, signal.SIGTERM)
-    handlers = {number: signal.signal(number, lambda *caught: came.append(caught)) for number in signals}
+    handlers = {each: signal.signal(each, lambda number, _: came.append(number)) for each in signals}
     try:
         action()
     finally:
         for number, handler in handlers.items():
             signal.signal(number, handler)
-    for caught, _ in came[:1]:
-        signal.raise_signal(caught)
+    if came:
+        signal.raise_signal(came[0])
 
 
 def _cancel(node: Node, accepting: Future) -> None:
