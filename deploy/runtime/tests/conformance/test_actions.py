@@ -446,12 +446,11 @@ def test_a_request_with_a_stamp_cancels_the_goals_until_then(
     serve: MakeServer, send: Send, task: Task, cancel: Cancel, node: Node, spin_until: SpinUntil
 ) -> None:
     serve(task, cancel_callback=accept_cancel)
-    _goals = [send(), send()]
+    goals = [send(), send()]
     spin_until(lambda: len(task.goals) == 2)
-    stamp = (
-        node.get_clock().now().to_msg()
-    )  # not that of a handle, which rclpy takes before it accepts the goal
-    _goals.append(send())
+    # Not the stamp of a handle: rclpy takes that before it accepts the goal.
+    stamp = node.get_clock().now().to_msg()
+    goals.append(send())
     spin_until(lambda: len(task.goals) == 3)
     assert cancel(GoalInfo(stamp=stamp)) == (CancelGoal.Response.ERROR_NONE, 2)
     (left,) = (goal_handle for goal_handle in task.goals if not goal_handle.is_cancel_requested)
