@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from rclpy.task import Future
 
 NODE_NAME_PREFIX = "_ros2cli"
+SPIN_TIME = 0.5
+"""How long a node looks for others at first, unless the user says otherwise [s]."""
 _PERIOD = 0.02
 """Period at which the graph is looked at [s]."""
 _CALM = 0.2
@@ -121,13 +123,13 @@ def full_topic_name(node: Node, topic: str) -> str:
 
 
 def interface_class(kind: str, name: str, problem: str) -> Any:
-    """Return the class of a message, service or action; ClickException with `problem` if there is none."""
+    """Return the class of a message, service or action; RuntimeError with `problem` if there is none."""
     from rosidl_runtime_py import utilities
 
     try:
         return getattr(utilities, f"get_{kind}")(name)
     except (AttributeError, ModuleNotFoundError, TypeError, ValueError):  # TypeError: "/std_msgs/String"
-        raise click.ClickException(problem) from None
+        raise RuntimeError(problem) from None
 
 
 def spin(node: Node, until: Future | None = None, timeout: float | None = None) -> None:

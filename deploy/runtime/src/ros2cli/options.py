@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from ros2cli.graph import SPIN_TIME
+
 if TYPE_CHECKING:
     from rclpy.qos import QoSProfile
 
@@ -24,7 +26,7 @@ def direct_options(verb: _Verb) -> _Verb:
     verb = click.option(
         "--spin-time",
         type=float,
-        default=0.5,
+        default=SPIN_TIME,
         show_default=True,
         help="Time in seconds to look for nodes. It looks longer while it still finds more.",
     )(verb)

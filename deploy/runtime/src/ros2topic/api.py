@@ -47,8 +47,6 @@ def get_msg_class(
 
 
 def _message_class(node: Node, topic: str, include_hidden_topics: bool) -> Any | None:
-    from rosidl_runtime_py.utilities import get_message
-
     topics = get_topic_names_and_types(node=node, include_hidden_topics=include_hidden_topics)
     types = dict(topics).get(graph.full_topic_name(node, topic))
     if types is None:
@@ -57,7 +55,4 @@ def _message_class(node: Node, topic: str, include_hidden_topics: bool) -> Any |
         raise RuntimeError(
             f"Cannot echo topic '{topic}', as it contains more than one type: [{', '.join(types)}]"
         )
-    try:
-        return get_message(types[0])
-    except (AttributeError, ModuleNotFoundError, ValueError):
-        raise RuntimeError(f"The message type '{types[0]}' is invalid") from None
+    return graph.interface_class("message", types[0], f"The message type '{types[0]}' is invalid")

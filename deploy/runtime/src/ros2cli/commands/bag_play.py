@@ -130,7 +130,7 @@ def _publishers(
     for topic in topics:
         try:
             class_ = graph.interface_class("message", topic.type, f"its type '{topic.type}' is unknown")
-        except click.ClickException as error:
+        except RuntimeError as error:
             node.get_logger().warn(f"Ignoring a topic '{topic.name}', reason: {error}.")
             continue
         profile = overrides.get(topic.name) or _adapted(node, topic)

@@ -154,7 +154,7 @@ class _Recorder:
         log = self._node.get_logger()
         try:
             class_ = graph.interface_class("message", type_, "")
-        except click.ClickException:
+        except RuntimeError:
             log.warn(f"Topic '{name}' has unknown type '{type_}'. Only topics with known type are supported.")
             return
         offers = self._node.get_publishers_info_by_topic(name)

@@ -11,9 +11,6 @@ from ros2cli import graph
 if TYPE_CHECKING:
     from rclpy.node import Node
 
-_SPIN_TIME = 0.5
-"""How long a node looks for others at first [s]."""
-
 
 class NodeStrategy:
     """
@@ -23,7 +20,7 @@ class NodeStrategy:
     """
 
     def __init__(self, args: Any) -> None:
-        spin_time = getattr(args, "spin_time", _SPIN_TIME)
+        spin_time = getattr(args, "spin_time", graph.SPIN_TIME)
         use_sim_time = getattr(args, "use_sim_time", False)
         self._scope = graph.node(spin_time, use_sim_time=use_sim_time)
         self._node: Node | None = None
@@ -47,7 +44,7 @@ class NodeStrategy:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options that :class:`NodeStrategy` reads."""
     parser.add_argument(
-        "--spin-time", type=float, default=_SPIN_TIME, help="how long to look for other nodes [s]"
+        "--spin-time", type=float, default=graph.SPIN_TIME, help="how long to look for other nodes [s]"
     )
     parser.add_argument("-s", "--use-sim-time", action="store_true", help="use simulated time")
     parser.add_argument("--no-daemon", action="store_true", help="no effect: there is no daemon")
