@@ -85,7 +85,8 @@ def step(
             since = "yet" if state.seen == NEVER else f"for {unseen:.3f} s"
             return reject(topics.ENGINES, f"turn_on refused: no operator seen {since}")
         case command, _:
-            return state._replace(engines=ON if command == topics.TURN_ON else OFF)
+            engines = ON if command == topics.TURN_ON else OFF
+            return state if engines == state.engines else state._replace(engines=engines, repeated=event.at)
 
 
 def engine_state(

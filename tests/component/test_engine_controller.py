@@ -36,18 +36,20 @@ ON_AND_SEEN = latch(ON, 99.5, 99.9)
     [
         (OFF_AND_SEEN, ("tick",), latch(OFF, 99.5, NOW)),
         (ON_AND_SEEN, ("tick",), latch(ON, 99.5, NOW)),
-        (ON_AND_SEEN, (TURN_OFF, 0.0), latch(OFF, 99.5, 99.9)),
-        (ON_AND_SEEN, (TURN_OFF, 99.0), latch(OFF, 99.5, 99.9)),
-        (OFF_AND_SEEN, (TURN_ON, 0.0), latch(ON, 99.5, 99.9)),
-        (OFF_AND_SEEN, (TURN_ON, 0.999), latch(ON, 99.5, 99.9)),
-        (latch(OFF, 99.001, 99.9), (TURN_ON, 0.0), latch(ON, 99.001, 99.9)),
+        (ON_AND_SEEN, (TURN_OFF, 0.0), latch(OFF, 99.5, NOW)),
+        (ON_AND_SEEN, (TURN_OFF, 99.0), latch(OFF, 99.5, NOW)),
+        (OFF_AND_SEEN, (TURN_ON, 0.0), latch(ON, 99.5, NOW)),
+        (OFF_AND_SEEN, (TURN_OFF, 0.0), OFF_AND_SEEN),
+        (ON_AND_SEEN, (TURN_ON, 0.0), ON_AND_SEEN),
+        (OFF_AND_SEEN, (TURN_ON, 0.999), latch(ON, 99.5, NOW)),
+        (latch(OFF, 99.001, 99.9), (TURN_ON, 0.0), latch(ON, 99.001, NOW)),
         (OFF_AND_SEEN, ("presence", 0.125), latch(OFF, 99.875, 99.9)),
         (OFF_AND_SEEN, ("presence", 0.75), OFF_AND_SEEN),  # an older one than the last
-        (OFF_AND_SEEN, ("presence", -0.049), latch(OFF, NOW, 99.9)),
+        (OFF_AND_SEEN, ("presence", -CLOCK_TOLERANCE), latch(OFF, NOW, 99.9)),
         (latch(ON, 90.001, 99.9), ("tick",), latch(ON, 90.001, NOW)),
         (latch(ON, 90.0, 99.9), ("tick",), latch(OFF, 90.0, NOW)),
         (latch(ON, 90.0, 99.9), ("presence", 0.0), latch(OFF, NOW, NOW)),
-        (latch(ON, 99.5, 99.601), ("tick",), latch(ON, 99.5, NOW)),
+        (latch(ON, 99.5, 99.6), ("tick",), latch(ON, 99.5, NOW)),
         (latch(ON, 99.5, 99.599), ("tick",), latch(OFF, 99.5, NOW)),
         (latch(ON, 99.5, 99.599), ("presence", 0.0), latch(OFF, NOW, NOW)),
         (latch(ON, 99.5, 99.599), (TURN_ON, 0.0), latch(ON, 99.5, NOW)),  # a new start
@@ -253,6 +255,12 @@ def test_pause_longer_than_the_drive_timeout_turns_off(engines: Engines) -> None
     states = engines.states([(1.2, TURN_ON, 1.2)], seen_until(20), 20.0)
     assert {state for time, state in states if 1.3 < time < 5.15} == {ON}
     assert {state for time, state in states if time > 5.15} == {OFF}
+
+
+def test_turn_on_that_waited_during_a_pause_is_not_undone() -> None:
+    paused = latch(OFF, 99.5, NOW - 1.5)
+    on = step(paused, Event(TURN_ON, at_time(NOW), 0.2))
+    assert step(on, Event("tick", at_time(NOW + 0.001))).engines == ON
 
 
 def test_short_pause_across_timeout_turns_off(engines: Engines) -> None:
