@@ -25,6 +25,7 @@ ELSEWHERE = (
     "deploy/runtime",
     "deploy/package",
     "deploy/chaos",
+    "deploy/mutants",
 )
 """Folders that are installed otherwise, or that an installed arm does not need."""
 
