@@ -15,9 +15,9 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
-from rclpy import _best_available, _names
+from rclpy import _best_available, _dds, _names
 from rclpy._bad_input import BadInput
-from rclpy._dds import INFINITY, GuardCondition, Participant, Reader, Sample, WaitSet, Writer
+from rclpy._dds import INFINITY, Reader, Sample, Writer
 from rclpy._dds.discovery import Discovery, Endpoint
 from rclpy._dds.qos import user_data_value
 from rclpy.exceptions import NodeNameNonExistentError
@@ -133,22 +133,23 @@ class Graph:
 
     def __init__(self, domain_id: int, enclave: str) -> None:
         self._lock = threading.RLock()
-        self.participant = Participant(domain_id, f"enclave={enclave};")
+        self.participant = _dds.Participant(domain_id, f"enclave={enclave};")
         hash_ = f"typehash={_TYPE_HASH};"
         self._writer = self.participant.create_writer(_TOPIC, _TYPE, _WRITER_QOS, hash_)
         self._reader = self.participant.create_reader(_TOPIC, _TYPE, _READER_QOS, hash_)
         self._own: dict[weakref.ref[Node], _OwnNode] = {}  # weak: they do not keep a node alive
         self._dropped: deque[weakref.ref[Node]] = deque()
-        self._drops = GuardCondition()
+        self._drops = _dds.GuardCondition()
         self._deferred = 0
         self._announced: dict[bytes, Sample] = {}  # by a participant's GUID; decoded on the first query
         self._bad_input = BadInput(get_logger("rclpy"), _TOPIC)
         self._peers: dict[bytes, list[NodeEntities]] = {}
         self._many_peers = _MANY_PEERS
         self._discovery: Discovery | None = None  # made on the first query
+        self._topics: dict[bool, tuple[list[Endpoint], NamesAndTypes]] = {}
         self._service_ids = 0
-        self._waiting: set[GuardCondition] = set()
-        self._waitset = WaitSet()
+        self._waiting: dict[_dds.GuardCondition, None] = {}  # in order
+        self._waitset = _dds.WaitSet()
         self._waitset.attach(self._reader.condition, 0)
         self._waitset.attach(self._drops.handle, 0)
         self._closing = threading.Event()
@@ -305,7 +306,7 @@ class Graph:
                 self._take()
                 if self._discovery is not None:
                     self._discovery.forget_gone()
-                for guard in self._waiting:
+                for guard in list(self._waiting):
                     guard.trigger()
             self._remove_dropped()  # without the lock: the callbacks may wait for other threads
 
@@ -334,7 +335,7 @@ class Graph:
     def _discovered(self) -> Discovery:
         with self._lock:
             if self._discovery is None:
-                self._discovery = Discovery(self.participant.handle)
+                self._discovery = self.participant.create_discovery()
                 for condition in self._discovery.gone:
                     self._waitset.attach(condition, 0)
             return self._discovery
@@ -350,9 +351,9 @@ class Graph:
         :return: whether the condition became true.
         """
         deadline = None if timeout is None or timeout < 0 else time.monotonic() + timeout
-        waitset, guard = WaitSet(), GuardCondition()
+        waitset, guard = _dds.WaitSet(), _dds.GuardCondition()
         with self._lock:
-            self._waiting.add(guard)
+            self._waiting[guard] = None
         try:
             for handle in (*self._discovered().news, guard.handle):
                 waitset.attach(handle, 0)
@@ -366,7 +367,7 @@ class Graph:
             return True
         finally:
             with self._lock:
-                self._waiting.discard(guard)
+                self._waiting.pop(guard, None)
             waitset.close()
             guard.close()
 
@@ -401,7 +402,12 @@ class Graph:
 
     def topic_names_and_types(self, no_demangle: bool) -> NamesAndTypes:
         """Return every topic that has a reader or writer, with its types."""
-        return _collect_topics(self._writers_and_readers(), no_demangle)
+        endpoints = self._writers_and_readers()
+        known, names = self._topics.get(no_demangle, ([], []))
+        if endpoints != known:  # collecting them is slow in a large domain, and some programs ask often
+            names = _collect_topics(endpoints, no_demangle)
+            self._topics[no_demangle] = (endpoints, names)
+        return [(name, list(types)) for name, types in names]
 
     def service_names_and_types(self) -> NamesAndTypes:
         """Return every service that has a server or client, with its types."""
@@ -469,11 +475,11 @@ def _sorted(found: dict[str, set[str]]) -> NamesAndTypes:
 
 def _collect_topics(endpoints: list[Endpoint], no_demangle: bool) -> NamesAndTypes:
     found: dict[str, set[str]] = {}
-    for endpoint in endpoints:
+    for topic, type_name in {(endpoint.topic, endpoint.type_name) for endpoint in endpoints}:
         if no_demangle:
-            found.setdefault(endpoint.topic, set()).add(endpoint.type_name)
-        elif (name := _names.topic_from_dds(endpoint.topic)) is not None:
-            found.setdefault(name, set()).add(_names.type_from_dds(endpoint.type_name))
+            found.setdefault(topic, set()).add(type_name)
+        elif (name := _names.topic_from_dds(topic)) is not None:
+            found.setdefault(name, set()).add(_names.type_from_dds(type_name))
     return _sorted(found)
 
 

@@ -135,7 +135,7 @@ class WaitableWatch:
         self._wait_set = wait_set
         self._attach(
             {
-                handle
+                handle: None  # in order, unlike a set
                 for kind in ("subscription", "client", "service", "event")
                 for handle in wait_set._entities[kind]
             }
@@ -153,11 +153,13 @@ class WaitableWatch:
                 entity._on_change = self._wake
         return self._wait_set._entities[kind]
 
-    def _attach(self, handles: set[int]) -> None:
-        for handle in self._tokens.keys() - handles:
+    def _attach(self, handles: dict[int, None]) -> None:
+        for handle in [each for each in self._tokens if each not in handles]:
             del self._tokens[handle]
             self._executor._waitset.detach(handle)
-        for handle in handles - self._tokens.keys() - self._executor._tokens.keys():
+        for handle in handles:
+            if handle in self._tokens or handle in self._executor._tokens:
+                continue
             self._executor._last_token += 1
             if self._executor._waitset.attach(handle, self._executor._last_token):
                 self._tokens[handle] = self._executor._last_token

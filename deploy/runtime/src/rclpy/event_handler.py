@@ -10,7 +10,7 @@ from enum import IntEnum
 from typing import Any
 
 from rclpy import logging
-from rclpy._dds import Reader, Writer, status
+from rclpy._dds import Reader, Writer
 from rclpy.callback_groups import CallbackGroup
 from rclpy.exceptions import UnsupportedEventTypeError  # noqa: F401 (re-export)
 from rclpy.qos import QoSPolicyKind, qos_policy_name_from_kind
@@ -148,11 +148,11 @@ _SUBSCRIPTION_EVENTS: dict[int, tuple[str, Callable[..., Any]]] = {
 }
 
 
-def _info(make: Callable[..., Any], found: Any) -> Any:
-    """Convert the C structure of a DDS status to the callback's argument."""
-    values = {name: getattr(found, name) for name, _ in found._fields_ if not name.startswith("last_")}
-    if hasattr(found, "last_policy_id"):
-        values["last_policy_kind"] = _POLICY_KINDS.get(found.last_policy_id, QoSPolicyKind.INVALID)
+def _info(make: Callable[..., Any], found: dict[str, int]) -> Any:
+    """Convert the fields of a DDS status to the callback's argument."""
+    values: dict[str, Any] = {name: value for name, value in found.items() if not name.startswith("last_")}
+    if "last_policy_id" in found:
+        values["last_policy_kind"] = _POLICY_KINDS.get(found["last_policy_id"], QoSPolicyKind.INVALID)
     return make(**values)
 
 
@@ -188,7 +188,7 @@ class EventHandler(Waitable):
     def add_to_wait_set(self, wait_set: Any) -> None:
         """Add the DDS entity; executors do without for the handlers of publishers and subscriptions."""
         if self._status != _NO_STATUS:
-            status.watch_also(self._parent.handle, self._status)
+            self._parent.watch_also(self._status)
         self._index = wait_set._add("event", self._parent.handle)
 
     def is_ready(self, wait_set: Any) -> bool:
@@ -206,7 +206,7 @@ class EventHandler(Waitable):
         """Return the changes since the last call, ``None`` without any."""
         if self._destroyed or self._status == _NO_STATUS:
             return None
-        found = status.changed(self._parent.handle, self._status)
+        found = self._parent.changed(self._status)
         return None if found is None else _info(self._make_info, found)
 
 
@@ -228,7 +228,7 @@ def _handlers(
         for event, callback in callbacks.items()
         if callback is not None
     ]
-    status.watch(parent.handle, [handler._status for handler in handlers if handler._status != _NO_STATUS])
+    parent.watch([handler._status for handler in handlers if handler._status != _NO_STATUS])
     return handlers
 
 

@@ -20,7 +20,7 @@ from types import CoroutineType, TracebackType
 from typing import TYPE_CHECKING, Any, Protocol
 
 from rclpy import _dds, signals
-from rclpy._dds import INFINITY, WaitSet
+from rclpy._dds import INFINITY
 from rclpy.callback_groups import CallbackGroup
 from rclpy.client import Client  # noqa: F401 (re-export)
 from rclpy.constants import S_TO_NS
@@ -126,10 +126,10 @@ class Executor(AbstractContextManager["Executor"]):
         self._idle = threading.Condition()
 
         self._guard = _dds.GuardCondition()
-        self._waitset = WaitSet()
+        self._waitset = _dds.WaitSet()
         self._waitset.attach(self._guard.handle, _WAKE)
         # Closed with the executor, also if it is garbage-collected without a shutdown.
-        self._dds: list[WaitSet | _dds.GuardCondition] = [self._waitset, self._guard]
+        self._dds: list[_dds.WaitSet | _dds.GuardCondition] = [self._waitset, self._guard]
         self._close_dds = weakref.finalize(self, _close, self._dds)
         self._close_dds.atexit = False  # at exit, DDS closes everything itself
         self._spinning_thread: int | None = None
@@ -538,7 +538,7 @@ class Executor(AbstractContextManager["Executor"]):
         self.shutdown()
 
 
-def _close(entities: list[WaitSet | _dds.GuardCondition]) -> None:
+def _close(entities: list[_dds.WaitSet | _dds.GuardCondition]) -> None:
     for entity in entities:
         entity.close()
 
@@ -640,7 +640,7 @@ class MultiThreadedExecutor(_BuiltInExecutor):
         )
         self._errors: deque[BaseException] = deque()
         self._in_pool = 0  # running or queued callbacks
-        self._wake_set = WaitSet()  # contains the guard condition only
+        self._wake_set = _dds.WaitSet()  # contains the guard condition only
         self._wake_set.attach(self._guard.handle, _WAKE)
         self._dds.append(self._wake_set)
 

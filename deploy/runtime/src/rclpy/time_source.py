@@ -33,7 +33,7 @@ class TimeSource:
         self._clock_sub: Subscription | None = None
         self._timeout: Timer | None = None
         self._node_weak_ref: weakref.ReferenceType[Node] | None = None
-        self._associated_clocks: set[ROSClock] = set()
+        self._associated_clocks: dict[ROSClock, None] = {}  # in order
         # Zero: no time was received.
         self._last_time_set = Time(clock_type=ClockType.ROS_TIME)
         self._ros_time_is_active = False
@@ -102,7 +102,7 @@ class TimeSource:
             raise ValueError("Only clocks with type ROS_TIME can be attached.")
         clock.set_ros_time_override(self._last_time_set)
         clock._set_ros_time_is_active(self.ros_time_is_active)
-        self._associated_clocks.add(clock)
+        self._associated_clocks[clock] = None
 
     def clock_callback(self, msg: rosgraph_msgs.msg.Clock) -> None:
         """

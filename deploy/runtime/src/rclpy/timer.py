@@ -109,7 +109,6 @@ class Timer:
     @timer_period_ns.setter
     def timer_period_ns(self, value: int) -> None:
         self._usable()._period = int(value)
-        self._on_change()
 
     def is_ready(self) -> bool:
         """Whether the next call is due."""

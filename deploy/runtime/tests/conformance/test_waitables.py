@@ -299,5 +299,7 @@ def test_the_methods_of_a_waitable_are_abstract() -> None:
         waitable.take_data()
     with pytest.raises(NotImplementedError, match="Must be implemented by subclass"):
         waitable.get_num_entities()
+    with pytest.raises(NotImplementedError, match="Must be implemented by subclass"):
+        waitable.execute(None).send(None)
     assert waitable.callback_group is not None
     assert waitable.callback_group.has_entity(waitable)

@@ -35,16 +35,18 @@ _users: dict[int, int] = {}  # domain id -> number of participants of this proce
 _handles: dict[int, int] = {}
 
 
-def domain_id_from_environment(environment: Mapping[str, str] = os.environ) -> int:
+def domain_id_from_environment(environment: Mapping[str, str] | None = None) -> int:
     """Return ROS_DOMAIN_ID, by default 0. Raises RCLError if it is not a number from 0 to 232."""
+    environment = os.environ if environment is None else environment
     text = environment.get("ROS_DOMAIN_ID", "").strip() or "0"
     if not text.isdecimal() or int(text) > 232:
         raise RCLError(f"ROS_DOMAIN_ID must be a whole number from 0 to 232, not '{text}'")
     return int(text)
 
 
-def configuration(environment: Mapping[str, str] = os.environ, domain_id: int = 0) -> str:
+def configuration(environment: Mapping[str, str] | None = None, domain_id: int = 0) -> str:
     """Return Cyclone's configuration of a domain. Raises RCLError if the environment is invalid."""
+    environment = os.environ if environment is None else environment
     if environment.get("ROS_SECURITY_ENABLE") == "true":  # no other spelling counts, as in ROS 2
         raise RCLError(
             "ROS_SECURITY_ENABLE is true, but this runtime has no DDS security: unset it, or use ROS 2"

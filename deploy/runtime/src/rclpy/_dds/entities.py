@@ -10,7 +10,8 @@ from rclpy._handle import Handle
 from rclpy.exceptions import InvalidHandle, RCLError
 from rclpy.qos import QoSProfile
 
-from . import domain, qos
+from . import domain, qos, status
+from .discovery import Discovery
 from .library import (
     ANY_STATE,
     LIBRARY_HANDLE,
@@ -91,6 +92,10 @@ class Participant:
         self.publisher = checked(blocking.dds_create_publisher(self.handle, None, None), "publisher")
         self.subscriber = checked(blocking.dds_create_subscriber(self.handle, None, None), "subscriber")
 
+    def create_discovery(self) -> Discovery:
+        """Return the entities that this participant discovers."""
+        return Discovery(self.handle)
+
     def close(self) -> None:
         """Leave the domain and notify peers, which need not wait for the end of a lease."""
         blocking.dds_delete(self.handle)
@@ -122,13 +127,32 @@ class Participant:
             blocking.dds_delete(handle)
 
 
-class Writer(Handle):
-    """A DDS writer of CDR."""
+class _Endpoint(Handle):
+    """A DDS writer or reader. Wait sets attach its ``handle`` for its statuses."""
 
     def __init__(self, handle: int) -> None:
         self.handle = handle
         self.logger_name = ""  # of the node that it belongs to
         self.gid = _guid(handle)
+
+    def watch(self, statuses: list[str]) -> None:
+        """Make changes of the named statuses, and of no others, trigger wait sets."""
+        status.watch(self.handle, statuses)
+
+    def watch_also(self, name: str) -> None:
+        """Watch a further status."""
+        status.watch_also(self.handle, name)
+
+    def changed(self, name: str) -> dict[str, int] | None:
+        """Return the fields of a status if it has changed since the last call, else ``None``."""
+        return status.changed(self.handle, name)
+
+
+class Writer(_Endpoint):
+    """A DDS writer of CDR."""
+
+    def __init__(self, handle: int) -> None:
+        super().__init__(handle)
         sertype = Pointer()
         checked(quick.dds_get_entity_sertype(handle, ct.byref(sertype)), "cannot read a writer's type")
         self._sertype = sertype.value  # None once closed: DDS frees it with the writer
@@ -183,13 +207,11 @@ class Writer(Handle):
         blocking.dds_delete(self.handle)
 
 
-class Reader(Handle):
+class Reader(_Endpoint):
     """A DDS reader of CDR. Wait sets attach its ``condition``."""
 
     def __init__(self, handle: int) -> None:
-        self.handle = handle
-        self.logger_name = ""  # of the node that it belongs to
-        self.gid = _guid(handle)
+        super().__init__(handle)
         self.condition = checked(blocking.dds_create_readcondition(handle, ANY_STATE), "read condition")
         # DDS returns a sample in a buffer. Each taking thread uses one; they are reused, as creation is slow.
         self._buffers: list[tuple[Pointer, int, SampleInfo, int]] = []

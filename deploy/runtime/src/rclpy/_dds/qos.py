@@ -26,10 +26,17 @@ _AUTOMATIC, _MANUAL_BY_TOPIC = 0, 2
 _XCDR1 = (ct.c_int16 * 1)(0)
 
 
-def _nanoseconds(duration: Duration) -> int:
+def nanoseconds(duration: Duration) -> int:
     """Convert a ROS duration for DDS: 0 (unspecified) and values out of range are infinite."""
-    nanoseconds = duration.nanoseconds
-    return nanoseconds if 0 < nanoseconds < INFINITY else INFINITY
+    value = duration.nanoseconds
+    return value if 0 < value < INFINITY else INFINITY
+
+
+def check(profile: QoSProfile) -> None:
+    """Raise RCLError if a policy is UNKNOWN, as rmw does."""
+    for name in ("history", "reliability", "durability", "liveliness"):
+        if getattr(profile, name).name == "UNKNOWN":
+            raise RCLError(f"the {name} of an endpoint cannot be UNKNOWN")
 
 
 @contextmanager
@@ -40,9 +47,7 @@ def endpoint_qos(profile: QoSProfile, user_data: str) -> Iterator[int]:
 
     :raises RCLError: if a policy is UNKNOWN, as in rmw.
     """
-    for name in ("history", "reliability", "durability", "liveliness"):
-        if getattr(profile, name).name == "UNKNOWN":
-            raise RCLError(f"the {name} of an endpoint cannot be UNKNOWN")
+    check(profile)
     qos = quick.dds_create_qos()
     try:
         quick.dds_qset_writer_data_lifecycle(qos, False)
@@ -63,10 +68,10 @@ def endpoint_qos(profile: QoSProfile, user_data: str) -> Iterator[int]:
             )
         else:
             quick.dds_qset_durability(qos, _VOLATILE)
-        quick.dds_qset_lifespan(qos, _nanoseconds(profile.lifespan))
-        quick.dds_qset_deadline(qos, _nanoseconds(profile.deadline))
+        quick.dds_qset_lifespan(qos, nanoseconds(profile.lifespan))
+        quick.dds_qset_deadline(qos, nanoseconds(profile.deadline))
         manual = profile.liveliness == LivelinessPolicy.MANUAL_BY_TOPIC
-        lease = _nanoseconds(profile.liveliness_lease_duration)
+        lease = nanoseconds(profile.liveliness_lease_duration)
         quick.dds_qset_liveliness(qos, _MANUAL_BY_TOPIC if manual else _AUTOMATIC, lease)
         encoded = user_data.encode()
         quick.dds_qset_userdata(qos, encoded, len(encoded))
@@ -110,7 +115,7 @@ def profile_of(qos: int | None) -> QoSProfile:
     """Return the ROS profile of a discovered endpoint; history is UNKNOWN if it is not announced."""
     kind, depth, duration = ct.c_int(), ct.c_int32(), library.Duration()
 
-    def nanoseconds(getter: str) -> Duration:
+    def duration_of(getter: str) -> Duration:
         if not qos or not getattr(quick, getter)(qos, ct.byref(duration)):
             return Duration(nanoseconds=INFINITY)
         return Duration(nanoseconds=duration.value)
@@ -133,8 +138,8 @@ def profile_of(qos: int | None) -> QoSProfile:
         depth=max(0, depth.value),
         reliability=reliability,
         durability=durability,
-        lifespan=nanoseconds("dds_qget_lifespan"),
-        deadline=nanoseconds("dds_qget_deadline"),
+        lifespan=duration_of("dds_qget_lifespan"),
+        deadline=duration_of("dds_qget_deadline"),
         liveliness=liveliness,
         liveliness_lease_duration=lease,
     )

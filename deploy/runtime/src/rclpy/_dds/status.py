@@ -71,8 +71,8 @@ def watch_also(handle: int, name: str) -> None:
     blocking.dds_set_status_mask(handle, mask.value | STATUSES[name][0])
 
 
-def changed(handle: int, name: str) -> Any:
-    """Return the status if it has changed since the last call, else ``None``."""
+def changed(handle: int, name: str) -> dict[str, int] | None:
+    """Return the fields of a status if it has changed since the last call, else ``None``."""
     bit, structure = STATUSES[name]
     changes = ct.c_uint32()
     if blocking.dds_get_status_changes(handle, ct.byref(changes)) != 0 or not changes.value & bit:
@@ -80,4 +80,4 @@ def changed(handle: int, name: str) -> Any:
     status = structure()
     if getattr(_getters, f"dds_get_{name}_status")(handle, ct.byref(status)) != 0:
         return None
-    return status
+    return {field[0]: getattr(status, field[0]) for field in structure._fields_}

@@ -70,7 +70,7 @@ class LifecycleNodeMixin(ManagedEntity):
             State.TRANSITION_STATE_DEACTIVATING: self.on_deactivate,
             State.TRANSITION_STATE_ERRORPROCESSING: self.on_error,
         }
-        self._managed_entities: set[ManagedEntity] = set()
+        self._managed_entities: dict[ManagedEntity, None] = {}  # in order
         assert isinstance(self, Node)
         self._state_machine = LifecycleStateMachine(self)
         if not enable_communication_interface:
@@ -150,20 +150,20 @@ class LifecycleNodeMixin(ManagedEntity):
         """
         if not isinstance(entity, ManagedEntity):
             raise TypeError("Expected a rclpy.lifecycle.ManagedEntity instance.")
-        self._managed_entities.add(entity)
+        self._managed_entities[entity] = None
 
     def create_lifecycle_publisher(self, *args: Any, **kwargs: Any) -> LifecyclePublisher:
         """Create a publisher that publishes only while the node is active, as ``create_publisher`` does."""
         if "publisher_class" in kwargs:
             raise TypeError("create_publisher() got an unexpected keyword argument 'publisher_class'")
         publisher: Any = Node.create_publisher(self, *args, **kwargs, publisher_class=LifecyclePublisher)  # type: ignore[arg-type]
-        self._managed_entities.add(publisher)
+        self._managed_entities[publisher] = None
         created: LifecyclePublisher = publisher
         return created
 
     def destroy_lifecycle_publisher(self, publisher: LifecyclePublisher) -> bool:
         """Destroy such a publisher; return ``False`` if the node does not have it."""
-        self._managed_entities.discard(publisher)
+        self._managed_entities.pop(publisher, None)
         return Node.destroy_publisher(self, publisher)  # type: ignore[arg-type]
 
     def __forward(self, callback_name: str, state: LifecycleState) -> TransitionCallbackReturn:
