@@ -1,0 +1,275 @@
+"""Simulated processes: their life, their signals, and what can happen to them."""
+
+from __future__ import annotations
+
+import io
+import signal
+import threading
+from collections import deque
+from collections.abc import Callable, Mapping
+from concurrent.futures.thread import _threads_queues
+from typing import TYPE_CHECKING, Any
+
+from greenlet import GreenletExit
+
+from rclpy_simulation import kernel
+from rclpy_simulation.host import Host
+from rclpy_simulation.thread import ProcessExit, Thread, trace
+
+if TYPE_CHECKING:
+    from rclpy_simulation.kernel import Kernel
+    from rclpy_simulation.participant import Participant
+
+_OUTPUT = 64 * 1024  # characters of a process's output that are kept
+_UNWILLING = 100  # waits of a killed thread that catches every exception
+_IGNORED = (signal.SIGCHLD, signal.SIGURG, signal.SIGWINCH, signal.SIGPIPE)  # by default, in Python
+
+
+class Output(io.TextIOBase):
+    """Standard output and error of a process; the latest part is kept."""
+
+    def __init__(self) -> None:
+        self._parts: deque[str] = deque()
+        self._length = 0
+        self._has_ended = False
+
+    def write(self, text: str) -> int:
+        """Add text, unless the process has ended."""
+        if not self._has_ended:
+            self._parts.append(text[-_OUTPUT:])
+            self._length += len(self._parts[-1])
+            while self._length > _OUTPUT and len(self._parts) > 1:
+                self._length -= len(self._parts.popleft())
+        return len(text)
+
+    def end(self) -> None:
+        """Ignore all later text."""
+        self._has_ended = True
+
+    @property
+    def text(self) -> str:
+        """What the process has written."""
+        return "".join(self._parts)
+
+
+class Process:
+    """A simulated process: the life of one program, from its start to its end."""
+
+    def __init__(
+        self,
+        kernel: Kernel,
+        name: str,
+        main: Callable[[], Any],
+        host: Host,
+        parent: int,
+        environment: Mapping[str, str],
+    ) -> None:
+        self.kernel = kernel
+        self.name = name
+        self.host = host
+        self.pid = kernel.next_pid()
+        self.parent_pid = parent
+        self.environment = environment
+        """The variables that it was started with."""
+        self.began = kernel.now
+        self.output = Output()
+        self.exit_code: int | None = None
+        """``None`` while it is alive, the negative signal number if a signal has killed it."""
+        self.participants: list[Participant] = []
+        self.handlers: dict[int, Any] = {}
+        """Its signal handlers."""
+        self.exit_functions: list[Callable[[], Any]] = []
+        self.interrupts: deque[Callable[[], Any]] = deque()
+        """Actions that wait for the main thread."""
+        self.face = threading.Thread(name="MainThread", daemon=False)
+        """The main thread, as its program sees it."""
+        self.saved: list[Any] = []
+        """Its variables, while those of another process are in place."""
+        self.is_stopped = False
+        """Whether SIGSTOP has suspended it."""
+        self.is_hung = False
+        """Whether it runs an endless loop."""
+        self._main = main
+        self._at_end: list[Callable[[], Any]] = []
+        self._threads: list[Thread] = []
+        self._postponed: list[Callable[[], Any]] = []
+        self._refused = 0
+        kernel.processes[self.pid] = self
+
+    def __repr__(self) -> str:
+        return f"<{self.name} {self.pid}>"
+
+    @property
+    def ended(self) -> bool:
+        """Whether the process has ended."""
+        return self.exit_code is not None
+
+    @property
+    def is_suspended(self) -> bool:
+        """Whether it runs nothing at present: stopped, or in an endless loop."""
+        return self.is_stopped or self.is_hung
+
+    # Its life
+
+    def begin(self) -> None:
+        """Run ``main``."""
+        if not self.ended:
+            self.start_thread(self._run, self.face)
+
+    def start_thread(self, work: Callable[[], Any], face: threading.Thread) -> None:
+        """Start a thread; the first one is the main thread."""
+        if len(self._threads) > 1:
+            self._threads[1:] = [thread for thread in self._threads[1:] if not thread.done]
+        thread = Thread(self, work, face)
+        self._threads.append(thread)
+        thread.wake()
+
+    def _run(self) -> None:
+        code = self._code_of(self._main)
+        for thread in self._threads[1:]:
+            if not thread.face.daemon and thread.face not in _threads_queues:  # Python ends pools itself
+                code = self._code_of(lambda it=thread: it.join(None)) or code  # type: ignore[misc]
+        while self.exit_functions:
+            self._code_of(self.exit_functions.pop())
+        self._code_of(self.kernel.at_exit)
+        self.exit(code)
+
+    def _code_of(self, work: Callable[[], Any]) -> int:
+        """Run a part of the program; return the exit code with which it ends."""
+        try:
+            work()
+        except SystemExit as error:
+            if error.code is None or isinstance(error.code, int):
+                return error.code or 0
+            self.output.write(f"{error.code}\n")
+            return 1
+        except (GreenletExit, ProcessExit):
+            raise
+        except BaseException as error:
+            self.output.write(trace(error))
+            return -signal.SIGINT if isinstance(error, KeyboardInterrupt) else 1
+        return 0
+
+    def refuse(self, thread: Thread) -> None:
+        """Raise in a killed process: it must not run on."""
+        self._refused += 1
+        if self._refused > _UNWILLING:  # it catches every exception: leave it where it is
+            self.kernel.unwilling.append(thread)
+            self.kernel.hub.switch()
+        raise GreenletExit
+
+    def exit(self, code: int) -> None:
+        """End at once."""
+        if self.ended:
+            return
+        self.exit_code = code
+        self.output.end()
+        kernel = self.kernel
+        kernel.note_end(self, code)
+        for participant in list(self.participants):
+            participant.vanish()
+        del kernel.processes[self.pid]
+        kernel.schedule(kernel.now, self._clear)
+
+    def _clear(self) -> None:
+        """Unwind the threads, and forget all that the process had."""
+        for thread in self._threads:
+            thread.throw()
+        self.kernel.load(None)
+        self._threads, self._postponed, self.participants, self.saved = [], [], [], []
+        self.interrupts.clear()
+        self.handlers.clear()
+        self.exit_functions.clear()
+        for action in self._at_end:
+            action()
+
+    def at_end(self, action: Callable[[], Any]) -> None:
+        """Run an action of the simulation when the process has ended."""
+        self._at_end.append(action)
+
+    def abandon(self) -> None:
+        """Forget the actions of :meth:`at_end`."""
+        self._at_end.clear()
+
+    # What happens to it
+
+    def kill(self) -> None:
+        """SIGKILL: it ends at once, without a word to anyone."""
+        self.exit(-signal.SIGKILL)
+
+    def stop(self) -> None:
+        """SIGSTOP: it runs nothing until :meth:`proceed`."""
+        if not self.is_stopped and not self.ended:
+            self.is_stopped = True
+            for participant in self.participants:
+                participant.fall_silent()
+
+    def hang(self) -> None:
+        """Let it run an endless loop in a callback. DDS, which has threads of its own, goes on."""
+        self.is_hung = True
+
+    def proceed(self) -> None:
+        """SIGCONT: it goes on, with all that has arrived meanwhile."""
+        if not self.is_stopped or self.ended:
+            return
+        self.is_stopped = False
+        postponed, self._postponed = self._postponed, []
+        for action in postponed:
+            action()
+        for participant in self.participants:
+            participant.speak_again()
+
+    def postpone(self, action: Callable[[], Any]) -> None:
+        """Run an action of the kernel when the process runs again."""
+        self._postponed.append(action)
+
+    def send_signal(self, number: int) -> None:
+        """Send a signal, such as ``signal.SIGTERM``; its handler runs on the main thread."""
+        if number == signal.SIGKILL:
+            self.kill()
+        elif number == signal.SIGSTOP:
+            self.stop()
+        elif number == signal.SIGCONT:
+            self.proceed()
+        elif number and self.handler(number) != signal.SIG_IGN:
+            if self.handler(number) != signal.SIG_DFL:
+                self.interrupt(lambda: self.handle(number))
+            elif self.is_stopped:
+                self.postpone(lambda: self.send_signal(number))
+            elif number not in _IGNORED:
+                self.exit(-number)
+
+    def interrupt(self, action: Callable[[], Any]) -> None:
+        """Run an action on the main thread where it waits, like a signal handler; it may raise or sleep."""
+        self.interrupts.append(action)
+        if self._threads:
+            self._threads[0].wake()
+
+    def handler(self, number: int) -> Any:
+        """Return the handler of a signal. Python handles SIGINT as soon as the program runs."""
+        is_interrupt = number == signal.SIGINT and bool(self._threads)
+        return self.handlers.get(number, signal.default_int_handler if is_interrupt else signal.SIG_DFL)
+
+    def handle(self, number: int) -> None:
+        """Handle a signal, on the main thread."""
+        handler = self.handler(number)
+        if callable(handler):
+            handler(number, None)
+        else:
+            self.send_signal(number)
+
+    def handle_interrupts(self, thread: Thread) -> None:
+        """Let a thread that runs note the end of its process, and run the actions of :meth:`interrupt`."""
+        if self.ended:
+            self.refuse(thread)
+        while self.interrupts and thread is self._threads[0]:
+            self.interrupts.popleft()()
+            if self.ended:
+                self.refuse(thread)
+
+    def settle(self) -> None:
+        """Let the running thread note what has just happened to its process: end, stop, signals."""
+        thread = kernel.running()
+        if self.is_suspended and not self.ended:
+            thread.wait(self.kernel.now)
+        self.handle_interrupts(thread)

@@ -1,0 +1,181 @@
+"""Threads of simulated processes: they take turns, and virtual time passes only while all of them wait."""
+
+from __future__ import annotations
+
+import threading
+import traceback
+from collections.abc import Callable
+from concurrent.futures.thread import _threads_queues
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from greenlet import GreenletExit, greenlet
+
+from rclpy_simulation import kernel
+from rclpy_simulation.host import SECOND
+
+if TYPE_CHECKING:
+    from rclpy_simulation.process import Process
+
+BUSY_WAITS = 1000  # without waiting in between: then a thread is taken for a busy loop
+_BUSY_PAUSE = SECOND // 1000
+_FIRST_IDENT = 1 << 62  # real identifiers of threads are addresses below
+_HERE = str(Path(__file__).parent)
+
+
+class ProcessExit(BaseException):
+    """``os._exit`` in a simulated process."""
+
+    def __init__(self, code: int) -> None:
+        super().__init__(code)
+        self.code = code
+
+
+class Thread:
+    """
+    A thread of a simulated process.
+
+    It is a greenlet, which runs until it waits: in a DDS wait set, in ``time.sleep``, or for a condition or
+    event of ``threading``.
+    """
+
+    def __init__(self, process: Process, work: Callable[[], Any], face: threading.Thread) -> None:
+        """
+        Prepare a thread.
+
+        :param face: what ``threading.current_thread`` returns in it.
+        """
+        self.process = process
+        self.face = face
+        self.ident = _FIRST_IDENT + process.kernel.next_number()
+        self.done = False
+        self._waiters: list[Thread] = []  # threads that join this one
+        self._work = work
+        self._greenlet = greenlet(self._run, parent=process.kernel.hub)
+        self._waits = True
+        self._is_due = False  # a resumption is scheduled, or postponed until the process runs again
+        self._deadline: int | None = None
+        self._alarm: int | None = None  # the time of the scheduled check of the deadline
+        self._busy_at = -1
+        self._busy_waits = 0
+        face._ident = self.ident  # type: ignore[attr-defined]
+        face._started.set()  # type: ignore[attr-defined]
+        face.__dict__["_simulated_thread"] = self
+        # threading.current_thread() looks here.
+        threading._active[self.ident] = face  # type: ignore[attr-defined]
+
+    def _run(self) -> None:
+        try:
+            self._work()
+        except (GreenletExit, SystemExit):
+            pass
+        except ProcessExit as error:
+            self.process.exit(error.code)
+        except BaseException as error:
+            self.process.output.write(f"Exception in thread {self.face.name}:\n{trace(error)}")
+        finally:
+            self._end()
+
+    def _end(self) -> None:
+        self.done = True
+        threading._active.pop(self.ident, None)  # type: ignore[attr-defined]
+        _threads_queues.pop(self.face, None)  # type: ignore[attr-defined]  # else Python joins it at its exit
+        for waiter in self._waiters:
+            waiter.wake()
+
+    def wake(self) -> None:
+        """End the present wait of this thread."""
+        if self._waits and not self._is_due and not self.done:
+            self._is_due = True
+            kernel = self.process.kernel
+            kernel.schedule(kernel.now, self._resume)
+
+    def _resume(self) -> None:
+        process = self.process
+        if process.is_stopped or process.is_hung:
+            process.postpone(self._resume)
+            return
+        self._is_due = False
+        if self._waits and not self.done and process.exit_code is None:
+            if listeners := process.kernel.listeners:
+                for listener in listeners:
+                    listener(process)
+                if process.exit_code is not None or process.is_suspended:
+                    self.wake()  # a listener has killed or stopped it
+                    return
+            self._waits = False
+            process.kernel.switch(process, self, self._greenlet.switch)
+
+    def wait(self, deadline: int | None) -> None:
+        """Let other threads run until this one is woken, or until a time of the monotonic clock [ns]."""
+        process = self.process
+        kernel = process.kernel
+        if process.exit_code is not None:
+            process.refuse(self)
+        self._waits, self._deadline = True, deadline
+        if deadline is not None and (self._alarm is None or deadline < self._alarm):
+            self._alarm = max(deadline, kernel.now)
+            kernel.schedule(self._alarm, self._ring)
+        kernel.hub.switch()
+        if process.interrupts or process.exit_code is not None:
+            process.handle_interrupts(self)
+
+    def _ring(self) -> None:
+        kernel = self.process.kernel
+        if self._alarm != kernel.now:
+            return  # an earlier alarm was set later
+        self._alarm = None
+        if self._waits and self._deadline is not None:
+            if self._deadline <= kernel.now:
+                self.wake()
+            else:
+                self._alarm = self._deadline
+                kernel.schedule(self._alarm, self._ring)
+
+    def note_empty_wait(self) -> None:
+        """Note a wait of zero length; a busy loop of them lets time pass."""
+        now = self.process.kernel.now
+        self._busy_waits = self._busy_waits + 1 if self._busy_at == now else 0
+        self._busy_at = now
+        if self._busy_waits > BUSY_WAITS:
+            self.pause()
+
+    def pause(self) -> None:
+        """Let a moment pass, as the code that has just run would have taken in reality."""
+        self.wait(self.process.kernel.now + _BUSY_PAUSE)
+
+    def wait_until(self, condition: Callable[[], object], timeout: float | None) -> None:
+        """Wait until a condition is true, at most ``timeout`` [s]; who makes it true wakes this thread."""
+        kernel = self.process.kernel
+        deadline = None if timeout is None else kernel.now + int(timeout * SECOND)
+        if deadline is not None and deadline <= kernel.now:
+            self.note_empty_wait()
+        while not condition() and (deadline is None or kernel.now < deadline):
+            self.wait(deadline)
+
+    def join(self, timeout: float | None) -> None:
+        """Let the running thread wait for the end of this one, at most ``timeout`` [s]."""
+        waiting = kernel.running()
+        if waiting is self:
+            raise RuntimeError("cannot join current thread")
+        self._waiters.append(waiting)
+        try:
+            waiting.wait_until(lambda: self.done, timeout)
+        finally:
+            self._waiters.remove(waiting)
+
+    def throw(self) -> None:
+        """Unwind this thread of a killed process."""
+        if not self.done:
+            if self._greenlet:
+                self._waits = False
+                self.process.kernel.switch(self.process, self, self._greenlet.throw)
+            self._end()
+
+
+def trace(error: BaseException) -> str:
+    """Return the traceback of a program's error, without the frames of the simulation around the program."""
+    frames = error.__traceback__
+    while frames is not None and frames.tb_frame.f_code.co_filename.startswith(_HERE):
+        frames = frames.tb_next
+    return "".join(traceback.format_exception(type(error), error, frames))

@@ -1,0 +1,74 @@
+"""A busy simulation, whose record test_determinism.py compares between interpreters."""
+
+from __future__ import annotations
+
+import hashlib
+import random
+import time
+import uuid
+
+import rclpy
+from rclpy_simulation import Network, Simulation
+from std_msgs.msg import Int64, String
+from std_srvs.srv import Trigger
+
+
+def talker() -> None:
+    """Publish numbers and names, and serve a service."""
+    rclpy.init()
+    node = rclpy.create_node("talker")
+    numbers = node.create_publisher(Int64, "numbers", 10)
+    names = node.create_publisher(String, "names", 1)
+    node.create_timer(0.05, lambda: numbers.publish(Int64(data=time.time_ns() + random.randrange(100))))
+    node.create_timer(0.3, lambda: names.publish(String(data=f"{uuid.uuid4()} {set('abc') and hash(1)}")))
+    node.create_service(Trigger, "serve", lambda request, response: response)
+    rclpy.spin(node)
+
+
+def listener() -> None:
+    """Publish what was heard, and call the service."""
+    rclpy.init()
+    node = rclpy.create_node("listener")
+    heard = node.create_publisher(Int64, "heard", 10)
+    client = node.create_client(Trigger, "serve")
+    for topic in ("numbers", "names"):
+        kind = Int64 if topic == "numbers" else String
+        node.create_subscription(kind, topic, lambda _: heard.publish(Int64(data=time.monotonic_ns())), 10)
+    node.create_timer(0.2, lambda: client.call_async(Trigger.Request()))
+    rclpy.spin(node)
+
+
+def digest(seed: int) -> str:
+    """Return a hash of all messages of a busy simulation, with their times and writers."""
+    found = hashlib.sha256()
+    with Simulation(seed, Network(loss=0.1)) as simulation:
+        simulation.tap(
+            lambda writer, sample: found.update(
+                f"{simulation.now:.9f} {writer.topic} {writer.gid.hex()} {sample.data.hex()}\n".encode()
+            )
+        )
+        for host in ("left", "right"):
+            simulation.start(talker, host=host)
+            simulation.start(listener, host=host)
+        for _ in range(20):
+            simulation.run(0.5)
+            process = simulation.random.choice(simulation.processes)
+            fault = simulation.random.choice(["kill", "stop", "cut", "step"])
+            if fault == "kill":
+                process.kill()
+                simulation.start(simulation.random.choice([talker, listener]), host=process.host.name)
+            elif fault == "stop":
+                process.stop()
+                simulation.after(simulation.random.uniform(0.0, 2.0), process.proceed)
+            elif fault == "cut":
+                simulation.cut("left", "right")
+                simulation.after(
+                    simulation.random.uniform(0.0, 2.0), lambda: simulation.heal("left", "right")
+                )
+            else:
+                process.host.step(simulation.random.uniform(-10.0, 10.0))
+    return found.hexdigest()
+
+
+if __name__ == "__main__":
+    print(digest(7), digest(8))

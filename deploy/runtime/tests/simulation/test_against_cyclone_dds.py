@@ -1,0 +1,140 @@
+"""The network model against Cyclone DDS: the same programs, in real processes and simulated."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from typing import Any
+
+import pytest
+from deploy.runtime.tests.simulation import programs
+
+from rclpy_simulation import Simulation
+
+Record = dict[str, Any]
+
+
+pytestmark = pytest.mark.alone  # lifespans and leases of real processes
+
+
+@pytest.fixture(scope="module")
+def real(module_domain_id: int) -> tuple[Record, Record]:
+    """What the talker and the listener note in real processes."""
+    environment = os.environ | {"ROS_DOMAIN_ID": str(module_domain_id)}
+
+    def start(name: str) -> subprocess.Popen[str]:
+        command = [sys.executable, "-m", programs.__name__, name]
+        return subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True)
+
+    with start("talker") as talker:
+        assert talker.stdout is not None
+        assert talker.stdout.readline() == "early\n"
+        with start("listener") as listener:
+            notes = talker.communicate(timeout=40)[0], listener.communicate(timeout=40)[0]
+    return json.loads(notes[0]), json.loads(notes[1])
+
+
+@pytest.fixture(scope="module")
+def simulated() -> tuple[Record, Record]:
+    """What they note in a simulation."""
+    with Simulation(seed=1) as simulation:
+        talker = simulation.start(programs.talker)
+        simulation.run_until(lambda: "early" in talker.output.text)
+        listener = simulation.start(programs.listener)
+        simulation.run_until(lambda: talker.ended and listener.ended)
+    notes = [process.output.text.splitlines()[-1] for process in (talker, listener)]
+    return json.loads(notes[0]), json.loads(notes[1])
+
+
+@pytest.fixture(params=["real", "simulated"])
+def notes(request: pytest.FixtureRequest) -> tuple[Record, Record]:
+    """What the talker and the listener note."""
+    found: tuple[Record, Record] = request.getfixturevalue(request.param)
+    return found
+
+
+@pytest.fixture
+def talker(notes: tuple[Record, Record]) -> Record:
+    """What the talker notes."""
+    return notes[0]
+
+
+@pytest.fixture
+def listener(notes: tuple[Record, Record]) -> Record:
+    """What the listener notes."""
+    return notes[1]
+
+
+def test_a_late_joiner_gets_the_history_that_is_transient_local(listener: Record) -> None:
+    assert listener["received"]["history"] == [3, 4, 5]
+
+
+def test_a_best_effort_reader_gets_no_history(listener: Record) -> None:
+    assert listener["received"]["history_best_effort"] == []
+
+
+def test_history_expires_with_its_lifespan(listener: Record) -> None:
+    assert listener["received"]["history_expired"] == []
+
+
+def test_a_volatile_sample_before_the_match_is_lost(listener: Record) -> None:
+    assert listener["received"]["volatile"] == [6]
+
+
+def test_samples_of_one_writer_arrive_in_order(listener: Record) -> None:
+    assert listener["received"]["order"] == list(range(100))
+
+
+def test_a_full_reader_keeps_the_last_samples(listener: Record) -> None:
+    assert listener["received"]["overflow"] == [4, 5]
+
+
+def test_a_sample_expires_in_the_queue_of_a_busy_reader(listener: Record) -> None:
+    assert listener["received"]["short_life"] == []
+
+
+def test_samples_that_are_overwritten_or_expired_are_not_reported_as_lost(listener: Record) -> None:
+    assert listener["lost"] == 0
+
+
+def test_a_reader_counts_missed_deadlines_from_the_first_sample(listener: Record) -> None:
+    assert listener["deadlines_before_1"] == 0
+    assert listener["deadlines_before_2"] >= 3
+
+
+def test_a_writer_counts_missed_deadlines_too(talker: Record) -> None:
+    assert talker["deadlines"] >= 3
+
+
+def test_a_silent_manual_writer_loses_its_liveliness(talker: Record) -> None:
+    assert talker["lost_before_assertion"] == 1
+
+
+def test_a_sample_revives_a_writer_and_an_assertion_does_not(listener: Record) -> None:
+    alive, lost, gone = [1, 0], [0, 1], [0, 0]
+    states = [state for state in listener["alive"] if state != gone]
+    assert states[-3:] == [lost, alive, lost]
+    assert states[:-3] in ([alive], [])  # the end of its first life may be known before its beginning
+
+
+@pytest.mark.parametrize(
+    ("topic", "policy"),
+    [
+        ("too_unreliable", "RELIABILITY"),
+        ("too_volatile", "DURABILITY"),
+        ("too_slow", "DEADLINE"),
+        ("too_automatic", "LIVELINESS"),
+        ("too_long_lease", "LIVELINESS"),
+    ],
+)
+def test_incompatible_qos_is_reported_on_both_sides(
+    talker: Record, listener: Record, topic: str, policy: str
+) -> None:
+    assert talker["incompatible"][topic] == listener["incompatible"][topic] == policy
+    assert listener["received"][topic] == []
+
+
+def test_an_end_in_order_unmatches_at_once(listener: Record) -> None:
+    assert listener["matched"] == [1, 0]
