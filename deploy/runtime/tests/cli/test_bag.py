@@ -15,7 +15,7 @@ from mcap.reader import make_reader
 from rosbags.highlevel import AnyReader
 
 from geometry_msgs.msg import PointStamped
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import String
 
 pytestmark = pytest.mark.embedded  # ROS 2's is C++; its bags have the same format
@@ -110,20 +110,25 @@ def test_filters_select_topics(record: Record, ros2: Any) -> None:
 
 
 def test_play_keeps_the_pace_and_the_qos(
-    lab: Any, record: Record, start: Any, ros2: Any, wait_until: Wait
+    lab: Any, record: Record, ros2: Any, wait_until: Wait, tmp_path: Path
 ) -> None:
     bag = record("/arm/chatter", "/arm/point", seconds=2.0)
+    # Queues that hold the whole record, and a delay for a late match: a busy machine loses nothing.
+    overrides = tmp_path / "qos.yaml"
+    overrides.write_text("/arm/chatter: {reliability: reliable, history: keep_all}")
+    everything = QoSProfile(history=HistoryPolicy.KEEP_ALL, depth=0)
     arrivals: list[float] = []
     points: list[PointStamped] = []
     latched = QoSProfile(
         depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL, reliability=ReliabilityPolicy.RELIABLE
     )
     subscriptions = [
-        lab.create_subscription(String, "/replay", lambda _: arrivals.append(time.monotonic()), 10),
+        lab.create_subscription(String, "/replay", lambda _: arrivals.append(time.monotonic()), everything),
         lab.create_subscription(PointStamped, "/replayed_point", points.append, latched),
     ]
     done = ros2(
-        *("bag", "play", str(bag), "-r", "2.0"),
+        *("bag", "play", str(bag), "-r", "2.0", "--delay", "3", "--wait-for-all-acked", "0"),
+        *("--qos-profile-overrides-path", str(overrides)),
         *("--remap", "/arm/chatter:=/replay", "/arm/point:=/replayed_point"),
     )
     assert (done.stderr, done.returncode) == ("", 0)

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import random
 import struct
+import time
+import tracemalloc
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -19,7 +22,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
-from std_msgs.msg import Float64, String
+from std_msgs.msg import Float64, Float64MultiArray, String
 from std_srvs.srv import SetBool
 
 MakeNode = Callable[..., Node]
@@ -124,6 +127,47 @@ def test_samples_with_huge_counts_are_dropped(
     for count in (0x7FFFFFFF, 0xFFFFFFFF, 1_000_000):
         writer.write(HEADER + stamp_and_frame + struct.pack("<I", count) + bytes(64))
     spin_until(lambda: subscription._bad_input.count == 3)
+
+
+@pytest.mark.parametrize("message_type", [DiagnosticArray, Float64MultiArray, String])
+@pytest.mark.parametrize("count", [0x7FFFFFFF, 0xFFFFFFFF, 100_000_000])
+def test_huge_counts_cost_no_memory_and_no_time(message_type: Any, count: int) -> None:
+    sample = HEADER + struct.pack("<I", count) * 20
+    begin = time.thread_time()
+    with pytest.raises(ValueError, match="not a valid"):
+        message_type._deserialize(sample)
+    assert time.thread_time() - begin < 0.1  # s; a hundred million of anything take longer
+    tracemalloc.start()
+    try:
+        with pytest.raises(ValueError, match="not a valid"):
+            message_type._deserialize(sample)
+        assert tracemalloc.get_traced_memory()[1] < 20_000  # bytes, at the peak
+    finally:
+        tracemalloc.stop()
+
+
+def allocated() -> int:
+    """The private memory of this process [kB], also what it has not touched yet."""
+    (line,) = (line for line in Path("/proc/self/status").read_text().splitlines() if "VmData" in line)
+    return int(line.split()[1])
+
+
+def test_bad_samples_leave_no_memory_behind(
+    node: Node, participant: Participant, spin_until: SpinUntil
+) -> None:
+    subscription = node.create_subscription(Float64, "x", lambda message: None, QUEUE)
+    writer = writer_for(participant, "rt/x", "std_msgs::msg::dds_::Float64_", spin_until)
+
+    def feed(number: int) -> None:
+        wanted = subscription._bad_input.count + number
+        for _ in range(number):
+            writer.write(HEADER + b"\1")
+        spin_until(lambda: subscription._bad_input.count == wanted)
+
+    feed(200)
+    before = allocated()
+    feed(200)
+    assert allocated() < before + 20_000
 
 
 def test_random_samples_are_dropped_or_delivered(
