@@ -10,8 +10,11 @@ from typing import Any
 
 import pytest
 import reactivex as rx
+from rclpy.clock import Clock, ClockType
+from rclpy.duration import Duration
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
+from rclpy.time import Time
 from reactivex.disposable import BooleanDisposable
 from reactivex.subject import Subject
 from rosgraph_msgs.msg import Clock as ClockMessage
@@ -193,16 +196,23 @@ def test_actions_left_by_many_cancellations_run_in_order(
 
 
 def test_setting_wall_clock_changes_nothing(
-    scheduler: NodeScheduler, spin_until: SpinUntil, monkeypatch: pytest.MonkeyPatch
+    make_node: MakeNode, spin_until: SpinUntil, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    node: ReactiveNode = make_node("timed")
     ticks: list[datetime] = []
-    rx.interval(0.01).timeout(1.0).subscribe(lambda _: ticks.append(scheduler.now), scheduler=scheduler)
-    time_ns, timer = time.time_ns, time.time
+    stream = rx.interval(0.01).timeout(1.0)
+    stream.subscribe(lambda _: ticks.append(node.scheduler.now), scheduler=node.scheduler)
+    read = Clock.now
     for hours in (1, -1):
-        seen = len(ticks)
-        monkeypatch.setattr(time, "time_ns", lambda hours=hours: time_ns() + hours * 3600 * 10**9)
-        monkeypatch.setattr(time, "time", lambda hours=hours: timer() + hours * 3600)
+        step = Duration(seconds=hours * 3600)
 
+        def now(clock: Clock, step: Duration = step) -> Time:
+            return read(clock) if clock.clock_type == ClockType.STEADY_TIME else read(clock) + step
+
+        seen, before = len(ticks), read(node.get_clock())
+        monkeypatch.setattr(Clock, "now", now)
+        stepped = node.get_clock().now() - before
+        assert abs(stepped.nanoseconds - step.nanoseconds) < 10 * 10**9
         spin_until(lambda seen=seen: len(ticks) >= seen + 5)
 
     assert all(timedelta(0) < b - a < timedelta(minutes=1) for a, b in pairwise(ticks))

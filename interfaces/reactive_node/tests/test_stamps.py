@@ -22,3 +22,19 @@ def test_stamps_lose_less_than_a_microsecond(seconds: int, nanoseconds: int) -> 
 
 def test_now_is_time_of_day() -> None:
     assert abs(stamps.now() - datetime.now(UTC)) < timedelta(seconds=1)
+
+
+def test_nanoseconds_count_from_1970_and_round_down_to_microseconds() -> None:
+    second = datetime(1970, 1, 1, 0, 0, 1, 2, UTC)
+
+    assert stamps.from_nanoseconds(1_000_002_999) == second
+    assert stamps.from_nanoseconds(-1) == datetime(1969, 12, 31, 23, 59, 59, 999_999, UTC)
+    assert stamps.to_nanoseconds(second) == 1_000_002_000
+    assert stamps.to_nanoseconds(datetime(1969, 12, 31, 23, 59, 59, 999_999, UTC)) == -1000
+
+
+def test_message_of_a_time_has_its_seconds_and_nanoseconds() -> None:
+    time = datetime(1970, 1, 1, 0, 1, 5, 7, UTC)
+
+    assert stamps.to_message(time) == Time(sec=65, nanosec=7000)
+    assert stamps.from_message(Time(sec=65, nanosec=7999)) == time

@@ -33,12 +33,12 @@ class _Item(abc.DisposableBase):
     """A scheduled action; disposing it cancels the action, or disposes the result of the action."""
 
     __slots__ = ("action", "cancelled", "due", "result", "scheduler", "state")
+    due: int  # [ns]
+    state: Any
 
     def __init__(self, scheduler: NodeScheduler) -> None:
         self.scheduler = scheduler
-        self.due = 0  # [ns]
         self.action: Any = None  # None while the item is not in the heap
-        self.state: Any = None
         self.cancelled = False
         self.result: abc.DisposableBase | None = None
 
@@ -75,11 +75,7 @@ class NodeScheduler(PeriodicScheduler):
         if not self._simulated:
             self._offset = node.get_clock().now().nanoseconds - self._read()
         self._jumps = node.get_clock().create_jump_callback(
-            JumpThreshold(
-                min_forward=Duration(nanoseconds=1),
-                min_backward=Duration(nanoseconds=-1),
-                on_clock_change=True,
-            ),
+            JumpThreshold(min_forward=Duration(nanoseconds=1), min_backward=Duration(nanoseconds=-1)),
             post_callback=self._time_has_jumped,
         )
 
@@ -156,7 +152,7 @@ class NodeScheduler(PeriodicScheduler):
             if item.action is not None:
                 item.action = item.state = None
                 self._cancelled += 1
-                if self._cancelled > _FEW and self._cancelled > len(self._heap) // 2:
+                if self._cancelled > _FEW and 2 * self._cancelled > len(self._heap):
                     self._heap = [entry for entry in self._heap if not entry[2].cancelled]
                     heapq.heapify(self._heap)
                     self._cancelled = 0

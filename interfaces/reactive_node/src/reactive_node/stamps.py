@@ -6,6 +6,7 @@ and may differ between hosts. Where safety depends on an age, take only the age 
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from typing import Generic, TypeVar
@@ -36,12 +37,12 @@ class Timestamp(Generic[_T]):
 
 def now() -> datetime:
     """Return the time of day."""
-    return datetime.now(UTC)
+    return from_nanoseconds(time.time_ns())
 
 
 def from_nanoseconds(nanoseconds: int) -> datetime:
     """Convert nanoseconds since 1970, rounding down to microseconds."""
-    return _EPOCH + timedelta(microseconds=nanoseconds // 1000)
+    return _EPOCH + timedelta(0, 0, nanoseconds // 1000)  # for each message: a keyword costs 0.2 µs more
 
 
 def to_nanoseconds(time: datetime) -> int:
