@@ -52,6 +52,10 @@ class Topic:
         package, kind = self.type.__module__.split(".")[:2]
         return f"{package}/{kind}/{self.type.__name__}"
 
+    def full_name(self, namespace: str) -> str:
+        """Return the name in the namespace of an arm."""
+        return self.name if self.name[0] == "/" else f"{namespace.rstrip('/')}/{self.name}"
+
 
 def _not_finite(message: Any) -> str:
     return "" if math.isfinite(message.data) else f"{message.data} is not finite"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import configparser
 import shlex
+from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -29,10 +30,21 @@ class Program(NamedTuple):
 
 def programs(path: Path = PATH) -> tuple[Program, ...]:
     """Return the programs in the order of the group."""
-    manifest = configparser.RawConfigParser(inline_comment_prefixes=(" ;",))
-    manifest.read(path, encoding="utf-8")
+    manifest = _read(path)
     names = manifest[f"group:{GROUP}"]["programs"].replace(",", " ").split()
     return tuple(_program(name, manifest[f"program:{name}"]["command"]) for name in names)
+
+
+@cache
+def start_retries(program: str) -> int:
+    """Return after how many early ends supervisord gives a program up."""
+    return _read(PATH).getint(f"program:{program}", "startretries")
+
+
+def _read(path: Path) -> configparser.RawConfigParser:
+    manifest = configparser.RawConfigParser(inline_comment_prefixes=(" ;",))
+    manifest.read(path, encoding="utf-8")
+    return manifest
 
 
 def _program(name: str, command: str) -> Program:

@@ -75,16 +75,11 @@ def _state(program: Program, reason: str, recent_restarts: int, node: str) -> Di
 
 def carry_out(action: Action, system: System, supervisor: int) -> None:
     """Carry out an action, unless its process has changed meanwhile."""
-    if action.verb == "revive":
-        with suppress(DeploymentError):  # the next observation shows whether it worked
-            system.revive(supervisor, action.program)
+    if action.verb == "kill":
+        processes.send_signal(system.run, action.program, action.pid, signal.SIGKILL)
         return
-    for handle in processes.open_handles(system.run, [action.pid]):
-        # The handle reaches this very process or none.
-        if processes.environment_of(action.pid).get("SUPERVISOR_PROCESS_NAME") == action.program:
-            with suppress(ProcessLookupError):
-                signal.pidfd_send_signal(handle, signal.SIGKILL)
-        processes.close([handle])
+    with suppress(DeploymentError):  # the next observation shows whether it worked
+        system.revive(supervisor, action.program)
 
 
 @dataclass(frozen=True)

@@ -51,7 +51,7 @@ class ServiceNode(ReactiveNode):
     def __init__(self, node_name: str, **options: Any) -> None:
         """Create the node of a service; the options are those of :class:`rclpy.node.Node`."""
         super().__init__(node_name, **options)
-        self._observed: list[Topic] = []
+        self._observed: dict[str, Topic] = {}  # by its resolved name
         self.health = HealthReporter(self, before_report=self._remark_other_types)
         self.add_on_set_parameters_callback(_only_finite)
 
@@ -83,7 +83,7 @@ class ServiceNode(ReactiveNode):
         :param timestamped: see :meth:`ReactiveNode.create_observable`.
         :param max_age: a message that is older [s], or this much ahead of the local clock, is not good.
         """
-        self._observed.append(topic)
+        self._observed[self.resolve_topic_name(topic.name)] = topic
         samples = (
             self._from_every_publisher(topic) if is_latched(topic.qos) else self._samples(topic, topic.qos)
         )
@@ -203,8 +203,7 @@ class ServiceNode(ReactiveNode):
     def _remark_other_types(self) -> None:
         """Remark publishers that use an observed topic with another type: nothing arrives from them."""
         types = dict(self.get_topic_names_and_types())
-        for topic in self._observed:
-            name = self.resolve_topic_name(topic.name)
+        for name, topic in self._observed.items():
             if types.get(name, [topic.type_name]) == [topic.type_name]:
                 continue
             for publisher in self.get_publishers_info_by_topic(name):

@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+import socket
+import time
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.clock import ClockType
+from rclpy.time import Time
 
-from interfaces.service.health import healths
+from interfaces.service import ServiceNode
+from interfaces.service.health import HealthMonitor, healths
+from interfaces.topics import DIAGNOSTICS
+from reactive_node.testing import MakeNode, SpinUntil
 
 GOOD = {"pid": "7", "published": "3", "seconds_since_output": "0.5"}
 
@@ -37,3 +45,95 @@ def test_report_of_a_service_in_the_namespace_is_read() -> None:
 )
 def test_other_statuses_are_ignored(name: str, values: dict[str, Any]) -> None:
     assert healths(message(name, values), "/arm1") == {}
+
+
+def test_report_tells_whether_the_service_is_ok_and_when_it_was_heard() -> None:
+    report = message("/velocity", GOOD)
+    report.status[0].level = DiagnosticStatus.WARN
+    before = time.monotonic()
+
+    health = healths(report, "")["velocity"]
+
+    assert not health.ok
+    assert before <= health.heard <= time.monotonic()
+
+
+def test_report_without_pid_is_ignored_but_not_the_others() -> None:
+    both = message("/arm1/battery", {"published": "3"})
+    both.status += message("/arm1/velocity", GOOD).status
+
+    assert healths(both, "/arm1").keys() == {"velocity"}
+
+
+@pytest.mark.parametrize("namespace", ["", "/armX"])
+def test_monitor_keeps_the_latest_report_of_each_service(
+    make_node: MakeNode, spin_until: SpinUntil, namespace: str
+) -> None:
+    monitor = HealthMonitor(make_node("listener", namespace=namespace))
+    publisher = make_node("peer").create_publisher(DIAGNOSTICS.type, DIAGNOSTICS.name, DIAGNOSTICS.qos)
+    spin_until(publisher.get_subscription_count)
+    for name, pid in (("velocity", "7"), ("kinematics", "8"), ("velocity", "9")):
+        publisher.publish(message(f"{namespace}/{name}", GOOD | {"pid": pid}))
+    spin_until(lambda: {name: health.pid for name, health in monitor.latest.items()}.get("velocity") == 9)
+
+    assert {name: health.pid for name, health in monitor.latest.items()} == {"velocity": 9, "kinematics": 8}
+
+
+# Reporting
+
+
+@pytest.fixture
+def service(make_node: MakeNode) -> ServiceNode:
+    service: ServiceNode = make_node("service", kind=ServiceNode)
+    return service
+
+
+def test_health_is_due_every_second_on_the_steady_clock(service: ServiceNode) -> None:
+    (timer,) = [timer for timer in service.timers if not timer.is_canceled()]
+
+    assert timer.timer_period_ns == 10**9
+    assert timer.clock.clock_type == ClockType.STEADY_TIME
+
+
+def test_warning_is_logged_when_it_is_new(service: ServiceNode, monkeypatch: pytest.MonkeyPatch) -> None:
+    logged: list[str] = []
+    logger = service.get_logger()
+    monkeypatch.setattr(logger, "warning", logged.append)
+    monkeypatch.setattr(service, "get_logger", lambda: logger)
+    for reasons in (["late", "early"], ["late"], ["late", "lost"], [], ["late"]):
+        for reason in reasons:
+            service.remark("l1", reason)
+        service.health.report()
+
+    assert logged == ["l1: early; l1: late", "l1: late; l1: lost", "l1: late"]
+
+
+def test_report_has_host_uptime_and_age_of_the_last_output(
+    service: ServiceNode, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    published: list[Any] = []
+    monkeypatch.setattr(service.health._publisher, "publish", published.append)
+    monkeypatch.setattr(service.health, "_started", 100.0)
+    monkeypatch.setattr("interfaces.service.health.time.monotonic", lambda: 107.0)
+    service.health.count_output()
+    monkeypatch.setattr("interfaces.service.health.time.monotonic", lambda: 107.5)
+    before = service.get_clock().now()
+    service.health.report()
+
+    (array,) = published
+    (status,) = array.status
+    values = {pair.key: pair.value for pair in status.values}
+    assert (values["uptime"], values["seconds_since_output"], values["published"]) == ("7.500", "0.500", "1")
+    assert (status.hardware_id, status.level) == (socket.gethostname(), DiagnosticStatus.OK)
+    assert before <= Time.from_msg(array.header.stamp) <= service.get_clock().now()
+
+
+def test_report_is_sent_when_a_subscriber_comes_not_when_one_goes(
+    service: ServiceNode, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    reports: list[int] = []
+    for change in (1, 0, -1, 2):
+        monkeypatch.setattr(service.health, "report", lambda change=change: reports.append(change))
+        service.health._on_matched(SimpleNamespace(current_count_change=change))
+
+    assert reports == [1, 2]

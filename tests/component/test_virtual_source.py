@@ -116,7 +116,8 @@ def test_source_without_an_origin_starts_its_scenario_at_once(
     values = emitted(node, source.follow("value", Events(((0.0, 2.0), (0.01, 3.0)))))
     events = emitted(node, source.play(Events(((0.0, "a"),))))
 
-    spin_until(lambda: (values, events) == ([2.0, 3.0], ["a"]))
+    spin_until(lambda: (values[-1:], events) == ([3.0], ["a"]))
+    assert values in ([2.0, 3.0], [3.0])  # a slow start skips what is over
 
 
 @pytest.mark.parametrize("timeline", [Events(((0.0, 2.0),)), Sweep(2.0, 0.0, 1.0)])

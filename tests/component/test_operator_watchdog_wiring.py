@@ -1,0 +1,134 @@
+"""The operator watchdog between its topics."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import pytest
+from rclpy.parameter import Parameter
+from std_msgs.msg import Bool
+
+from interfaces.topics import (
+    ALIVE,
+    ENGINES,
+    INCAPACITATED,
+    MISSED,
+    OPERATOR_ACTIVITY,
+    OPERATOR_HEARTBEAT,
+    OPERATOR_PRESENCE,
+    TURN_OFF,
+)
+from reactive_node import stamps
+from reactive_node.testing import MakeNode, SpinFor, SpinUntil
+from services.operator_watchdog import wire
+from tests.component.wiring import Wired
+
+OUTPUTS = [OPERATOR_PRESENCE, OPERATOR_ACTIVITY, ENGINES]
+
+
+@pytest.fixture
+def wired(make_node: MakeNode, spin_until: SpinUntil, monkeypatch: pytest.MonkeyPatch) -> Any:
+    """Wires a watchdog; its health is reported on demand."""
+    monkeypatch.setattr("interfaces.service.health.PERIOD", 3600.0)
+
+    def make(**parameters: Any) -> Wired:
+        return Wired(make_node, spin_until, wire, inputs=[OPERATOR_HEARTBEAT], outputs=OUTPUTS, **parameters)
+
+    return make
+
+
+def data(wired: Wired, topic: Any) -> list[str]:
+    return [message.data for message in wired.heard[topic.name]]
+
+
+def test_presence_is_stamped_with_the_source_time_of_the_heartbeat(wired: Any, spin_for: SpinFor) -> None:
+    watchdog = wired(sampling=0.3)
+    sources: list[Any] = []
+
+    def note(_: Any, info: Any) -> None:
+        sources.append(stamps.from_nanoseconds(info["source_timestamp"]))
+
+    watchdog.peer.create_subscription(Bool, OPERATOR_HEARTBEAT.name, note, OPERATOR_HEARTBEAT.qos)
+    spin_for(0.1)
+    presences = watchdog.heard[OPERATOR_PRESENCE.name]
+    while not presences or not sources:
+        watchdog.publish(OPERATOR_HEARTBEAT, Bool(data=True))
+        spin_for(0.1)
+
+    assert stamps.from_message(presences[0].stamp) in sources
+    assert presences[0].frame_id == ""
+    assert data(watchdog, OPERATOR_ACTIVITY) == [ALIVE] * len(presences)
+
+
+def test_heartbeat_older_than_the_lifespan_is_dropped_and_counted(
+    wired: Any, spin_until: SpinUntil, spin_for: SpinFor, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    watchdog = wired(lifespan=0.4, sampling=0.01)
+    monkeypatch.setattr(watchdog.service, "age", lambda _: 0.401)
+    watchdog.publish(OPERATOR_HEARTBEAT, Bool(data=True))
+    spin_until(lambda: watchdog.service.health._dropped)
+    spin_for(0.1)
+
+    assert data(watchdog, OPERATOR_ACTIVITY) == []
+    assert watchdog.remarks() == ["operator_heartbeat: it is 0.401 s old"]
+    assert watchdog.reports()[-1]["dropped"] == "1"
+
+
+def test_silences_are_missed_then_incapacitated_then_turn_off(
+    wired: Any, spin_until: SpinUntil, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begin = time.monotonic()
+    watchdog = wired(silence=0.4, strikes=2, repeat=0.1)
+    logged: list[str] = []
+    logger = watchdog.service.get_logger()
+    monkeypatch.setattr(logger, "warning", logged.append)
+    monkeypatch.setattr(watchdog.service, "get_logger", lambda: logger)
+    spin_until(lambda: len(watchdog.heard[ENGINES.name]) >= 4)
+    took = time.monotonic() - begin
+
+    assert data(watchdog, OPERATOR_ACTIVITY) == [MISSED, MISSED, INCAPACITATED]
+    assert data(watchdog, ENGINES) == [TURN_OFF] * len(watchdog.heard[ENGINES.name])
+    assert watchdog.heard[OPERATOR_PRESENCE.name] == []
+    assert logged == [f"operator {MISSED}", f"operator {MISSED}", f"operator {INCAPACITATED}"]
+    assert 0.8 + 0.3 <= took < 0.8 + 3 * 0.5  # three of the repetitions
+
+
+def test_watchdog_that_resumes_soon_reports_the_operator(wired: Any, spin_for: SpinFor) -> None:
+    watchdog = wired(sampling=9.0, scenario_epoch=time.monotonic() - 60.0)
+    for _ in range(20):
+        watchdog.publish(OPERATOR_HEARTBEAT, Bool(data=True))
+        spin_for(0.05)
+        if watchdog.heard[OPERATOR_PRESENCE.name]:
+            break
+
+    assert data(watchdog, OPERATOR_ACTIVITY) == [ALIVE]
+
+
+def test_watchdog_that_resumes_samples_no_less_than_it_should(wired: Any, spin_for: SpinFor) -> None:
+    began = time.monotonic()
+    watchdog = wired(sampling=0.02, scenario_epoch=began - 60.0)
+    while not watchdog.heard[OPERATOR_PRESENCE.name]:
+        watchdog.publish(OPERATOR_HEARTBEAT, Bool(data=True))
+        spin_for(0.01)
+        assert time.monotonic() < began + 10.0
+
+
+def test_watchdog_samples_at_the_parameter_in_a_new_scenario(wired: Any, spin_for: SpinFor) -> None:
+    began = time.monotonic()
+    watchdog = wired(sampling=0.8)
+    while not watchdog.heard[OPERATOR_PRESENCE.name]:
+        watchdog.publish(OPERATOR_HEARTBEAT, Bool(data=True))
+        spin_for(0.02)
+    assert time.monotonic() - began >= 0.8
+
+
+def test_no_operator_is_expected_before_the_scenario(
+    wired: Any, spin_for: SpinFor, spin_until: SpinUntil
+) -> None:
+    watchdog = wired(silence=0.1, scenario_epoch=-1.0)
+    spin_for(0.3)
+    assert data(watchdog, OPERATOR_ACTIVITY) == []
+
+    watchdog.service.set_parameters([Parameter("scenario_epoch", value=time.monotonic())])
+    spin_until(lambda: data(watchdog, OPERATOR_ACTIVITY)[:1] == [MISSED])

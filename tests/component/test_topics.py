@@ -1,0 +1,123 @@
+"""The contract beside the README's table: what is wrong with a message, and which topics may be silent."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+from geometry_msgs.msg import Point, PointStamped
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from std_msgs.msg import Bool, Float64, String
+
+from interfaces import topics
+from interfaces.topics import Topic
+
+
+def number(value: float) -> Float64:
+    return Float64(data=value)
+
+
+def position(x: float, y: float) -> PointStamped:
+    return PointStamped(point=Point(x=x, y=y))
+
+
+def text(data: str) -> String:
+    return String(data=data)
+
+
+@pytest.mark.parametrize(
+    ("topic", "message", "problem"),
+    [
+        (topics.L1, number(0.0), ""),
+        (topics.L1, number(-0.5), "-0.5 is negative"),
+        (topics.L2, number(math.inf), "inf is not finite"),
+        (topics.L2, number(-0.5), "-0.5 is negative"),
+        (topics.THETA1, number(-0.5), ""),
+        (topics.THETA1, number(math.nan), "nan is not finite"),
+        (topics.THETA2, number(-math.inf), "-inf is not finite"),
+        (topics.EFFECTOR_SPEED, number(-0.5), "-0.5 is negative"),
+        (topics.EFFECTOR_POSITION, position(1.0, -1.0), ""),
+        (topics.EFFECTOR_POSITION, position(math.nan, 1.0), "(nan, 1.0) is not finite"),
+        (topics.EFFECTOR_POSITION, position(1.0, math.inf), "(1.0, inf) is not finite"),
+        (topics.OPERATOR_HEARTBEAT, Bool(data=True), ""),
+        (topics.OPERATOR_HEARTBEAT, Bool(data=False), "a released switch is no sign of life"),
+        *((topics.ENGINES, text(data), "") for data in ("turn_on", "turn_off")),
+        (topics.ENGINES, text("x" * 50), f"'{'x' * 40}' is unknown"),
+        *((topics.ENGINES_STATE, text(data), "") for data in ("on", "off")),
+        (topics.ENGINES_STATE, text("turn_on"), "'turn_on' is unknown"),
+        *((topics.OPERATOR_ACTIVITY, text(data), "") for data in ("alive", "missed", "incapacitated")),
+        (topics.OPERATOR_ACTIVITY, text("asleep"), "'asleep' is unknown"),
+        (topics.ROBOT_DESCRIPTION, text("anything"), ""),
+    ],
+)
+def test_problem_of_a_message(topic: Topic, message: Any, problem: str) -> None:
+    assert topic.problem(message) == problem
+
+
+def test_topics_that_report_single_events_may_be_silent() -> None:
+    gaps = {topic.name: topic.longest_gap for topic in topics.CONTRACT}
+
+    assert {name for name, gap in gaps.items() if gap == math.inf} == {
+        "robot_description",
+        "operator_activity",
+        "engines",
+    }
+    assert {name: gap for name, gap in gaps.items() if gap == 1.0} == {
+        "operator_presence": 1.0,  # at 2 Hz
+        "/diagnostics": 1.0,
+    }
+    assert sorted(set(gaps.values())) == [0.25, 1.0, math.inf]
+
+
+def test_topics_follow_those_that_they_are_made_of() -> None:
+    assert {topic.name: topic.follows for topic in topics.CONTRACT if topic.follows} == {
+        "effector/speed": "effector/position",
+        "operator_presence": "operator_heartbeat",
+    }
+
+
+def test_configuration_is_the_four_sources() -> None:
+    assert list(topics.CONFIGURATION.items()) == [
+        (topic.name, topic) for topic in (topics.L1, topics.L2, topics.THETA1, topics.THETA2)
+    ]
+
+
+@pytest.mark.parametrize("topic", topics.CONTRACT, ids=lambda topic: topic.name)
+def test_qos_is_the_described_one(topic: Topic) -> None:
+    described = topics._describe(topic.qos).split(", ")
+
+    assert ("reliable" in described) == (topic.qos.reliability == ReliabilityPolicy.RELIABLE)
+    assert ("best effort" in described) == (topic.qos.reliability == ReliabilityPolicy.BEST_EFFORT)
+    assert ("transient local" in described) == (topic.qos.durability == DurabilityPolicy.TRANSIENT_LOCAL)
+    assert ("volatile" in described) == (topic.qos.durability == DurabilityPolicy.VOLATILE)
+    assert f"last {topic.qos.depth}" in described
+    lifespans = [each for each in described if each.startswith("lifespan")]
+    nanoseconds = topic.qos.lifespan.nanoseconds
+    assert lifespans == ([] if nanoseconds == 0 else [_lifespan(nanoseconds)])
+    assert topics.is_latched(topic.qos) == ("transient local" in described)
+
+
+def _lifespan(nanoseconds: int) -> str:
+    return (
+        f"lifespan {nanoseconds // 10**9} s"
+        if nanoseconds >= 10**9
+        else f"lifespan {nanoseconds // 10**6} ms"
+    )
+
+
+def test_lifespan_of_a_second_is_in_seconds() -> None:
+    assert topics._describe(topics.OPERATOR_PRESENCE.qos).endswith("lifespan 1 s")
+    assert topics._describe(QoSProfile(depth=3)) == "reliable, volatile, last 3"
+
+
+@pytest.mark.parametrize(
+    ("topic", "namespace", "name"),
+    [
+        (topics.L1, "/", "/l1"),
+        (topics.L1, "/arm1", "/arm1/l1"),
+        (topics.DIAGNOSTICS, "/arm1", "/diagnostics"),
+    ],
+)
+def test_full_name_is_in_the_namespace_of_the_arm(topic: topics.Topic, namespace: str, name: str) -> None:
+    assert topic.full_name(namespace) == name

@@ -1,0 +1,276 @@
+"""The sentinel between its probe, its policy, its actions and /diagnostics."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import pytest
+from diagnostic_msgs.msg import DiagnosticStatus
+from rclpy.time import Time
+
+from deploy.supervision import processes, sentinel
+from deploy.supervision.manifest import SENTINEL
+from deploy.supervision.policy import Action, Observation, Timeouts
+from deploy.supervision.system import DeploymentError, Program, System
+from interfaces.topics import DIAGNOSTICS
+from reactive_node.testing import MakeNode, SpinFor, SpinUntil
+from tests.component.wiring import Wired
+
+VELOCITY = Program("velocity", "RUNNING", 501, 3.0, 2, "code 1", "")
+
+
+class Probe:
+    """Observes what the test has prepared."""
+
+    def __init__(self) -> None:
+        self.programs = [VELOCITY]
+        self.failure = ""
+        self.made = self.began = 0  # [ns]
+        self.threads: set[int] = set()
+        self.made_of: tuple[Path, int] | None = None
+        self.heard: dict[str, Any] = {}
+
+    def hear(self, reports: Mapping[str, Any]) -> None:
+        self.heard.update(reports)
+
+    def observe(self) -> Observation:
+        self.began = self.began or time.time_ns()
+        self.threads.add(threading.get_ident())
+        if self.failure:
+            raise DeploymentError(self.failure)
+        return Observation(0.0, self.programs)
+
+
+class Policy:
+    """Decides what the test has prepared."""
+
+    def __init__(self) -> None:
+        self.kill_inhibited_by = ""
+        self.reasons: dict[str, str] = {"velocity": "no health"}
+        self.recent_restarts: dict[str, int] = {"velocity": 3}
+        self.actions: list[Action] = []
+        self.timeouts: Timeouts | None = None
+
+    def decide(self, observation: Observation) -> list[Action]:
+        actions, self.actions = self.actions, []
+        return actions
+
+
+class Sentinel(Wired):
+    """A wired sentinel with a probe and a policy of the test."""
+
+    probe: Probe
+    policy: Policy
+    carried_out: list[tuple[Action, Path, int]]
+
+    def states(self) -> list[Any]:
+        """The messages about processes, without the health of the sentinel."""
+        return [each for each in self.heard[DIAGNOSTICS.name] if ": " in each.status[0].name]
+
+
+@pytest.fixture
+def wired(make_node: MakeNode, spin_until: SpinUntil, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Any:
+    probe, policy = Probe(), Policy()
+    carried_out: list[tuple[Action, Path, int]] = []
+
+    def make_policy(timeouts: Timeouts) -> Policy:
+        policy.timeouts = timeouts
+        return policy
+
+    monkeypatch.setenv(processes.MARK, str(tmp_path))
+    monkeypatch.setattr("interfaces.service.health.PERIOD", 3600.0)
+
+    def make_probe(system: System, supervisor: int) -> Probe:
+        probe.made = time.time_ns()
+        probe.made_of = (system.run, supervisor)
+        return probe
+
+    monkeypatch.setattr(sentinel, "Probe", make_probe)
+    monkeypatch.setattr(sentinel, "Policy", make_policy)
+    monkeypatch.setattr(
+        sentinel,
+        "carry_out",
+        lambda action, system, supervisor: carried_out.append((action, system.run, supervisor)),
+    )
+
+    def make(**options: Any) -> Sentinel:
+        options.setdefault("period", 0.05)
+        made = Sentinel(make_node, spin_until, sentinel.wire, inputs=[], outputs=[DIAGNOSTICS], **options)
+        made.probe, made.policy, made.carried_out = probe, policy, carried_out
+        return made
+
+    return make
+
+
+def test_states_are_published_on_change_and_every_second(wired: Any, spin_until: SpinUntil) -> None:
+    watching = wired(namespace="/arm1")
+    spin_until(lambda: len(watching.states()) >= 3)
+    *_, before, last = watching.states()
+    apart = (Time.from_msg(last.header.stamp) - Time.from_msg(before.header.stamp)).nanoseconds
+    assert 0.9e9 < apart < 1.8e9
+    assert watching.probe.began - watching.probe.made < 0.9e9
+    assert watching.probe.threads == {threading.get_ident()}
+    # The first repetition, for those who have just discovered the sentinel, comes soon.
+    ages = [Time.from_msg(each.header.stamp).nanoseconds - watching.probe.began for each in watching.states()]
+    assert any(0.25e9 <= age < 1.0e9 for age in ages)
+
+    (status,) = last.status
+    assert status.name == "/arm1/service: velocity"
+    assert (status.level, status.message) == (
+        DiagnosticStatus.WARN,
+        "RUNNING, restarted 3 times within a minute",
+    )
+    assert {pair.key: pair.value for pair in status.values}["why"] == "no health"
+
+    watching.probe.programs = [VELOCITY._replace(state="BACKOFF", pid=0)]
+    spin_until(lambda: watching.states()[-1].status[0].level == DiagnosticStatus.ERROR)
+    changed = Time.from_msg(watching.states()[-1].header.stamp)
+    assert (changed - Time.from_msg(last.header.stamp)).nanoseconds < 0.9e9
+
+
+def test_uptime_is_no_change(wired: Any, spin_until: SpinUntil, spin_for: SpinFor) -> None:
+    watching = wired()
+    spin_until(lambda: len(watching.states()) >= 2)
+    before = len(watching.states())
+    for uptime in (10.0, 11.0, 12.0, 13.0, 14.0, 15.0):
+        watching.probe.programs = [VELOCITY._replace(uptime=uptime)]
+        spin_for(0.06)
+    assert len(watching.states()) <= before + 1
+
+
+@pytest.mark.parametrize("namespace", ["", "/armX"])
+def test_health_reports_of_the_namespace_reach_the_probe(
+    wired: Any, spin_until: SpinUntil, namespace: str
+) -> None:
+    watching = wired(namespace=namespace)
+    watching.remarks()
+    spin_until(lambda: "service" in watching.probe.heard)
+    assert watching.probe.heard["service"].pid == os.getpid()
+
+
+def test_actions_are_carried_out_and_reported(wired: Any, spin_until: SpinUntil, tmp_path: Path) -> None:
+    watching = wired(health_timeout=1.5, start_timeout=4.0)
+    assert watching.policy.timeouts == Timeouts(0.05, 1.5, 4.0)
+    assert watching.probe.made_of == (tmp_path, os.getppid())
+    action = Action("kill", "velocity", 501, "no health for 3.0 s")
+    watching.policy.actions = [action]
+    spin_until(lambda: watching.carried_out)
+
+    assert watching.carried_out == [(action, tmp_path, os.getppid())]
+    assert watching.remarks() == ["velocity: kill: no health for 3.0 s"]
+
+
+def test_reason_to_kill_no_silent_service_is_reported(wired: Any, spin_until: SpinUntil) -> None:
+    watching = wired()
+    watching.policy.kill_inhibited_by = "3 of 4 services are silent at once"
+    spin_until(lambda: watching.service.health._remarks)
+
+    assert all(
+        each.startswith("sentinel: kills no silent service: 3 of 4 services are silent at once")
+        for each in watching.remarks()
+    )
+
+
+def test_failed_observation_is_reported_and_not_the_last(wired: Any, spin_until: SpinUntil) -> None:
+    watching = wired()
+    watching.probe.failure = "supervisord has died"
+    spin_until(lambda: watching.service.health._remarks)
+    assert watching.remarks()[0].startswith(f"{SENTINEL}: supervisord has died")
+
+    watching.probe.failure = ""
+    watching.probe.programs = [VELOCITY._replace(state="FATAL", pid=0)]
+    spin_until(lambda: watching.states()[-1:] and "FATAL" in watching.states()[-1].status[0].message)
+
+
+# Actions
+
+
+def test_kill_reaches_the_process_of_the_program_only(tmp_path: Path) -> None:
+    mark = {processes.MARK: str(tmp_path), "SUPERVISOR_PROCESS_NAME": "velocity"}
+    code = "import signal; print(flush=True); signal.pause()"
+    command = [sys.executable, "-c", code]
+    with subprocess.Popen(command, env=os.environ | mark, stdout=subprocess.PIPE) as process:
+        try:
+            assert process.stdout is not None
+            process.stdout.readline()
+            sentinel.carry_out(Action("kill", "kinematics", process.pid, ""), System(tmp_path), 1)
+            sentinel.carry_out(Action("kill", "velocity", process.pid, ""), System(tmp_path / "other"), 1)
+            assert process.poll() is None
+            sentinel.carry_out(Action("kill", "velocity", process.pid, ""), System(tmp_path), 1)
+            assert process.wait(5.0) == -signal.SIGKILL
+        finally:
+            process.kill()
+
+
+def test_revival_asks_supervisord_and_may_fail(tmp_path: Path) -> None:
+    asked: list[tuple[int, str]] = []
+
+    class Asked(System):
+        def revive(self, supervisor: int, program: str) -> None:
+            asked.append((supervisor, program))
+            raise DeploymentError("it does not answer")
+
+    sentinel.carry_out(Action("revive", "velocity", 0, ""), Asked(tmp_path), 7)
+
+    assert asked == [(7, "velocity")]
+
+
+# States
+
+
+@pytest.mark.parametrize(
+    ("program", "reason", "restarts", "level", "message", "why"),
+    [
+        (VELOCITY._replace(error="it had exited"), "", 2, DiagnosticStatus.OK, "RUNNING", ""),
+        (VELOCITY._replace(state="STARTING"), "hung", 0, DiagnosticStatus.OK, "STARTING", "hung"),
+        (
+            VELOCITY,
+            "",
+            3,
+            DiagnosticStatus.WARN,
+            "RUNNING, restarted 3 times within a minute",
+            "",
+        ),
+        (
+            VELOCITY._replace(state="FATAL", error="Exited too quickly"),
+            "",
+            9,
+            DiagnosticStatus.ERROR,
+            "FATAL after 2 restarts Exited too quickly",
+            "Exited too quickly",
+        ),
+        (
+            VELOCITY._replace(state="STOPPED"),
+            "",
+            0,
+            DiagnosticStatus.ERROR,
+            "STOPPED after 2 restarts",
+            "",
+        ),
+    ],
+)
+def test_state_of_a_process(
+    program: Program, reason: str, restarts: int, level: bytes, message: str, why: str
+) -> None:
+    (status,) = sentinel.states([program], {"velocity": reason}, {"velocity": restarts}, "/sentinel")
+
+    assert (status.level, status.message) == (level, message)
+    assert (status.name, status.hardware_id) == ("/sentinel: velocity", socket.gethostname())
+    values = {pair.key: pair.value for pair in status.values}
+    assert (values["why"], values["pid"], values["last exit"]) == (why, "501", "code 1")
+
+
+def test_process_without_reason_or_restart_is_good() -> None:
+    (status,) = sentinel.states([VELOCITY], {}, {}, "/sentinel")
+
+    assert (status.level, status.message) == (DiagnosticStatus.OK, "RUNNING")
+    assert {pair.key: pair.value for pair in status.values}["why"] == ""
