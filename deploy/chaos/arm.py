@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import time
+from collections.abc import Iterable
 from contextlib import suppress
 
+from deploy.chaos.babbler import BABBLER
+from deploy.supervision import processes
 from deploy.supervision.system import DeploymentError, System
 
 PID_TIMEOUT = 2.0  # s to wait for a program that is being restarted
@@ -18,6 +22,7 @@ class Arm:
         self.system = system
         self.domain = 0  # ROS_DOMAIN_ID
         self._environment: dict[str, str] = {}
+        self._spent = 0.0  # s of processor time of processes for whose end no supervisord waits
 
     def pid(self, program: str) -> int:
         """Return the process of a program, or 0. Waits for a program that is being restarted."""
@@ -36,6 +41,23 @@ class Arm:
         """Return the environment of the arm's processes; the last known one if none is alive."""
         self._environment = self.system.environment() or self._environment
         return self._environment
+
+    def processor_time(self) -> float:
+        """Return the processor time [s] of the arm's processes, also of those that have ended."""
+        pids = [member.pid for member in self.system.members() if member.program != BABBLER]
+        return self._spent + sum(map(_processor_time, pids))
+
+    def remember_processor_time(self, pids: Iterable[int]) -> None:
+        """Count the processor time of processes on, which end without a supervisord that waits for them."""
+        self._spent += sum(map(_processor_time, pids))
+
+
+def _processor_time(pid: int) -> float:
+    """Return the processor time [s] of a process, and of its children that it has waited for."""
+    user, system, children_user, children_system = 11, 12, 13, 14  # after the name, see proc(5)
+    fields = processes.stat_of(pid)
+    ticks = (int(fields[at]) for at in (user, system, children_user, children_system) if fields)
+    return sum(ticks) / os.sysconf("SC_CLK_TCK")
 
 
 def file_suffix(namespace: str) -> str:

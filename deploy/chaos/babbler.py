@@ -27,8 +27,7 @@ from interfaces import topics
 
 BABBLER = "babbler"
 """The program name of a babbler's process, which is neither a program of the arm nor supervisord."""
-FLOOD_RATE = 10_000  # Hz
-BABBLE_RATE = 200  # Hz, over all topics
+RATES = {"flood": 10_000.0, "babble": 200.0}  # Hz; of babble, over all topics
 
 TEXT = "babble"
 _CDR_TEXT = struct.pack("<I", len(TEXT) + 1) + TEXT.encode() + b"\0"  # the whole string, not a part of one
@@ -72,21 +71,21 @@ def _bad_message(topic: topics.Topic, rng: random.Random) -> Any:
     return topic.type(data=contents[topic.type]) if topic.type in contents else None
 
 
-def flood(node: Node) -> None:
-    """Send heartbeats much faster than any switch."""
+def flood(node: Node, rate: float) -> None:
+    """Send heartbeats much faster than any switch, at a rate [Hz]."""
     topic = topics.OPERATOR_HEARTBEAT
     publisher = node.create_publisher(topic.type, topic.name, topic.qos)
-    for _ in _ticks(FLOOD_RATE):
+    for _ in _ticks(rate):
         publisher.publish(Bool(data=True))
 
 
-def babble(node: Node) -> None:
-    """Send nonsense on every topic."""
+def babble(node: Node, rate: float) -> None:
+    """Send nonsense on every topic, at a rate [Hz]."""
     rng = random.Random(1)
     publishers = [
         (topic, node.create_publisher(topic.type, topic.name, topic.qos)) for topic in topics.CONTRACT
     ]
-    for _ in _ticks(BABBLE_RATE):
+    for _ in _ticks(rate):
         topic, publisher = rng.choice(publishers)
         publisher.publish(nonsense(topic, rng))
 
@@ -101,12 +100,12 @@ def _ticks(rate: float) -> Iterator[None]:
         time.sleep(1 / min(rate, 1000))
 
 
-def main(arguments: list[str]) -> None:
-    """Send until killed."""
+def run(mode: str, rate: float) -> None:
+    """Flood or babble at a rate [Hz] until killed."""
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)  # a signal ends it without clean-up
     node = Node(f"babbler_{os.getpid()}", namespace=namespace_of(os.environ))
-    {"flood": flood, "babble": babble}[arguments[0]](node)
+    {"flood": flood, "babble": babble}[mode](node, rate)
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    run(sys.argv[1], RATES[sys.argv[1]])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Sequence
 from contextlib import suppress
@@ -10,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from deploy.chaos.arm import Arm
+from deploy.chaos.babbler import BABBLER
 
 
 @dataclass(frozen=True)
@@ -19,7 +19,7 @@ class Cost:
     time: float
     """[s], monotonic clock."""
     busy: float
-    """Processor time of the whole machine [s]; it includes processes that were killed, and other programs."""
+    """Processor time of the arms' processes [s], also of those that were killed."""
     arms: int
     processes: int
     memory: float
@@ -33,14 +33,15 @@ class Cost:
         memory = 0.0
         for arm in arms:
             for member in arm.system.members():
+                if member.program == BABBLER:
+                    continue
                 with suppress(OSError, KeyError):
                     lines = Path(f"/proc/{member.pid}/status").read_text().splitlines()
                     fields = dict(line.split(":", 1) for line in lines)
                     memory += int(fields["VmRSS"].split()[0]) / 1024
                     threads += int(fields["Threads"])
                     processes += 1
-        ticks = map(int, Path("/proc/stat").read_text().split()[1:4])
-        busy = sum(ticks) / os.sysconf("SC_CLK_TCK")
+        busy = sum(arm.processor_time() for arm in arms)
         return cls(time.monotonic(), busy, len(arms), processes, memory, threads)
 
     def since(self, before: Cost) -> str:
@@ -48,7 +49,7 @@ class Cost:
         cores = (self.busy - before.busy) / (self.time - before.time) / self.arms
         memory, threads = self.memory / self.arms, self.threads / self.arms
         return (
-            f"{cores:.2f} cores (with observer and injection), "
+            f"{cores:.2f} cores, "
             f"{memory:.0f} MB ({memory - before.memory / self.arms:+.0f}), "
             f"{threads:.0f} threads ({threads - before.threads / self.arms:+.0f}) "
             f"in {self.processes / self.arms:.0f} processes per arm"

@@ -90,9 +90,13 @@ def kill_all(arm: Arm, target: str) -> None:
 
 def kill_supervisor(arm: Arm, target: str) -> Undo:
     """SIGKILL supervisord; at the end, start the system again over its orphans."""
-    _send(arm, arm.system.supervisor() or 0, signal.SIGKILL)
+    supervisor = arm.system.supervisor() or 0
+    arm.remember_processor_time([supervisor])
+    _send(arm, supervisor, signal.SIGKILL)
 
     def start_again() -> None:
+        orphans = [member.pid for member in arm.system.members() if member.program not in ("", BABBLER)]
+        arm.remember_processor_time(orphans)
         arm.system.start_again()
 
     return start_again

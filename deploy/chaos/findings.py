@@ -32,6 +32,8 @@ class Finding:
     """How often the promise was exercised and the record does not show the outcome."""
     times: dict[str, list[float]] = field(default_factory=dict)
     """Durations [s] by program, for a promise about durations."""
+    worst: float = math.nan
+    """The longest duration [s], for a promise that limits one."""
 
     @property
     def verdict(self) -> str:

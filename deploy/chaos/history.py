@@ -30,7 +30,11 @@ CONDITIONS = (OVERLOAD, LOSS, SILENCE)
 """Recorded like faults, but not injected into a process: the observer was not scheduled in time, the network
 loses packets, the operator released the switch."""
 
-SUSPENDING = ("stop", "hang", "hog")
+PARTITION = "partition"
+"""A fault of the network between the operator's host and the robot's."""
+REDISCOVERY = 10.0  # s after a partition until the hosts have discovered each other again
+
+SUSPENDING = ("stop", "hang", "hog", "slow")
 """Faults in which a process receives nothing until it continues or is replaced."""
 
 
@@ -56,6 +60,11 @@ DEPENDENTS = {
     OPERATOR: (SWITCH, *_dependents(SWITCH)),
 }
 """The programs whose output stops when that of a program stops, or when the operator releases the switch."""
+
+
+ROBOT_STATE = topics.JOINT_STATES.publishers[0]
+NEEDED_AT_START = dict.fromkeys((KINEMATICS, ROBOT_STATE), SOURCES)
+"""The programs without which a program has no output after a restart: it needs a value from each of them."""
 
 
 class Sample(NamedTuple):
@@ -105,6 +114,8 @@ class History:
     """By topic name of the contract, in the order of sending."""
     lives: list[Life] = field(default_factory=list)
     faults: list[InjectedFault] = field(default_factory=list)
+    absent: frozenset[str] = frozenset()
+    """Programs that this arm does not have."""
 
     @property
     def injected(self) -> list[InjectedFault]:

@@ -9,13 +9,12 @@ from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
-from deploy.chaos import partition, schedule
+from deploy.chaos import partition, schedule, schedule_file
 from deploy.chaos.faults import FAULT_KINDS
 from deploy.chaos.history import PROGRAMS
 from deploy.chaos.schedule import Schedule
-from deploy.chaos.testbed import SCENARIO, Testbed
+from deploy.chaos.testbed import SCENARIO, Testbed, sources
 from deploy.supervision.system import DeploymentError
-from interfaces import topics
 from reactive_node.domains import DOMAINS
 
 RANDOM = "monkey"  # the scenario of random faults
@@ -41,21 +40,24 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         description="Inject faults into an arm, record it from outside, and check the promises.",
     )
     add = parser.add_argument
-    add("--minutes", type=_number(0.01, 10_000), default=5.0, help="length of the random faults, default 5")
+    add("--minutes", type=number(0.01, 10_000), default=5.0, help="length of the random faults, default 5")
     add("--seed", type=int, help="the same seed gives the same random faults")
-    add("--every", type=_number(0.01, 3600), default=5.0, help="seconds between two random faults, default 5")
-    add("--faults", type=_names(FAULT_KINDS), default=tuple(FAULT_KINDS), help=f"of {', '.join(FAULT_KINDS)}")
-    add("--targets", type=_names(PROGRAMS), default=(), help=f"of {', '.join(PROGRAMS)}")
-    names = f"instead of random faults: {', '.join(NAMED)}"
-    add("--scenario", choices=(RANDOM, *NAMED), default=RANDOM, metavar="NAME", help=names)
+    add("--every", type=number(0.01, 3600), default=5.0, help="seconds between two random faults, default 5")
+    add("--faults", type=names(FAULT_KINDS), default=tuple(FAULT_KINDS), help=f"of {', '.join(FAULT_KINDS)}")
+    add("--targets", type=names(PROGRAMS), default=(), help=f"of {', '.join(PROGRAMS)}")
+    scenarios = f"instead of random faults: {', '.join(NAMED)}"
+    add("--scenario", choices=(RANDOM, *NAMED), default=RANDOM, metavar="NAME", help=scenarios)
     add("--arms", type=int, default=1, help="they share the random faults; each gets a whole scenario")
-    add("--loss", type=_number(0, 100), default=0.0, help="percent of all DDS packets that are lost")
+    add("--loss", type=number(0, 100), default=0.0, help="percent of all DDS packets that are lost")
+    add("--schedule", type=Path, metavar="FILE", help="play a schedule, such as `make simulate` writes")
     add("--replay", type=Path, metavar="RECORD", help="only judge a record")
     options = parser.parse_args(arguments)
     if not 1 <= options.arms <= len(DOMAINS):
         parser.error(f"--arms must be from 1 to {len(DOMAINS)}: each arm needs a ROS domain")
     if options.arms > 1 and options.scenario in partition.SCHEDULES:
         parser.error(f"--scenario {options.scenario} allows only one arm")
+    if options.schedule and (options.scenario != RANDOM or options.arms > 1):
+        parser.error("--schedule has faults of its own, for one arm")
     if options.scenario != RANDOM and any(
         getattr(options, name) != parser.get_default(name) for name in ("every", "faults", "targets")
     ):
@@ -73,6 +75,8 @@ def plan(options: argparse.Namespace) -> Plan:
             raise DeploymentError(f"{options.scenario} is not possible on this machine: {reason}")
         title = f"Scenario {options.scenario}: the network between the operator's host and the robot's"
         return Plan(title, [partition.SCHEDULES[options.scenario]], partition.LENGTH, partition.TwoHosts)
+    if options.schedule:
+        return _scheduled(options.schedule)
     several = f", {options.arms} arms" if options.arms > 1 else ""
     testbed = _fleet(options.arms) if options.arms > 1 else Testbed
     if options.scenario != RANDOM:
@@ -94,34 +98,44 @@ def plan(options: argparse.Namespace) -> Plan:
     return Plan(title, [planned[arm :: options.arms] for arm in range(options.arms)], length, testbed)
 
 
+def _scheduled(path: Path) -> Plan:
+    shift = schedule_file.load(path)
+    if unknown := sorted({each.kind for each in shift.faults} - FAULT_KINDS.keys()):
+        raise DeploymentError(f"{path}: only make simulate can inject {', '.join(unknown)}")
+    title = f"Schedule {path}, {shift.length:.0f} s"
+    return Plan(title, [shift.faults], shift.length, partial(Testbed, scenario=shift.scenario))
+
+
 def _fleet(arms: int) -> Callable[..., Testbed]:
     """Return a testbed with several arms, each in another namespace."""
     namespaces = tuple(f"/arm{number}" for number in range(1, arms + 1))
-    slow = {name: {**SCENARIO[name], "rate": FLEET_RATE} for name in topics.CONFIGURATION}
-    return partial(Testbed, namespaces=namespaces, scenario={**SCENARIO, **slow})
+    return partial(Testbed, namespaces=namespaces, scenario={**SCENARIO, **sources(FLEET_RATE)})
 
 
-def _number(least: float, most: float) -> Callable[[str], float]:
+def number(least: float, most: float) -> Callable[[str], float]:
+    """Return a parser of numbers of the command line."""
+
     def parse(text: str) -> float:
         try:
-            number = float(text)
+            value = float(text)
         except ValueError:
             raise argparse.ArgumentTypeError(f"{text!r} is not a number") from None
-        if not least <= number <= most:
+        if not least <= value <= most:
             raise argparse.ArgumentTypeError(f"{text} is not from {least:g} to {most:g}")
-        return number
+        return value
 
     return parse
 
 
-def _names(known: Iterable[str]) -> Callable[[str], tuple[str, ...]]:
-    names = list(known)
+def names(known: Iterable[str]) -> Callable[[str], tuple[str, ...]]:
+    """Return a parser of names of the command line, with commas between."""
+    all_names = list(known)
 
     def parse(text: str) -> tuple[str, ...]:
         words = tuple(word.strip() for word in text.split(","))
         for word in words:
-            if word not in names:
-                raise argparse.ArgumentTypeError(f"{word!r} is not one of {', '.join(names)}")
+            if word not in all_names:
+                raise argparse.ArgumentTypeError(f"{word!r} is not one of {', '.join(all_names)}")
         return words
 
     return parse

@@ -48,7 +48,7 @@ def namespaces(path: Path) -> list[str]:
 def load(path: Path, namespace: str = "/") -> History:
     """Return the history of the arm in a namespace."""
     prefix = namespace.rstrip("/") + "/"
-    names = {topic.name if topic.name[0] == "/" else prefix + topic.name: topic for topic in topics.CONTRACT}
+    names = {topic.full_name(namespace): topic for topic in topics.CONTRACT}
     streams: dict[str, list[Sample]] = {topic.name: [] for topic in topics.CONTRACT}
     lives: dict[tuple[int, float], Life] = {}
     faults: list[InjectedFault] = []
@@ -62,18 +62,14 @@ def load(path: Path, namespace: str = "/") -> History:
             received, sent = ((t - origin) / 1e9 for t in (message.log_time, message.publish_time))
             if topic := names.get(channel.topic):
                 streams[topic.name] += [
-                    Sample(sent, received, value) for value in _values(topic, message.data, prefix)
+                    Sample(sent, received, value) for value in values(topic, message.data, prefix)
                 ]
             elif channel.topic in (PROCESSES, FAULTS):
-                event = _event(message.data)
-                if event.pop("namespace", namespace) != namespace:
-                    continue
-                if channel.topic == FAULTS:
-                    event.pop("detail", None)  # of an older record; always empty
-                    faults.append(InjectedFault(**event))
-                else:
-                    life = Life(**event)
-                    lives[life.pid, life.began] = life
+                event = read_event(channel.topic, message.data, namespace)
+                if isinstance(event, InjectedFault):
+                    faults.append(event)
+                elif event is not None:
+                    lives[event.pid, event.began] = event
     for samples in streams.values():
         samples.sort()
     return History(
@@ -84,12 +80,21 @@ def load(path: Path, namespace: str = "/") -> History:
     )
 
 
+def read_event(topic: str, data: bytes, namespace: str) -> Life | InjectedFault | None:
+    """Return an event of :data:`PROCESSES` or :data:`FAULTS`; ``None`` if it concerns another arm."""
+    event = _event(data)
+    if event.pop("namespace", namespace) != namespace:
+        return None
+    event.pop("detail", None)  # of an older record; always empty
+    return InjectedFault(**event) if topic == FAULTS else Life(**event)
+
+
 def _event(data: bytes) -> dict[str, Any]:
     event: dict[str, Any] = json.loads(deserialize_message(data, String).data)
     return event
 
 
-def _values(topic: topics.Topic, data: bytes, prefix: str) -> list[Any]:
+def values(topic: topics.Topic, data: bytes, prefix: str) -> list[Any]:
     """Return the content of a message as plain values; none for an injected one."""
     if is_babble(topic, data):
         return []

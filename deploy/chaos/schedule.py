@@ -5,8 +5,8 @@ from __future__ import annotations
 import itertools
 import math
 import random
-from collections.abc import Callable, Iterable, Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, NamedTuple
 
 from deploy.chaos.faults import FAULT_KINDS
 from deploy.chaos.history import ALL, NO_TARGET, PROGRAMS
@@ -15,6 +15,7 @@ DAY = 45.0  # s after which the operator's scenario repeats
 AWAKE = 30.0  # s of each day in which the operator holds the switch
 SETTLE = 8.0  # s after the last fault: also on a busy machine, the whole system restarts in less
 FIRST_FAULT = 5.0  # s until the first fault: the engines are on by then
+PAUSE = 1.0  # s between two kills: a restart that keeps the median of L1 has ended before the next one
 
 WEIGHTS = {"kill": 6, "stop": 3, "hang": 2}
 """How often the random schedule picks a kind, in relation to the other kinds."""
@@ -38,17 +39,19 @@ Schedule = Sequence[PlannedFault]
 
 
 def random_faults(
-    seed: int,
+    seed: int | str,
     duration: float,
     *,
     every: float = 5.0,
     kinds: Iterable[str] = tuple(FAULT_KINDS),
     targets: Iterable[str] = (),
+    table: Mapping[str, Any] = FAULT_KINDS,
 ) -> Schedule:
     """
     Return one random fault in each interval of ``every`` [s]. The same seed gives the same schedule.
 
     :param targets: hit only these programs; empty for all. Faults of the whole arm are not affected.
+    :param table: the kinds, each with its targets and durations.
     """
     rng = random.Random(seed)
     kinds = [kind for kind in sorted(kinds) for _ in range(WEIGHTS.get(kind, 1))]
@@ -56,18 +59,18 @@ def random_faults(
     planned = []
     for step in range(int((duration - FIRST_FAULT) / every)):
         kind = rng.choice(kinds)
-        allowed = [t for t in FAULT_KINDS[kind].targets if not wanted or t in wanted or t not in PROGRAMS]
+        allowed = [t for t in table[kind].targets if not wanted or t in wanted or t not in PROGRAMS]
         at = FIRST_FAULT + every * (step + rng.uniform(0.0, 0.5))
         if allowed:
-            lasting = rng.uniform(*FAULT_KINDS[kind].duration)
+            lasting = rng.uniform(*table[kind].duration)
             planned.append(PlannedFault(round(at, 3), kind, rng.choice(allowed), round(lasting, 3)))
     return planned
 
 
-def kill_each(times: int = 20, pause: float = 0.8) -> Schedule:
-    """SIGKILL every program ``times`` times, with ``pause`` [s] between two kills."""
+def kill_each(times: int = 20) -> Schedule:
+    """SIGKILL every program ``times`` times, one after the other."""
     targets = [program for _ in range(times) for program in ROUND]
-    return [PlannedFault(FIRST_FAULT + pause * n, "kill", target) for n, target in enumerate(targets)]
+    return [PlannedFault(FIRST_FAULT + PAUSE * n, "kill", target) for n, target in enumerate(targets)]
 
 
 def hang_each(pause: float = 7.0) -> Schedule:
@@ -120,14 +123,13 @@ def nonsense() -> Schedule:
 
 
 def briefly() -> Schedule:
-    """Kill every program three times; when the operator sleeps, kill the watchdog every 2 s."""
-    times = 3
-    pause = (AWAKE - FIRST_FAULT - 1.0) / (times * len(PROGRAMS))
-    return [*kill_each(times, pause), *_kill_every(2.0, AWAKE, DAY, "operator_watchdog")]
+    """Kill every program twice, and once on the next day; while the operator sleeps, only the watchdog."""
+    next_day = [kill._replace(at=DAY + kill.at) for kill in kill_each(1)]
+    return [*kill_each(2), *_kill_every(2.0, AWAKE, DAY, "operator_watchdog"), *next_day]
 
 
 def variously() -> Schedule:
-    """Inject all other faults once; at the end, stop the controller when it has to act."""
+    """Inject every kind of fault and kill every program; stop the controller when it has to act."""
     return [
         PlannedFault(5.0, "hang", "kinematics", 15.0),
         PlannedFault(5.5, "double", "engine_controller", 6.0),
@@ -139,12 +141,23 @@ def variously() -> Schedule:
         PlannedFault(13.0, "flood", NO_TARGET, 5.0),
         PlannedFault(15.0, "kill", "operator_watchdog"),
         PlannedFault(18.0, "babble", NO_TARGET, 7.0),
+        PlannedFault(18.5, "kill", "engine_controller"),
         PlannedFault(20.0, "kill", "kinematics"),
         PlannedFault(20.5, "stop", "sentinel", 15.0),
         PlannedFault(26.0, "full_disk", NO_TARGET, 4.0),
-        PlannedFault(27.0, "kill", "config_theta1"),
+        PlannedFault(26.5, "kill", "config_theta1"),
+        PlannedFault(27.2, "kill", "operator_watchdog"),
+        PlannedFault(27.8, "kill", "robot_state"),
+        PlannedFault(28.6, "kill", "dead_mans_switch"),
+        PlannedFault(30.0, "kill", "config_l1"),
+        PlannedFault(31.0, "kill", "operator_console"),
+        PlannedFault(32.0, "kill", "config_l2"),
+        PlannedFault(33.0, "kill", "velocity"),
+        PlannedFault(34.0, "kill", "config_theta2"),
         *stop_controller(),
+        PlannedFault(AWAKE + 7.0, "kill", "sentinel"),
         PlannedFault(AWAKE + 14.0, "kill_supervisor", ALL, 1.0),
+        PlannedFault(AWAKE + 19.0, "kill_all", ALL),
     ]
 
 

@@ -65,6 +65,11 @@ SCENARIO: dict[str, Any] = {
 """All values move. The operator's day has 45 s; the operator sleeps in the last third."""
 
 
+def sources(rate: float) -> dict[str, Any]:
+    """Return the part of :data:`SCENARIO` that moves the values, with another rate [Hz]."""
+    return {name: {**SCENARIO[name], "rate": rate} for name in topics.CONFIGURATION}
+
+
 class Testbed:
     """Arms, and the observer that records them until the end of the `with`."""
 

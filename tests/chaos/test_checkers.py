@@ -8,7 +8,17 @@ from dataclasses import replace
 import pytest
 
 from deploy.chaos.findings import HOLDS, UNKNOWN, VIOLATED, percentile
-from deploy.chaos.history import ALL, NO_TARGET, OPERATOR, PROGRAMS, History, InjectedFault, Life, Sample
+from deploy.chaos.history import (
+    ALL,
+    NEEDED_AT_START,
+    NO_TARGET,
+    OPERATOR,
+    PROGRAMS,
+    History,
+    InjectedFault,
+    Life,
+    Sample,
+)
 from deploy.chaos.promises import CHECKERS, meaning
 from deploy.chaos.report import text
 from interfaces.topics import OFF, ON, TURN_OFF
@@ -31,8 +41,10 @@ def asleep(history: History, begin: float, off: float) -> History:
 
 
 @pytest.mark.parametrize("promise", CHECKERS)
-def test_good_history_violates_nothing(promise: str) -> None:
-    assert verdict(promise, good()) in (HOLDS, UNKNOWN)
+def test_good_history_holds_what_it_exercises(promise: str) -> None:
+    finding = CHECKERS[promise](good())
+    assert finding.verdict == (HOLDS if promise in ("S3", "S4") else UNKNOWN)
+    assert finding.unknown == 0
 
 
 @pytest.mark.parametrize("promise", CHECKERS)
@@ -270,6 +282,26 @@ def test_s5_detects_two_that_report_health_in_turn() -> None:
     assert verdict("S5", added(good(), "/diagnostics", *((t + 0.5, v) for t, v in reports))) == VIOLATED
 
 
+def test_s5_detects_one_report_of_an_instance_beside_another() -> None:
+    history = good()
+    history = replace(history, lives=[*history.lives, Life("kinematics", 777, 20.0, 20.3)])
+    history = added(history, "/diagnostics", (20.2, ("kinematics", 777)))
+    (evidence,) = CHECKERS["S5"](history).evidence
+    assert evidence == (20.2, "process 777 is kinematics beside process 105")
+
+
+def test_s5_is_unknown_if_the_end_of_the_first_may_have_been_noted_late() -> None:
+    history = killed(good(), "kinematics", 20.0, 0.1)
+    first = next(life for life in history.lives if life.program == "kinematics")
+    history = replace(
+        history, lives=[life._replace(ended=20.9) if life == first else life for life in history.lives]
+    )
+    history = added(history, "/diagnostics", (20.7, ("kinematics", 1105)))
+    assert verdict("S5", history) == VIOLATED
+    finding = CHECKERS["S5"](faulty(history, InjectedFault("overload", NO_TARGET, 20.5, 20.9)))
+    assert (finding.verdict, finding.unknown) == (HOLDS, 1)
+
+
 # L1
 
 
@@ -294,7 +326,8 @@ def test_l1_detects_silence_for_good_after_any_fault() -> None:
     for topic in history.streams:
         history = silent(history, topic, 20.0, END)
     finding = CHECKERS["L1"](faulty(history, InjectedFault("kill_supervisor", ALL, 20.0, 21.0)))
-    assert len(finding.evidence) == len(PROGRAMS)
+    # Of the silent sources follows the silence of the programs that wait for them.
+    assert len(finding.evidence) == len(set(PROGRAMS) - NEEDED_AT_START.keys())
 
 
 def test_l1_is_unknown_if_a_second_fault_interferes() -> None:
@@ -315,6 +348,14 @@ def test_l1_released_switch_is_no_case() -> None:
     history = asleep(good(), 20.0, 29.6)
     history = killed(history, "dead_mans_switch", 25.0, 0.6)
     assert verdict("L1", history) == UNKNOWN
+
+
+@pytest.mark.parametrize("program", ["kinematics", "robot_state"])
+def test_l1_restart_that_waits_for_a_dead_source_is_no_case(program: str) -> None:
+    history = killed(good(), program, 20.0, 3.0)
+    assert verdict("L1", history) == VIOLATED
+    assert CHECKERS["L1"](silent(history, "l1", 18.0, 23.0)).unknown == 1
+    assert verdict("L1", silent(history, "l1", 18.9, 19.9)) == VIOLATED  # a late message is no dead source
 
 
 # L2

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import pytest
 
 from deploy.chaos import schedule
 from deploy.chaos.faults import FAULT_KINDS
 from deploy.chaos.history import PROGRAMS
+from deploy.chaos.liveness import MEDIAN
 
 
 def test_only_the_same_seed_gives_the_same_schedule() -> None:
@@ -49,3 +52,13 @@ def test_everything_injects_each_fault_into_each_target() -> None:
 def test_kill_each_kills_every_program_twenty_times() -> None:
     killed = [each.target for each in schedule.kill_each()]
     assert {program: killed.count(program) for program in PROGRAMS} == dict.fromkeys(PROGRAMS, 20)
+
+
+def test_a_brief_run_kills_every_program_three_times_while_the_operator_is_awake() -> None:
+    killed = [each.target for each in schedule.briefly() if each.at % schedule.DAY < schedule.AWAKE]
+    assert {program: killed.count(program) for program in PROGRAMS} == dict.fromkeys(PROGRAMS, 3)
+
+
+def test_a_killed_program_has_time_to_restart_before_the_next_kill() -> None:
+    for planned in (schedule.kill_each(), schedule.briefly()):
+        assert min(two.at - one.at for one, two in pairwise(planned)) >= MEDIAN

@@ -1,0 +1,59 @@
+"""Schedule files: what happens to an arm, in YAML. `make simulate` and `make chaos` play them.
+
+.. code-block:: yaml
+
+    seed: 7 shift 12
+    length: 45.0                                          # s
+    scenario: {l1: {...}, operator: {...}, engines: ...}  # as in a scenario file
+    faults:
+      - {at: 5.0, kind: kill, target: kinematics, duration: 0.0}
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from deploy.chaos.schedule import PlannedFault, Schedule
+from deploy.supervision.system import DeploymentError
+
+
+@dataclass(frozen=True)
+class Shift:
+    """What happens to an arm. In a simulation, equal shifts give equal records."""
+
+    seed: str
+    """Of all chance in a simulation: in the network and the processes."""
+    length: float
+    """[s] of the scenario."""
+    scenario: Mapping[str, Any]
+    faults: Schedule
+
+
+def save(shift: Shift, path: Path) -> None:
+    """Write a shift to a file."""
+    document = {
+        "seed": shift.seed,
+        "length": shift.length,
+        "scenario": dict(shift.scenario),
+        "faults": [each._asdict() for each in shift.faults],
+    }
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(yaml.safe_dump(document, sort_keys=False, default_flow_style=None), encoding="utf-8")
+
+
+def load(path: Path) -> Shift:
+    """Read a shift from a file. Raises DeploymentError: one line with the file and the reason."""
+    try:
+        document: Any = yaml.safe_load(path.read_text(encoding="utf-8"))
+        faults = [PlannedFault(**each) for each in document["faults"]]
+        return Shift(str(document["seed"]), float(document["length"]), document["scenario"], faults)
+    except OSError as error:
+        raise DeploymentError(f"{path}: {error.strerror}") from None
+    except (yaml.YAMLError, UnicodeDecodeError, KeyError, TypeError, ValueError) as error:
+        reason = " ".join(str(error).split())
+        raise DeploymentError(f"{path} is no schedule: {reason}") from None
