@@ -1,0 +1,19 @@
+"""An engine controller with a bug: it does not turn off on its own when it hears of no operator."""
+
+from __future__ import annotations
+
+from interfaces import service
+from services import engine_controller
+from services.engine_controller import Event, Parameters, State
+
+_step = engine_controller.step
+
+
+def step(state: State, event: Event, given: Parameters, drive_timeout: float) -> State:
+    """Take every presence for one that is still valid an hour later."""
+    return _step(state, event, Parameters(given.max_presence_age, 3600.0, given.repeat), drive_timeout)
+
+
+if __name__ == "__main__":
+    engine_controller.step = step
+    service.run("engine_controller", engine_controller.wire)

@@ -1,0 +1,110 @@
+"""Simulated shifts of the whole arm: repeatable, and judged by the same checkers as real ones."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+
+from deploy.chaos import schedule
+from deploy.chaos.history import ALL, NO_TARGET
+from deploy.chaos.schedule import AWAKE, DAY, PlannedFault
+from deploy.chaos.schedule_file import Shift
+from deploy.chaos.testbed import SCENARIO
+from deploy.simulation import arm, plan
+from deploy.simulation.faults import BAD_LINE, FAULT_KINDS
+from deploy.simulation.shift import Outcome, play
+from deploy.supervision.manifest import Program
+from deploy.supervision.processes import ROOT
+
+LENGTH = 40.0  # s
+
+
+def violations(outcome: Outcome) -> dict[str, Sequence[object]]:
+    return {finding.promise: finding.evidence for finding in outcome.findings if finding.evidence}
+
+
+@pytest.mark.parametrize("kind", FAULT_KINDS)
+def test_the_promises_hold_under_each_kind_of_fault(kind: str) -> None:
+    outcome = play(plan.shift(f"only {kind}", LENGTH, 4.0, [kind]))
+    assert outcome.injected[kind] >= 4
+    assert not violations(outcome)
+
+
+@pytest.mark.parametrize("name", ["kill_watchdog", "kill_controller", "stop_controller", "kill_supervisor"])
+def test_the_promises_hold_in_the_scenarios_of_the_chaos_monkey(name: str) -> None:
+    faults = [
+        each
+        for each in schedule.SCENARIOS[name]()
+        if each.target in FAULT_KINDS[each.kind].targets or each.target == NO_TARGET
+    ]
+    length = max(schedule.duration(faults), DAY)
+    outcome = play(Shift(name, length, SCENARIO, faults))
+    assert not violations(outcome)
+    assert next(finding for finding in outcome.findings if finding.promise == "S1").cases
+
+
+def test_a_quiet_shift_has_output_from_every_program() -> None:
+    outcome = play(Shift("quiet", 20.0, SCENARIO, []))
+    assert not violations(outcome)
+    assert len(outcome.history.lives) == len(arm.NAMES)
+    for program in arm.NAMES:
+        assert outcome.history.output(program), program
+
+
+def test_equal_shifts_give_equal_records_in_any_interpreter() -> None:
+    program = (
+        "from deploy.simulation import plan; from deploy.simulation.shift import play; "
+        f"print(play(plan.shift('equal', {LENGTH}, 3.0, list(plan.FAULT_KINDS))).digest)"
+    )
+    runs = [
+        subprocess.Popen(
+            [sys.executable, "-c", program],
+            cwd=ROOT,
+            env={**os.environ, "PYTHONHASHSEED": seed},
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        for seed in ("1", "2")
+    ]
+    digests = [run.communicate()[0] for run in runs]
+    assert digests[0]
+    assert digests[0] == digests[1]
+
+
+def test_another_seed_gives_another_record() -> None:
+    one, two = (play(Shift(seed, 5.0, SCENARIO, [])) for seed in ("one", "two"))
+    assert one.digest != two.digest
+
+
+def with_a_bug(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let the simulated arm run an engine controller with a bug."""
+    broken = [
+        Program(each.name, "tests.simulation.deaf_controller", ())
+        if each.name == "engine_controller"
+        else each
+        for each in arm.PROGRAMS
+    ]
+    monkeypatch.setattr(arm, "PROGRAMS", tuple(broken))
+
+
+def test_a_bug_of_a_service_violates_a_promise(monkeypatch: pytest.MonkeyPatch) -> None:
+    with_a_bug(monkeypatch)
+    kills = [PlannedFault(AWAKE + 1.0 + n, "kill", "operator_watchdog") for n in range(14)]
+    assert "S1" in violations(play(Shift("bug", DAY, SCENARIO, kills)))
+
+
+def test_a_line_is_good_again_after_overlapping_faults(tmp_path: Path) -> None:
+    with arm.simulated_arm("1", tmp_path, SCENARIO) as simulated:
+        network = simulated.simulation.network
+        good = network.loss, network.latency
+        undone = [FAULT_KINDS["bad_line"].inject(simulated, ALL, 1.0) for _ in range(2)]
+        assert (network.loss, network.latency) == BAD_LINE
+        for undo in undone:
+            assert undo is not None
+            undo()
+        assert (network.loss, network.latency) == good

@@ -1,0 +1,81 @@
+"""A schedule that violates a promise is shrunk to the faults that matter."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+
+from deploy.chaos import schedule_file
+from deploy.chaos.schedule import AWAKE, DAY, PlannedFault
+from deploy.chaos.schedule_file import Shift
+from deploy.chaos.testbed import SCENARIO
+from deploy.simulation.shift import play
+from deploy.simulation.shrink import minimal, shrink
+from deploy.supervision.system import DeploymentError
+from tests.simulation.test_shift import with_a_bug
+
+
+@pytest.mark.parametrize("needed", [set(), {0}, {3}, {2, 7}, {0, 5, 9}, set(range(10))])
+def test_the_minimum_is_exactly_what_fails(needed: set[int]) -> None:
+    tried = 0
+
+    def fails(items: Sequence[int]) -> bool:
+        nonlocal tried
+        tried += 1
+        return needed <= set(items)
+
+    assert set(minimal(range(10), fails)) == needed
+    assert tried < 100
+
+
+def test_a_schedule_is_shrunk_to_the_faults_that_violate_the_promise(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    with_a_bug(monkeypatch)
+    others = [PlannedFault(8.0, "kill", "velocity"), PlannedFault(12.0, "terminate", "config_l1")]
+    kills = [PlannedFault(AWAKE + 1.0 + 4 * n, "kill", "operator_watchdog") for n in range(3)]
+    outcome = play(Shift("bug", DAY, SCENARIO, [*others, *kills]))
+    assert "S1" in outcome.violated()
+    left: list[int] = []
+    small = shrink(outcome, left.append)
+    assert "S1" in small.violated()
+    assert {each.target for each in small.shift.faults} == {"operator_watchdog"}
+    assert left[-1] == len(small.shift.faults) < len(kills) + 1
+
+    path = tmp_path / "small.yaml"
+    schedule_file.save(small.shift, path)
+    again = play(schedule_file.load(path))
+    assert again.digest == small.digest
+
+
+@pytest.mark.parametrize(
+    ("content", "reason"),
+    [
+        ("", "no schedule"),
+        ("faults: 3", "no schedule"),
+        ("seed: 1\nlength: x\nscenario: {}\nfaults: []", "could not convert"),
+        ("seed: 1\nlength: 5\nscenario: {}\nfaults: [{at: 1, kind: kill}]", "target"),
+        ("{", "no schedule"),
+    ],
+)
+def test_a_bad_schedule_is_one_line(content: str, reason: str, tmp_path: Path) -> None:
+    path = tmp_path / "bad.yaml"
+    path.write_text(content)
+    with pytest.raises(DeploymentError, match=reason) as error:
+        schedule_file.load(path)
+    assert str(path) in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(("kind", "target"), [("magic", "all"), ("kill", "moon"), ("full_disk", "nothing")])
+def test_a_fault_that_cannot_be_simulated_is_named(kind: str, target: str) -> None:
+    with pytest.raises(DeploymentError, match=f"no fault {kind} of {target}"):
+        play(Shift("1", 5.0, SCENARIO, [PlannedFault(1.0, kind, target)]))
+
+
+def test_an_error_of_the_scenario_is_one_line() -> None:
+    with pytest.raises(DeploymentError, match=r"the scenario has an error: .*theta1") as error:
+        play(Shift("1", 5.0, {"theta1": "much"}, []))
+    assert "\n" not in str(error.value)
