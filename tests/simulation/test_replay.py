@@ -1,0 +1,182 @@
+"""Replay of a real arm's record, made by `ros2 bag record --storage-preset-profile zstd_small`.
+
+In the 38 s of play.mcap the engines are turned on, the watchdog and kinematics are killed, the operator falls
+asleep until the watchdog turns the engines off, comes back, and turns them on again.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from rclpy.serialization import deserialize_message, serialize_message
+from std_msgs.msg import Float64, String
+
+from deploy.recording.recorder import Recorder
+from deploy.replay import chains
+from deploy.replay.comparison import compare
+from deploy.replay.record import Message, Record, load
+from interfaces import topics
+
+ROOT = Path(__file__).parents[2]
+PLAY = Path(__file__).parent / "play.mcap"
+SECOND = 10**9
+
+
+def replay(
+    record: Path, *options: str, directory: Path = ROOT, **environment: str
+) -> subprocess.CompletedProcess[str]:
+    """Replay in a subprocess, which handles signals; modules of the directory come first."""
+    return subprocess.run(
+        [sys.executable, "-m", "deploy.replay", str(record), *options],
+        cwd=directory,
+        env={**os.environ, "PYTHONPATH": str(ROOT), **environment},
+        capture_output=True,
+        text=True,
+        timeout=150,
+    )
+
+
+def verdicts(done: subprocess.CompletedProcess[str]) -> dict[str, str]:
+    """Return what the command says about each topic."""
+    rows = re.findall(r"^(\S+) .* (equal|DIFFERENT) ", done.stdout, re.MULTILINE)
+    return dict(rows)
+
+
+def test_replay_of_a_real_play_is_equal_and_the_same_each_time(tmp_path: Path) -> None:
+    outputs = [tmp_path / "one.mcap", tmp_path / "two.mcap"]
+    for seed, output in enumerate(outputs):
+        done = replay(PLAY, "--output", str(output), PYTHONHASHSEED=str(seed))
+        assert (done.returncode, done.stderr) == (0, ""), done.stdout
+        assert verdicts(done) == {
+            "effector/position": "equal",
+            "effector/speed": "equal",
+            "operator_presence": "equal",
+            "operator_activity": "equal",
+            "engines": "equal",
+            "engines/state": "equal",
+        }
+        assert "\nEqual within the bounds for 38 s\n" in done.stdout
+    assert outputs[0].read_bytes() == outputs[1].read_bytes()
+
+    states = load(outputs[0]).of(topics.ENGINES_STATE, "/")
+    texts = [deserialize_message(message.data, String).data for message in states]
+    changes = [text for before, text in zip(["", *texts], texts, strict=False) if text != before]
+    assert changes[-3:] == ["on", "off", "on"]
+
+
+CHANGES: list[tuple[str, str, str, str]] = [
+    ("kinematics.py", "y = l1 * math.sin(theta1) +", "y = l1 * math.sin(theta1) -", "effector/position"),
+    ("velocity.py", "before.y) / seconds", "before.y) / seconds * 1.001", "effector/speed"),
+    ("operator_watchdog.py", "parameter(3, (1, 100)", "parameter(2, (1, 100)", "operator_activity"),
+    ("operator_watchdog.py", "lambda _: TURN_OFF", "lambda _: topics.TURN_ON", "engines"),
+    ("engine_controller.py", "10.0, (1.0, 10.0)", "5.0, (1.0, 10.0)", "engines/state"),
+]
+
+
+@pytest.mark.parametrize(("file", "text", "other", "topic"), CHANGES, ids=[each[3] for each in CHANGES])
+def test_changed_recipe_differs(file: str, text: str, other: str, topic: str, tmp_path: Path) -> None:
+    shutil.copytree(ROOT / "services", tmp_path / "services")
+    changed = tmp_path / "services" / file
+    source = changed.read_text()
+    assert text in source
+    changed.write_text(source.replace(text, other))
+    done = replay(PLAY, "--output", str(tmp_path / "out.mcap"), directory=tmp_path)
+    assert done.returncode == 1, done.stderr
+    assert verdicts(done)[topic] == "DIFFERENT"
+    assert re.search(rf"^Different in 38 s: .*{topic}", done.stdout, re.MULTILINE)
+
+
+def test_changed_parameter_differs(tmp_path: Path) -> None:
+    parameters = tmp_path / "parameters.yaml"
+    parameters.write_text("operator_watchdog: {ros__parameters: {silence: 1.0}}")
+    done = replay(PLAY, "--output", str(tmp_path / "out.mcap"), "--parameters", str(parameters))
+    assert done.returncode == 1
+    assert verdicts(done)["engines/state"] == "DIFFERENT"
+
+
+def test_service_that_fails_is_reported(tmp_path: Path) -> None:
+    shutil.copytree(ROOT / "services", tmp_path / "services")
+    (tmp_path / "services" / "velocity.py").write_text("raise ValueError('no velocity')")
+    done = replay(PLAY, "--output", str(tmp_path / "out.mcap"), directory=tmp_path)
+    assert done.returncode == 1
+    assert "velocity ended: ValueError: no velocity" in done.stdout
+
+
+def damaged(data: bytes) -> bytes:
+    return data[:50_000] + bytes(100) + data[50_100:]
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda data: b"",
+        lambda data: data[:1000],
+        lambda data: data[:-10],
+        damaged,
+        lambda data: b"Dear arm,\n",
+    ],
+    ids=["empty", "beginning", "without end", "damaged", "letter"],
+)
+def test_bad_file_is_refused_in_one_line(change: Callable[[bytes], bytes], tmp_path: Path) -> None:
+    record = tmp_path / "record.mcap"
+    record.write_bytes(change(PLAY.read_bytes()))
+    done = replay(record)
+    assert done.returncode == 2
+    assert done.stderr.startswith(f"{record} is not a complete MCAP: ")
+    assert done.stderr.count("\n") == 1
+    assert list(tmp_path.iterdir()) == [record]
+
+
+def test_missing_file_and_missing_arm_are_one_line(tmp_path: Path) -> None:
+    done = replay(tmp_path / "none.mcap")
+    assert (done.returncode, done.stderr) == (2, f"{tmp_path}/none.mcap: No such file or directory\n")
+    record = tmp_path / "other.mcap"
+    recorder = Recorder(record, 0, SECOND)
+    recorder.message("/other", "std_msgs/msg/Float64", "", serialize_message(Float64()), 0, 0)
+    recorder.close()
+    done = replay(record)
+    assert (done.returncode, done.stderr) == (2, f"{record} contains no topic of an arm\n")
+    done = replay(PLAY, "--namespace", "/arm2")
+    assert (done.returncode, done.stderr) == (2, f"{PLAY} has no arm /arm2; it has /\n")
+
+
+def text(*items: tuple[float, str]) -> list[Message]:
+    return [Message(round(at * SECOND), serialize_message(String(data=data))) for at, data in items]
+
+
+def test_turn_off_belongs_to_the_watchdog_while_it_misses_the_operator() -> None:
+    activity = text((1.0, topics.ALIVE), (5.0, topics.INCAPACITATED), (8.0, topics.ALIVE))
+    sent = text(
+        (2.0, topics.TURN_OFF),
+        (5.001, topics.TURN_OFF),
+        (6.0, topics.TURN_ON),
+        (7.0, topics.TURN_OFF),
+        (9.0, topics.TURN_OFF),
+    )
+    record = Record(0, 10 * SECOND, 0, {"/operator_activity": activity, "/engines": sent})
+    people, watchdog = chains.commands(record, "/")
+    assert [message.sent / SECOND for message in people] == [2.0, 6.0, 9.0]
+    assert [message.sent / SECOND for message in watchdog] == [5.001, 7.0]
+
+
+def test_state_that_changes_later_than_its_bound_differs() -> None:
+    def states(change: float) -> list[Message]:
+        return text(*((n / 10, topics.ON if n / 10 < change else topics.OFF) for n in range(100)))
+
+    assert compare(topics.ENGINES_STATE, states(5.0), states(5.5), []).is_equal
+    late = compare(topics.ENGINES_STATE, states(5.0), states(5.9), [])
+    assert not late.is_equal
+    assert late.differences[0].replayed == topics.ON
+    assert compare(topics.ENGINES_STATE, states(5.0), states(5.9), [(4 * SECOND, 7 * SECOND)]).is_equal
+
+
+def test_state_that_is_repeated_too_seldom_differs() -> None:
+    often, seldom = (text(*((n / rate, topics.ON) for n in range(10 * rate))) for rate in (10, 5))
+    assert not compare(topics.ENGINES_STATE, often, seldom, []).is_equal
