@@ -1,0 +1,72 @@
+"""The modules of the safety path, and the component tests that guard each of them."""
+
+from __future__ import annotations
+
+REACTIVE_NODE = "interfaces/reactive_node/src/reactive_node"
+_NODE_TESTS = "interfaces/reactive_node/tests"
+
+GUARDS: dict[str, tuple[str, ...]] = {
+    "services/operator_watchdog.py": (
+        "tests/component/test_operator_watchdog.py",
+        "tests/component/test_operator_watchdog_wiring.py",
+        "tests/component/test_readme.py",
+    ),
+    "services/engine_controller.py": (
+        "tests/component/test_engine_controller.py",
+        "tests/component/test_engine_controller_wiring.py",
+        "tests/component/test_readme.py",
+    ),
+    "interfaces/topics.py": (
+        "tests/component/test_topics.py",
+        "tests/component/test_readme.py",
+        "tests/component/test_service_node.py",
+    ),
+    "interfaces/service/health.py": (
+        "tests/component/test_health.py",
+        "tests/component/test_service_node.py",
+    ),
+    "interfaces/service/instance.py": ("tests/component/test_service_life.py",),
+    "interfaces/service/node.py": ("tests/component/test_service_node.py",),
+    "interfaces/service/parameters.py": (
+        "tests/component/test_readme.py",
+        "tests/component/test_service_node.py",
+        "tests/supervision/test_parameter_file.py",
+    ),
+    "interfaces/service/process.py": ("tests/component/test_service_life.py",),
+    f"{REACTIVE_NODE}/scheduler.py": (
+        f"{_NODE_TESTS}/test_scheduler_limits.py",
+        f"{_NODE_TESTS}/test_scheduler.py",
+    ),
+    f"{REACTIVE_NODE}/stamps.py": (f"{_NODE_TESTS}/test_stamps.py",),
+    f"{REACTIVE_NODE}/node.py": tuple(
+        f"{_NODE_TESTS}/test_{name}.py"
+        for name in (
+            "publishing",
+            "observables",
+            "parameters",
+            "events",
+            "calls",
+            "services",
+            "transforms",
+            "actions",
+        )
+    ),
+    f"{REACTIVE_NODE}/shared_reader.py": (f"{_NODE_TESTS}/test_observables.py",),
+    "deploy/supervision/policy.py": (
+        "tests/supervision/test_policy.py",
+        "tests/supervision/test_sentinel.py",
+    ),
+    "deploy/supervision/sentinel.py": (
+        "tests/supervision/test_sentinel.py",
+        "tests/supervision/test_sentinel_wiring.py",
+        "tests/component/test_readme.py",
+    ),
+    "deploy/chaos/history.py": ("tests/chaos/test_history.py", "tests/chaos/test_checkers.py"),
+    "deploy/chaos/promises.py": ("tests/chaos/test_checkers.py", "tests/chaos/test_reports.py"),
+    "deploy/chaos/safety.py": ("tests/chaos/test_bounds.py", "tests/chaos/test_checkers.py"),
+    "deploy/chaos/liveness.py": ("tests/chaos/test_bounds.py", "tests/chaos/test_checkers.py"),
+}
+"""Paths of modules, and of the tests that run for each mutant of the module, quick ones first."""
+
+SIMULATION = "tests/simulation/test_shift.py"
+"""Tests that run only for the mutants that survive component tests."""
