@@ -11,16 +11,20 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from hypothesis import settings
+from hypothesis import Phase, settings
 
 # The embedded runtime is not installed beside ROS 2's rclpy, and not every ROS 2 has the command line.
-_NEEDED_BY = {
-    "rosidl_runtime_embedded": "deploy/runtime/tests/runtime",
-    "ros2cli": "deploy/runtime/tests/cli",
+_NEEDS = {
+    "deploy/runtime/tests/runtime": "rosidl_runtime_embedded",
+    "deploy/runtime/tests/interop": "rosidl_runtime_embedded",
+    "deploy/runtime/tests/simulation": "rosidl_runtime_embedded",
+    "deploy/runtime/tests/cli": "ros2cli",
 }
-collect_ignore = [tests for needed, tests in _NEEDED_BY.items() if not importlib.util.find_spec(needed)]
+collect_ignore = [tests for tests, needed in _NEEDS.items() if not importlib.util.find_spec(needed)]
 
 settings.register_profile("reactive-arm", deadline=None)  # a busy machine is no defect
+# For `make mutants`: whether a test fails, not the smallest example; the same examples each time.
+settings.register_profile("mutants", deadline=None, derandomize=True, phases=[Phase.explicit, Phase.generate])
 settings.load_profile("reactive-arm")
 
 MARK = "REACTIVE_ARM_TESTS"
@@ -38,9 +42,10 @@ def pytest_configure() -> None:
 
 def pytest_sessionfinish(session: pytest.Session) -> None:
     """With REACTIVE_ARM_SKIPS=fail, fail if a test was skipped for a reason other than "platform: …"."""
-    if os.environ.get("REACTIVE_ARM_SKIPS") != "fail":
+    reporter = session.config.pluginmanager.get_plugin("terminalreporter")  # none in a worker of pytest-xdist
+    if os.environ.get("REACTIVE_ARM_SKIPS") != "fail" or not reporter:
         return
-    skipped = session.config.pluginmanager.get_plugin("terminalreporter").stats.get("skipped", [])
+    skipped = reporter.stats.get("skipped", [])
     reasons = [str(report.longrepr[2]).removeprefix("Skipped: ") for report in skipped]
     if not all(reason.startswith("platform:") for reason in reasons) and session.exitstatus == 0:
         session.exitstatus = pytest.ExitCode.TESTS_FAILED

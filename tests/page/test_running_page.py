@@ -18,8 +18,9 @@ from deploy.supervision.system import System
 from interfaces import topics
 from interfaces.topics import OFF, ON
 from tests.page.clients import Hand, Link
-from tests.system import pauses
 from tests.system.sites import LIMIT, Peer, Site
+
+pytestmark = pytest.mark.alone
 
 STEADY = str(Path(__file__).parents[1] / "system" / "steady.yaml")
 S1 = 10.5  # s
@@ -107,14 +108,13 @@ def hold(hand: Hand, observer: Observer) -> None:
 def test_release_is_visible_at_once(hand: Hand, observer: Observer) -> None:
     hold(hand, observer)
     delays = []
-    with pauses.watched() as stood_still:
-        for _ in range(20):
-            hand.press()
-            observer.watch(0.2)
-            released = hand.release()
-            observer.watch(0.35)
-            delays.append(max(observer.after(released), default=0.0))
-    assert max(delays) <= RELEASED + stood_still.total, delays
+    for _ in range(20):
+        hand.press()
+        observer.watch(0.2)
+        released = hand.release()
+        observer.watch(0.35)
+        delays.append(max(observer.after(released), default=0.0))
+    assert max(delays) <= RELEASED, delays
 
 
 def test_engines_go_off_in_time_when_the_hand_is_gone(hand: Hand, observer: Observer) -> None:
@@ -123,10 +123,9 @@ def test_engines_go_off_in_time_when_the_hand_is_gone(hand: Hand, observer: Obse
     hand.say("engines", command="turn_on")
     observer.until(lambda: observer.engines == ON)
     observer.until(lambda: hand.shown["engines"]["state"] == ON)
-    with pauses.watched() as stood_still:
-        released = hand.release()
-        off = observer.until(lambda: observer.engines == OFF)
-    assert off - released <= S1 + stood_still.total
+    released = hand.release()
+    off = observer.until(lambda: observer.engines == OFF)
+    assert off - released <= S1
     observer.until(lambda: "incapacitated" in hand.shown["engines"]["why"])
     assert hand.shown["operator"]["strikes_left"] == 0
 
@@ -161,7 +160,8 @@ def test_killed_console_is_a_silent_operator(
     observer.until(finds_it_again)
 
 
-@pytest.mark.parametrize("seconds", [0.6, 2.0])
+# Shorter than the patience of the sentinel: it restarts a process that was silent for longer.
+@pytest.mark.parametrize("seconds", [0.6, 1.2])
 def test_paused_console_holds_nothing_when_it_goes_on(
     hand: Hand, observer: Observer, module_site: Site, seconds: float
 ) -> None:
@@ -196,14 +196,13 @@ def test_hand_survives_the_death_of_other_programs(hand: Hand, observer: Observe
     for program in ("dead_mans_switch", "dead_mans_switch", "operator_watchdog", "sentinel", "config_l1"):
         hold(hand, observer)
         pid = module_site.members[program]
-        with pauses.watched() as stood_still:
-            os.kill(pid, signal.SIGKILL)
-            killed = time.monotonic()
-            observer.until(lambda pid=pid, program=program: module_site.members.get(program, pid) != pid)
-            observer.watch(1.0)
+        os.kill(pid, signal.SIGKILL)
+        killed = time.monotonic()
+        observer.until(lambda pid=pid, program=program: module_site.members.get(program, pid) != pid)
+        observer.watch(1.0)
         gaps = [later - earlier for earlier, later in itertools.pairwise(observer.after(killed - 0.2))]
-        assert max(gaps) <= 0.25 or stood_still.total > 0.1, program
-        assert hand.shown["switch"]["by"] == "this_page" or stood_still.total > 0.1, program
+        assert max(gaps) <= 0.25, program
+        assert hand.shown["switch"]["by"] == "this_page", program
 
 
 def test_page_kills_and_stops_processes(hand: Hand, observer: Observer, module_site: Site) -> None:

@@ -39,9 +39,10 @@ def prefix(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def command(prefix: Path, executable: str, *arguments: str) -> list[str]:
     """Return the command that `ros2 run` starts, in the environment of the sourced workspace."""
-    (python_path,) = prefix.glob("lib/python3*/site-packages")
+    (python_path,) = map(str, prefix.glob("lib/python3*/site-packages"))
+    python_path += os.pathsep + os.environ.get("PYTHONPATH", "")  # of a sourced ROS 2
     path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
-    environment = ["env", "-C", str(prefix), f"PYTHONPATH={python_path}", f"PATH={path}"]
+    environment = ["env", "-C", str(prefix), f"PYTHONPATH={python_path.rstrip(os.pathsep)}", f"PATH={path}"]
     return [*environment, str(prefix / "lib" / PACKAGE / executable), *arguments]
 
 

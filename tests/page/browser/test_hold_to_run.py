@@ -13,10 +13,12 @@ import time
 
 import pytest
 
-from tests.system import pauses
+from tests.page.browser import pauses
 
 from .arm import GONE, Arm, hold_with_engines_on, undisturbed
 from .chromium import HandOnPage
+
+pytestmark = pytest.mark.alone
 
 SAMPLES = 100
 LOCALLY = 0.15  # s from the hand's release to the last heartbeat, at p99

@@ -12,10 +12,14 @@ import time
 from contextlib import closing
 from typing import Any
 
+import pytest
+
 from . import chromium
 from .arm import GONE, LINK, Arm, hold_with_engines_on
 from .chromium import HandOnPage
 from .link import Link
+
+pytestmark = pytest.mark.alone
 
 S1 = 10.5  # s
 HELD_UP = 2.0  # s

@@ -16,6 +16,8 @@ from .arm import LINK, Arm, hold_with_engines_on, undisturbed
 from .chromium import HandOnPage
 from .link import Link
 
+pytestmark = pytest.mark.alone
+
 WIDTHS = {320: 568, 390: 844, 1280: 800, 3840: 2160}
 CONTROLS = ("button", "slider", "spinbutton")
 NAMED = (*CONTROLS, "link", "textbox", "image", "table", "region")

@@ -11,6 +11,8 @@ import pytest
 from deploy.console.page.site import STATIC
 from tests.page.clients import Arm
 
+pytestmark = pytest.mark.alone
+
 RECOVERIES = """
 async () => {
     const { Processes } = await import("/static/processes.js");
