@@ -7,7 +7,13 @@ WEB ?=
 TESTS ?= tests interfaces/reactive_node deploy/runtime
 MINUTES ?= 5
 SEED ?=
+HOURS ?= 1
+SCHEDULE ?=
+SIMULATE ?=
 CHAOS ?=
+RECORD ?=
+REPLAY ?=
+MODULES ?=
 SHELL := /bin/sh
 MAKEFLAGS += --no-print-directory
 PY := .venv/bin/python
@@ -16,7 +22,7 @@ STAMP := .venv/made-from
 HOLD := $(shell env --block-signal=INT echo env --block-signal=INT 2>/dev/null)
 export PYTHON SCENARIO PARAMETERS WEB
 
-.PHONY: help setup run start stop status logs record console chaos test check bench
+.PHONY: help setup run start stop status logs record console chaos simulate replay test mutants check bench
 
 help:
 	@echo "make run      start the system, show it in this terminal, stop it with Ctrl-C"
@@ -28,7 +34,10 @@ help:
 	@echo "make record   record its messages until Ctrl-C     (MCAP for Foxglove and ros2 bag, in .run/records)"
 	@echo "make stop     stop it"
 	@echo "make chaos    break a system on purpose and check its promises  (MINUTES=5 SEED= CHAOS=--help for more)"
+	@echo "make simulate the same in virtual time, hours in minutes  (HOURS=1 SEED= SCHEDULE=file SIMULATE=--help for more)"
+	@echo "make replay   feed a record through today's services and show what differs  (RECORD= REPLAY=--help for more)"
 	@echo "make test     run the tests                       (TESTS=tests/component for a part)"
+	@echo "make mutants  change the safety path in every small way: do the tests notice?  (MODULES= for a part)"
 	@echo "make bench    measure the costs of rclpy on this machine"
 	@echo "make check    ruff, mypy, import rules, shellcheck, yamllint"
 	@echo "make setup    only set up .venv                   (PYTHON= chooses the interpreter, 3.11 to 3.13)"
@@ -49,8 +58,17 @@ stop:
 chaos: setup
 	@exec $(HOLD) $(PY) -m deploy.chaos --minutes $(MINUTES) $(if $(SEED),--seed $(SEED)) $(CHAOS)
 
+simulate: setup
+	@exec $(HOLD) $(PY) -m deploy.simulation --hours $(HOURS) $(if $(SEED),--seed $(SEED)) $(if $(SCHEDULE),--schedule "$(SCHEDULE)") $(SIMULATE)
+
+replay: setup
+	@exec $(HOLD) $(PY) -m deploy.replay $(if $(RECORD),"$(RECORD)") $(REPLAY)
+
 test: setup
-	@$(PY) -m pytest $(TESTS)
+	@$(PY) -m deploy.commands.test $(TESTS)
+
+mutants: setup
+	@exec $(HOLD) $(PY) -m deploy.mutants $(MODULES)
 
 bench: setup
 	@$(PY) deploy/runtime/benchmarks/run.py
@@ -62,5 +80,5 @@ check: setup
 	@$(PY) -m mypy
 	@$(PY) -m mypy --config-file deploy/runtime/pyproject.toml
 	@PYTHONPATH="interfaces/reactive_node/src:deploy/runtime/src:$$PYTHONPATH" .venv/bin/lint-imports --no-logo --no-cache
-	@.venv/bin/shellcheck deploy/commands/python.sh .ci/run
+	@.venv/bin/shellcheck deploy/commands/python.sh .ci/run .ci/run-on-ros
 	@$(PY) -m yamllint --strict deploy
