@@ -219,13 +219,15 @@ def _merged(intervals: Iterable[tuple[float, float]]) -> list[tuple[float, float
 
 def _abandoned(history: History, off: Sample) -> bool:
     """Return whether the operator or a suspended watchdog left the controller without presence for 10 s."""
-    presences = history.stream(topics.OPERATOR_PRESENCE)
     begin = off.sent - PRESENCE_TIMEOUT + SAMPLING + TRANSPORT  # a presence is as old as its stamp
-    if between(presences, begin, off.sent - TRANSPORT):
-        return False
+    deaf = [(one, two) for one, two in _deaf(history) if one < off.sent and two > begin]
+    for presence in between(history.stream(topics.OPERATOR_PRESENCE), begin, off.sent - TRANSPORT):
+        # One that the watchdog sent when it went on may be of a heartbeat before that.
+        if not any(one < presence.sent <= two + TRANSPORT for one, two in deaf):
+            return False
     heartbeats = [s.sent for s in history.signs_of_life()]
     silent = any(two - one > MAX_PRESENCE_AGE for one, two in gaps(heartbeats, begin, off.sent))
-    return silent or any(one < off.sent and two > begin for one, two in _deaf(history))
+    return silent or bool(deaf)
 
 
 def _deaf(history: History) -> Iterator[tuple[float, float]]:

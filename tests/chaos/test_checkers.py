@@ -180,6 +180,14 @@ def test_s2_permits_turn_off_10_s_after_the_last_presence() -> None:
     assert verdict("S2", silent(history, "operator_heartbeat", 50.0, 55.0)) == VIOLATED  # too late
 
 
+def test_s2_presence_after_a_suspension_is_as_old_as_its_begin() -> None:
+    history = silent(silent(good(), "operator_heartbeat", 20.0, END), "operator_presence", 20.0, END)
+    history = with_value(added(history, "operator_presence", (21.0, 20.0)), "engines/state", OFF, 29.9)
+    assert verdict("S2", history) == VIOLATED
+    assert verdict("S2", faulty(history, InjectedFault("slow", "operator_watchdog", 19.9, 20.9))) != VIOLATED
+    assert verdict("S2", faulty(history, InjectedFault("slow", "operator_watchdog", 19.8, 20.8))) == VIOLATED
+
+
 def test_s2_permits_turn_off_after_a_stopped_controller() -> None:
     history = with_value(silent(good(), "engines/state", 30.0, 31.55), "engines/state", OFF, 31.5)
     assert verdict("S2", history) == VIOLATED
