@@ -51,7 +51,10 @@ GUARDS: dict[str, tuple[str, ...]] = {
             "actions",
         )
     ),
-    f"{REACTIVE_NODE}/shared_reader.py": (f"{_NODE_TESTS}/test_observables.py",),
+    f"{REACTIVE_NODE}/shared_reader.py": (
+        f"{_NODE_TESTS}/test_observables.py",
+        f"{_NODE_TESTS}/test_events.py",
+    ),
     "deploy/supervision/policy.py": (
         "tests/supervision/test_policy.py",
         "tests/supervision/test_sentinel.py",

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import gc
 import threading
+import weakref
 from collections.abc import Callable
 from datetime import UTC, datetime, timedelta
 from typing import Any
@@ -11,11 +13,13 @@ import pytest
 import reactivex as rx
 from rclpy.node import Node
 from rclpy.publisher import Publisher
-from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile
 from reactivex.abc import DisposableBase
+from reactivex.subject import AsyncSubject
 from std_msgs.msg import String
 
 from reactive_node import ReactiveNode, Timestamp
+from reactive_node.shared_reader import SharedReader
 from reactive_node.testing import SpinFor, SpinUntil
 
 LATCHED = QoSProfile(depth=3, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -236,10 +240,46 @@ def test_observer_that_leaves_early_gets_no_retained_samples(
     latched_talker.say("0")
     spin_until(lambda: first)
 
-    observable.subscribe(texts_into(late)).dispose()
+    take = texts_into(late)
+    forgotten = weakref.ref(take)
+    observable.subscribe(take).dispose()
+    del take
     spin_for(0.05)
+    gc.collect()
 
     assert late == []
+    assert forgotten() is None
+
+
+def test_late_observer_of_keep_all_topic_gets_every_sample(
+    node: ReactiveNode, peer: Node, spin_until: SpinUntil
+) -> None:
+    everything = QoSProfile(
+        history=HistoryPolicy.KEEP_ALL, depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL
+    )
+    observable = node.create_observable(String, "topic", everything)
+    first: list[str] = []
+    late: list[str] = []
+    observable.subscribe(texts_into(first))
+    Talker(peer, spin_until, everything).say("0", "1", "2")
+    spin_until(lambda: first == ["0", "1", "2"])
+
+    observable.subscribe(texts_into(late))
+    spin_until(lambda: late == ["0", "1", "2"])
+
+
+def test_reader_that_is_gone_waits_for_no_end_of_the_node(node: ReactiveNode, spin_until: SpinUntil) -> None:
+    end: AsyncSubject[None] = AsyncSubject()
+    reader = SharedReader(
+        node,
+        lambda callback: node.create_subscription(String, "topic", callback, 10),
+        scheduler=node.scheduler,
+        end=end,
+    )
+    subscription = rx.Observable(reader.subscribe).subscribe()
+    assert len(end.observers) == 1
+    subscription.dispose()
+    assert end.observers == []
 
 
 def test_timestamped_items_carry_source_time(
@@ -271,9 +311,12 @@ def test_observable_of_ended_node_completes_at_once(node: ReactiveNode) -> None:
 def test_invalid_message_type_is_error_of_observable(node: ReactiveNode) -> None:
     errors: list[Exception] = []
 
-    node.create_observable(int, "topic").subscribe(on_error=errors.append)
+    observable = node.create_observable(int, "topic")
+    observable.subscribe(on_error=errors.append)
+    observable.subscribe(on_error=errors.append)
 
-    assert len(errors) == 1
+    assert len(errors) == 2
+    assert all("'int'" in str(error) for error in errors)
 
 
 # Disposing anywhere

@@ -21,6 +21,11 @@ from reactive_node.stamps import Timestamp
 class SharedReader:
     """Creates a DDS reader for the first observer and destroys it after the last one."""
 
+    # While there is a reader:
+    _at_end: abc.DisposableBase
+    _listening: tuple[abc.ObserverBase[Any], ...]
+    """Members that have got the retained samples. Replaced, never changed: _receive takes no lock."""
+
     def __init__(
         self,
         node: Node,
@@ -48,10 +53,7 @@ class SharedReader:
         self._callback = self._receive_with_info if timestamped else self._receive
         self._lock = threading.RLock()
         self._subscription: Subscription | None = None
-        self._at_end: abc.DisposableBase = Disposable()
         self._members: list[abc.ObserverBase[Any]] = []
-        # Members that have got the retained samples. Replaced, never changed: _receive takes no lock.
-        self._listening: tuple[abc.ObserverBase[Any], ...] = ()
 
     def subscribe(
         self, observer: abc.ObserverBase[Any], scheduler: abc.SchedulerBase | None = None
@@ -67,7 +69,7 @@ class SharedReader:
                 try:
                     self._subscription = self._create(self._callback)
                 except Exception:
-                    self._members, self._listening = [], ()
+                    self._members = []
                     raise
                 self._at_end = self._end.subscribe(on_completed=self._complete)
             elif self._retained is None:
@@ -78,7 +80,7 @@ class SharedReader:
 
     def _join(self, observer: abc.ObserverBase[Any]) -> None:
         with self._lock:
-            if self._subscription is None or not any(member is observer for member in self._members):
+            if self._subscription is None or observer not in self._members:
                 return
             self._listening += (observer,)
             # DDS drops the retained samples of a publisher that has gone.
