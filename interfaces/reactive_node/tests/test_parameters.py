@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import gc
 import threading
+import weakref
 
 import pytest
 import reactivex as rx
@@ -10,6 +12,7 @@ from rclpy.exceptions import ParameterNotDeclaredException
 from rclpy.parameter import Parameter
 
 from reactive_node import ReactiveNode
+from reactive_node.testing import SpinUntil
 
 
 def test_parameter_observable_emits_present_and_new_values(node: ReactiveNode) -> None:
@@ -26,6 +29,23 @@ def test_parameter_observable_emits_present_and_new_values(node: ReactiveNode) -
     node.set_parameters([Parameter("gain", value=4.0)])
 
     assert gains == [1.0, 2.0, 3.0]
+
+
+def test_observer_that_has_left_is_forgotten(node: ReactiveNode, spin_until: SpinUntil) -> None:
+    node.declare_parameter("gain", 1.0)
+
+    def take(value: float) -> None:
+        pass
+
+    left = weakref.ref(take)
+
+    def is_forgotten() -> bool:
+        gc.collect()
+        return left() is None
+
+    node.create_parameter_observable("gain").subscribe(take).dispose()
+    del take
+    spin_until(is_forgotten)
 
 
 def test_observers_agree_when_one_of_them_sets_parameter(node: ReactiveNode) -> None:
