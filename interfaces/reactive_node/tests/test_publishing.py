@@ -39,6 +39,15 @@ def test_publisher_lives_from_wiring_until_disposal(
     spin_until(lambda: peer.count_publishers("numbers") == 0)
 
 
+def test_ten_messages_wait_unless_the_user_wants_otherwise(node: ReactiveNode) -> None:
+    node.create_observable(Float64, "heard").subscribe()
+    node.publish_observable(rx.never(), Float64, "said")
+    endpoints = [*node.subscriptions, *node.publishers]
+    depths = {endpoint.topic_name: endpoint.qos_profile.depth for endpoint in endpoints}
+
+    assert (depths["/heard"], depths["/said"]) == (10, 10)
+
+
 def test_recipe_runs_on_scheduler_of_node(node: ReactiveNode, spin_until: SpinUntil) -> None:
     threads: list[int] = []
 
