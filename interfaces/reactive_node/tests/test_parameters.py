@@ -31,7 +31,8 @@ def test_parameter_observable_emits_present_and_new_values(node: ReactiveNode) -
     assert gains == [1.0, 2.0, 3.0]
 
 
-def test_observer_that_has_left_is_forgotten(node: ReactiveNode, spin_until: SpinUntil) -> None:
+@pytest.mark.parametrize("name", ["gain", "undeclared"])
+def test_observer_that_has_left_is_forgotten(node: ReactiveNode, spin_until: SpinUntil, name: str) -> None:
     node.declare_parameter("gain", 1.0)
 
     def take(value: float) -> None:
@@ -43,7 +44,7 @@ def test_observer_that_has_left_is_forgotten(node: ReactiveNode, spin_until: Spi
         gc.collect()
         return left() is None
 
-    node.create_parameter_observable("gain").subscribe(take).dispose()
+    node.create_parameter_observable(name).subscribe(take, lambda _: None).dispose()
     del take
     spin_until(is_forgotten)
 
