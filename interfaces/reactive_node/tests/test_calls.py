@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from typing import Any
 
 import reactivex as rx
@@ -33,6 +34,23 @@ def test_call_emits_response(node: ReactiveNode, peer: Node, spin_until: SpinUnt
     spin_until(lambda: responses == [(True, "answered"), (False, "answered")])
 
 
+def test_slow_server_gets_one_request(node: ReactiveNode, make_node: MakeNode, spin_until: SpinUntil) -> None:
+    served: list[Any] = []
+    responses: list[Any] = []
+    make_node("server").serve_recipe(
+        lambda requests: (
+            requests.do_action(served.append).delay(0.2).map(lambda request: (request, SetBool.Response()))
+        ),
+        SetBool,
+        "switch",
+    )
+
+    node.create_call(SetBool, "switch")(SetBool.Request()).subscribe(responses.append)
+    spin_until(lambda: responses)
+
+    assert len(served) == 1
+
+
 def test_call_waits_for_server_without_blocking(
     node: ReactiveNode, peer: Node, spin_until: SpinUntil
 ) -> None:
@@ -61,14 +79,16 @@ def test_call_finds_server_while_simulated_time_stands_still(
 
 
 def test_call_without_response_ends_in_timeout_error(node: ReactiveNode, spin_until: SpinUntil) -> None:
-    errors: list[Exception] = []
+    errors: list[tuple[Exception, int]] = []
     call = node.create_call(SetBool, "nowhere", timeout=0.1)
 
-    call(SetBool.Request()).subscribe(on_error=errors.append)
+    call(SetBool.Request()).subscribe(on_error=lambda error: errors.append((error, threading.get_ident())))
     spin_until(lambda: errors)
 
-    assert isinstance(errors[0], TimeoutError)
-    assert str(errors[0]) == "no response of nowhere within 0.1 s"
+    ((error, thread),) = errors
+    assert isinstance(error, TimeoutError)
+    assert str(error) == "no response of nowhere within 0.1 s"
+    assert thread == threading.get_ident()
 
 
 def test_call_with_wrong_request_type_is_error(node: ReactiveNode, peer: Node, spin_until: SpinUntil) -> None:

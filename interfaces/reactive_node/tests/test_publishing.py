@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import gc
 import threading
+import weakref
 from typing import Any
 
 import pytest
@@ -37,6 +39,17 @@ def test_publisher_lives_from_wiring_until_disposal(
     sink.dispose()
     sink.dispose()
     spin_until(lambda: peer.count_publishers("numbers") == 0)
+
+
+def test_publisher_is_forgotten_after_disposal(node: ReactiveNode) -> None:
+    sink = node.publish_observable(rx.never(), Float64, "numbers")
+    disposed = weakref.ref(sink)
+
+    sink.dispose()
+    del sink
+    gc.collect()
+
+    assert disposed() is None
 
 
 def test_ten_messages_wait_unless_the_user_wants_otherwise(node: ReactiveNode) -> None:
