@@ -52,6 +52,24 @@ def test_publisher_is_forgotten_after_disposal(node: ReactiveNode) -> None:
     assert disposed() is None
 
 
+def test_ended_node_leaves_the_graph_and_drops_its_actions(
+    node: ReactiveNode, peer: Node, spin_until: SpinUntil
+) -> None:
+    def act(*_: Any) -> None:
+        pass
+
+    dropped = weakref.ref(act)
+    node.scheduler.schedule_relative(60.0, act)
+    del act
+    spin_until(lambda: "reactive" in peer.get_node_names())
+
+    node.destroy_node()
+    gc.collect()
+
+    assert dropped() is None
+    spin_until(lambda: "reactive" not in peer.get_node_names())
+
+
 def test_ten_messages_wait_unless_the_user_wants_otherwise(node: ReactiveNode) -> None:
     node.create_observable(Float64, "heard").subscribe()
     node.publish_observable(rx.never(), Float64, "said")
