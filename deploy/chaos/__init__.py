@@ -4,7 +4,7 @@
 |---|---|
 | `__main__` | `make chaos`: the command line, from the plan to the reports |
 | `schedule` | when which fault is injected: named scenarios, random faults |
-| `faults`, `inject/`, `babbler`, `partition` | the kinds of faults |
+| `faults`, `inject/`, `babbler`, `clock`, `partition` | the kinds of faults |
 | `testbed`, `arm` | the arms under test, and the injection |
 | `observer`, `process_monitor`, `record` | the record: messages, processes, faults |
 | `history` | the content of a record for one arm |

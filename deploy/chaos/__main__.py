@@ -44,7 +44,8 @@ def main(arguments: Sequence[str]) -> int:
 
 def unleash(options: argparse.Namespace) -> int:
     """Start the arms, inject the faults, and judge the record; return the exit code."""
-    title, schedules, length, new_testbed = plan.plan(options)
+    planned = plan.plan(options)
+    title, schedules, length, new_testbed = planned
     if options.loss:
         title += f", {options.loss:g} % packet loss"
     print(title, flush=True)
@@ -53,7 +54,7 @@ def unleash(options: argparse.Namespace) -> int:
         print(line, flush=True)
 
     with _directory() as directory:
-        with new_testbed(directory, say=say, loss=options.loss) as testbed:
+        with new_testbed(directory, say=say, loss=options.loss, steps_clock=planned.steps_clock) as testbed:
             before = Cost.now(testbed.arms)
             testbed.inject(schedules, length)
             cost = Cost.now(testbed.arms).since(before)

@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import yaml
 
+from deploy.chaos import clock
 from deploy.chaos.arm import Arm
 from deploy.chaos.babbler import BABBLER
 from deploy.chaos.history import ALL, NO_TARGET, PROGRAMS
@@ -153,6 +154,11 @@ def full_disk(arm: Arm, target: str) -> Undo:
     return lambda: limit(None)
 
 
+def step_clock(arm: Arm, target: str) -> None:
+    """Step the time of day of all processes of an arm, within a second; it stays so."""
+    arm.clock.step()
+
+
 def _babbler(mode: str) -> Callable[[Arm, str], Undo]:
     def start(arm: Arm, target: str) -> Undo:
         process = subprocess.Popen(
@@ -189,5 +195,6 @@ FAULT_KINDS: dict[str, FaultKind] = {
     "full_disk": FaultKind(full_disk, (NO_TARGET,), (3.0, 10.0)),
     "flood": FaultKind(_babbler("flood"), (NO_TARGET,), (3.0, 6.0)),
     "babble": FaultKind(_babbler("babble"), (NO_TARGET,), (3.0, 10.0)),
+    **({} if clock.missing() else {clock.STEP: FaultKind(step_clock, (NO_TARGET,))}),
 }
-"""All faults within one host; `partition` has those between hosts."""
+"""All faults within one host that this machine can have; `partition` has those between hosts."""

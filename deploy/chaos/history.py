@@ -99,6 +99,8 @@ class InjectedFault(NamedTuple):
     """When the injection ended; equal to ``begin`` for a momentary fault."""
     pid: int = 0
     """The process that was hit; 0 if the target is not a program, or had no process."""
+    ahead: float = 0.0
+    """By how much the arm's time of day is ahead of the machine's from then on [s]."""
 
     def overlaps(self, begin: float, end: float) -> bool:
         """Return whether the fault was active at any time between two times."""

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import argparse
 import random
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
-from deploy.chaos import partition, schedule, schedule_file
+from deploy.chaos import clock, partition, schedule, schedule_file
 from deploy.chaos.faults import FAULT_KINDS
 from deploy.chaos.history import PROGRAMS
 from deploy.chaos.schedule import Schedule
@@ -32,6 +32,11 @@ class Plan(NamedTuple):
     """[s]."""
     testbed: Callable[..., Testbed]
 
+    @property
+    def steps_clock(self) -> bool:
+        """Whether the faults include a step of the time of day."""
+        return any(each.kind == clock.STEP for planned in self.schedules for each in planned)
+
 
 def parse(arguments: Sequence[str]) -> argparse.Namespace:
     """Parse the command line; exits with code 2 if it has an error."""
@@ -43,7 +48,9 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     add("--minutes", type=number(0.01, 10_000), default=5.0, help="length of the random faults, default 5")
     add("--seed", type=int, help="the same seed gives the same random faults")
     add("--every", type=number(0.01, 3600), default=5.0, help="seconds between two random faults, default 5")
-    add("--faults", type=names(FAULT_KINDS), default=tuple(FAULT_KINDS), help=f"of {', '.join(FAULT_KINDS)}")
+    kinds = tuple(dict.fromkeys((*FAULT_KINDS, clock.STEP)))
+    of_kinds = f"of {', '.join(kinds)}; {clock.STEP} needs {clock.PACKAGE}"
+    add("--faults", type=names(kinds), default=tuple(FAULT_KINDS), help=of_kinds)
     add("--targets", type=names(PROGRAMS), default=(), help=f"of {', '.join(PROGRAMS)}")
     scenarios = f"instead of random faults: {', '.join(NAMED)}"
     add("--scenario", choices=(RANDOM, *NAMED), default=RANDOM, metavar="NAME", help=scenarios)
@@ -84,6 +91,7 @@ def plan(options: argparse.Namespace) -> Plan:
         length = schedule.duration(planned)
         title = f"Scenario {options.scenario}, {length:.0f} s{several}"
         return Plan(title, [planned] * options.arms, length, testbed)
+    _require_clock(options.faults)
     seed = random.randrange(10**6) if options.seed is None else options.seed
     length = 60 * options.minutes
     planned = schedule.random_faults(
@@ -100,10 +108,17 @@ def plan(options: argparse.Namespace) -> Plan:
 
 def _scheduled(path: Path) -> Plan:
     shift = schedule_file.load(path)
-    if unknown := sorted({each.kind for each in shift.faults} - FAULT_KINDS.keys()):
+    kinds = {each.kind for each in shift.faults}
+    _require_clock(kinds)
+    if unknown := sorted(kinds - FAULT_KINDS.keys()):
         raise DeploymentError(f"{path}: only make simulate can inject {', '.join(unknown)}")
     title = f"Schedule {path}, {shift.length:.0f} s"
     return Plan(title, [shift.faults], shift.length, partial(Testbed, scenario=shift.scenario))
+
+
+def _require_clock(kinds: Collection[str]) -> None:
+    if clock.STEP in kinds and (reason := clock.missing()):
+        raise DeploymentError(f"{clock.STEP} is not possible on this machine: {reason}")
 
 
 def _fleet(arms: int) -> Callable[..., Testbed]:

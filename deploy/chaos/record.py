@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import struct
-from collections.abc import Iterator
+from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -70,14 +70,34 @@ def load(path: Path, namespace: str = "/") -> History:
                     faults.append(event)
                 elif event is not None:
                     lives[event.pid, event.began] = event
-    for samples in streams.values():
-        samples.sort()
+    offsets = {0.0, *(fault.ahead for fault in faults)}
+    for name, samples in streams.items():
+        streams[name] = sorted(s._replace(sent=time_sent(s.received, s.sent, offsets)) for s in samples)
     return History(
         end,
         streams,
         sorted(lives.values(), key=lambda life: life.began),
         sorted(faults, key=lambda f: f.begin),
     )
+
+
+def clock_offsets(faults: Iterable[bytes]) -> set[float]:
+    """Return by how much the arms' time of day was ahead of the machine's [s]; from :data:`FAULTS`."""
+    return {0.0, *(_event(data).get("ahead", 0.0) for data in faults)}
+
+
+def time_sent(received: float, stamp: float, offsets: Collection[float]) -> float:
+    """
+    Return when a message was sent, on the clock of its reception.
+
+    :param stamp: its source time, on the arm's time of day.
+    :param offsets: by which that has been ahead of the time of day of the receiver.
+    """
+    if not any(offsets):
+        return stamp
+    # Among the possible latencies, the shortest that is not negative.
+    latencies = (received - stamp + offset for offset in offsets)
+    return received - min(latencies, key=lambda latency: (latency < 0.0, abs(latency)))
 
 
 def read_event(topic: str, data: bytes, namespace: str) -> Life | InjectedFault | None:

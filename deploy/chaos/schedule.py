@@ -8,6 +8,7 @@ import random
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
+from deploy.chaos.clock import STEP
 from deploy.chaos.faults import FAULT_KINDS
 from deploy.chaos.history import ALL, NO_TARGET, PROGRAMS
 
@@ -130,7 +131,7 @@ def briefly() -> Schedule:
 
 def variously() -> Schedule:
     """Inject every kind of fault and kill every program; stop the controller when it has to act."""
-    return [
+    planned = [
         PlannedFault(5.0, "hang", "kinematics", 15.0),
         PlannedFault(5.5, "double", "engine_controller", 6.0),
         PlannedFault(8.0, "terminate", "config_l2"),
@@ -144,6 +145,7 @@ def variously() -> Schedule:
         PlannedFault(18.5, "kill", "engine_controller"),
         PlannedFault(20.0, "kill", "kinematics"),
         PlannedFault(20.5, "stop", "sentinel", 15.0),
+        PlannedFault(23.0, STEP, NO_TARGET),
         PlannedFault(26.0, "full_disk", NO_TARGET, 4.0),
         PlannedFault(26.5, "kill", "config_theta1"),
         PlannedFault(27.2, "kill", "operator_watchdog"),
@@ -154,11 +156,13 @@ def variously() -> Schedule:
         PlannedFault(32.0, "kill", "config_l2"),
         PlannedFault(33.0, "kill", "velocity"),
         PlannedFault(34.0, "kill", "config_theta2"),
+        PlannedFault(AWAKE + 6.5, STEP, NO_TARGET),
         *stop_controller(),
         PlannedFault(AWAKE + 7.0, "kill", "sentinel"),
         PlannedFault(AWAKE + 14.0, "kill_supervisor", ALL, 1.0),
         PlannedFault(AWAKE + 19.0, "kill_all", ALL),
     ]
+    return [each for each in planned if each.kind in FAULT_KINDS]
 
 
 def everything() -> Schedule:

@@ -28,6 +28,7 @@ from typing import Any
 
 import yaml
 
+from deploy.chaos import clock
 from deploy.chaos.arm import Arm, file_suffix
 from deploy.chaos.faults import FAULT_KINDS, INJECTED, Undo
 from deploy.chaos.history import (
@@ -84,11 +85,13 @@ class Testbed:
         scenario: Mapping[str, Any] = SCENARIO,
         say: Callable[[str], None] = lambda text: None,
         loss: float = 0.0,
+        steps_clock: bool = False,
     ) -> None:
         """
         :param directory: for the record and the runtime files; must not exist yet.
         :param say: receives a line for each injected fault.
         :param loss: DDS packets that each process loses [%], by Cyclone DDS: not every kernel has netem.
+        :param steps_clock: whether the fault `step_clock` can be injected.
         """
         self.record = directory / "record.mcap"
         self.arms = [Arm(name, System(directory / f"run{file_suffix(name)}")) for name in namespaces]
@@ -99,6 +102,7 @@ class Testbed:
         self._scenario = scenario
         self._say = say
         self._loss = loss
+        self._steps_clock = steps_clock
         self._stack = ExitStack()
         self._epoch = 0.0  # origin of the scenario
         self._origin = 0.0  # of the record
@@ -107,6 +111,7 @@ class Testbed:
         with ExitStack() as stack:
             self._directory.mkdir(parents=True)
             self.prepare(stack)
+            faked = stack.enter_context(clock.faked()) if self._steps_clock else {}
             for arm in self.arms:
                 arm.domain = stack.enter_context(reserved_domain())
                 stack.callback(arm.system.stop)  # after the end of the record, which shows no stopping arm
@@ -114,10 +119,10 @@ class Testbed:
             lines = self._start_observer(stack, environment)
             parameters = self._parameters()
             path = [str(INJECTED), *filter(None, [os.environ.get("PYTHONPATH")])]
-            environment["PYTHONPATH"] = os.pathsep.join(path)
+            environment |= {"PYTHONPATH": os.pathsep.join(path), **faked}
             for arm in self.arms:
                 arm_environment = {NAMESPACE: arm.namespace, "ROS_DOMAIN_ID": str(arm.domain)}
-                with _environment(environment | arm_environment):
+                with _environment(environment | arm_environment | arm.clock.environment()):
                     self.start(arm, parameters)
                 arm.environment()
                 # One arm after the other: starting together would take each of them too long.
@@ -171,7 +176,7 @@ class Testbed:
         now = time.monotonic()
         self._say(f"{now - self._origin:7.1f} s  {arm.namespace:7} {kind} {target_name(target)}")
         undo = self.faults[kind].inject(arm, target)
-        self._report(InjectedFault(kind, target, now, now + duration, pid), arm)
+        self._report(InjectedFault(kind, target, now, now + duration, pid, arm.clock.ahead), arm)
         return (now + duration, undo) if undo else None
 
     def _report(self, fault: InjectedFault, arm: Arm) -> None:

@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 import re
 from bisect import bisect_left, bisect_right
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from rclpy.serialization import deserialize_message
 from rclpy_simulation.host import SECOND
 
+from deploy.chaos.record import time_sent
 from deploy.replay.record import Message
 from interfaces import topics
 from interfaces.topics import Topic
@@ -98,17 +99,22 @@ class _Item(NamedTuple):
 
 
 def compare(
-    topic: Topic, recorded: Sequence[Message], replayed: Sequence[Message], excused: Sequence[Interval]
+    topic: Topic,
+    recorded: Sequence[Message],
+    replayed: Sequence[Message],
+    excused: Sequence[Interval],
+    offsets: Collection[int] = (),
 ) -> Comparison:
     """
     Compare the messages of a topic.
 
     :param excused: times in which nothing is compared [ns since 1970].
+    :param offsets: by which the arm's time of day has been ahead [ns].
     """
     bounds = BOUNDS[topic.name]
     result = Comparison(topic.name, bounds, len(recorded), len(replayed))
     one, other = (
-        [_Item(sent, _value(topic, sent, data)) for sent, data in it] for it in (recorded, replayed)
+        [_Item(sent, _value(topic, sent, data, offsets)) for sent, data in it] for it in (recorded, replayed)
     )
     counts, far = [], 0
     for items, others, is_recorded in ((one, other, True), (other, one, False)):
@@ -185,14 +191,15 @@ _READ: dict[str, Callable[[Any], Value]] = {
 }
 
 
-def _value(topic: Topic, sent: int, data: bytes) -> Value:
+def _value(topic: Topic, sent: int, data: bytes, offsets: Collection[int]) -> Value:
     """Return the content of a message that has to be equal, without the time of its emission."""
     try:
         message = deserialize_message(data, topic.type)
     except Exception as error:  # of any type, by the runtime
         return f"unreadable: {type(error).__name__}"
     if topic is topics.OPERATOR_PRESENCE:
-        return ((sent - message.stamp.sec * SECOND - message.stamp.nanosec) / SECOND,)
+        stamp = message.stamp.sec * SECOND + message.stamp.nanosec
+        return ((sent - time_sent(sent, stamp, offsets)) / SECOND,)
     return _READ.get(topic.name, lambda it: str(it.data))(message)
 
 

@@ -80,7 +80,8 @@ def run(record: Record, job: Job) -> Outcome:
         recorded = chains.recorded(record, job.namespace, topic)
         if recorded or topic is ENGINES:  # which nobody may have sent
             excused = _excused(record, playback, topic)
-            comparisons.append(compare(topic, recorded, playback.messages[topic.name], excused))
+            replayed = playback.messages[topic.name]
+            comparisons.append(compare(topic, recorded, replayed, excused, record.offsets))
     return Outcome(job, playback.messages, comparisons, playback.failures)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import IO, Any, NamedTuple
 
@@ -11,7 +11,7 @@ from mcap.reader import make_reader
 from mcap.records import Channel
 from rclpy.serialization import deserialize_message
 
-from deploy.chaos.record import FAULTS, PROCESSES, read_event
+from deploy.chaos.record import FAULTS, PROCESSES, clock_offsets, read_event, time_sent
 from deploy.recording.recorder import METADATA
 from deploy.supervision.system import DeploymentError
 from interfaces import topics
@@ -19,7 +19,7 @@ from interfaces.topics import Topic
 
 
 class Message(NamedTuple):
-    """A message and its DDS source time."""
+    """A message and its DDS source time, on the time of day of the recorder."""
 
     sent: int
     """[ns since 1970]."""
@@ -38,6 +38,8 @@ class Record(NamedTuple):
     """From which the events of the chaos monkey count their times [ns since 1970]."""
     messages: dict[str, list[Message]]
     """By full topic name, in the order of sending."""
+    offsets: Collection[int] = ()
+    """By which the chaos monkey has put the time of day of an arm forward [ns]."""
 
     def of(self, topic: Topic, namespace: str) -> list[Message]:
         """Return the messages of a topic of the arm in a namespace."""
@@ -98,14 +100,22 @@ def _read(file: IO[bytes]) -> Record | None:
         for channel in summary.channels.values()
         if _is_wanted(channel, summary.schemas[channel.schema_id].name if channel.schema_id else "")
     ]
-    messages: defaultdict[str, list[Message]] = defaultdict(list)
+    read: defaultdict[str, list[tuple[int, int, bytes]]] = defaultdict(list)
     for _, channel, message in reader.iter_messages(wanted, log_time_order=False):
-        messages[channel.topic].append(Message(message.publish_time or message.log_time, message.data))
-    for of_topic in messages.values():
-        of_topic.sort(key=lambda message: message.sent)
+        stamp = message.publish_time or message.log_time
+        read[channel.topic].append((message.log_time, stamp, message.data))
+    offsets = [round(each * 1e9) for each in clock_offsets(data for *_, data in read[FAULTS])]
+    messages = {
+        topic: sorted(
+            (Message(int(time_sent(received, stamp, offsets)), data) for received, stamp, data in each),
+            key=lambda message: message.sent,
+        )
+        for topic, each in read.items()
+        if each
+    }
     origin = [int(each.metadata["origin"]) for each in reader.iter_metadata() if each.name == METADATA]
     begin, end = summary.statistics.message_start_time, summary.statistics.message_end_time
-    return Record(begin, end, origin[0] if origin else begin, dict(messages))
+    return Record(begin, end, origin[0] if origin else begin, messages, offsets)
 
 
 def _is_wanted(channel: Channel, type_name: str) -> bool:

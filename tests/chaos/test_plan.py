@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from deploy.chaos import plan
+from deploy.chaos import clock, plan
 from deploy.chaos.schedule import PlannedFault
 from deploy.chaos.schedule_file import Shift, save
-from deploy.chaos.testbed import SCENARIO
+from deploy.chaos.testbed import SCENARIO, Testbed
 from deploy.supervision.system import DeploymentError
 
 
@@ -32,6 +32,33 @@ def test_a_fault_that_only_a_simulation_has_is_refused(tmp_path: Path) -> None:
     path = schedule(tmp_path / "schedule.yaml", "skew_clock", "operator")
     with pytest.raises(DeploymentError, match="only make simulate can inject skew_clock"):
         plan.plan(plan.parse(["--schedule", path]))
+
+
+@pytest.fixture
+def without_library(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(clock, "LIBRARY", tmp_path / "libfaketime")
+
+
+NEEDED = "step_clock is not possible on this machine: there is no libfaketime (apt-get install libfaketime)"
+
+
+@pytest.mark.usefixtures("without_library")
+def test_a_step_of_the_clock_without_libfaketime_is_refused(tmp_path: Path) -> None:
+    for options in (
+        ["--faults", "kill,step_clock"],
+        ["--schedule", schedule(tmp_path / "schedule.yaml", "step_clock", "nothing")],
+    ):
+        with pytest.raises(DeploymentError) as error:
+            plan.plan(plan.parse(options))
+        assert str(error.value) == NEEDED
+
+
+def test_only_a_step_of_the_clock_needs_libfaketime() -> None:
+    plans = [
+        plan.Plan("", [[PlannedFault(5.0, kind, "nothing")]], 1.0, Testbed)
+        for kind in ("flood", "step_clock")
+    ]
+    assert [each.steps_clock for each in plans] == [False, True]
 
 
 @pytest.mark.parametrize("other", [["--scenario", "briefly"], ["--arms", "2"]])

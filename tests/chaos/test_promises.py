@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import pytest
 
+from deploy.chaos.clock import STEP, missing
 from deploy.chaos.findings import HOLDS
-from deploy.chaos.history import PROGRAMS, SILENCE, between
+from deploy.chaos.history import PROGRAMS, SILENCE, Sample, between
 from deploy.chaos.promises import CHECKERS
 from deploy.chaos.safety import OFF_WITHIN, TRANSPORT, running
-from interfaces.topics import DRIVE_TIMEOUT, ENGINES, OPERATOR_HEARTBEAT
+from interfaces.topics import DRIVE_TIMEOUT, ENGINES, OPERATOR_HEARTBEAT, OPERATOR_PRESENCE
 
 from .experiments import Experiment, experiment
 
@@ -43,6 +44,21 @@ def test_engines_turn_off_in_time_with_a_stopped_controller(play: Experiment) ->
 
 def test_hung_programs_and_a_stopped_sentinel_are_replaced(play: Experiment) -> None:
     assert set(play.finding("L4").times) == {"kinematics", "config_l1", "sentinel"}
+
+
+@pytest.mark.skipif(bool(missing()), reason=f"platform: {missing()}")
+def test_time_of_day_of_the_arm_steps_forward_and_back(play: Experiment) -> None:
+    steps = [fault for fault in play.history.faults if fault.kind == STEP]
+    assert len(steps) == 2
+    presences = play.history.stream(OPERATOR_PRESENCE)
+
+    def ahead(presence: Sample) -> float:  # its value is its stamp
+        return float(presence.value) - presence.sent - (presences[0].value - presences[0].sent)
+
+    for step in steps:
+        after = next(presence for presence in presences if presence.sent > step.begin + 1.5)
+        assert ahead(after) == pytest.approx(step.ahead, abs=1.0)
+    assert steps[0].ahead < 0.0 < steps[1].ahead - steps[0].ahead
 
 
 def test_killed_supervisord_leaves_no_second_instance(play: Experiment) -> None:

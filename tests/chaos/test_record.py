@@ -14,8 +14,9 @@ from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 from std_msgs.msg import Float64
 
-from deploy.chaos.history import Life
-from deploy.chaos.record import PROCESSES
+from deploy.chaos.clock import STEP
+from deploy.chaos.history import NO_TARGET, InjectedFault, Life
+from deploy.chaos.record import FAULTS, PROCESSES, load
 from deploy.recording.recorder import Recorder, qos_profiles
 from deploy.supervision import processes
 from interfaces import topics
@@ -100,6 +101,22 @@ def test_ros_tools_read_a_record(tmp_path: Path) -> None:
         ("/effector/speed", 10**18 + 1_002_000_000, 1.5),
     ]
     assert json.loads(read[0][2])["program"] == "velocity"
+
+
+def test_times_of_a_stepped_arm_are_those_of_the_machine(tmp_path: Path) -> None:
+    path = tmp_path / "record.mcap"
+    recorder = Recorder(path, 0, 10**18)
+    step = InjectedFault(STEP, NO_TARGET, 5.0, 5.0, ahead=-1000.5)
+    recorder.event(FAULTS, 5 * 10**9, step._asdict() | {"namespace": "/"})
+    data = serialize_message(Float64(data=1.5))
+    for second in range(10):
+        sent = second * 10**9
+        stamp = sent - (1_000_500_000_000 if second > 5 else 0)
+        type_name = topics.EFFECTOR_SPEED.type_name
+        recorder.message("/effector/speed", type_name, "", data, sent + 2_000_000, stamp)
+    recorder.close()
+    speeds = load(path).stream(topics.EFFECTOR_SPEED)
+    assert [speed.sent for speed in speeds] == pytest.approx(range(10), abs=1e-6)
 
 
 def test_violation_is_reported_with_evidence_and_exit_code_1(tmp_path: Path) -> None:

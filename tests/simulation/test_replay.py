@@ -15,9 +15,13 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from builtin_interfaces.msg import Time
 from rclpy.serialization import deserialize_message, serialize_message
-from std_msgs.msg import Float64, String
+from std_msgs.msg import Float64, Header, String
 
+from deploy.chaos.clock import STEP
+from deploy.chaos.history import NO_TARGET, InjectedFault
+from deploy.chaos.record import FAULTS
 from deploy.recording.recorder import Recorder
 from deploy.replay import chains
 from deploy.replay.comparison import compare
@@ -180,3 +184,29 @@ def test_state_that_changes_later_than_its_bound_differs() -> None:
 def test_state_that_is_repeated_too_seldom_differs() -> None:
     often, seldom = (text(*((n / rate, topics.ON) for n in range(10 * rate))) for rate in (10, 5))
     assert not compare(topics.ENGINES_STATE, often, seldom, []).is_equal
+
+
+def test_presences_of_a_stepped_arm_are_equal_to_replayed_ones() -> None:
+    def presences(ahead: int) -> list[Message]:
+        return [
+            Message(n * SECOND, serialize_message(Header(stamp=Time(sec=n + ahead))))
+            for n in range(1000, 1100)
+        ]
+
+    assert compare(topics.OPERATOR_PRESENCE, presences(-600), presences(0), [], [0, -600 * SECOND]).is_equal
+    assert not compare(topics.OPERATOR_PRESENCE, presences(-600), presences(0), []).is_equal
+
+
+def test_times_of_a_stepped_arm_are_those_of_the_recorder(tmp_path: Path) -> None:
+    path = tmp_path / "record.mcap"
+    recorder = Recorder(path, 0, 1000 * SECOND)
+    step = InjectedFault(STEP, NO_TARGET, 0.0, 0.0, ahead=-600.0)
+    recorder.event(FAULTS, 0, step._asdict() | {"namespace": "/"})
+    data = serialize_message(String(data=topics.ON))
+    for sent, ahead in ((1, 0), (2, -600)):
+        received, stamp = sent * SECOND + 1000, (sent + ahead) * SECOND
+        recorder.message("/engines/state", topics.ENGINES_STATE.type_name, "", data, received, stamp)
+    recorder.close()
+    record = load(path)
+    assert [sent for sent, _ in record.of(topics.ENGINES_STATE, "/")] == [1001 * SECOND, 1002 * SECOND]
+    assert set(record.offsets) == {0, -600 * SECOND}
