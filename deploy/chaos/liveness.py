@@ -211,9 +211,12 @@ def _is_disturbed(
     """Return whether another fault disturbs a program's return (default: the target's)."""
     program = program or fault.target
     needed = [source for source, dependents in DEPENDENTS.items() if program in dependents]
+    # If all were hit, those that it follows had to start as well.
+    starting = (program, *needed) if fault.target == ALL else (program,)
     silent = (
         not _flowed(history, source, time, FLOWING)
-        for source in NEEDED_AT_START.get(program, ())
+        for each in starting
+        for source in NEEDED_AT_START.get(each, ())
         for time in (begin, end)
     )
     return any(silent) or any(

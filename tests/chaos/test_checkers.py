@@ -10,6 +10,7 @@ import pytest
 from deploy.chaos.findings import HOLDS, UNKNOWN, VIOLATED, percentile
 from deploy.chaos.history import (
     ALL,
+    DEPENDENTS,
     NEEDED_AT_START,
     NO_TARGET,
     OPERATOR,
@@ -335,7 +336,18 @@ def test_l1_detects_silence_for_good_after_any_fault() -> None:
         history = silent(history, topic, 20.0, END)
     finding = CHECKERS["L1"](faulty(history, InjectedFault("kill_supervisor", ALL, 20.0, 21.0)))
     # Of the silent sources follows the silence of the programs that wait for them.
-    assert len(finding.evidence) == len(set(PROGRAMS) - NEEDED_AT_START.keys())
+    waiting = {*NEEDED_AT_START, *(each for program in NEEDED_AT_START for each in DEPENDENTS[program])}
+    assert len(finding.evidence) == len(set(PROGRAMS) - waiting)
+
+
+def test_l1_silence_of_all_that_waits_for_a_dead_source_is_explained() -> None:
+    history = good()
+    for topic in ("l1", "effector/position", "effector/speed", "joint_states"):
+        history = silent(history, topic, 20.0, END)
+    finding = CHECKERS["L1"](faulty(history, InjectedFault("kill_supervisor", ALL, 20.0, 21.0)))
+    assert [evidence.text for evidence in finding.evidence] == [
+        "config_l1 is silent for 10 s after kill_supervisor"
+    ]
 
 
 def test_l1_is_unknown_if_a_second_fault_interferes() -> None:
