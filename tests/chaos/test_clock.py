@@ -39,6 +39,10 @@ def test_source_time_of_a_stepped_process_is_put_right(latency: float, ahead: fl
     assert time_sent(100.0, stamp, [0.0, -2632.577, 131.054]) == pytest.approx(100.0 - latency)
 
 
+def test_no_message_is_received_before_it_is_sent() -> None:
+    assert time_sent(100.0, 100.1, [0.0, 0.3]) == pytest.approx(99.8)
+
+
 @pytest.mark.parametrize("stamp", [99.9, 100.1])
 def test_source_time_without_a_step_stays_as_it_is(stamp: float) -> None:
     assert time_sent(100.0, stamp, [0.0]) == stamp
@@ -77,9 +81,9 @@ def running(environment: dict[str, str]) -> Iterator[IO[str]]:
     command = [sys.executable, "-c", PROGRAM]
     with subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
-        # It has made no semaphore of its own, which would survive SIGKILL.
-        assert process.stdout.readline().strip() == environment["FAKETIME_SHARED"]
         try:
+            # It has made no semaphore of its own, which would survive SIGKILL.
+            assert process.stdout.readline().strip() == environment["FAKETIME_SHARED"]
             yield process.stdout
         finally:
             process.kill()
