@@ -71,6 +71,7 @@ class ArmInterface:
     def __init__(self, supervisord: Any) -> None:
         self._supervisord = supervisord
         self._starts: Counter[str] = Counter()
+        self._started: dict[str, float] = {}  # [s, monotonic clock]: laststart would follow the time of day
         self._changed = False
         self._exits: dict[str, str] = {}
         self._guarded = (0, 0.0)  # the sentinel's pid, and the deadline of its next call
@@ -88,7 +89,7 @@ class ArmInterface:
                 "name": name,
                 "state": getProcessStateDescription(process.get_state()),
                 "pid": process.pid,
-                "uptime": max(0.0, time.time() - process.laststart) if process.pid else 0.0,
+                "uptime": time.monotonic() - self._started[name] if process.pid else 0.0,
                 "restarts": max(0, self._starts[name] - 1),
                 "exit": self._exits.get(name, ""),
                 "error": process.spawnerr or "",
@@ -123,6 +124,7 @@ class ArmInterface:
         name = event.process.config.name
         if isinstance(event, events.ProcessStateStartingEvent):
             self._starts[name] += 1
+            self._started[name] = time.monotonic()
         elif isinstance(event, _ENDS):
             # supervisord does not keep the number of a signal, nor the code of a process that ended early.
             code = event.process.exitstatus

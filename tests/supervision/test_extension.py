@@ -1,15 +1,17 @@
-"""Logs of supervisord that drop lines instead of raising."""
+"""Logs of supervisord that drop lines instead of raising, and the state of its programs."""
 
 from __future__ import annotations
 
+import time
 from contextlib import closing
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 from supervisor import events, loggers
+from supervisor.states import ProcessStates
 
-from deploy.supervision.extension import LossyLog, make_interface
+from deploy.supervision.extension import ArmInterface, LossyLog, make_interface
 
 LIMIT = 10  # bytes of a log until it is rolled over
 
@@ -75,3 +77,25 @@ def test_supervisord_uses_it_from_then_on(tmp_path: Path, monkeypatch: pytest.Mo
         own.info(b"short\n")
         loggers.handle_file(program, "/dev/null/velocity.log", "%(message)s", True, LIMIT, 1)
     assert file.read_bytes() == b"too long a line\nshort\n"
+
+
+def test_setting_the_clock_changes_no_uptime(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(events, "callbacks", [])
+    velocity = SimpleNamespace(
+        config=SimpleNamespace(name="velocity"),
+        get_state=lambda: ProcessStates.RUNNING,
+        pid=1000,
+        laststart=time.time(),
+        spawnerr=None,
+        backoff=0,
+    )
+    group = SimpleNamespace(processes={"velocity": velocity})
+    options = SimpleNamespace(poller=SimpleNamespace(poll=None))
+    arm = ArmInterface(SimpleNamespace(options=options, process_groups={"arm": group}))
+    events.notify(events.ProcessStateStartingEvent(velocity, ProcessStates.STOPPED))
+    real = time.time
+
+    for hours in (1, -1):
+        monkeypatch.setattr(time, "time", lambda hours=hours: real() + hours * 3600)
+        (state,) = arm.programs()
+        assert 0.0 < state["uptime"] < 60.0
