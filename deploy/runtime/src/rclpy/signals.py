@@ -3,11 +3,13 @@
 A thread that waits in DDS does not notice a signal. So Python's C handler writes to a pipe
 (``signal.set_wakeup_fd``), and a thread that reads it wakes the executors; then Python can run the handler.
 If the main thread does not run it, for example in the event loop of a GUI, the reading thread shuts down.
+The same thread wakes the executors when the time of day is set (:mod:`rclpy._clock_steps`).
 """
 
 from __future__ import annotations
 
 import os
+import select
 import signal
 import threading
 import time
@@ -16,6 +18,7 @@ from enum import IntEnum
 from types import FrameType
 from typing import TYPE_CHECKING, Any
 
+from rclpy import _clock_steps
 from rclpy._listeners import Listeners
 from rclpy.guard_condition import GuardCondition
 
@@ -80,8 +83,17 @@ def _restore(signum: int) -> None:
         signal.signal(signum, signal.SIG_DFL if previous is None else previous)
 
 
-def _wake_executors(fd: int) -> None:
-    while numbers := os.read(fd, 64):
+def _wake_executors(signals: int, steps: int | None) -> None:
+    """Wake the executors after each signal, and after each step of the time of day."""
+    poll = select.poll()
+    for fd in (signals, steps):
+        if fd is not None:
+            poll.register(fd, select.POLLIN)
+    while True:
+        ready = [fd for fd, _ in poll.poll()]
+        if steps in ready:
+            _clock_steps.acknowledge(steps)
+        numbers = os.read(signals, 64) if signals in ready else b""
         contexts = [context for context in _contexts if context._valid]
         for executor in _executors:
             executor.wake()
@@ -105,7 +117,8 @@ def _listen() -> None:
     if _wakeup_fd < 0:
         reading, _wakeup_fd = os.pipe()
         os.set_blocking(_wakeup_fd, False)
-        threading.Thread(target=_wake_executors, args=(reading,), name="rclpy-signals", daemon=True).start()
+        sources = (reading, _clock_steps.open_watch())
+        threading.Thread(target=_wake_executors, args=sources, name="rclpy-signals", daemon=True).start()
     signal.set_wakeup_fd(_wakeup_fd, warn_on_full_buffer=False)
 
 

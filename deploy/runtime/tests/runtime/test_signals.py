@@ -1,8 +1,9 @@
-"""Ctrl-C and SIGTERM end spinning at once, without an error."""
+"""Ctrl-C and SIGTERM end spinning at once, without an error; a step of the clock delays no timer."""
 
 from __future__ import annotations
 
 import os
+import select
 import signal
 import subprocess
 import sys
@@ -10,6 +11,8 @@ import time
 from pathlib import Path
 
 import pytest
+
+from rclpy import _clock_steps
 
 SPIN = """
 import asyncio, signal, threading
@@ -165,3 +168,66 @@ def test_a_handled_signal_does_not_end_the_next_context(domain_id: int) -> None:
             assert process.stdout.readline() == "True\n"
         finally:
             process.kill()
+
+
+# DDS waits until a time of day: a wait that has begun before a step back by an hour takes an hour longer.
+STEP_BACK = """
+import sys
+import rclpy
+from rclpy import _clock_steps, _dds
+
+wait, acknowledge = _dds.WaitSet.wait, _clock_steps.acknowledge
+hour = 3600 * 10**9
+
+def note_step(watch):
+    global hour
+    hour = 0
+    acknowledge(watch)
+
+def wait_an_hour_longer(wait_set, timeout):
+    if 0 < timeout < 10**9:
+        print("waits", flush=True)
+        timeout += hour
+    return wait(wait_set, timeout)
+
+_clock_steps.open_watch = lambda: int(sys.argv[1])
+_clock_steps.acknowledge = note_step
+_dds.WaitSet.wait = wait_an_hour_longer
+rclpy.init(args=[])
+node = rclpy.create_node("waiting")
+node.create_timer(0.5, lambda: (print("fired", flush=True), rclpy.shutdown()))
+rclpy.spin(node)
+"""
+
+
+def test_a_timer_fires_in_time_although_the_clock_is_set_back(domain_id: int) -> None:
+    reading, writing = os.pipe()
+    with subprocess.Popen(
+        [sys.executable, "-c", STEP_BACK, str(reading)],
+        env={**os.environ, "ROS_DOMAIN_ID": str(domain_id)},
+        pass_fds=[reading],
+        stdout=subprocess.PIPE,
+        text=True,
+    ) as process:
+        assert process.stdout is not None
+        try:
+            assert process.stdout.readline() == "waits\n"
+            while not is_asleep(process.pid):
+                time.sleep(0.001)
+            os.write(writing, b"step")
+            assert process.wait(10) == 0
+            assert process.stdout.read().endswith("fired\n")
+        finally:
+            process.kill()
+            os.close(reading)
+            os.close(writing)
+
+
+def test_the_kernel_watches_the_clock_and_reports_nothing_without_a_step() -> None:
+    watch = _clock_steps.open_watch()
+    assert watch is not None
+    try:
+        assert select.select([watch], [], [], 0.0) == ([], [], [])
+        _clock_steps.acknowledge(watch)
+    finally:
+        os.close(watch)
