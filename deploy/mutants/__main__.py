@@ -80,7 +80,7 @@ def test(scores: dict[str, Score], equivalent: dict[str, dict[str, str]]) -> Non
                 score, killed_by_simulation = scores[mutant.module], False
                 killed = bench.kills(mutant, GUARDS[mutant.module])
                 if not killed:
-                    killed_by_simulation = bench.kills(mutant, (SIMULATION,))
+                    killed_by_simulation = bench.kills(mutant, SIMULATION)
             except Exception as error:
                 failures.append(error)
                 continue
