@@ -25,7 +25,7 @@ GUARDS: dict[str, tuple[str, ...]] = {
         "tests/component/test_health.py",
         "tests/component/test_service_node.py",
     ),
-    "interfaces/service/instance.py": ("tests/component/test_service_life.py",),
+    "interfaces/service/instance.py": ("tests/component/test_instance.py",),
     "interfaces/service/node.py": ("tests/component/test_service_node.py",),
     "interfaces/service/parameters.py": (
         "tests/component/test_readme.py",

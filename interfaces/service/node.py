@@ -204,7 +204,7 @@ class ServiceNode(ReactiveNode):
         """Remark publishers that use an observed topic with another type: nothing arrives from them."""
         types = dict(self.get_topic_names_and_types())
         for name, topic in self._observed.items():
-            if types.get(name, [topic.type_name]) == [topic.type_name]:
+            if types.get(name) == [topic.type_name]:
                 continue
             for publisher in self.get_publishers_info_by_topic(name):
                 if publisher.topic_type != topic.type_name:

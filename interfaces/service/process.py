@@ -93,7 +93,7 @@ def _spin(node: ServiceNode, wire: Callable[[ServiceNode], None]) -> int:
 
 
 def _refuse(name: str, reason: object, code: int) -> int:
-    print(f"{name}: {' '.join(str(reason).split())}", file=sys.stderr, flush=True)
+    print(f"{name}: {' '.join(str(reason).split())}", file=sys.stderr)
     return code
 
 

@@ -14,16 +14,21 @@ from pathlib import Path
 
 import pytest
 
+from interfaces.service import process
+
 ROOT = Path(__file__).parents[2]
 
 HANGING = """
+from contextlib import suppress
 from interfaces import service
 
 def wire(node):
     def hang():
         print("hangs", flush=True)
         while True:
-            pass
+            with suppress(Exception):
+                while True:
+                    pass
     node.create_timer(0.01, hang)
 
 service.run("hanging", wire)
@@ -74,6 +79,26 @@ service.run("ready", wire)
 """
 
 
+ENDING = """
+import rclpy
+from interfaces import service
+from interfaces.service import ServiceNode
+
+def announce(owner, name):
+    original = getattr(owner, name)
+    setattr(owner, name, lambda *arguments: (print(name, flush=True), original(*arguments)))
+
+announce(ServiceNode, "destroy_node")
+announce(rclpy, "try_shutdown")
+
+service.run("ending", lambda node: node.create_timer(0.01, lambda: print("ready", flush=True)))
+"""
+
+SIGNALLED_AT_EXIT = """
+import atexit, os, signal
+atexit.register(lambda: os.kill(os.getpid(), signal.SIGTERM))
+"""
+
 NO_LAST_RESORT = """
 from interfaces.service import process
 process._SHUTDOWN_TIMEOUT = 3600.0
@@ -84,6 +109,7 @@ class Process:
     """A Python process with captured output."""
 
     def __init__(self, *arguments: str) -> None:
+        self.output = ""  # after the end
         self.popen = subprocess.Popen(
             [sys.executable, *arguments], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
         )
@@ -97,7 +123,7 @@ class Process:
         """Wait, after a signal if given; return the exit code and the standard error."""
         if by is not None:
             self.popen.send_signal(by)
-        _, errors = self.popen.communicate(timeout=30)
+        self.output, errors = self.popen.communicate(timeout=30)
         return self.popen.returncode, errors
 
 
@@ -130,16 +156,6 @@ def service(name: str, announce: bool = False) -> tuple[str, ...]:
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-@pytest.mark.parametrize("delay", [0.0, 0.03, 0.06, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.6])
-def test_signal_ends_a_service_at_every_moment(start: Start, number: signal.Signals, delay: float) -> None:
-    process = start(*service("operator_watchdog", announce=True))
-    assert process.wait_for_line() == "begun"
-    time.sleep(delay)
-
-    assert process.end(by=number) == (0, "")
-
-
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_signal_ends_a_hung_service(start: Start, number: signal.Signals) -> None:
     process = start("-c", HANGING)
     assert process.wait_for_line() == "hangs"
@@ -167,6 +183,18 @@ def test_second_signal_ends_a_service_at_once(start: Start) -> None:
     assert process.end() == (0, "")
 
 
+def test_hung_service_ends_within_a_second() -> None:
+    assert process._SHUTDOWN_TIMEOUT < 1.0
+
+
+def test_service_ends_in_order(start: Start) -> None:
+    ending = start("-c", ENDING)
+    assert ending.wait_for_line() == "ready"
+
+    assert ending.end(by=signal.SIGTERM) == (0, "")
+    assert ending.output.split()[-2:] == ["destroy_node", "try_shutdown"]
+
+
 @pytest.mark.parametrize(
     ("program", "error"), [(FAILING, "ZeroDivisionError"), (FAILING_WHILE_WIRED, "LookupError: planted")]
 )
@@ -177,6 +205,10 @@ def test_unexpected_error_is_logged_once_and_ends_the_service(start: Start, prog
     assert errors.count("Traceback") == 1
     assert errors.count(error) == 1
     assert "[failing]" in errors
+
+
+def test_signal_after_the_end_does_not_change_the_exit_code(start: Start) -> None:
+    assert start("-c", SIGNALLED_AT_EXIT + FAILING_WHILE_WIRED).end()[0] == 1
 
 
 def test_second_instance_refuses_to_start_and_names_the_first(start: Start, domain_id: int) -> None:
@@ -225,7 +257,7 @@ def test_killed_instance_frees_its_name_at_once(start: Start) -> None:
 @pytest.mark.parametrize(
     ("arguments", "reason"),
     [
-        (["services.config_publisher"], "must be one of l1, l2, theta1, theta2, not ''"),
+        (["services.config_publisher"], "config_publisher: .*must be one of l1, l2, theta1, theta2, not ''"),
         (["services.config_publisher", "l1", "--ros-args", "-p", "value:=-1.0"], "config_l1: .*-1.0.*value"),
         (["services.config_publisher", "l1", "--ros-args", "-p", "value:=.nan"], "config_l1: .*nan.*value"),
         (
@@ -243,19 +275,34 @@ def test_user_error_is_one_line_and_exit_code_2(start: Start, arguments: list[st
 
     assert code == 2
     assert errors.count("\n") == 1
-    assert re.search(reason, errors)
+    assert re.match(reason, errors)
 
 
 @pytest.mark.parametrize(
-    ("variable", "value"),
-    [("ROS_DOMAIN_ID", "one"), ("CYCLONEDDS_URI", "<no xml"), ("REACTIVE_ARM_NAMESPACE", "/arm 1")],
+    ("variable", "value", "reason"),
+    [
+        ("ROS_DOMAIN_ID", "one", "ROS_DOMAIN_ID"),
+        ("CYCLONEDDS_URI", "<no xml", ""),
+        ("REACTIVE_ARM_NAMESPACE", "/arm 1", "/arm 1"),
+    ],
 )
 def test_unusable_environment_is_reported_without_a_traceback(
-    start: Start, monkeypatch: pytest.MonkeyPatch, variable: str, value: str
+    start: Start, monkeypatch: pytest.MonkeyPatch, variable: str, value: str, reason: str
 ) -> None:
     monkeypatch.setenv("RMW_IMPLEMENTATION", "rmw_cyclonedds_cpp")
     monkeypatch.setenv(variable, value)
-    code, errors = start(*service("velocity")).end()
-    assert code == 2
-    assert errors.splitlines()[-1].startswith("velocity: ")
+    ending = start("-c", ENDING)
+    code, errors = ending.end()
+    assert (code, ending.output) == (2, "try_shutdown\n")
+    assert re.match(f"ending: .*{reason}", errors.splitlines()[-1])
     assert "Traceback" not in errors
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+@pytest.mark.parametrize("delay", [0.0, 0.03, 0.06, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.6])
+def test_signal_ends_a_service_at_every_moment(start: Start, number: signal.Signals, delay: float) -> None:
+    process = start(*service("operator_watchdog", announce=True))
+    assert process.wait_for_line() == "begun"
+    time.sleep(delay)
+
+    assert process.end(by=number) == (0, "")

@@ -14,10 +14,11 @@ import pytest
 import reactivex as rx
 from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import Point, PointStamped
+from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from rclpy.qos import QoSProfile
+from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.serialization import serialize_message
 from rclpy.time import Time
 from reactivex.subject import Subject
@@ -25,15 +26,16 @@ from std_msgs.msg import Bool, Float64, Header, String
 
 from interfaces import topics
 from interfaces.service import Rejected, ServiceNode, parameter
+from reactive_node.stamps import Timestamp
 
 Make = Callable[..., Any]
 SpinUntil = Callable[..., None]
 SpinFor = Callable[[float], None]
 
 
-def one(name: str, default: Any, within: Any, meaning: str, settable: bool = False) -> Any:
+def one(name: str, default: Any, within: Any, meaning: str, *, unit: str = "", settable: bool = False) -> Any:
     """A dataclass of one parameter."""
-    field = parameter(default, within, "", meaning, settable=settable)
+    field = parameter(default, within, unit, meaning, settable=settable)
     return dataclasses.make_dataclass("Parameters", [(name, type(default), field)], frozen=True)
 
 
@@ -185,9 +187,11 @@ def test_truncated_messages_are_dropped_and_reported(
 def test_publisher_of_another_type_is_reported(
     service: ServiceNode, peer: Node, spin_until: SpinUntil, health: Callable[[], dict[str, Any]]
 ) -> None:
-    service.observe(topics.L1).subscribe()
+    for topic in (topics.L2, topics.L1):
+        service.observe(topic).subscribe()
+    peer.create_publisher(Float64, "l2", topics.L2.qos)
     peer.create_publisher(String, "l1", topics.L1.qos)
-    spin_until(lambda: service.count_publishers("l1") == 1)
+    spin_until(lambda: service.count_publishers("l1") == service.count_publishers("l2") == 1)
 
     report = health()
 
@@ -264,6 +268,74 @@ def test_rejected_items_are_reported_instead_of_published(
     assert (report["published"], report["dropped"]) == ("1", "1")
 
 
+class Readers:
+    """Stands in for the readers of a service: all receive the same samples."""
+
+    def __init__(self) -> None:
+        self.samples: Subject[Timestamp[bytes]] = Subject()
+        self.qos: list[QoSProfile] = []
+        self.events: list[SubscriptionEventCallbacks] = []
+
+    def create(
+        self, _: Any, __: Any, qos: QoSProfile, *, event_callbacks: Any = None, **___: Any
+    ) -> Subject[Timestamp[bytes]]:
+        self.qos.append(qos)
+        self.events.append(event_callbacks)
+        return self.samples
+
+    def receive(self, message: Any, *seconds: float) -> None:
+        """Receive a message once for each source time."""
+        for at in seconds:
+            self.samples.on_next(Timestamp(bytes(serialize_message(message)), at_time(at)))
+
+
+def at_time(seconds: float) -> datetime:
+    return datetime.fromtimestamp(seconds, UTC)
+
+
+@pytest.fixture
+def readers(service: ServiceNode, monkeypatch: pytest.MonkeyPatch) -> Readers:
+    readers = Readers()
+    monkeypatch.setattr(service, "create_observable", readers.create)
+    return readers
+
+
+def test_copies_of_latched_messages_are_dropped(service: ServiceNode, readers: Readers) -> None:
+    received: list[Any] = []
+    service.observe(topics.L1, timestamped=True).subscribe(received.append)
+    readers.receive(number(1.5), *range(17), *range(1, 17))
+    assert received == [Timestamp(number(1.5), at_time(at)) for at in range(17)]
+    readers.receive(number(1.5), 0.0)  # forgotten: only the last sixteen are known
+    assert len(received) == 18
+
+
+def test_events_of_one_time_are_no_copies(service: ServiceNode, readers: Readers) -> None:
+    received: list[Any] = []
+    service.observe(topics.ENGINES).subscribe(received.append)
+    readers.receive(String(data="turn_off"), 1.0, 1.0)
+    assert received == [String(data="turn_off")] * 2
+
+
+def test_volatile_publishers_get_one_reader(service: ServiceNode, readers: Readers) -> None:
+    service.observe(topics.L1).subscribe()
+    assert readers.qos == [topics.L1.qos]
+    for _ in range(2):
+        readers.events[0].incompatible_qos(None)
+    assert [(qos.depth, qos.durability) for qos in readers.qos[1:]] == [(1, DurabilityPolicy.VOLATILE)]
+
+
+@pytest.mark.parametrize("topic", [topics.L1, topics.ENGINES], ids=lambda topic: topic.name)
+def test_end_of_a_reader_is_passed_on(service: ServiceNode, readers: Readers, topic: topics.Topic) -> None:
+    ends: list[Any] = []
+    service.observe(topic).subscribe(on_completed=lambda: ends.append("completed"))
+    service.observe(topic).subscribe(on_error=ends.append)
+    error = LookupError()
+    completed, failed = readers.samples.observers
+    completed.on_completed()
+    failed.on_error(error)
+    assert ends == ["completed", error]
+
+
 @pytest.mark.parametrize(
     ("age", "problem"),
     [
@@ -275,25 +347,21 @@ def test_rejected_items_are_reported_instead_of_published(
 )
 def test_messages_that_are_not_fresh_are_dropped(
     service: ServiceNode,
-    peer: Node,
-    spin_until: SpinUntil,
-    health: Callable[[], dict[str, Any]],
+    readers: Readers,
     monkeypatch: pytest.MonkeyPatch,
     age: float,
     problem: str | None,
 ) -> None:
     received: list[Any] = []
-    topic = topics.OPERATOR_HEARTBEAT
-    service.observe(topic, timestamped=True, max_age=0.5).subscribe(received.append)
-    publisher = peer.create_publisher(topic.type, topic.name, topic.qos)
-    spin_until(lambda: publisher.get_subscription_count() == 1)
-    monkeypatch.setattr(service, "age", lambda stamp: age)
+    dropped: list[tuple[str, str]] = []
+    monkeypatch.setattr(service.health, "drop", lambda *why: dropped.append(why))
+    monkeypatch.setattr("interfaces.service.node.stamps.now", lambda: at_time(20.0))
+    service.observe(topics.OPERATOR_HEARTBEAT, max_age=0.5).subscribe(received.append)
 
-    publisher.publish(Bool(data=True))
-    spin_until(lambda: received or service.health._dropped)
+    readers.receive(Bool(data=True), 20.0 - age)
 
-    assert len(received) == (problem is None)
-    assert health()["message"] == (f"operator_heartbeat: {problem}" if problem else "running")
+    assert received == ([] if problem else [Bool(data=True)])
+    assert dropped == ([("operator_heartbeat", problem)] if problem else [])
 
 
 def test_age_is_by_the_time_of_day(service: ServiceNode) -> None:
@@ -344,7 +412,7 @@ def overridden(make_node: Make, **values: Any) -> ServiceNode:
 
 
 def test_parameter_has_a_description_and_a_range(service: ServiceNode) -> None:
-    assert service.declare(one("rate", 20.0, (1.0, 100.0), "how often [Hz]")).rate == 20.0
+    assert service.declare(one("rate", 20.0, (1.0, 100.0), "how often", unit="Hz")).rate == 20.0
     assert service.declare(one("strikes", 3, (1, 9), "how many")).strikes == 3
 
     rate, strikes = service.describe_parameters(["rate", "strikes"])
@@ -352,6 +420,7 @@ def test_parameter_has_a_description_and_a_range(service: ServiceNode) -> None:
     assert (rate.description, rate.read_only) == ("how often [Hz]", True)
     assert (rate.floating_point_range[0].from_value, rate.floating_point_range[0].to_value) == (1.0, 100.0)
     assert (strikes.integer_range[0].from_value, strikes.integer_range[0].to_value) == (1, 9)
+    assert strikes.description == "how many"
 
 
 @pytest.mark.parametrize("value", [0.5, 100.5, math.nan, math.inf, -math.inf])
@@ -380,6 +449,14 @@ def test_only_settable_parameters_can_be_set_at_run_time(service: ServiceNode) -
     assert set_to("value", 21.0)
     assert not set_to("value", math.nan)
     assert service.get_parameter("value").value == 21.0
+
+
+def test_number_that_is_not_finite_is_refused_without_a_range(service: ServiceNode) -> None:
+    service.declare(one("value", 20.0, None, "value", settable=True))
+
+    (result,) = service.set_parameters([Parameter("value", value=math.inf)])
+
+    assert (result.successful, result.reason) == (False, "inf is not finite")
 
 
 def test_health_is_reported_every_second(make_node: Make, peer: Node, spin_until: SpinUntil) -> None:

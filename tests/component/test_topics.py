@@ -71,7 +71,8 @@ def test_topics_that_report_single_events_may_be_silent() -> None:
 
 
 def test_topics_follow_those_that_they_are_made_of() -> None:
-    assert {topic.name: topic.follows for topic in topics.CONTRACT if topic.follows} == {
+    assert {topic.name: topic.follows for topic in topics.CONTRACT} == {
+        **{topic.name: "" for topic in topics.CONTRACT},
         "effector/speed": "effector/position",
         "operator_presence": "operator_heartbeat",
     }
@@ -116,6 +117,7 @@ def test_lifespan_of_a_second_is_in_seconds() -> None:
     [
         (topics.L1, "/", "/l1"),
         (topics.L1, "/arm1", "/arm1/l1"),
+        (topics.L1, "/armX", "/armX/l1"),
         (topics.DIAGNOSTICS, "/arm1", "/diagnostics"),
     ],
 )
