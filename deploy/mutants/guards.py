@@ -4,6 +4,7 @@ from __future__ import annotations
 
 REACTIVE_NODE = "interfaces/reactive_node/src/reactive_node"
 _NODE_TESTS = "interfaces/reactive_node/tests"
+_CHECKERS = ("tests/chaos/test_findings.py", "tests/chaos/test_bounds.py", "tests/chaos/test_checkers.py")
 
 GUARDS: dict[str, tuple[str, ...]] = {
     "services/operator_watchdog.py": (
@@ -66,8 +67,8 @@ GUARDS: dict[str, tuple[str, ...]] = {
     ),
     "deploy/chaos/history.py": ("tests/chaos/test_history.py", "tests/chaos/test_checkers.py"),
     "deploy/chaos/promises.py": ("tests/chaos/test_checkers.py", "tests/chaos/test_reports.py"),
-    "deploy/chaos/safety.py": ("tests/chaos/test_bounds.py", "tests/chaos/test_checkers.py"),
-    "deploy/chaos/liveness.py": ("tests/chaos/test_bounds.py", "tests/chaos/test_checkers.py"),
+    "deploy/chaos/safety.py": _CHECKERS,
+    "deploy/chaos/liveness.py": _CHECKERS,
 }
 """Paths of modules, and of the tests that run for each mutant of the module, quick ones first."""
 

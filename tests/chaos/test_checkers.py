@@ -63,6 +63,7 @@ def test_violation_is_reported_with_its_figures() -> None:
 @pytest.mark.parametrize("promise", CHECKERS)
 def test_every_promise_has_a_sentence(promise: str) -> None:
     assert meaning(promise).endswith(".")
+    assert meaning("S3") == "Engines turn on only by a turn_on with the operator present."
 
 
 # S1

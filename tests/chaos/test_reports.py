@@ -14,7 +14,7 @@ from deploy.chaos.pictures import framed, timeline
 from deploy.chaos.promises import CHECKERS
 from deploy.chaos.report import text
 
-from .histories import END, faulty, good, killed, with_value
+from .histories import END, faulty, good, killed, silent, with_value
 
 
 def faults_of(history: History) -> list[list[str]]:
@@ -60,6 +60,17 @@ def test_numbers_and_nouns_agree() -> None:
     history = with_value(killed(good(), "engine_controller", 30.0, 0.6), "engines/state", "off", 30.5)
     assert CHECKERS["S2"](history).measured == "0 kills while on; turned off once for a permitted reason"
     assert CHECKERS["S3"](history).measured.startswith("turned on once, ")
+
+
+def test_durations_have_a_title_and_percentiles() -> None:
+    back = killed(good(), "kinematics", 20.0, 0.6)
+    hang = faulty(
+        silent(good(), "effector/position", 20.0, 23.9), InjectedFault("stop", "kinematics", 20.0, 35.0)
+    )
+    report = text([CHECKERS["L1"](back), CHECKERS["L4"](hang)]).splitlines()
+    for title, seconds in (("Silence after SIGKILL [s]", "0.60"), ("Silence after a hang [s]", "3.90")):
+        row = report[report.index(title) + 2]
+        assert row.split() == ["kinematics", "1", seconds, seconds]
 
 
 def test_promise_without_cases_is_not_exercised() -> None:

@@ -1,0 +1,347 @@
+"""The findings in full, cases, figures and evidence, on small histories at exact moments."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import pytest
+
+from deploy.chaos.findings import Evidence, Finding
+from deploy.chaos.history import (
+    ALL,
+    CONTROLLER,
+    KINEMATICS,
+    NO_TARGET,
+    SWITCH,
+    WATCHDOG,
+    History,
+    InjectedFault,
+    Life,
+    Sample,
+)
+from deploy.chaos.promises import CHECKERS
+from deploy.chaos.safety import PRESENCE_TIMEOUT, SAMPLING, TRANSPORT
+from interfaces.topics import DRIVE_TIMEOUT, OFF, ON, TURN_OFF, TURN_ON
+
+TOPICS = {
+    "heartbeats": "operator_heartbeat",
+    "presences": "operator_presence",
+    "commands": "engines",
+    "states": "engines/state",
+    "positions": "effector/position",
+    "speeds": "effector/speed",
+    "health": "/diagnostics",
+}
+
+
+def history(
+    *,
+    lives: Sequence[Life] = (),
+    faults: Iterable[InjectedFault] = (),
+    **messages: Iterable[tuple[float, Any]],
+) -> History:
+    """Return a history of 40 s with these messages, each received 0.125 s after it was sent."""
+    streams = {
+        TOPICS.get(name, name): sorted(Sample(at, at + 0.125, value) for at, value in items)
+        for name, items in messages.items()
+    }
+    return History(40.0, streams, [*lives], sorted(faults, key=lambda fault: fault.begin))
+
+
+def steps(begin: float, end: float, step: float = 0.25, value: Any = True) -> list[tuple[float, Any]]:
+    """Return a message at each step, the first and the last included."""
+    return [(begin + n * step, value) for n in range(round((end - begin) / step) + 1)]
+
+
+def engines(*switched: tuple[float, str]) -> list[tuple[float, str]]:
+    """Return the states of engines that are switched at these times, repeated every 0.25 s."""
+    ends = [*(at for at, _ in switched[1:]), 40.25]
+    return [
+        each
+        for (begin, state), end in zip(switched, ends, strict=True)
+        for each in steps(begin, end - 0.25, value=state)
+    ]
+
+
+def overload(begin: float, end: float) -> InjectedFault:
+    return InjectedFault("overload", NO_TARGET, begin, end)
+
+
+# S1
+
+
+def test_s1_counts_silences_that_last_until_the_engines_are_off() -> None:
+    heartbeats = [*steps(1, 2), *steps(4, 5), *steps(6, 8), *steps(10, 12), (30.0, True), (31.0, True)]
+    states = engines(
+        (1.0, ON),
+        (5.5, OFF),  # in a silence of one second
+        (6.0, ON),
+        (9.0, OFF),  # in a silence of two seconds
+        (10.0, ON),
+        (22.5, OFF),  # 10.5 s after the last heartbeat
+    )
+    assert CHECKERS["S1"](history(heartbeats=heartbeats, states=states)) == Finding(
+        "S1", 2, "off within 10.50 s, allowed 10.5 s", [], worst=10.5
+    )
+
+
+def test_s1_operator_who_is_never_silent_is_no_case() -> None:
+    found = CHECKERS["S1"](history(heartbeats=steps(0, 40), states=engines((0.0, ON))))
+    assert found == Finding("S1", 0, "off within 0.25 s, allowed 10.5 s", [], worst=0.25)
+
+
+def test_s1_evidence_has_the_moment_of_the_violation() -> None:
+    states = engines((1.0, ON), (1.5, OFF), (5.0, ON), (17.0, OFF))
+    assert CHECKERS["S1"](history(heartbeats=[(5.0, True)], states=states)) == Finding(
+        "S1",
+        1,
+        "off within 12.00 s, allowed 10.5 s",
+        [
+            Evidence(1.0, "engines on before the operator's first sign of life"),
+            Evidence(15.5, "engines still on 12.00 s after the operator's last sign of life"),
+        ],
+        worst=12.0,
+    )
+
+
+# S2
+
+PRESENT = {"heartbeats": steps(0, 40), "presences": steps(0, 40, 0.5)}
+
+
+def test_s2_overload_just_before_makes_the_outcome_unknown() -> None:
+    states = engines((0.0, ON), (10.0, OFF), (11.0, ON), (20.0, OFF), (21.0, ON), (30.0, OFF))
+    faults = [overload(9.5, 9.625), overload(19.5, 19.625), overload(28.5, 28.625)]
+    assert CHECKERS["S2"](history(**PRESENT, states=states, faults=faults)) == Finding(
+        "S2",
+        0,
+        "0 kills while on; turned off 0 times for a permitted reason",
+        [Evidence(30.0, "engines turned off although the operator was present")],
+        2,
+    )
+
+
+def test_s2_counts_kills_while_the_engines_are_on_and_the_operator_is_present() -> None:
+    lives = [
+        Life(CONTROLLER, 1, 0.0, 9.875),
+        Life(CONTROLLER, 2, 9.875, 20.0),
+        Life(CONTROLLER, 3, 20.0, None),
+    ]
+    faults = [
+        InjectedFault("kill", "velocity", 0.5, 0.5),  # before the first state
+        InjectedFault("kill", "velocity", 5.0, 5.0),  # a case
+        InjectedFault("terminate", "velocity", 6.0, 6.0),
+        InjectedFault("kill", CONTROLLER, 9.875, 9.875, 1),
+        InjectedFault("kill", "velocity", 10.875, 10.875),  # while off
+        InjectedFault("kill", "velocity", 11.125, 11.125),  # a case
+        InjectedFault("kill", "velocity", 34.0, 34.0),  # a case: the last heartbeat is one second old
+        InjectedFault("kill", "velocity", 35.0, 35.0),
+    ]
+    states = engines((1.0, ON), (10.0, OFF), (11.0, ON), (20.0, OFF), (21.0, ON))
+    found = CHECKERS["S2"](
+        history(
+            heartbeats=steps(0, 33), presences=steps(0, 33, 0.5), states=states, lives=lives, faults=faults
+        )
+    )
+    assert found == Finding("S2", 3, "3 kills while on; turned off 2 times for a permitted reason", [])
+
+
+def two_lives(program: str, began: float) -> list[Life]:
+    """Return the processes of a program whose second one began then."""
+    return [Life(program, 1, 0.0, began - 0.01), Life(program, 2, began, None)]
+
+
+def stopped(program: str, begin: float, end: float, kind: str = "stop") -> InjectedFault:
+    return InjectedFault(kind, program, begin, end)
+
+
+def heard_but_in(*silences: tuple[float, float]) -> list[tuple[float, bool]]:
+    """Return heartbeats from 0.25 s on, with these silences."""
+    return [beat for beat in steps(0.25, 40) if not any(begin < beat[0] < end for begin, end in silences)]
+
+
+SILENCES = ((4.0, 7.0), (8.0, 11.0), (12.0, 15.0))  # a strike each
+LATE = [(at, state) for at, state in engines((0.0, ON), (20.0, OFF)) if not 19.0 < at < 20.0]
+UNSEEN = {"presences": steps(0, 10), "heartbeats": steps(0, 40)}
+FIRST_UNSEEN = 20.0 - PRESENCE_TIMEOUT + SAMPLING + TRANSPORT
+COMMANDED = {"commands": [(20.0, TURN_OFF)], "heartbeats": heard_but_in(*SILENCES)}
+
+
+@pytest.mark.parametrize(
+    ("parts", "permitted"),
+    [
+        # the controller was away
+        ({"lives": two_lives(CONTROLLER, 20.0)}, True),
+        ({"lives": two_lives(CONTROLLER, 19.75)}, True),
+        ({"lives": two_lives(CONTROLLER, 19.75 - 0.02)}, False),
+        ({"states": LATE, "faults": [stopped(CONTROLLER, 19.25, 19.75)]}, True),
+        ({"states": LATE, "faults": [stopped("velocity", 19.25, 19.75)]}, False),
+        ({"states": LATE, "faults": [stopped(CONTROLLER, 5.0, 6.0)]}, False),
+        ({"faults": [stopped(CONTROLLER, 19.75, 20.0)]}, False),
+        ({"states": [(0.0, ON), (DRIVE_TIMEOUT, OFF)], "faults": [stopped(CONTROLLER, 0.125, 0.25)]}, False),
+        # the watchdog commanded it
+        (COMMANDED, True),
+        (COMMANDED | {"commands": [(20.5, TURN_OFF)]}, False),
+        (COMMANDED | {"commands": [(18.0, TURN_ON), (20.0, TURN_OFF)]}, True),
+        (COMMANDED | {"commands": [(19.0, TURN_OFF), (20.0, TURN_OFF)]}, True),
+        (COMMANDED | {"commands": [(18.5, TURN_OFF), (20.0, TURN_OFF)]}, False),
+        (COMMANDED | {"lives": two_lives(WATCHDOG, 10.0)}, False),
+        (COMMANDED | {"lives": two_lives(WATCHDOG, 20.0)}, True),
+        (
+            {
+                "commands": [(11.0, TURN_OFF), (20.0, TURN_OFF)],  # at a heartbeat
+                "heartbeats": heard_but_in((8.0, 11.0), (12.0, 15.0), (15.0, 18.0)),
+            },
+            False,
+        ),
+        # a suspended watchdog hears nothing
+        (COMMANDED | {"faults": [stopped(WATCHDOG, 13.0, 14.0)]}, True),
+        (COMMANDED | {"faults": [stopped(WATCHDOG, 25.0, 26.0)]}, True),
+        (
+            COMMANDED | {"heartbeats": heard_but_in(*SILENCES[:2]), "faults": [stopped(WATCHDOG, 0.0, 2.5)]},
+            True,
+        ),
+        (
+            COMMANDED
+            | {"heartbeats": heard_but_in(*SILENCES[1:]), "faults": [stopped(WATCHDOG, 13.0, 15.5)]},
+            False,
+        ),
+        (
+            COMMANDED
+            | {"heartbeats": heard_but_in(*SILENCES[1:]), "faults": [stopped(WATCHDOG, 13.0, 18.0)]},
+            True,
+        ),
+        # no presence for ten seconds, for a reason
+        (UNSEEN, False),
+        (UNSEEN | {"heartbeats": steps(0, 40, 1.0)}, False),
+        (UNSEEN | {"heartbeats": heard_but_in((15.0, 16.25))}, True),
+        (UNSEEN | {"heartbeats": heard_but_in((15.0, 16.25)), "presences": [(20.0, 20.0)]}, True),
+        (UNSEEN | {"faults": [stopped(WATCHDOG, 15.0, 16.0)]}, True),
+        (UNSEEN | {"faults": [stopped(ALL, 15.0, 16.0, "hang")]}, True),
+        (UNSEEN | {"faults": [stopped(WATCHDOG, 15.0, 16.0, "crash_loop")]}, False),
+        (UNSEEN | {"faults": [stopped("velocity", 15.0, 16.0)]}, False),
+        (UNSEEN | {"faults": [stopped(WATCHDOG, 20.0, 21.0)]}, False),
+        (UNSEEN | {"faults": [stopped(WATCHDOG, 9.0, FIRST_UNSEEN)]}, False),
+        (UNSEEN | {"faults": [stopped(NO_TARGET, 1.0, 2.0, "partition")]}, True),
+    ],
+)
+def test_s2_reasons_that_permit_to_turn_off(parts: dict[str, Any], permitted: bool) -> None:
+    found = CHECKERS["S2"](history(**PRESENT | {"states": engines((0.0, ON), (20.0, OFF))} | parts))
+    assert (len(found.evidence), found.unknown) == (not permitted, 0)
+    assert f"turned off {'once' if permitted else '0 times'} for" in found.measured
+
+
+# S3
+
+
+def test_s3_each_start_needs_a_command_and_a_sign_of_life_of_its_own() -> None:
+    states = engines(
+        (0.0, OFF),
+        (5.0, ON),
+        (6.0, OFF),
+        (10.0, ON),  # command and sign of life at the same moment
+        (10.5, OFF),
+        (10.75, ON),  # with another command
+        (11.0, OFF),
+        (20.0, ON),  # the command comes later
+        (20.5, OFF),
+        (25.0, ON),
+        (25.25, OFF),
+        (25.5, ON),  # by the same command
+        (26.0, OFF),
+        (35.0, ON),  # without a sign of life
+    )
+    commands = [(at, TURN_ON) for at in (4.75, 10.0, 10.75, 20.5, 25.0, 34.5)]
+    heartbeats = [(4.5, True), (10.0, True), (10.75, True), *steps(20, 30)]
+    assert CHECKERS["S3"](history(states=states, commands=commands, heartbeats=heartbeats)) == Finding(
+        "S3",
+        4,
+        "turned on 4 times, operator seen at most 0.50 s before",
+        [
+            Evidence(20.0, "engines turned on without a turn_on in the last second"),
+            Evidence(25.5, "engines turned on without a turn_on in the last second"),
+            Evidence(35.0, "engines turned on without a sign of life in the last second"),
+        ],
+    )
+
+
+def test_s3_new_switch_or_overload_makes_the_outcome_unknown() -> None:
+    lives = [Life(SWITCH, 1, 0.0, 10.0), Life(SWITCH, 2, 10.0, 17.0), Life(SWITCH, 3, 17.0, None)]
+    starts = (
+        10.0,  # at the start of a switch
+        11.0,  # within three seconds
+        20.0,  # three seconds after
+        25.0,
+        30.0,  # after an overload
+    )
+    switched = [(0.0, OFF)]
+    for at in starts:
+        switched += [(at, ON), (at + 0.5, OFF)]
+    faults = [overload(24.5, 24.625), overload(29.5, 29.625)]
+    found = CHECKERS["S3"](history(**PRESENT, states=engines(*switched), lives=lives, faults=faults))
+    assert [each.time for each in found.evidence] == [20.0]
+    assert (found.cases, found.unknown) == (0, 4)
+
+
+@pytest.mark.parametrize(("presence", "unknown"), [(19.0, 1), (20.0, 1), (20.5, 0), (18.0, 0)])
+def test_s3_a_new_switch_excuses_only_a_present_operator(presence: float, unknown: int) -> None:
+    states = engines((0.0, OFF), (20.0, ON), (20.25, OFF))
+    found = CHECKERS["S3"](
+        history(states=states, presences=[(presence, presence)], lives=two_lives(SWITCH, 19.0))
+    )
+    assert (len(found.evidence), found.unknown) == (1 - unknown, unknown)
+
+
+# S4
+
+LINKS = {name: [(0.0, value)] for name, value in {"l1": 1.0, "l2": 1.0, "theta1": 0.0, "theta2": 0.0}.items()}
+
+
+def test_s4_names_wrong_speeds_and_positions() -> None:
+    right, wrong = (2.0, 0.0), (5.0, 0.0)
+    positions = [(5.0, right), (6.0, wrong), (10.0, wrong), (10.5, wrong)]
+    speeds = [(5.0, 0.0), (6.0, -0.5), (7.0, 0.5)]
+    found = CHECKERS["S4"](history(**LINKS, positions=positions, speeds=speeds, faults=[overload(9.5, 10.0)]))
+    assert found == Finding(
+        "S4",
+        5,
+        "4 positions, 3 speeds",
+        [Evidence(6.0, "speed -0.5"), Evidence(6.0, "no published values give (5.0, 0.0)")],
+        2,
+    )
+
+
+# S5
+
+
+def test_s5_names_the_processes_in_the_order_of_their_start() -> None:
+    lives = [
+        Life("velocity", 5, 10.0, 20.0),
+        Life("velocity", 9, 0.0, None),
+        Life("", 2, 5.0, 9.0),
+        Life("", 1, 0.0, None),
+        Life(KINEMATICS, 7, 0.0, 6.0),
+        Life(KINEMATICS, 8, 4.0, None),  # starts for two seconds
+    ]
+    assert CHECKERS["S5"](history(lives=lives)) == Finding(
+        "S5",
+        3,
+        "restarts and duplicates: 3",
+        [
+            Evidence(5.0, "processes 1 and 2 are both supervisord"),
+            Evidence(10.0, "processes 9 and 5 are both velocity"),
+        ],
+    )
+
+
+def test_s5_reports_beside_another_process() -> None:
+    ends = {7: 3.0, 8: 6.0, 9: 9.0, 10: 10.0}
+    lives = [Life("velocity", pid, 0.0, end) for pid, end in ends.items()]
+    reports = [(1.0, 7), (3.0, 8), (5.0, 9), (8.0, 10), (8.5, 9), (9.25, 11)]
+    health = [(at, ("velocity", pid)) for at, pid in reports]
+    faults = [overload(5.5, 5.625), overload(9.5, 9.625)]
+    found = CHECKERS["S5"](history(health=health, lives=lives, faults=faults))
+    beside = [each for each in found.evidence if "beside" in each.text]
+    assert beside == [Evidence(8.0, "process 10 is velocity beside process 9")]
+    assert found.unknown == 2
