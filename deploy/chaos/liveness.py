@@ -92,9 +92,8 @@ def other_streams_flow(history: History) -> Finding:
     """L2: meanwhile the other services' streams show no gap over 250 ms."""
     evidence, cases, unknown, longest = [], 0, 0, 0.0
     for fault in _kills(history):
-        end = min(fault.begin + min(_recovery(history, fault) or SLOWEST, SLOWEST), history.end - GAP)
-        others = [p for p in STREAMS if p not in (fault.target, *DEPENDENTS.get(fault.target, ()))]
-        for program in others:
+        end = fault.begin + min(_recovery(history, fault) or SLOWEST, SLOWEST)
+        for program in STREAMS:
             if not _flowed(history, program, fault.begin, GAP):
                 continue
             if any(_disturbs(history, f, program, fault.begin - 1.0, end + GAP) for f in history.faults):

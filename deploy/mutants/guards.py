@@ -65,7 +65,7 @@ GUARDS: dict[str, tuple[str, ...]] = {
         "tests/supervision/test_sentinel_wiring.py",
         "tests/component/test_readme.py",
     ),
-    "deploy/chaos/history.py": ("tests/chaos/test_history.py", "tests/chaos/test_checkers.py"),
+    "deploy/chaos/history.py": ("tests/chaos/test_history.py", *_CHECKERS),
     "deploy/chaos/promises.py": ("tests/chaos/test_checkers.py", "tests/chaos/test_reports.py"),
     "deploy/chaos/safety.py": _CHECKERS,
     "deploy/chaos/liveness.py": _CHECKERS,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -13,6 +14,8 @@ from deploy.chaos.history import (
     CONTROLLER,
     KINEMATICS,
     NO_TARGET,
+    OPERATOR,
+    PROGRAMS,
     SWITCH,
     WATCHDOG,
     History,
@@ -37,16 +40,17 @@ TOPICS = {
 
 def history(
     *,
+    end: float = 40.0,
     lives: Sequence[Life] = (),
     faults: Iterable[InjectedFault] = (),
     **messages: Iterable[tuple[float, Any]],
 ) -> History:
-    """Return a history of 40 s with these messages, each received 0.125 s after it was sent."""
+    """Return a history with these messages, each received 0.125 s after it was sent."""
     streams = {
         TOPICS.get(name, name): sorted(Sample(at, at + 0.125, value) for at, value in items)
         for name, items in messages.items()
     }
-    return History(40.0, streams, [*lives], sorted(faults, key=lambda fault: fault.begin))
+    return History(end, streams, [*lives], sorted(faults, key=lambda fault: fault.begin))
 
 
 def steps(begin: float, end: float, step: float = 0.25, value: Any = True) -> list[tuple[float, Any]]:
@@ -168,6 +172,11 @@ FIRST_UNSEEN = 20.0 - PRESENCE_TIMEOUT + SAMPLING + TRANSPORT
 COMMANDED = {"commands": [(20.0, TURN_OFF)], "heartbeats": heard_but_in(*SILENCES)}
 
 
+def suspended_with_a_presence_at(time: float) -> dict[str, Any]:
+    presences = [*UNSEEN["presences"], (time, time)]
+    return UNSEEN | {"presences": presences, "faults": [stopped(WATCHDOG, 15.0, 16.0)]}
+
+
 @pytest.mark.parametrize(
     ("parts", "permitted"),
     [
@@ -219,6 +228,10 @@ COMMANDED = {"commands": [(20.0, TURN_OFF)], "heartbeats": heard_but_in(*SILENCE
         (UNSEEN | {"heartbeats": heard_but_in((15.0, 16.25)), "presences": [(20.0, 20.0)]}, True),
         (UNSEEN | {"faults": [stopped(WATCHDOG, 15.0, 16.0)]}, True),
         (UNSEEN | {"faults": [stopped(ALL, 15.0, 16.0, "hang")]}, True),
+        (suspended_with_a_presence_at(15.0), False),
+        (suspended_with_a_presence_at(15.5), True),  # of a heartbeat before
+        (suspended_with_a_presence_at(16.0 + TRANSPORT), True),
+        (suspended_with_a_presence_at(16.5), False),
         (UNSEEN | {"faults": [stopped(WATCHDOG, 15.0, 16.0, "crash_loop")]}, False),
         (UNSEEN | {"faults": [stopped("velocity", 15.0, 16.0)]}, False),
         (UNSEEN | {"faults": [stopped(WATCHDOG, 20.0, 21.0)]}, False),
@@ -340,8 +353,295 @@ def test_s5_reports_beside_another_process() -> None:
     lives = [Life("velocity", pid, 0.0, end) for pid, end in ends.items()]
     reports = [(1.0, 7), (3.0, 8), (5.0, 9), (8.0, 10), (8.5, 9), (9.25, 11)]
     health = [(at, ("velocity", pid)) for at, pid in reports]
+    lives.append(Life(KINEMATICS, 20, 0.0, None))
+    health += [(1.0, (KINEMATICS, 20)), (12.0, (KINEMATICS, 7))]  # a pid that velocity had before
     faults = [overload(5.5, 5.625), overload(9.5, 9.625)]
     found = CHECKERS["S5"](history(health=health, lives=lives, faults=faults))
     beside = [each for each in found.evidence if "beside" in each.text]
-    assert beside == [Evidence(8.0, "process 10 is velocity beside process 9")]
+    assert beside == [
+        Evidence(8.0, "process 10 is velocity beside process 9"),
+        Evidence(12.0, "process 7 is kinematics beside process 20"),
+    ]
     assert found.unknown == 2
+
+
+# L1
+
+
+def kill(program: str, *times: float) -> list[InjectedFault]:
+    return [InjectedFault("kill", program, at, at) for at in times]
+
+
+def back(*silences: tuple[float, float]) -> list[tuple[float, float]]:
+    """Return messages with these silences: when each begins, and for how long the observer hears nothing."""
+    heard = [at for at, _ in steps(0, 40) if not any(0 < at - begin < length for begin, length in silences)]
+    return [(at, 0.0) for at in sorted({*heard, *(begin + length - 0.125 for begin, length in silences)})]
+
+
+def test_l1_counts_silences_and_those_that_nobody_can_know() -> None:
+    found = CHECKERS["L1"](
+        history(
+            l1=back((2.0, 0.875), (8.0, 1.0), (14.0, 1.5), (20.0, 2.0)),
+            l2=[message for message in back((26.0, 3.0)) if message[0] > 4.0],
+            theta1=[message for message in back((26.0, 2.5)) if message[0] > 4.0],
+            theta2=back((10.0, 3.0), (20.0, 0.5)),
+            faults=[
+                *kill("config_l1", 2.0, 8.0, 14.0, 20.0),
+                *kill("config_l2", 3.0, 26.0),  # without output before, and in a pause of the machine
+                *kill("config_theta1", 3.0, 26.0),
+                *kill("config_theta2", 10.0, 20.0),
+                overload(26.5, 27.5),
+            ],
+        )
+    )
+    assert found == Finding(
+        "L1",
+        6,
+        "p50 1.00 s, p99 3.00 s",
+        [Evidence(10.0, "config_theta2 is silent for 3.00 s after SIGKILL")],
+        4,
+        {"config_l1": [0.875, 1.0, 1.5, 2.0], "config_theta2": [3.0, 0.5]},
+        3.0,
+    )
+
+
+def test_l1_slow_median_is_evidence_of_no_moment() -> None:
+    times = (5.0, 15.0, 25.0)
+    found = CHECKERS["L1"](history(l1=back(*((at, 1.5) for at in times)), faults=kill("config_l1", *times)))
+    assert found.evidence == [Evidence(0.0, "config_l1: the median silence after SIGKILL is 1.50 s")]
+
+
+def test_l1_slowest_of_a_hundred_is_not_in_p99() -> None:
+    times = [4.0 * n for n in range(1, 101)]
+    output = [(at - 0.5, 0.0) for at in times] + [(at + (1.5 if at == 4.0 else 0.375), 0.0) for at in times]
+    found = CHECKERS["L1"](history(end=404.0, l1=output, faults=kill("config_l1", *times)))
+    assert (found.measured, found.worst) == ("p50 0.50 s, p99 0.50 s", 1.625)
+
+
+@pytest.mark.parametrize("promise", ["L1", "L4"])
+def test_promise_about_durations_without_cases_has_no_figures(promise: str) -> None:
+    assert CHECKERS[promise](history()) == Finding(promise, 0, "", [])
+
+
+def test_l1_silence_for_good_after_any_fault_is_evidence() -> None:
+    silent = replace(
+        history(
+            l1=steps(0, 40, value=0.0),
+            l2=steps(0, 29, value=0.0),
+            faults=[
+                stopped("config_l1", 1.0, 31.0),  # the record ends before it tells
+                stopped(ALL, 29.0, 30.0, "kill_supervisor"),
+                stopped(NO_TARGET, 5.0, 5.0, "flood"),
+                stopped("config_l1", 6.0, 6.0, "terminate"),
+            ],
+        ),
+        absent=frozenset({*PROGRAMS} - {"config_l1", "config_l2"}),
+    )
+    assert CHECKERS["L1"](silent).evidence == [
+        Evidence(40.0, "config_l2 is silent for 10 s after kill_supervisor")
+    ]
+
+
+@pytest.mark.parametrize(
+    ("ended", "time"),
+    [
+        (Life("config_l1", 5, 0.0, 9.5), 1.5),
+        (Life("config_l1", 5, 0.0, 10.0), 1.5),
+        (Life("config_l1", 5, 0.0, 10.5), 1.0),
+        (Life("config_l1", 5, 0.0, 11.0), 0.5),
+        (Life("config_l1", 5, 0.0, 11.25), 1.5),  # too late to be the death
+        (Life("config_l1", 5, 0.0, None), 1.5),
+        (Life("config_l1", 6, 0.0, 11.0), 1.5),
+        (Life("config_l2", 5, 0.0, 11.0), 1.5),
+    ],
+)
+def test_l1_silence_begins_with_the_death(ended: Life, time: float) -> None:
+    faults = [InjectedFault("kill", "config_l1", 10.0, 10.0, 5)]
+    assert CHECKERS["L1"](history(l1=back((10.0, 1.5)), lives=[ended], faults=faults)).worst == time
+
+
+@pytest.mark.parametrize(
+    ("other", "unknown"),
+    [
+        (stopped("config_l1", 7.875, 7.875, "terminate"), 0),
+        (stopped("config_l1", 8.0, 8.0, "terminate"), 1),
+        (stopped("config_l1", 11.5, 11.5, "terminate"), 1),
+        (stopped("config_l1", 11.625, 11.625, "terminate"), 0),
+        (stopped("config_l1", 4.0, 4.875), 0),
+        (stopped("config_l1", 4.0, 5.0), 1),
+        (stopped("config_l1", 0.0, 0.0, "partition"), 1),
+        (stopped("config_l2", 10.0, 11.0), 0),
+        (stopped(ALL, 10.0, 11.0), 1),
+    ],
+)
+def test_l1_other_fault_that_disturbs_the_return(other: InjectedFault, unknown: int) -> None:
+    found = CHECKERS["L1"](history(l1=back((10.0, 1.5)), faults=[*kill("config_l1", 10.0), other]))
+    assert (found.cases, found.unknown) == (1 - unknown, unknown)
+
+
+def test_l1_fault_of_a_needed_program_disturbs_the_return() -> None:
+    faults = [*kill("velocity", 10.0), stopped(KINEMATICS, 10.0, 10.0, "terminate")]
+    assert CHECKERS["L1"](history(speeds=back((10.0, 1.5)), faults=faults)).unknown == 1
+
+
+@pytest.mark.parametrize(("last", "unknown"), [(8.75, 1), (8.875, 0), (10.0, 0)])
+def test_l1_needs_output_shortly_before(last: float, unknown: int) -> None:
+    output = [(last, 0.0), (11.0, 0.0)]
+    assert CHECKERS["L1"](history(l1=output, faults=kill("config_l1", 10.0))).unknown == unknown
+
+
+@pytest.mark.parametrize(("at", "unknown"), [(34.875, 0), (35.0, 1)])
+def test_l1_record_has_to_be_long_enough_for_silence_for_good(at: float, unknown: int) -> None:
+    found = CHECKERS["L1"](history(l1=steps(0, 34.75, value=0.0), faults=kill("config_l1", at)))
+    assert found.unknown == unknown
+    assert [each.text for each in found.evidence] == (
+        [] if unknown else ["config_l1 is silent for good after SIGKILL"]
+    )
+
+
+# L2
+
+
+def test_l2_longest_gap_is_that_of_the_other_streams() -> None:
+    found = CHECKERS["L2"](
+        history(
+            l2=back((5.0, 1.125)),  # before the kills
+            theta1=back(),
+            theta2=back((10.0, 0.5)),
+            faults=kill("config_theta2", 10.0),
+        )
+    )
+    assert found == Finding("L2", 2, "longest gap 250 ms, allowed 250 ms", [], worst=0.25)
+
+
+def test_l2_gap_within_the_restart_is_evidence_unless_the_observer_missed_it() -> None:
+    found = CHECKERS["L2"](
+        history(
+            l1=back((10.0, 0.5)),
+            l2=back((10.0, 0.625), (10.5, 0.625)),  # the observer may have missed the first
+            theta1=back((9.75, 1.125)),
+            theta2=back((10.75, 1.125)),  # after the restart
+            faults=[*kill("config_l1", 10.0), overload(10.125, 10.375)],
+        )
+    )
+    assert found == Finding(
+        "L2",
+        2,
+        "longest gap 1000 ms, allowed 250 ms",
+        [
+            Evidence(10.5, "config_l2 is silent for 0.50 s when config_l1 is killed"),
+            Evidence(9.75, "config_theta1 is silent for 1.00 s when config_l1 is killed"),
+        ],
+        1,
+        worst=1.0,
+    )
+
+
+@pytest.mark.parametrize(
+    ("other", "cases"),
+    [
+        (stopped("config_l2", 6.875, 6.875, "terminate"), 1),
+        (stopped("config_l2", 7.0, 7.0, "terminate"), 0),
+        (stopped("config_l2", 10.75, 10.75, "terminate"), 0),
+        (stopped("config_l2", 10.875, 10.875, "terminate"), 1),
+        *((stopped("config_l2", 4.0, 4.5, kind), 0) for kind in ("stop", "hang", "hog", "slow")),
+        *(
+            (stopped("config_l2", 4.0, 4.5, kind), 0)
+            for kind in ("crash_loop", "kill_all", "kill_supervisor")
+        ),
+    ],
+)
+def test_l2_stream_that_another_fault_disturbs_is_no_case(other: InjectedFault, cases: int) -> None:
+    messages = {"l1": back((10.0, 0.5)), "l2": back()}
+    assert CHECKERS["L2"](history(**messages, faults=[*kill("config_l1", 10.0), other])).cases == cases
+
+
+# L3
+
+
+def positions(*wrong: float) -> list[tuple[float, tuple[float, float]]]:
+    """Return positions with a silence after each restart at 4, 12, 20 and 28 s, wrong at these times."""
+    heard = [at for at, _ in back(*((at, 0.625) for at in (4.0, 12.0, 20.0, 28.0)))]
+    return [(at, (5.0, 0.0) if at in wrong else (2.0, 0.0)) for at in heard]
+
+
+def test_l3_judges_the_last_position_of_a_second() -> None:
+    found = CHECKERS["L3"](
+        history(
+            **LINKS,
+            positions=positions(6.0, 14.0, 22.0),
+            speeds=back((20.0, 0.5)),
+            faults=[
+                *kill("config_l1", 1.0),  # without output before
+                *kill(KINEMATICS, 4.0, 12.0, 20.0, 28.0),
+                *kill("velocity", 20.0),
+                overload(5.875, 5.9375),
+                overload(21.875, 21.9375),
+            ],
+        )
+    )
+    assert found == Finding(
+        "L3",
+        2,
+        "right after 1 of 2 returns",
+        [Evidence(14.0, "the position does not follow from the last values after kill of kinematics")],
+        2,
+    )
+
+
+@pytest.mark.parametrize(("at", "cases"), [(5.5, 1), (6.125, 1), (6.25, 2), (13.25, 1)])
+def test_l3_disturbed_return_is_no_case(at: float, cases: int) -> None:
+    faults = [*kill(KINEMATICS, 4.0, 12.0), stopped(KINEMATICS, at, at, "double")]
+    assert CHECKERS["L3"](history(**LINKS, positions=positions(), faults=faults)).cases == cases
+
+
+@pytest.mark.parametrize(("kind", "cases"), [("terminate", 1), ("raise", 1), ("stop", 1), ("double", 0)])
+def test_l3_kinds_of_faults(kind: str, cases: int) -> None:
+    faults = [stopped(KINEMATICS, 4.0, 4.0, kind)]
+    assert CHECKERS["L3"](history(**LINKS, positions=positions(), faults=faults)).cases == cases
+
+
+# L4
+
+
+def test_l4_counts_hangs_that_last() -> None:
+    found = CHECKERS["L4"](
+        history(
+            l1=back((10.0, 5.0)),
+            l2=back((10.0, 5.5)),
+            faults=[
+                stopped("config_l1", 2.0, 4.0),  # too short
+                stopped(OPERATOR, 3.0, 9.0),
+                stopped("config_theta1", 3.0, 9.0),  # without output before
+                stopped("config_theta2", 3.0, 9.0),
+                stopped("config_l1", 20.0, 30.0, "slow"),
+                stopped("config_l1", 10.0, 15.0),
+                stopped("config_l2", 10.0, 20.0, "hang"),
+            ],
+        )
+    )
+    assert found == Finding(
+        "L4",
+        2,
+        "replaced within 5.50 s, allowed 5 s",
+        [Evidence(10.0, "config_l2 hangs and is silent for 5.50 s")],
+        2,
+        {"config_l1": [5.0], "config_l2": [5.5]},
+        5.5,
+    )
+
+
+@pytest.mark.parametrize(
+    ("other", "unknown"),
+    [
+        (kill("sentinel", 9.0), 0),
+        (kill("sentinel", 9.5), 1),
+        (kill("sentinel", 12.0), 1),
+        (kill("sentinel", 12.5), 0),
+        (kill(ALL, 9.5), 1),
+        (kill("config_l2", 11.0), 0),
+    ],
+)
+def test_l4_is_unknown_if_the_sentinel_was_hit_meanwhile(other: list[InjectedFault], unknown: int) -> None:
+    found = CHECKERS["L4"](history(l1=back((10.0, 2.0)), faults=[stopped("config_l1", 10.0, 20.0), *other]))
+    assert (found.cases, found.unknown) == (1 - unknown, unknown)
