@@ -130,7 +130,7 @@ def right_after_restart(history: History) -> Finding:
         if fault.target not in (KINEMATICS, *SOURCES) or fault.kind not in (*MOMENTARY, *LASTING):
             continue
         time = _recovery(history, fault)
-        if time is None or time == math.inf:
+        if time is None:
             continue
         begin = fault.begin + time + SETTLED
         others = (other for other in history.faults if other is not fault)

@@ -237,6 +237,7 @@ def suspended_with_a_presence_at(time: float) -> dict[str, Any]:
         (UNSEEN | {"faults": [stopped(WATCHDOG, 20.0, 21.0)]}, False),
         (UNSEEN | {"faults": [stopped(WATCHDOG, 9.0, FIRST_UNSEEN)]}, False),
         (UNSEEN | {"faults": [stopped(NO_TARGET, 1.0, 2.0, "partition")]}, True),
+        (UNSEEN | {"faults": [stopped(NO_TARGET, 0.25, 0.5, "partition")]}, False),
     ],
 )
 def test_s2_reasons_that_permit_to_turn_off(parts: dict[str, Any], permitted: bool) -> None:
@@ -572,7 +573,7 @@ def test_l3_judges_the_last_position_of_a_second() -> None:
             positions=positions(6.0, 14.0, 22.0),
             speeds=back((20.0, 0.5)),
             faults=[
-                *kill("config_l1", 1.0),  # without output before
+                *kill("config_l1", 1.0, 2.0),  # without output after, or before
                 *kill(KINEMATICS, 4.0, 12.0, 20.0, 28.0),
                 *kill("velocity", 20.0),
                 overload(5.875, 5.9375),

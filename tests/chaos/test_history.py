@@ -1,11 +1,27 @@
-"""Targets, outputs and dependents as they follow from the manifest and the contract."""
+"""What a history tells, and targets, outputs and dependents as they follow from manifest and contract."""
 
 from __future__ import annotations
 
 import subprocess
 import sys
 
-from deploy.chaos.history import DEPENDENTS, OPERATOR, OUTPUTS
+import pytest
+
+from deploy.chaos.history import (
+    ALL,
+    CONDITIONS,
+    DEPENDENTS,
+    NO_TARGET,
+    OPERATOR,
+    OUTPUTS,
+    History,
+    InjectedFault,
+    Life,
+    Sample,
+    between,
+    gaps,
+    target_name,
+)
 from deploy.chaos.liveness import STREAMS
 from deploy.supervision import processes
 from interfaces import topics
@@ -74,3 +90,86 @@ for program in ("guard", "accelerometer"):
 
 def test_new_services_need_no_change_in_the_chaos_tools() -> None:
     subprocess.run([sys.executable, "-c", NEW_SERVICES], cwd=processes.ROOT, check=True)
+
+
+def test_names_in_schedules_and_records_stay() -> None:
+    assert (OPERATOR, ALL, NO_TARGET) == ("operator", "all", "nothing")
+    assert CONDITIONS == ("overload", "loss", "silence")
+
+
+def test_target_has_a_name_for_a_reader() -> None:
+    names = [target_name(target) for target in (ALL, NO_TARGET, "velocity")]
+    assert names == ["(whole arm)", "(no target)", "velocity"]
+
+
+@pytest.mark.parametrize(
+    ("begin", "end", "overlaps"),
+    [(1.0, 2.0, False), (1.0, 2.5, True), (2.5, 3.0, True), (3.5, 5.0, True), (4.0, 5.0, False)],
+)
+def test_fault_overlaps_an_interval_with_which_it_has_time_in_common(
+    begin: float, end: float, overlaps: bool
+) -> None:
+    assert InjectedFault("stop", "velocity", 2.0, 4.0).overlaps(begin, end) is overlaps
+
+
+def test_observer_misses_messages_by_overload_and_loss() -> None:
+    faults = [
+        InjectedFault("overload", NO_TARGET, 1.0, 3.0),
+        InjectedFault("loss", NO_TARGET, 5.0, 6.0),
+        InjectedFault("stop", "velocity", 7.0, 8.0),
+    ]
+    history = History(10.0, faults=faults)
+    assert history.missed(2.0, 5.5) == 1.5
+    assert history.missed(0.0, 10.0) == 3.0
+    assert not history.may_have_missed(3.0, 5.0)
+    assert history.may_have_missed(2.5, 4.0)
+    assert history.injected == faults[2:]
+
+
+@pytest.mark.parametrize(
+    ("kind", "target", "pid", "end"),
+    [
+        *((kind, "velocity", 5, 3.0) for kind in ("stop", "hang", "hog", "slow")),
+        ("partition", "velocity", 5, 4.0),
+        ("stop", "velocity", 6, 4.0),
+        ("stop", "velocity", 7, 4.0),
+        ("stop", "kinematics", 5, 4.0),
+    ],
+)
+def test_suspension_matters_until_its_process_ends(kind: str, target: str, pid: int, end: float) -> None:
+    lives = [
+        Life("velocity", 5, 0.0, 3.0),
+        Life("velocity", 6, 0.0, None),
+        Life("velocity", 7, 0.0, 9.0),
+    ]
+    assert History(10.0, lives=lives).effect_end(InjectedFault(kind, target, 2.0, 4.0, pid)) == end
+
+
+def test_lives_of_a_program_are_those_without_an_older_one_that_lasts() -> None:
+    lives = [
+        Life("velocity", 1, 0.0, 5.0),
+        Life("velocity", 2, 1.0, 2.0),  # ended while the first lived on
+        Life("velocity", 3, 1.0, 5.0),
+        Life("velocity", 4, 5.0, None),
+        Life("velocity", 5, 6.0, 7.0),  # ended while the fourth lived on
+        Life("velocity", 6, 6.0, None),
+        Life("velocity", 7, 5.0, None),
+        Life("kinematics", 8, 0.0, None),
+    ]
+    history = History(10.0, lives=lives)
+    assert [life.pid for life in history.lives_of("velocity")] == [1, 3, 4, 7]
+
+
+def test_output_of_a_program_without_one_is_its_health() -> None:
+    health = [Sample(1.0, 1.0, ("sentinel", 5)), Sample(1.5, 1.5, ("velocity", 6))]
+    assert History(9.0, {"/diagnostics": health}).output("sentinel") == health[:1]
+
+
+def test_intervals_between_times() -> None:
+    assert [*gaps([1.0, 2.0, 2.0, 9.0], 0.0, 4.0)] == [(0.0, 1.0), (1.0, 2.0), (2.0, 4.0)]
+    assert [*gaps([], 3.0, 3.0)] == []
+
+
+def test_samples_between_two_times_include_those_at_the_times() -> None:
+    samples = [Sample(at, at, None) for at in (1.0, 2.0, 3.0, 4.0)]
+    assert between(samples, 2.0, 3.0) == samples[1:3]
