@@ -14,6 +14,7 @@ from deploy.chaos.history import (
     NO_TARGET,
     OPERATOR,
     OUTPUTS,
+    PARTITION,
     History,
     InjectedFault,
     Life,
@@ -95,6 +96,11 @@ def test_new_services_need_no_change_in_the_chaos_tools() -> None:
 def test_names_in_schedules_and_records_stay() -> None:
     assert (OPERATOR, ALL, NO_TARGET) == ("operator", "all", "nothing")
     assert CONDITIONS == ("overload", "loss", "silence")
+    assert PARTITION == "partition"
+
+
+def test_fault_without_a_process_has_pid_0() -> None:
+    assert InjectedFault("flood", NO_TARGET, 1.0, 2.0).pid == 0
 
 
 def test_target_has_a_name_for_a_reader() -> None:
