@@ -485,6 +485,11 @@ def test_l1_fault_of_a_needed_program_disturbs_the_return() -> None:
     assert CHECKERS["L1"](history(speeds=back((10.0, 1.5)), faults=faults)).unknown == 1
 
 
+def test_l1_dead_source_does_not_excuse_a_program_that_starts_without_it() -> None:
+    found = CHECKERS["L1"](history(speeds=back((10.0, 3.0)), faults=kill("velocity", 10.0)))
+    assert (len(found.evidence), found.unknown) == (1, 0)
+
+
 @pytest.mark.parametrize(("last", "unknown"), [(8.75, 1), (8.875, 0), (10.0, 0)])
 def test_l1_needs_output_shortly_before(last: float, unknown: int) -> None:
     output = [(last, 0.0), (11.0, 0.0)]
