@@ -20,7 +20,7 @@ def node(name: str, domain: int = 7) -> Any:
     return SimpleNamespace(context=context, get_fully_qualified_name=lambda: name)
 
 
-@pytest.mark.parametrize("name", [NAME, LONG])
+@pytest.mark.parametrize("name", [NAME, LONG], ids=["short", "long"])
 def test_name_is_claimed_until_the_claim_ends(name: str) -> None:
     assert not is_claimed(name, 7)
     with claim(node(name)):
