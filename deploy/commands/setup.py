@@ -164,6 +164,8 @@ def _step(title: str, command: list[str], log: Path | None = LOG) -> None:
     print(f"  {title}", end="" if live else "\n", flush=True)
     lines: list[str] = []
     environment = os.environ | {"PIP_DISABLE_PIP_VERSION_CHECK": "1"}
+    # A signal waits until the command can be ended.
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM, signal.SIGHUP})
     process = subprocess.Popen(
         command,
         env=environment,
@@ -171,8 +173,10 @@ def _step(title: str, command: list[str], log: Path | None = LOG) -> None:
         stderr=subprocess.STDOUT,
         text=True,
         start_new_session=True,  # the children of venv and pip end with it
+        preexec_fn=partial(signal.pthread_sigmask, signal.SIG_SETMASK, mask),
     )
     try:
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
         assert process.stdout is not None
         for line in process.stdout:
             lines.append(line)

@@ -12,6 +12,7 @@ import threading
 import time
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -136,13 +137,29 @@ def test_a_quote_in_a_variable_of_make_is_no_shell_syntax(checkout: Path) -> Non
     assert done.stderr.splitlines()[-2:-1] == ["PYTHON=it's is not a Python 3.11, 3.12 or 3.13"]
 
 
+def test_an_interrupt_waits_until_the_step_can_be_ended(monkeypatch: pytest.MonkeyPatch) -> None:
+    begun: list[subprocess.Popen[str]] = []
+
+    class Interrupted(subprocess.Popen[str]):
+        def __init__(self, *arguments: Any, **options: Any) -> None:
+            super().__init__(*arguments, **options)
+            begun.append(self)
+            signal.pthread_kill(threading.get_ident(), signal.SIGINT)
+
+    monkeypatch.setattr(subprocess, "Popen", Interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        setup._step("a long sleep", ["sleep", "60"], log=None)
+    assert begun[0].returncode == -signal.SIGTERM
+
+
 def test_an_interrupted_step_ends_with_all_its_children(tmp_path: Path) -> None:
     begun = tmp_path / "pid"
+    main_thread = threading.get_ident()
 
     def interrupt() -> None:
         while not begun.exists():
             time.sleep(0.01)
-        os.kill(os.getpid(), signal.SIGINT)
+        signal.pthread_kill(main_thread, signal.SIGINT)
 
     interrupter = threading.Thread(target=interrupt)
     interrupter.start()
