@@ -99,8 +99,9 @@ def test_names_in_schedules_and_records_stay() -> None:
     assert PARTITION == "partition"
 
 
-def test_fault_without_a_process_has_pid_0() -> None:
-    assert InjectedFault("flood", NO_TARGET, 1.0, 2.0).pid == 0
+def test_fault_hits_no_process_and_no_clock_unless_it_says_so() -> None:
+    fault = InjectedFault("flood", NO_TARGET, 1.0, 2.0)
+    assert (fault.pid, fault.ahead) == (0, 0.0)
 
 
 def test_target_has_a_name_for_a_reader() -> None:
