@@ -202,7 +202,10 @@ class ServiceNode(ReactiveNode):
 
     def _remark_other_types(self) -> None:
         """Remark publishers that use an observed topic with another type: nothing arrives from them."""
+        types = dict(self.get_topic_names_and_types())
         for name, topic in self._observed.items():
+            if types.get(name) == [topic.type_name]:  # to ask for each topic's publishers would cost more
+                continue
             for publisher in self.get_publishers_info_by_topic(name):
                 if publisher.topic_type != topic.type_name:
                     self.remark(topic.name, f"{publisher.node_name} publishes {publisher.topic_type}")
