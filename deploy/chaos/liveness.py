@@ -164,7 +164,14 @@ def hung_is_replaced(history: History) -> Finding:
             for other in history.faults
             if other is not fault
         )
-        if time is None or sentinel_was_hit or _is_disturbed(history, fault, fault.begin, until):
+        # Its successor does not know yet how long the others have been silent.
+        sentinel_was_new = any(fault.begin - 1.0 < life.began < until for life in history.lives_of(SENTINEL))
+        if (
+            time is None
+            or sentinel_was_hit
+            or sentinel_was_new
+            or _is_disturbed(history, fault, fault.begin, until)
+        ):
             unknown += 1
             continue
         times.setdefault(fault.target, []).append(time)
