@@ -164,8 +164,10 @@ def hung_is_replaced(history: History) -> Finding:
             for other in history.faults
             if other is not fault
         )
-        # Its successor does not know yet how long the others have been silent.
-        sentinel_was_new = any(fault.begin - 1.0 < life.began < until for life in history.lives_of(SENTINEL))
+        # It does not know yet how long the others have been silent.
+        sentinel_was_new = fault.target != SENTINEL and any(
+            fault.begin - 1.0 < life.began < until for life in history.lives_of(SENTINEL)
+        )
         if (
             time is None
             or sentinel_was_hit

@@ -505,6 +505,14 @@ def test_l4_is_unknown_if_the_sentinel_was_new(began: float, unknown: int) -> No
     assert CHECKERS["L4"](replace(history, lives=[*lives, successor])).unknown == unknown
 
 
+def test_l4_successor_of_a_hung_sentinel_is_its_replacement() -> None:
+    history = silent(good(), "/diagnostics", 20.0, 23.5)
+    lives = [life._replace(ended=23.0) if life.program == "sentinel" else life for life in history.lives]
+    history = replace(history, lives=[*lives, Life("sentinel", 999, 23.0, None)])
+    finding = CHECKERS["L4"](faulty(history, InjectedFault("stop", "sentinel", 20.0, 35.0, 111)))
+    assert (finding.cases, finding.unknown) == (1, 0)
+
+
 def test_percentiles_are_nearest_ranks() -> None:
     values = [float(n) for n in range(1, 101)]
     assert (percentile(values, 50), percentile(values, 99)) == (50.0, 99.0)
