@@ -114,6 +114,7 @@ def talker() -> None:
 
     for topic in EARLY:
         publish(topic, 1, 2, 3, 4, 5)
+    time.sleep(2 * LIFESPAN)  # what expires is gone before the listener starts, on a fast machine too
     print("early", flush=True)
     _spin_until(node, lambda: ready and all(publishers[each].get_subscription_count() for each in EARLY))
     publish("volatile", 6)
