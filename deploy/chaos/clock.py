@@ -19,6 +19,7 @@ from pathlib import Path
 STEP = "step_clock"
 """The kind of fault."""
 LARGEST = 3600.0  # s; of a step
+SPREAD = 1.0  # s within which a step reaches all processes
 PACKAGE = "libfaketime"  # of Debian and Ubuntu
 LIBRARY = Path(f"/usr/lib/{platform.machine()}-linux-gnu/faketime/libfaketimeMT.so.1")
 

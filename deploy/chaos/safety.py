@@ -8,6 +8,7 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Iterable, Iterator, Sequence
 from operator import itemgetter
 
+from deploy.chaos.clock import SPREAD, STEP
 from deploy.chaos.findings import Evidence, Finding, count, how_often
 from deploy.chaos.history import (
     ALL,
@@ -231,12 +232,14 @@ def _abandoned(history: History, off: Sample) -> bool:
 
 
 def _deaf(history: History) -> Iterator[tuple[float, float]]:
-    """Yield when the operator watchdog received nothing: it was suspended, or cut off from the operator."""
+    """Yield when no heartbeat counted: the watchdog was suspended or cut off, or its clock differed."""
     for fault in history.faults:
         if fault.kind in SUSPENDING and fault.target in (WATCHDOG, ALL):
             yield fault.begin, history.effect_end(fault)
         elif fault.kind == PARTITION:
             yield fault.begin, fault.end + REDISCOVERY
+        elif fault.kind == STEP:
+            yield fault.begin, fault.begin + SPREAD
 
 
 def _last(samples: Sequence[Sample], time: float) -> Sample | None:

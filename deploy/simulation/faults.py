@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 from rclpy_simulation import Delay, Process
 
+from deploy.chaos import clock
 from deploy.chaos.faults import PARAMETERS, Undo
 from deploy.chaos.history import ALL, NO_TARGET, OPERATOR, PARTITION
 from deploy.simulation import people
@@ -87,10 +88,10 @@ def _stranger(program: Callable[[], None]) -> Callable[[Arm, str, float], Undo]:
 
 
 def _step_clock(arm: Arm, target: str, duration: float) -> None:
-    """Set the time of day of both hosts, one after the other, within a second."""
-    seconds = arm.simulation.random.uniform(-3600.0, 3600.0)
+    """Set the time of day of both hosts, one after the other."""
+    seconds = arm.simulation.random.uniform(-clock.LARGEST, clock.LARGEST)
     arm.simulation.host(ROBOT).step(seconds)
-    pause = arm.simulation.random.uniform(0.0, 1.0)
+    pause = arm.simulation.random.uniform(0.0, clock.SPREAD)
     arm.simulation.after(pause, lambda: arm.simulation.host(CONTROL).step(seconds))
 
 
@@ -142,7 +143,7 @@ FAULT_KINDS: dict[str, FaultKind] = {
     "crash_loop": FaultKind(_crash_loop, tuple(each for each in PARAMETERS if each in NAMES), (3.0, 6.0)),
     "flood": FaultKind(_stranger(people.flood), (NO_TARGET,), (3.0, 6.0)),
     "babble": FaultKind(_stranger(people.babble), (NO_TARGET,), (3.0, 10.0)),
-    "step_clock": FaultKind(_step_clock, (NO_TARGET,)),
+    clock.STEP: FaultKind(_step_clock, (NO_TARGET,)),
     "skew_clock": FaultKind(_skew_clock, (OPERATOR,)),
     "drift_clock": FaultKind(_drift_clock, (NO_TARGET,), (5.0, 60.0)),
     PARTITION: FaultKind(_partition, (OPERATOR,), (0.5, 20.0)),

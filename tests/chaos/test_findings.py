@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from deploy.chaos.clock import STEP
 from deploy.chaos.findings import Evidence, Finding
 from deploy.chaos.history import (
     ALL,
@@ -169,6 +170,7 @@ SILENCES = ((4.0, 7.0), (8.0, 11.0), (12.0, 15.0))  # a strike each
 LATE = [(at, state) for at, state in engines((0.0, ON), (20.0, OFF)) if not 19.0 < at < 20.0]
 UNSEEN = {"presences": steps(0, 10), "heartbeats": steps(0, 40)}
 FIRST_UNSEEN = 20.0 - PRESENCE_TIMEOUT + SAMPLING + TRANSPORT
+SHORT = heard_but_in(*SILENCES[:2], (12.0, 14.25))  # the last silence lacks 0.75 s of a strike
 COMMANDED = {"commands": [(20.0, TURN_OFF)], "heartbeats": heard_but_in(*SILENCES)}
 
 
@@ -221,6 +223,10 @@ def suspended_with_a_presence_at(time: float) -> dict[str, Any]:
             | {"heartbeats": heard_but_in(*SILENCES[1:]), "faults": [stopped(WATCHDOG, 13.0, 18.0)]},
             True,
         ),
+        # while a step of the time of day spreads, heartbeats have a wrong age
+        (COMMANDED | {"heartbeats": SHORT, "faults": [stopped(NO_TARGET, 14.0, 14.0, STEP)]}, True),
+        (COMMANDED | {"heartbeats": SHORT, "faults": [stopped(NO_TARGET, 13.25, 13.25, STEP)]}, False),
+        (COMMANDED | {"heartbeats": SHORT, "faults": [stopped(NO_TARGET, 14.5, 14.5, STEP)]}, False),
         # no presence for ten seconds, for a reason
         (UNSEEN, False),
         (UNSEEN | {"heartbeats": steps(0, 40, 1.0)}, False),
