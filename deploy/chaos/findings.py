@@ -48,6 +48,19 @@ class Finding:
         return "outcome unknown" if self.unknown else "not exercised"
 
 
+def overall(findings: Sequence[Finding]) -> str:
+    """Return VIOLATED if a promise is, HOLDS if every exercised one is known to hold, else UNKNOWN."""
+    verdicts = {finding.verdict for finding in findings}
+    if VIOLATED in verdicts:
+        return VIOLATED
+    return HOLDS if HOLDS in verdicts and not undecided(findings) else UNKNOWN
+
+
+def undecided(findings: Sequence[Finding]) -> list[str]:
+    """Return the promises that were exercised, but never with a known outcome."""
+    return [finding.promise for finding in findings if finding.verdict == UNKNOWN and finding.unknown]
+
+
 def percentile(values: Sequence[float], percent: float) -> float:
     """Return the nearest-rank percentile; NaN if there are no values."""
     if not values:

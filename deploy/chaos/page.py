@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 
-from deploy.chaos.findings import HOLDS, UNKNOWN, VIOLATED, Finding, count
+from deploy.chaos.findings import UNKNOWN, VIOLATED, Finding, count, overall, undecided
 from deploy.chaos.history import ALL, NO_TARGET, History, InjectedFault, Life, target_name
 from deploy.chaos.liveness import HUNG, MEDIAN, SLOWEST
 from deploy.chaos.pictures import COLORS, STYLE, histograms, timeline
@@ -40,8 +40,8 @@ def verdict(findings: Sequence[Finding]) -> str:
     """Return the verdict on all promises in a few words."""
     if broken := [finding.promise for finding in findings if finding.verdict == VIOLATED]:
         return f"{', '.join(broken)} violated"
-    if undecided := [f.promise for f in findings if f.verdict == UNKNOWN and f.unknown]:
-        return f"No promise is violated, but the outcome for {', '.join(undecided)} is unknown"
+    if unknown := undecided(findings):
+        return f"No promise is violated, but the outcome for {', '.join(unknown)} is unknown"
     if all(finding.verdict == UNKNOWN for finding in findings):
         return "No promise was exercised"
     return "All exercised promises hold"
@@ -49,14 +49,12 @@ def verdict(findings: Sequence[Finding]) -> str:
 
 def page(title: str, remarks: Sequence[str], findings: Sequence[Finding], history: History) -> str:
     """Return the whole page."""
-    verdicts = {finding.verdict for finding in findings}
-    kind = "violated" if VIOLATED in verdicts else "holds" if HOLDS in verdicts else "unknown"
     picture, *_ = timeline(history, findings)
     lines = [
         "<!doctype html><html lang=en><meta charset=utf-8>",
         "<meta name=viewport content='width=device-width'>",
         f"<title>{escape(title)}</title><style>{COLORS}{PAGE_STYLE}{STYLE}</style>",
-        f"<h1 class={kind}>{verdict(findings)}</h1>",
+        f"<h1 class={overall(findings).lower()}>{verdict(findings)}</h1>",
         *(f"<p>{escape(remark)}</p>" for remark in remarks),
         f"<h2>Promises</h2><div class=card>{_promises(findings)}</div>",
         f"<h2>Timeline</h2><p>{LEGEND}</p><div class=card>{picture}</div>",

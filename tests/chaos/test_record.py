@@ -6,6 +6,7 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -22,9 +23,11 @@ from deploy.supervision import processes
 from interfaces import topics
 
 
-def recorded(path: Path, *lives: Life) -> bytes:
-    """Write a record with processes and speeds only; return its bytes."""
+def recorded(path: Path, *lives: Life, faults: Sequence[InjectedFault] = ()) -> bytes:
+    """Write a record with processes, faults and speeds only; return its bytes."""
     recorder = Recorder(path, 0, 10**18)
+    for fault in faults:
+        recorder.event(FAULTS, round(fault.begin * 10**9), fault._asdict() | {"namespace": "/"})
     for life in lives:
         recorder.event(PROCESSES, 1, life._asdict() | {"namespace": "/"})
     speed = topics.EFFECTOR_SPEED
@@ -130,10 +133,22 @@ def test_violation_is_reported_with_evidence_and_exit_code_1(tmp_path: Path) -> 
     assert "processes 7 and 8 are both velocity" in page
 
 
-def test_exit_code_is_0_without_a_violation(tmp_path: Path) -> None:
+def test_exit_code_is_0_if_all_exercised_promises_hold(tmp_path: Path) -> None:
     path = tmp_path / "record.mcap"
     recorded(path, ONE)
-    assert replay(path).returncode == 0
+    done = replay(path)
+    assert done.returncode == 0
+    assert "\nAll exercised promises hold\nReport: " in done.stdout
+
+
+def test_exit_code_is_1_if_an_outcome_is_unknown(tmp_path: Path) -> None:
+    path = tmp_path / "record.mcap"
+    killed, successor = Life("velocity", 7, 0.0, 5.2), Life("velocity", 8, 5.4, None)
+    interfering = [InjectedFault("kill", "velocity", at, at, pid) for at, pid in ((5.2, 7), (5.3, 0))]
+    recorded(path, killed, successor, faults=interfering)
+    done = replay(path)
+    assert done.returncode == 1
+    assert "\nNo promise is violated, but the outcome for L1 is unknown\nReport: " in done.stdout
 
 
 @pytest.mark.parametrize("kept", [0, 5, 100, -10], ids="to {} bytes".format)

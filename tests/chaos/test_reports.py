@@ -80,17 +80,20 @@ def test_promise_without_cases_is_not_exercised() -> None:
 
 def test_heading_states_the_verdict() -> None:
     headings = {
-        "All exercised promises hold": [Finding("S1", 1, ""), Finding("L1", 0, "")],
-        "No promise was exercised": [Finding("S1", 0, "")],
-        "No promise is violated, but the outcome for L1 is unknown": [
+        "holds>All exercised promises hold": [Finding("S1", 1, ""), Finding("L1", 0, "")],
+        "unknown>No promise was exercised": [Finding("S1", 0, "")],
+        "unknown>No promise is violated, but the outcome for L1 is unknown": [
             Finding("S1", 1, ""),
             Finding("S2", 0, ""),
             Finding("L1", 0, "", unknown=2),
         ],
-        "L1 violated": [Finding("S1", 1, ""), CHECKERS["L1"](killed(good(), "kinematics", 20.0, 9.0))],
+        "violated>L1 violated": [
+            Finding("S1", 1, ""),
+            CHECKERS["L1"](killed(good(), "kinematics", 20.0, 9.0)),
+        ],
     }
     for heading, findings in headings.items():
-        assert f">{heading}</h1>" in page("title", [], findings, good())
+        assert f"<h1 class={heading}</h1>" in page("title", [], findings, good())
 
 
 def test_picture_is_well_formed_and_shows_every_fault() -> None:
