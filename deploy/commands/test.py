@@ -1,4 +1,4 @@
-"""`make test`: most tests wait, so they share the processors; those marked `alone` follow, one by one."""
+"""`make test`: most tests share the processors; those marked `timed` follow, with few at a time."""
 
 from __future__ import annotations
 
@@ -9,18 +9,22 @@ import sys
 from collections.abc import Sequence
 
 PASSED, FAILED, NO_TESTS = 0, 1, 5  # exit codes of pytest
-WORKERS = 2 * (os.cpu_count() or 1)
+PROCESSORS = os.cpu_count() or 1
+IN_WORKERS = ["--dist", "loadfile", "--no-loadscope-reorder", "-n"]
 PHASES = (
-    ["-n", str(WORKERS), "--dist", "loadfile", "--no-loadscope-reorder", "-m", "not alone"],
-    ["-m", "alone"],
+    [*IN_WORKERS, str(2 * PROCESSORS), "-m", "not timed"],  # about half of their time is waiting
+    [*IN_WORKERS, str(PROCESSORS + 1), "-m", "timed"],  # nearly all of it
 )
 
 
 def main(arguments: Sequence[str]) -> int:
     """Run pytest for each phase with further arguments; return its exit code."""
+    # All workers use what one of them has compiled.
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
     codes = []
     for options in PHASES:
-        codes.append(subprocess.call([sys.executable, "-m", "pytest", *options, *arguments]))
+        command = [sys.executable, "-m", "pytest", *options, *arguments]
+        codes.append(subprocess.call(command, env=environment))
         if codes[-1] not in (PASSED, FAILED, NO_TESTS):
             return codes[-1]
     return max((code for code in codes if code != NO_TESTS), default=NO_TESTS)

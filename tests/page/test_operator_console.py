@@ -24,7 +24,7 @@ from interfaces.service import ServiceNode
 from interfaces.topics import CONFIGURATION
 from services import config_publisher, dead_mans_switch
 
-pytestmark = pytest.mark.alone  # a held page answers within 250 ms
+pytestmark = pytest.mark.timed  # a held page answers within 250 ms
 
 SpinUntil = Callable[..., None]
 

@@ -20,7 +20,7 @@ from interfaces.topics import OFF, ON
 from tests.page.clients import Hand, Link
 from tests.system.sites import LIMIT, Peer, Site
 
-pytestmark = pytest.mark.alone
+pytestmark = pytest.mark.timed
 
 STEADY = str(Path(__file__).parents[1] / "system" / "steady.yaml")
 S1 = 10.5  # s

@@ -1,4 +1,4 @@
-"""`make test`: two runs of pytest, of which the second has the tests that run alone."""
+"""`make test`: two runs of pytest, of which the second has the tests with bounds of time."""
 
 from __future__ import annotations
 
@@ -17,17 +17,27 @@ def test_exit_code_is_the_worst_and_an_interruption_ends_it(
     monkeypatch: pytest.MonkeyPatch, codes: list[int], result: int
 ) -> None:
     left = list(codes)
-    monkeypatch.setattr(subprocess, "call", lambda command: left.pop(0))
+    monkeypatch.setattr(subprocess, "call", lambda command, env: left.pop(0))
     assert command.main(["tests"]) == result
     assert left == []
 
 
-def test_every_test_runs_once_and_those_marked_alone_in_no_worker(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_every_test_runs_once_and_those_with_bounds_of_time_in_fewer_workers(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     commands: list[list[str]] = []
-    monkeypatch.setattr(subprocess, "call", lambda command: commands.append(command) or 0)
+    monkeypatch.setattr(subprocess, "call", lambda command, env: commands.append(command) or 0)
     command.main(["tests/system", "-x"])
-    shared, alone = commands
-    assert shared[-4:] == ["-m", "not alone", "tests/system", "-x"]
-    assert alone[-4:] == ["-m", "alone", "tests/system", "-x"]
-    assert "-n" in shared
-    assert "-n" not in alone
+    shared, timed = commands
+    assert shared[-4:] == ["-m", "not timed", "tests/system", "-x"]
+    assert timed[-4:] == ["-m", "timed", "tests/system", "-x"]
+    workers = [int(each[each.index("-n") + 1]) for each in commands]
+    assert workers[0] >= workers[1]
+
+
+def test_workers_share_compiled_modules(monkeypatch: pytest.MonkeyPatch) -> None:
+    environments: list[dict[str, str]] = []
+    monkeypatch.setenv("PYTHONDONTWRITEBYTECODE", "1")
+    monkeypatch.setattr(subprocess, "call", lambda command, env: environments.append(env) or 0)
+    command.main(["tests/system"])
+    assert not any("PYTHONDONTWRITEBYTECODE" in environment for environment in environments)

@@ -19,7 +19,7 @@ from . import chromium
 from .arm import GONE, Arm, hold_with_engines_on
 from .chromium import CHROMIUM, HandOnPage
 
-pytestmark = pytest.mark.alone
+pytestmark = pytest.mark.timed
 
 ADDRESS = f"{NETWORK}.1"  # of the robot's host
 S1 = 10.5  # s

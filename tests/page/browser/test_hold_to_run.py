@@ -18,7 +18,7 @@ from tests.page.browser import pauses
 from .arm import GONE, Arm, hold_with_engines_on, undisturbed
 from .chromium import HandOnPage
 
-pytestmark = pytest.mark.alone
+pytestmark = pytest.mark.timed
 
 SAMPLES = 100
 LOCALLY = 0.15  # s from the hand's release to the last heartbeat, at p99

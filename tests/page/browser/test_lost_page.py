@@ -19,7 +19,7 @@ from .arm import GONE, LINK, Arm, hold_with_engines_on
 from .chromium import HandOnPage
 from .link import Link
 
-pytestmark = pytest.mark.alone
+pytestmark = pytest.mark.timed
 
 S1 = 10.5  # s
 HELD_UP = 2.0  # s

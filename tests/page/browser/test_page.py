@@ -16,7 +16,7 @@ from .arm import LINK, Arm, hold_with_engines_on, undisturbed
 from .chromium import HandOnPage
 from .link import Link
 
-pytestmark = pytest.mark.alone
+pytestmark = pytest.mark.timed
 
 WIDTHS = {320: 568, 390: 844, 1280: 800, 3840: 2160}
 CONTROLS = ("button", "slider", "spinbutton")

@@ -11,7 +11,7 @@ import pytest
 from deploy.console.page.site import STATIC
 from tests.page.clients import Arm
 
-pytestmark = pytest.mark.alone
+pytestmark = pytest.mark.timed
 
 RECOVERIES = """
 async () => {

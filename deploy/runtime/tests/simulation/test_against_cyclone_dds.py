@@ -16,7 +16,7 @@ from rclpy_simulation import Simulation
 Record = dict[str, Any]
 
 
-pytestmark = pytest.mark.alone  # lifespans and leases of real processes
+pytestmark = pytest.mark.timed  # lifespans and leases of real processes
 
 
 @pytest.fixture(scope="module")
