@@ -1,4 +1,4 @@
-"""`make test`: most tests share the processors; those marked `timed` follow, with few at a time."""
+"""`make test`: most tests share the processors; those with bounds of time follow, few at a time or alone."""
 
 from __future__ import annotations
 
@@ -12,8 +12,14 @@ PASSED, FAILED, NO_TESTS = 0, 1, 5  # exit codes of pytest
 PROCESSORS = os.cpu_count() or 1
 IN_WORKERS = ["--dist", "loadfile", "--no-loadscope-reorder", "-n"]
 PHASES = (
-    [*IN_WORKERS, str(2 * PROCESSORS), "-m", "not timed"],  # about half of their time is waiting
-    [*IN_WORKERS, str(PROCESSORS + 1), "-m", "timed"],  # nearly all of it
+    [
+        *IN_WORKERS,
+        str(2 * PROCESSORS),
+        "-m",
+        "not timed and not alone",
+    ],  # about half of their time is waiting
+    [*IN_WORKERS, str(PROCESSORS), "-m", "timed"],
+    ["-m", "alone"],
 )
 
 

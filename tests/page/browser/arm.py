@@ -59,11 +59,15 @@ class Arm:
 def hold_with_engines_on(arm: Arm, hand: HandOnPage, *hands: Callable[[], None]) -> None:
     """Hold until heartbeats flow and the engines are on; ``hands`` as of :meth:`HandOnPage.hold`."""
     begin = time.time()
+
+    def is_held() -> bool:
+        return hand.state == "held"
+
     while True:
         hand.hold(*hands)
-        arm.record.turn_on()
-        arm.record.await_beats(begin, 3)
-        if hand.state == "held":
+        arm.record.turn_on(is_held)
+        arm.record.until(lambda: not is_held() or len(arm.record.beats_after(begin)) >= 3)
+        if is_held():
             return
 
 

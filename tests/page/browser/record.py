@@ -89,10 +89,14 @@ class Record:
         late = [beat - moment for beat in self.beats_after(moment)]
         assert not late, f"heartbeats {late} s after the release"
 
-    def turn_on(self) -> None:
-        """Command the engines, as the terminal does, until they are on."""
+    def turn_on(self, is_held: Callable[[], bool]) -> None:
+        """Command the engines, as the terminal does, until they are on or the switch is not held."""
         begin, due = time.time(), 0.0
-        while not any(state.time > begin and state.engines == topics.ON for state in self.states):
+
+        def are_on() -> bool:
+            return any(state.time > begin and state.engines == topics.ON for state in self.states)
+
+        while is_held() and not are_on():
             assert time.time() < begin + LIMIT, "the engines are not on"
             if time.monotonic() > due:
                 due = time.monotonic() + 0.5
