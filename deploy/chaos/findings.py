@@ -49,16 +49,9 @@ class Finding:
 
 
 def overall(findings: Sequence[Finding]) -> str:
-    """Return VIOLATED if a promise is, HOLDS if every exercised one is known to hold, else UNKNOWN."""
+    """Return VIOLATED if a promise is violated, HOLDS if none is and one holds, and UNKNOWN otherwise."""
     verdicts = {finding.verdict for finding in findings}
-    if VIOLATED in verdicts:
-        return VIOLATED
-    return HOLDS if HOLDS in verdicts and not undecided(findings) else UNKNOWN
-
-
-def undecided(findings: Sequence[Finding]) -> list[str]:
-    """Return the promises that were exercised, but never with a known outcome."""
-    return [finding.promise for finding in findings if finding.verdict == UNKNOWN and finding.unknown]
+    return next((verdict for verdict in (VIOLATED, HOLDS) if verdict in verdicts), UNKNOWN)
 
 
 def percentile(values: Sequence[float], percent: float) -> float:

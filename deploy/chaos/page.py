@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 
-from deploy.chaos.findings import UNKNOWN, VIOLATED, Finding, count, overall, undecided
+from deploy.chaos.findings import UNKNOWN, VIOLATED, Finding, count, overall
 from deploy.chaos.history import ALL, NO_TARGET, History, InjectedFault, Life, target_name
 from deploy.chaos.liveness import HUNG, MEDIAN, SLOWEST
 from deploy.chaos.pictures import COLORS, STYLE, histograms, timeline
@@ -40,8 +40,8 @@ def verdict(findings: Sequence[Finding]) -> str:
     """Return the verdict on all promises in a few words."""
     if broken := [finding.promise for finding in findings if finding.verdict == VIOLATED]:
         return f"{', '.join(broken)} violated"
-    if unknown := undecided(findings):
-        return f"No promise is violated, but the outcome for {', '.join(unknown)} is unknown"
+    if undecided := [f.promise for f in findings if f.verdict == UNKNOWN and f.unknown]:
+        return f"No promise is violated, but the outcome for {', '.join(undecided)} is unknown"
     if all(finding.verdict == UNKNOWN for finding in findings):
         return "No promise was exercised"
     return "All exercised promises hold"

@@ -82,7 +82,7 @@ def test_heading_states_the_verdict() -> None:
     headings = {
         "holds>All exercised promises hold": [Finding("S1", 1, ""), Finding("L1", 0, "")],
         "unknown>No promise was exercised": [Finding("S1", 0, "")],
-        "unknown>No promise is violated, but the outcome for L1 is unknown": [
+        "holds>No promise is violated, but the outcome for L1 is unknown": [
             Finding("S1", 1, ""),
             Finding("S2", 0, ""),
             Finding("L1", 0, "", unknown=2),
