@@ -78,7 +78,9 @@ def systems() -> dict[Path, dict[str, str]]:
 def using(directory: Path) -> list[Path]:
     """The run directories of the systems that run the programs of a directory."""
     first = f"{directory}{os.pathsep}"
-    return sorted(run for run, environment in systems().items() if environment["PATH"].startswith(first))
+    marked = (environment for _, environment in _marked() if MARK in environment)
+    # Any process will do: without the directory, a service that starts again finds an interpreter elsewhere.
+    return sorted({Path(each[MARK]) for each in marked if each.get("PATH", "").startswith(first)})
 
 
 def _marked(begin: str = "") -> Iterator[tuple[int, dict[str, str]]]:

@@ -54,6 +54,7 @@ def test_systems_that_use_a_directory_of_programs_are_found(spawn: Spawn, tmp_pa
     spawn(**marked, SUPERVISOR_PROCESS_NAME="velocity", PATH=f"{programs}:{elsewhere}")
     spawn(**{processes.MARK: str(tmp_path / "other")}, PATH=f"{elsewhere}:{programs}")
     spawn(PATH=f"{programs}:{elsewhere}")
+    spawn(**marked, SUPERVISOR_PROCESS_NAME="sentinel", PATH=f"/shims:{programs}:{elsewhere}")  # of pyenv
     assert processes.using(programs) == [tmp_path / "run"]
 
 
