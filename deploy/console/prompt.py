@@ -95,7 +95,7 @@ class Prompt:
             while True:
                 try:
                     self._typed.put(await session.prompt_async(set_exception_handler=False))
-                except EOFError:  # Ctrl-D
+                except (EOFError, OSError):  # Ctrl-D, or the terminal is closed: only make gets its SIGHUP
                     self._typed.put(None)
                     return
                 except KeyboardInterrupt:
