@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.system.sites import Checkout, Peer, Site
+from tests.system.sites import Checkout, Peer, Site, make_small_arm
 
 
 @pytest.fixture
@@ -26,10 +26,23 @@ def module_site(tmp_path_factory: pytest.TempPathFactory, module_domain_id: int)
         yield site
 
 
+@pytest.fixture(scope="session")
+def small_arm(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The checkout of a small arm; tests leave it as it is."""
+    return make_small_arm(tmp_path_factory.mktemp("small"))
+
+
 @pytest.fixture
-def checkout(tmp_path: Path, domain_id: int) -> Iterator[Checkout]:
-    """A site for a system of this test, in a checkout of its own."""
-    with closing(Checkout(tmp_path, domain_id)) as site:
+def small_site(small_arm: Path, tmp_path: Path, domain_id: int) -> Iterator[Site]:
+    """A site for a small arm of this test: for what does not depend on the services there are."""
+    with closing(Site(tmp_path / "run", domain_id, directory=small_arm)) as site:
+        yield site
+
+
+@pytest.fixture
+def checkout(small_arm: Path, domain_id: int) -> Iterator[Checkout]:
+    """A site for a small arm of this test, as in a user's checkout."""
+    with closing(Checkout(small_arm, domain_id)) as site:
         yield site
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import configparser
 import os
 import re
 import shutil
@@ -10,7 +11,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any
@@ -22,12 +23,16 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 
-from deploy.supervision import processes
+from deploy.supervision import manifest, processes
 from deploy.supervision.system import System
 from interfaces import topics
 
 ROOT = Path(__file__).parents[2]
 LIMIT = 30.0  # s for each awaited event, also on a busy machine
+LOOK = 0.1  # s between two looks at all processes, which cost some milliseconds
+STEADY = str(Path(__file__).with_name("steady.yaml"))
+SMALL = ("dead_mans_switch", "engine_controller", "sentinel")
+"""The programs of a small arm: enough to start and stop, and for the operator's terminal."""
 
 
 class Command:
@@ -133,15 +138,14 @@ class Command:
 
 
 class Site:
-    """A run directory, a DDS domain and a ROS namespace for one system."""
+    """A run directory, a DDS domain and a ROS namespace for one system of a checkout."""
 
-    directory = ROOT
-    python = sys.executable
-
-    def __init__(self, run: Path, domain: int, namespace: str = "") -> None:
+    def __init__(self, run: Path, domain: int, namespace: str = "", directory: Path = ROOT) -> None:
         self.run = run
         self.domain = domain
         self.namespace = namespace
+        self.directory = directory
+        self.python = sys.executable if directory == ROOT else str(directory / ".venv" / "bin" / "python")
         self._commands = ExitStack()
 
     @property
@@ -205,12 +209,17 @@ class Site:
         """The pids of the live processes of the system, by program; that of supervisord by ''."""
         return {process.program: process.pid for process in processes.of_system(self.run)}
 
+    @property
+    def programs(self) -> set[str]:
+        """The programs of the system, of which each has a process while it runs."""
+        return {each.name for each in manifest.programs(self.directory / "deploy" / "supervisord.conf")}
+
     def await_members(self, condition: Callable[[dict[str, int]], bool]) -> None:
         """Wait until the live processes fulfil a condition."""
         deadline = time.monotonic() + LIMIT
         while not condition(self.members):
             assert time.monotonic() < deadline, f"{self.members} after {LIMIT} s"
-            time.sleep(0.02)
+            time.sleep(LOOK)
 
     def close(self) -> None:
         """End all commands and the system."""
@@ -221,23 +230,59 @@ class Site:
 
 
 class Checkout(Site):
-    """A site in a checkout of its own, whose path is as unpleasant as paths get; it shares our .venv."""
+    """A site as in a user's checkout: its run directory is .run, and .venv/bin is on the PATH."""
 
-    def __init__(self, parent: Path, domain: int) -> None:
-        self.directory = parent / 'it\'s 100 % "fine"' / ("deep" * 30)
-        super().__init__(self.directory / ".run", domain)
-        for name in ("deploy", "interfaces", "services"):
-            ignored = shutil.ignore_patterns("__pycache__", "runtime", "tests")
-            shutil.copytree(ROOT / name, self.directory / name, ignore=ignored)
-        shutil.copyfile(ROOT / "Makefile", self.directory / "Makefile")
-        (self.directory / ".venv").symlink_to(sys.prefix)
-        self.python = str(self.directory / ".venv" / "bin" / "python")
+    def __init__(self, directory: Path, domain: int) -> None:
+        super().__init__(directory / ".run", domain, directory=directory)
 
     @property
     def environment(self) -> dict[str, str]:
         """The variables of a shell with .venv/bin on the PATH."""
         path = f"{self.directory / '.venv' / 'bin'}{os.pathsep}{os.environ['PATH']}"
         return os.environ | {"ROS_DOMAIN_ID": str(self.domain), "PATH": path}
+
+    def close(self) -> None:
+        """End all commands and the system; its files must not meet the next test."""
+        super().close()
+        shutil.rmtree(self.run, ignore_errors=True)
+
+
+def make_small_arm(parent: Path) -> Path:
+    """Make a checkout of a small arm, set up, in a directory whose path is as unpleasant as paths get."""
+    directory = parent / 'it\'s 100 % "fine"' / ("deep" * 30)
+    ignored = shutil.ignore_patterns("runtime", "tests", "*.pyc.*")  # the last are gone in a moment
+    for name in ("deploy", "interfaces", "services"):
+        shutil.copytree(ROOT / name, directory / name, ignore=ignored)
+    (directory / "deploy" / "runtime").symlink_to(ROOT / "deploy" / "runtime")
+    shutil.copyfile(ROOT / "Makefile", directory / "Makefile")
+    _leave_programs(directory / "deploy" / "supervisord.conf", SMALL)
+    _set_up(directory)
+    return directory
+
+
+def _leave_programs(path: Path, names: Sequence[str]) -> None:
+    """Remove all other programs from a manifest."""
+    conf = configparser.RawConfigParser(inline_comment_prefixes=(" ;",))
+    conf.read(path)
+    for section in conf.sections():
+        kind, _, name = section.partition(":")
+        if kind == "program" and name not in names:
+            conf.remove_section(section)
+    conf[f"group:{manifest.GROUP}"]["programs"] = ", ".join(names)
+    with path.open("w") as file:
+        conf.write(file)
+
+
+def _set_up(directory: Path) -> None:
+    """Give a checkout our packages in a .venv of its own, with the stamps of a set-up."""
+    venv = directory / ".venv"
+    venv.mkdir()
+    for entry in Path(sys.prefix).iterdir():
+        if not entry.name.startswith("made-from"):
+            (venv / entry.name).symlink_to(entry)
+    stamp = "from deploy.commands import setup; setup.make = setup.install = lambda *_: None; setup.main()"
+    base: str = sys._base_executable  # type: ignore[attr-defined]
+    subprocess.run([base, "-c", stamp], cwd=directory, check=True, stdout=subprocess.DEVNULL)
 
 
 class Peer:

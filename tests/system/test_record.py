@@ -65,10 +65,10 @@ def test_ctrl_c_completes_a_record_of_all_topics_in_the_namespace(site: Site) ->
     assert re.search(r'<link name="arm1/base">', description)
 
 
-def test_record_is_complete_when_the_system_ends(site: Site) -> None:
-    assert site.do("start", "demo")[0] == 0
-    command = record(site)
-    assert site.do("stop")[0] == 0
+def test_record_is_complete_when_the_system_ends(small_site: Site) -> None:
+    assert small_site.do("start", "demo")[0] == 0
+    command = record(small_site)
+    assert small_site.do("stop")[0] == 0
     assert command.wait() == 0
     command.await_line("The system has ended")
     path = Path(command.await_line(SUMMARY)[1])

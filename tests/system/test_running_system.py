@@ -18,12 +18,8 @@ import pytest
 from geometry_msgs.msg import Point, PointStamped
 from std_msgs.msg import Bool, Float64, String
 
-from deploy.supervision import manifest
 from interfaces import topics
-from tests.system.sites import LIMIT, ROOT, Peer, Site
-
-STEADY = str(Path(__file__).with_name("steady.yaml"))
-SERVICES = {program.name for program in manifest.programs()}
+from tests.system.sites import LIMIT, ROOT, STEADY, Peer, Site
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -53,7 +49,7 @@ def status(site: Site, until: Callable[[list[str]], bool]) -> dict[str, list[str
 
 def test_status_shows_every_service_running(module_site: Site) -> None:
     services = status(module_site, until=lambda row: row[0] == "RUNNING")
-    assert services.keys() >= SERVICES
+    assert services.keys() >= module_site.programs
     for name, (state, pid, _uptime, restarts, *_) in services.items():
         assert (state, int(pid), restarts) == ("RUNNING", module_site.members[name], "0")
 
@@ -64,6 +60,20 @@ def test_a_second_start_reports_the_running_system(module_site: Site) -> None:
         assert code == 1
         where = f"supervisord has pid {module_site.members['']} and works in {module_site.run}"
         assert printed == f"Already running: {where}"
+
+
+def test_a_second_system_in_the_same_domain_is_refused(module_site: Site, tmp_path: Path) -> None:
+    before = module_site.members
+    with closing(Site(tmp_path / "second", module_site.domain)) as second:
+        code, printed = second.do("start", STEADY)
+        assert code == 1
+        assert printed == (
+            f"ROS domain {module_site.domain} is in use: the system in {module_site.run} has /config_l1. Set"
+            " ROS_DOMAIN_ID to another domain (0 to 101), or REACTIVE_ARM_NAMESPACE, for example to /arm2."
+        )
+        assert second.members == {}
+        assert not second.run.exists()
+    assert module_site.members == before
 
 
 def test_only_its_user_reaches_supervisord(module_site: Site) -> None:
@@ -87,7 +97,7 @@ def test_no_shell_stands_between_supervisord_and_a_service(module_site: Site) ->
 
 
 def test_each_service_has_a_log_of_its_own(module_site: Site) -> None:
-    assert {path.stem for path in (module_site.run / "logs").glob("*.log")} >= SERVICES
+    assert {path.stem for path in (module_site.run / "logs").glob("*.log")} >= module_site.programs
 
 
 def test_a_late_joiner_gets_the_latched_configuration_and_position(peer: Peer) -> None:
@@ -187,7 +197,7 @@ def test_the_operator_commands_switch_and_engines_from_the_console(
     console.await_line("Not received signal from operator")
     console.type("quit\n")
     assert console.wait() == 0
-    assert module_site.members.keys() >= SERVICES
+    assert module_site.members.keys() >= module_site.programs
 
 
 def test_releasing_the_switch_in_the_demo_stops_the_engines(site: Site) -> None:
@@ -212,17 +222,19 @@ def test_another_terminal_may_have_sourced_another_rclpy(
     assert {row[-1] for row in services.values()} == {"ok"}
 
 
-def test_a_second_arm_runs_in_a_namespace_of_the_same_domain(module_site: Site, tmp_path: Path) -> None:
+def test_a_second_arm_runs_in_a_namespace_of_the_same_domain(
+    module_site: Site, small_arm: Path, tmp_path: Path
+) -> None:
     first = module_site.members
     parameters = tmp_path / "mine.yaml"
     parameters.write_text("dead_mans_switch: {ros__parameters: {pressed: true}}")
-    with closing(Site(tmp_path / "run", module_site.domain, "/second")) as second:
+    with closing(Site(tmp_path / "run", module_site.domain, "/second", small_arm)) as second:
         command = second.begin("run", STEADY, str(parameters))
         command.await_line(f"ROS domain {second.domain}, namespace /second ...")
-        command.await_line("Position x")
-        command.await_line("Operator is alive")
+        command.await_line("Received signal from operator")
         second.namespace = ""  # as in another terminal
         services = status(second, until=lambda row: row[-1] == "ok")
+        assert services.keys() == second.programs
         assert {row[-1] for row in services.values()} == {"ok"}
         command.type("quit\n")
         assert command.wait() == 0

@@ -3,43 +3,31 @@
 from __future__ import annotations
 
 import shutil
-import sys
-from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 
-import pytest
-
-from deploy.supervision import manifest
-from tests.system.sites import Checkout, Site
+from tests.system.sites import Checkout, Site, make_small_arm
 
 CONF = ("-c", "deploy/supervisord.conf")
-PROGRAMS = {program.name for program in manifest.programs()}
 
 
-def start_by_hand(checkout: Checkout) -> None:
-    assert checkout.do_command("supervisord", *CONF) == (0, "")
-
-
-def start_by_make(checkout: Checkout) -> None:
+def test_supervisorctl_works(checkout: Checkout) -> None:
     code, printed = checkout.do("start", "demo")
     assert code == 0, printed
-
-
-@pytest.mark.parametrize("start", [start_by_hand, start_by_make])
-def test_supervisorctl_works(checkout: Checkout, start: Callable[[Checkout], None]) -> None:
-    start(checkout)
-    checkout.await_members(lambda left: left.keys() >= PROGRAMS)
     _, table = checkout.do_command("supervisorctl", *CONF, "status")
     rows = [line.split() for line in table.splitlines()]
-    assert {row[0] for row in rows} == {f"arm:{name}" for name in PROGRAMS}
+    assert {row[0] for row in rows} == {f"arm:{name}" for name in checkout.programs}
     assert {row[1] for row in rows} <= {"STARTING", "RUNNING"}
-    before = checkout.members["kinematics"]
-    code, printed = checkout.do_command("supervisorctl", *CONF, "restart", "arm:kinematics")
-    assert (code, printed.splitlines()) == (0, ["arm:kinematics: stopped", "arm:kinematics: started"])
-    assert checkout.members["kinematics"] != before
-    tail = checkout.begin_command("supervisorctl", *CONF, "tail", "-f", "arm:operator_watchdog")
+    before = checkout.members["engine_controller"]
+    code, printed = checkout.do_command("supervisorctl", *CONF, "restart", "arm:engine_controller")
+    assert (code, printed.splitlines()) == (
+        0,
+        [f"arm:engine_controller: {word}" for word in ("stopped", "started")],
+    )
+    assert checkout.members["engine_controller"] != before
+    tail = checkout.begin_command("supervisorctl", *CONF, "tail", "-f", "arm:engine_controller")
     tail.await_line("Press Ctrl-C to exit")
-    with (checkout.run / "logs" / "operator_watchdog.log").open("a") as log:
+    with (checkout.run / "logs" / "engine_controller.log").open("a") as log:
         log.write("a line of the log\n")
     tail.await_line("a line of the log")
     assert checkout.do("stop")[1].splitlines()[-1] == "All have ended."
@@ -47,13 +35,13 @@ def test_supervisorctl_works(checkout: Checkout, start: Callable[[Checkout], Non
 
 
 def test_a_start_by_hand_serves_the_commands_of_make(checkout: Checkout) -> None:
-    start_by_hand(checkout)
-    checkout.await_members(lambda left: left.keys() >= PROGRAMS)
+    assert checkout.do_command("supervisord", *CONF) == (0, "")
+    checkout.await_members(lambda left: left.keys() >= checkout.programs)
     console = checkout.begin("console")
-    console.await_line("Engines are on")
+    console.await_line("Turning on engines")
     code, table = checkout.do("status")
     assert code == 0
-    assert len(table.splitlines()) == len(PROGRAMS) + 1
+    assert len(table.splitlines()) == len(checkout.programs) + 1
     code, printed = checkout.do_command("supervisord", *CONF)
     assert code == 1
     assert printed.startswith("Already running: supervisord has pid ")
@@ -63,34 +51,36 @@ def test_a_start_by_hand_serves_the_commands_of_make(checkout: Checkout) -> None
     checkout.await_members(lambda left: not left)
 
 
-def test_supervisorctl_reaches_another_run_directory(site: Site) -> None:
-    assert site.do("start", "demo")[0] == 0
-    ctl = str(Path(sys.executable).with_name("supervisorctl"))
-    code, table = site.do_command(ctl, "-s", f"unix://{site.run}/supervisor.sock", "status")
-    assert code in (0, 3)  # 3: a program is still STARTING
-    assert len(table.splitlines()) == len(PROGRAMS)
-
-
-def test_a_terminal_accepts_the_shutdown_of_supervisorctl(checkout: Checkout) -> None:
-    command = checkout.begin("run", "demo")
+def test_supervisorctl_ends_a_terminal_in_another_run_directory(small_site: Site) -> None:
+    command = small_site.begin("run", "demo")
     command.await_line("Engines are off")
-    assert checkout.do_command("supervisorctl", *CONF, "shutdown") == (0, "Shut down")
+    ctl = [
+        str(Path(small_site.python).with_name("supervisorctl")),
+        "-s",
+        f"unix://{small_site.run}/supervisor.sock",
+    ]
+    code, table = small_site.do_command(*ctl, "status")
+    assert code in (0, 3)  # 3: a program is still STARTING
+    assert len(table.splitlines()) == len(small_site.programs)
+    assert small_site.do_command(*ctl, "shutdown") == (0, "Shut down")
     command.await_line("The system has ended")
     assert command.wait() == 0
-    assert checkout.members == {}
+    assert small_site.members == {}
 
 
-def test_make_stop_needs_neither_venv_nor_run_directory(checkout: Checkout) -> None:
-    start_by_make(checkout)
-    (checkout.directory / ".venv").unlink()  # as `git clean -xfd` does
-    shutil.rmtree(checkout.run)
-    code, printed = checkout.do_command("make", "status")
-    assert code != 0
-    assert ".venv is not set up: make setup (make stop works without it)" in printed
-    code, printed = checkout.do_command("make", "setup")
-    assert code != 0
-    assert "A running system uses this .venv. Stop it before the set-up: make stop\n" in printed
-    code, printed = checkout.do_command("make", "stop")
-    assert (code, printed.splitlines()[-1]) == (0, "All have ended.")
-    assert checkout.members == {}
-    assert checkout.do_command("make", "stop") == (0, "Nothing runs.")
+def test_make_stop_needs_neither_venv_nor_run_directory(tmp_path: Path, domain_id: int) -> None:
+    with closing(Checkout(make_small_arm(tmp_path), domain_id)) as checkout:
+        code, printed = checkout.do("start", "demo")
+        assert code == 0, printed
+        shutil.rmtree(checkout.directory / ".venv")  # as `git clean -xfd` does
+        shutil.rmtree(checkout.run)
+        code, printed = checkout.do_command("make", "status")
+        assert code != 0
+        assert ".venv is not set up: make setup (make stop works without it)" in printed
+        code, printed = checkout.do_command("make", "setup")
+        assert code != 0
+        assert "A running system uses this .venv. Stop it before the set-up: make stop\n" in printed
+        code, printed = checkout.do_command("make", "stop")
+        assert (code, printed.splitlines()[-1]) == (0, "All have ended.")
+        assert checkout.members == {}
+        assert checkout.do_command("make", "stop") == (0, "Nothing runs.")
