@@ -1,0 +1,98 @@
+"""Accidents: a terminal closes, supervisord or make is killed. The system goes on in order, or ends whole."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import signal
+
+from tests.system.sites import STEADY, Site
+
+
+def test_closing_the_terminal_ends_everything(small_site: Site) -> None:
+    terminal = small_site.begin_in_terminal("make", "run", f"SCENARIO={STEADY}")
+    terminal.await_line("Engines are off")
+    members = small_site.members
+    terminal.signal(signal.SIGKILL)
+    small_site.await_members(lambda left: not left)
+    assert members.keys() == {"", *small_site.programs}
+
+
+def test_nohup_keeps_it_running_when_the_terminal_closes(small_site: Site) -> None:
+    launcher = [small_site.python, "-m", "deploy.commands.launcher"]
+    command = small_site.begin_command("nohup", *launcher, "run", STEADY)
+    command.await_line("Engines are off")
+    command.signal(signal.SIGHUP)
+    command.type("turn_on\n")
+    command.await_line("Turning on engines")
+    command.type("quit\n")
+    assert command.wait() == 0
+
+
+def test_the_end_of_a_pipe_ends_everything(small_site: Site) -> None:
+    run = shlex.join([small_site.python, "-m", "deploy.commands.launcher", "run", STEADY])
+    reader = small_site.begin_in_terminal("sh", "-c", f"{run} | head -n 1")
+    reader.await_line("Starting the services")
+    small_site.await_members(lambda left: not left)
+
+
+def test_killing_make_ends_everything(small_site: Site) -> None:
+    command = small_site.begin_command("make", "run", f"SCENARIO={STEADY}")
+    command.await_line("Engines are off")
+    os.kill(command.pid, signal.SIGKILL)
+    small_site.await_members(lambda left: not left)
+    command.wait()
+
+
+def test_it_starts_again_when_supervisord_is_killed(small_site: Site) -> None:
+    command = small_site.begin("run", STEADY)
+    command.await_line("Engines are off")
+    before = small_site.members
+    os.kill(before[""], signal.SIGKILL)
+    command.await_line("supervisord was killed: everything has been started anew")
+    after = small_site.members
+    assert set(after.values()).isdisjoint(before.values())
+    command.type("quit\n")
+    assert command.wait() == 0
+    assert small_site.members == {}
+
+
+def test_orphans_of_a_killed_supervisord_are_reported_until_they_are_stopped(site: Site) -> None:
+    assert site.do("start", STEADY)[0] == 0
+    console = site.begin("console")
+    console.await_line("Engines are off")
+    os.kill(site.members[""], signal.SIGKILL)
+    console.await_line(f"supervisord has died; {len(site.programs)} services go on without it")
+    assert console.wait() == 0
+    assert site.members.keys() == site.programs
+    code, printed = site.do("status")
+    assert code == 1
+    assert "supervisord has died" in printed
+    assert site.do("stop")[0] == 0
+    assert site.members == {}
+    assert site.do("stop") == (0, "Nothing runs.")
+
+
+def test_start_replaces_the_orphans_of_a_killed_supervisord(small_site: Site) -> None:
+    assert small_site.do("start", STEADY)[0] == 0
+    os.kill(small_site.members[""], signal.SIGKILL)
+    small_site.await_members(lambda left: "" not in left)
+    orphans = small_site.members
+    assert orphans.keys() == small_site.programs
+    assert small_site.do("start", STEADY)[0] == 0
+    assert small_site.members.keys() == {"", *small_site.programs}
+    assert set(small_site.members.values()).isdisjoint(orphans.values())
+
+
+def test_the_switch_stays_pressed_by_hand_when_its_process_dies(small_site: Site) -> None:
+    signal_line = "Received signal from operator"
+    command = small_site.begin("run", STEADY)
+    command.await_line("Engines are off")
+    command.insist("press\n", signal_line)
+    switch = small_site.members["dead_mans_switch"]
+    os.kill(switch, signal.SIGKILL)
+    small_site.await_members(lambda left: left.get("dead_mans_switch", switch) != switch)
+    for _ in range(3):  # the first may come from the dead process
+        command.await_line(signal_line, after=len(command.lines))
+    command.type("quit\n")
+    assert command.wait() == 0

@@ -1,0 +1,100 @@
+"""Mistakes of a user: one line says what is wrong, and nothing starts."""
+
+from __future__ import annotations
+
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from interfaces.service import instance
+from tests.system.sites import STEADY, Site
+
+ERRORS = [
+    ("l1: -1.0", "{file}: l1: -1.0 is negative"),
+    ("l3: 1.0", "{file}: scenario: unknown key 'l3'"),
+    ("l1: [", "{file}: "),
+]
+
+
+@pytest.mark.parametrize(("text", "complaint"), ERRORS)
+def test_an_error_in_a_scenario_is_reported_before_the_start(
+    site: Site, tmp_path: Path, text: str, complaint: str
+) -> None:
+    file = tmp_path / "wrong.yaml"
+    file.write_text(text)
+    code, printed = site.do("run", str(file))
+    assert code == 1
+    assert printed.startswith(complaint.format(file=file))
+    assert "\n" not in printed
+    assert not site.run.exists()
+
+
+def test_an_unknown_scenario_is_reported_with_the_known_ones(site: Site) -> None:
+    assert site.do("run", "tango") == (1, "SCENARIO=tango is neither a file nor one of: demo, listing_5_9")
+
+
+def test_a_quote_in_scenario_is_no_shell_syntax(site: Site) -> None:
+    code, printed = site.do_command("make", "start", "SCENARIO=it's")
+    assert code != 0
+    assert printed.startswith("SCENARIO=it's is neither a file nor one of: demo, listing_5_9")
+
+
+def test_an_error_in_a_parameter_file_is_reported_before_the_start(site: Site, tmp_path: Path) -> None:
+    file = tmp_path / "mine.yaml"
+    file.write_text("operator_watchdog: {ros__parameters: {silence: -1.0}}")
+    complaint = f"{file}: operator_watchdog.silence: must be from 0.1 to 60, not -1.0"
+    assert site.do("start", STEADY, str(file)) == (1, complaint)
+    assert not site.run.exists()
+
+
+def test_an_impossible_domain_is_reported(site: Site) -> None:
+    site.domain = 233
+    assert site.do("run", STEADY) == (1, "ROS_DOMAIN_ID=233 is not a number from 0 to 232")
+
+
+def test_an_impossible_namespace_is_reported(site: Site) -> None:
+    site.namespace = "arm 1"
+    code, printed = site.do("run", STEADY)
+    assert code == 1
+    assert printed.startswith("REACTIVE_ARM_NAMESPACE=arm 1 is no namespace such as /arm1: ")
+    assert "\n" not in printed
+
+
+def test_an_impossible_dds_configuration_is_reported(site: Site, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CYCLONEDDS_URI", "<no xml")
+    code, printed = site.do("run", STEADY)
+    assert code == 1
+    assert printed.splitlines()[-1].startswith("Cannot join the ROS graph: ")
+    assert "Traceback" not in printed
+    assert not site.run.exists()
+
+
+def test_a_run_directory_that_cannot_be_made_is_reported(site: Site, tmp_path: Path) -> None:
+    site.run = tmp_path / "file" / "run"
+    site.run.parent.touch()
+    assert site.do("start", STEADY) == (1, f"[Errno 20] Not a directory: '{site.run}'")
+    site.run.parent.unlink()
+
+
+def test_a_full_disk_is_reported_with_the_file(site: Site) -> None:
+    site.run.mkdir()
+    (site.run / "parameters.new").symlink_to("/dev/full")
+    assert site.do("start", STEADY) == (1, f"{site.run / 'parameters.yaml'}: No space left on device")
+    assert site.members == {}
+
+
+def test_a_service_in_the_same_domain_is_reported(site: Site) -> None:
+    service = site.begin_command(sys.executable, "-m", "services.velocity")
+    while not instance.is_claimed("/velocity", site.domain):
+        assert service.is_alive, service.output
+        time.sleep(0.02)
+    code, printed = site.do("start", STEADY)
+    assert code == 1
+    assert printed.startswith(f"ROS domain {site.domain} is in use: /velocity already runs on this host. Set")
+
+
+def test_the_sentinel_runs_only_under_supervisord(site: Site) -> None:
+    code, printed = site.do_command(sys.executable, "-m", "deploy.supervision.sentinel")
+    assert (code, printed) == (2, "sentinel: runs only under supervisord: make start")
