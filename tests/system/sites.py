@@ -247,7 +247,7 @@ class Checkout(Site):
         shutil.rmtree(self.run, ignore_errors=True)
 
 
-def make_small_arm(parent: Path) -> Path:
+def make_small_arm(parent: Path, programs: Sequence[str] = SMALL) -> Path:
     """Make a checkout of a small arm, set up, in a directory whose path is as unpleasant as paths get."""
     directory = parent / 'it\'s 100 % "fine"' / ("deep" * 30)
     ignored = shutil.ignore_patterns("runtime", "tests", "*.pyc.*")  # the last are gone in a moment
@@ -255,7 +255,7 @@ def make_small_arm(parent: Path) -> Path:
         shutil.copytree(ROOT / name, directory / name, ignore=ignored)
     (directory / "deploy" / "runtime").symlink_to(ROOT / "deploy" / "runtime")
     shutil.copyfile(ROOT / "Makefile", directory / "Makefile")
-    _leave_programs(directory / "deploy" / "supervisord.conf", SMALL)
+    _leave_programs(directory / "deploy" / "supervisord.conf", programs)
     _set_up(directory)
     return directory
 

@@ -200,18 +200,6 @@ def test_the_operator_commands_switch_and_engines_from_the_console(
     assert module_site.members.keys() >= module_site.programs
 
 
-def test_releasing_the_switch_in_the_demo_stops_the_engines(site: Site) -> None:
-    command = site.begin("run", "demo")
-    command.await_line("Engines are on")
-    released = time.monotonic()
-    command.type("release\n")
-    command.await_line(r"Turning off engines\.\.\.$")
-    turned_off = next(time_ for time_, text in command.lines if "Turning off engines" in text)
-    assert turned_off - released < 10.5
-    command.type("quit\n")
-    assert command.wait() == 0
-
-
 def test_another_terminal_may_have_sourced_another_rclpy(
     module_site: Site, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -109,25 +109,19 @@ def test_ctrl_c_ends_the_wait_for_another_start_or_stop(small_site: Site, argume
     assert small_site.members == {}
 
 
-def test_make_stop_elsewhere_ends_the_terminal(small_site: Site) -> None:
-    command = small_site.begin("run", STEADY)
-    command.await_line("Engines are off")
-    assert small_site.do("stop")[0] == 0
-    command.await_line("The system has ended")
-    assert command.wait() == 0
-    assert small_site.members == {}
-
-
-def test_logs_follow_the_system_until_it_ends(small_site: Site) -> None:
+def test_make_stop_elsewhere_ends_terminal_and_logs(small_site: Site) -> None:
     code, printed = small_site.do("logs")
     assert code == 1
     assert printed == f"Nothing runs: make start. The logs of the last run are in {small_site.run / 'logs'}"
-    assert small_site.do("start", STEADY)[0] == 0
+    terminal = small_site.begin("run", STEADY)
+    terminal.await_line("Engines are off")
     logs = small_site.begin("logs")
     logs.await_line("logs/engine_controller.log")
     assert small_site.do("stop")[0] == 0
-    logs.await_line("The system has ended")
-    assert logs.wait() == 0
+    for command in (terminal, logs):
+        command.await_line("The system has ended")
+        assert command.wait() == 0
+    assert small_site.members == {}
 
 
 @pytest.mark.parametrize("hung", ["", "engine_controller"])

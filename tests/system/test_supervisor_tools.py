@@ -38,7 +38,7 @@ def test_a_start_by_hand_serves_the_commands_of_make(checkout: Checkout) -> None
     assert checkout.do_command("supervisord", *CONF) == (0, "")
     checkout.await_members(lambda left: left.keys() >= checkout.programs)
     console = checkout.begin("console")
-    console.await_line("Turning on engines")
+    console.await_line("Received signal from operator")  # the demo has begun
     code, table = checkout.do("status")
     assert code == 0
     assert len(table.splitlines()) == len(checkout.programs) + 1
