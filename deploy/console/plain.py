@@ -17,6 +17,7 @@ class PlainTerminal:
     def __init__(self) -> None:
         """Read standard input, unless it is closed."""
         self._input = None if sys.stdin is None else sys.stdin.fileno()
+        self._is_terminal = self._input is not None and os.isatty(self._input)  # false after its end
         self._typed = b""
 
     def show(self, lines: Iterable[str]) -> None:
@@ -37,8 +38,8 @@ class PlainTerminal:
             time.sleep(seconds)
             return []
         if not typed:
-            is_terminal, self._input = os.isatty(self._input), None
-            if is_terminal:  # the end of a file or a pipe means nothing
+            self._input = None
+            if self._is_terminal:  # the end of a file or a pipe means nothing
                 raise EOFError
             return []
         *lines, self._typed = (self._typed + typed).split(b"\n")

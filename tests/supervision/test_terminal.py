@@ -38,19 +38,29 @@ except KeyboardInterrupt:
 finally:
     terminal.close()
 """
+# Shows one line only, and reads until the input ends.
+SILENT_PROGRAM = """
+from contextlib import suppress
+from deploy.console.terminal import open_terminal
+terminal = open_terminal([])
+terminal.show(["line 0"])
+with suppress(EOFError):
+    while True:
+        terminal.read(0.05)
+"""
 ENVIRONMENT = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path), "TERM": "xterm"}
 
 
 class User:
     """Types at a terminal, and reads what the program shows there."""
 
-    def __init__(self, shell: str = 'exec "$@"', term: str = "xterm") -> None:
-        """Run the program as `"$@"` in a shell that controls the terminal."""
+    def __init__(self, shell: str = 'exec "$@"', term: str = "xterm", program: str = PROGRAM) -> None:
+        """Run a program as `"$@"` in a shell that controls the terminal."""
         self.output = b""
         self._keyboard, self.terminal = pty.openpty()
         self.modes = termios.tcgetattr(self.terminal)
         self._process = subprocess.Popen(
-            ["setsid", "--ctty", "bash", "-c", shell, "bash", sys.executable, "-c", PROGRAM],
+            ["setsid", "--ctty", "bash", "-c", shell, "bash", sys.executable, "-c", program],
             cwd=ROOT,
             env=ENVIRONMENT | {"TERM": term},
             stdin=self.terminal,
@@ -79,6 +89,12 @@ class User:
         assert self._process.returncode == 0, self.output
         assert termios.tcgetattr(self.terminal) == self.modes
 
+    def close_terminal(self) -> None:
+        """Close it, and wait until the shell ends."""
+        os.close(self._keyboard)
+        self._keyboard = -1
+        self._process.wait(LIMIT)
+
     def interrupt(self) -> None:
         self._process.send_signal(signal.SIGINT)
 
@@ -90,8 +106,9 @@ class User:
         with suppress(ProcessLookupError):
             os.killpg(self._process.pid, signal.SIGKILL)
         self._process.wait()
-        os.close(self._keyboard)
-        os.close(self.terminal)
+        for descriptor in (self._keyboard, self.terminal):
+            with suppress(OSError):  # it has been closed
+                os.close(descriptor)
 
 
 @pytest.fixture
@@ -197,6 +214,7 @@ def test_dumb_terminal_gets_plain_lines(user: User) -> None:
     assert b"\x1b" not in user.output
 
 
+NO_HANGUP = 'trap : HUP; "$@"'  # as make, which waits for the program
 IN_THE_BACKGROUND = 'set -m; "$@" & read -r; kill -INT %1; wait %1'
 
 
@@ -207,6 +225,16 @@ def test_program_in_the_background_leaves_the_terminal_alone(user: User) -> None
     user.type(b"for the shell\n")
     user.await_text(rb"interrupted\r\n")
     user.await_end()
+
+
+@pytest.mark.parametrize(
+    "user",
+    [{"shell": NO_HANGUP, "term": term, "program": SILENT_PROGRAM} for term in ("xterm", "dumb")],
+    indirect=True,
+)
+def test_closed_terminal_is_the_end_of_input(user: User) -> None:
+    user.await_text(rb"line 0\r\n")
+    user.close_terminal()
 
 
 @pytest.mark.parametrize("redirection", ["</dev/null", "<&-"])
