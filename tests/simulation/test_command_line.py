@@ -12,9 +12,13 @@ from pathlib import Path
 
 import pytest
 
-from deploy.chaos.schedule import AWAKE, DAY, PlannedFault
+from deploy.chaos.schedule import PlannedFault
 from deploy.chaos.schedule_file import Shift, save
 from deploy.chaos.testbed import SCENARIO
+from deploy.simulation import plan
+from deploy.simulation.faults import FAULT_KINDS
+from deploy.simulation.shift import play
+from deploy.simulation.summary import Summary
 from deploy.supervision.processes import ROOT
 
 
@@ -30,20 +34,18 @@ def simulate(run: Path, *arguments: str, **environment: str) -> subprocess.Popen
 
 
 def test_the_same_seed_gives_the_same_record(tmp_path: Path) -> None:
-    runs = [simulate(tmp_path, "--hours", "0.02", "--seed", "7") for _ in range(2)]
-    output = [run.communicate()[0] for run in runs]
-    assert [run.returncode for run in runs] == [0, 0]
-    records = [re.search(r"record (\w+)", text) for text in output]
-    assert records[0] is not None
-    assert records[1] is not None
-    assert records[0][1] == records[1][1]
-    assert "seed 7" in output[0]
-    assert "times real time" in output[0]
+    run = simulate(tmp_path, "--hours", "0.01", "--seed", "7")
+    output, _ = run.communicate()
+    assert run.returncode == 0
+    (shift,) = plan.shifts("7", 0.01, 5.0, tuple(FAULT_KINDS))
+    assert f"record {Summary.of(play(shift)).digest}\n" in output
+    assert "seed 7" in output
+    assert "times real time" in output
 
 
 def test_a_schedule_is_played_and_reported(tmp_path: Path) -> None:
     path = tmp_path / "schedule.yaml"
-    save(Shift("1", DAY, SCENARIO, [PlannedFault(AWAKE, "kill", "operator_watchdog")]), path)
+    save(Shift("1", 10.0, SCENARIO, [PlannedFault(5.0, "kill", "operator_watchdog")]), path)
     run = simulate(tmp_path, "--schedule", str(path))
     output, errors = run.communicate()
     assert (run.returncode, errors) == (0, "")

@@ -26,6 +26,7 @@ from deploy.recording.recorder import Recorder
 from deploy.replay import chains
 from deploy.replay.comparison import compare
 from deploy.replay.record import Message, Record, load
+from deploy.supervision.system import DeploymentError
 from interfaces import topics
 
 ROOT = Path(__file__).parents[2]
@@ -75,26 +76,36 @@ def test_replay_of_a_real_play_is_equal_and_the_same_each_time(tmp_path: Path) -
     assert changes[-3:] == ["on", "off", "on"]
 
 
-CHANGES: list[tuple[str, str, str, str]] = [
-    ("kinematics.py", "y = l1 * math.sin(theta1) +", "y = l1 * math.sin(theta1) -", "effector/position"),
-    ("velocity.py", "before.y) / seconds", "before.y) / seconds * 1.001", "effector/speed"),
-    ("operator_watchdog.py", "parameter(3, (1, 100)", "parameter(2, (1, 100)", "operator_activity"),
-    ("operator_watchdog.py", "lambda _: TURN_OFF", "lambda _: topics.TURN_ON", "engines"),
-    ("engine_controller.py", "10.0, (1.0, 10.0)", "5.0, (1.0, 10.0)", "engines/state"),
-]
+POSITION = (
+    "kinematics.py",
+    "y = l1 * math.sin(theta1) +",
+    "y = l1 * math.sin(theta1) -",
+    "effector/position",
+)
+SPEED = ("velocity.py", "before.y) / seconds", "before.y) / seconds * 1.001", "effector/speed")
+ACTIVITY = ("operator_watchdog.py", "parameter(3, (1, 100)", "parameter(2, (1, 100)", "operator_activity")
+COMMAND = ("operator_watchdog.py", "lambda _: TURN_OFF", "lambda _: topics.TURN_ON", "engines")
+STATE = ("engine_controller.py", "10.0, (1.0, 10.0)", "5.0, (1.0, 10.0)", "engines/state")
 
 
-@pytest.mark.parametrize(("file", "text", "other", "topic"), CHANGES, ids=[each[3] for each in CHANGES])
-def test_changed_recipe_differs(file: str, text: str, other: str, topic: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    "changes",
+    [[POSITION, ACTIVITY], [SPEED, COMMAND], [STATE]],
+    ids=["position and activity", "speed and command", "state"],
+)
+def test_changed_recipe_differs(changes: list[tuple[str, str, str, str]], tmp_path: Path) -> None:
+    """Changes of one replay are of chains that do not hear each other's replayed output."""
     shutil.copytree(ROOT / "services", tmp_path / "services")
-    changed = tmp_path / "services" / file
-    source = changed.read_text()
-    assert text in source
-    changed.write_text(source.replace(text, other))
+    for file, text, other, _ in changes:
+        changed = tmp_path / "services" / file
+        source = changed.read_text()
+        assert text in source
+        changed.write_text(source.replace(text, other))
     done = replay(PLAY, "--output", str(tmp_path / "out.mcap"), directory=tmp_path)
     assert done.returncode == 1, done.stderr
-    assert verdicts(done)[topic] == "DIFFERENT"
-    assert re.search(rf"^Different in 38 s: .*{topic}", done.stdout, re.MULTILINE)
+    for *_, topic in changes:
+        assert verdicts(done)[topic] == "DIFFERENT"
+        assert re.search(rf"^Different in 38 s: .*{topic}", done.stdout, re.MULTILINE)
 
 
 def test_changed_parameter_differs(tmp_path: Path) -> None:
@@ -131,6 +142,15 @@ def damaged(data: bytes) -> bytes:
 def test_bad_file_is_refused_in_one_line(change: Callable[[bytes], bytes], tmp_path: Path) -> None:
     record = tmp_path / "record.mcap"
     record.write_bytes(change(PLAY.read_bytes()))
+    with pytest.raises(DeploymentError) as error:
+        load(record)
+    assert str(error.value).startswith(f"{record} is not a complete MCAP: ")
+    assert "\n" not in str(error.value)
+
+
+def test_command_with_a_bad_record_says_so_and_writes_nothing(tmp_path: Path) -> None:
+    record = tmp_path / "record.mcap"
+    record.write_bytes(b"Dear arm,\n")
     done = replay(record)
     assert done.returncode == 2
     assert done.stderr.startswith(f"{record} is not a complete MCAP: ")
@@ -139,14 +159,14 @@ def test_bad_file_is_refused_in_one_line(change: Callable[[bytes], bytes], tmp_p
 
 
 def test_missing_file_and_missing_arm_are_one_line(tmp_path: Path) -> None:
-    done = replay(tmp_path / "none.mcap")
-    assert (done.returncode, done.stderr) == (2, f"{tmp_path}/none.mcap: No such file or directory\n")
+    with pytest.raises(DeploymentError, match=f"^{tmp_path}/none.mcap: No such file or directory$"):
+        load(tmp_path / "none.mcap")
     record = tmp_path / "other.mcap"
     recorder = Recorder(record, 0, SECOND)
     recorder.message("/other", "std_msgs/msg/Float64", "", serialize_message(Float64()), 0, 0)
     recorder.close()
-    done = replay(record)
-    assert (done.returncode, done.stderr) == (2, f"{record} contains no topic of an arm\n")
+    with pytest.raises(DeploymentError, match=f"^{record} contains no topic of an arm$"):
+        load(record)
     done = replay(PLAY, "--namespace", "/arm2")
     assert (done.returncode, done.stderr) == (2, f"{PLAY} has no arm /arm2; it has /\n")
 

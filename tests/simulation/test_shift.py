@@ -12,7 +12,7 @@ import pytest
 
 from deploy.chaos import schedule
 from deploy.chaos.history import ALL, NO_TARGET
-from deploy.chaos.schedule import AWAKE, DAY, PlannedFault
+from deploy.chaos.schedule import DAY, PlannedFault
 from deploy.chaos.schedule_file import Shift
 from deploy.chaos.testbed import SCENARIO
 from deploy.simulation import arm, plan
@@ -20,8 +20,10 @@ from deploy.simulation.faults import BAD_LINE, FAULT_KINDS
 from deploy.simulation.shift import Outcome, play
 from deploy.supervision.manifest import Program
 from deploy.supervision.processes import ROOT
+from interfaces import topics
 
-LENGTH = 40.0  # s
+LENGTH = 30.0  # s: four faults, and the time in which the arm recovers from the last one
+EVERY = 2.5  # s between two faults
 
 
 def violations(outcome: Outcome) -> dict[str, Sequence[object]]:
@@ -30,7 +32,7 @@ def violations(outcome: Outcome) -> dict[str, Sequence[object]]:
 
 @pytest.mark.parametrize("kind", FAULT_KINDS)
 def test_the_promises_hold_under_each_kind_of_fault(kind: str) -> None:
-    outcome = play(plan.shift(f"only {kind}", LENGTH, 4.0, [kind]))
+    outcome = play(plan.shift(f"only {kind}", LENGTH, EVERY, [kind]))
     assert outcome.injected[kind] >= 4
     assert not violations(outcome)
 
@@ -59,7 +61,7 @@ def test_a_quiet_shift_has_output_from_every_program() -> None:
 def test_equal_shifts_give_equal_records_in_any_interpreter() -> None:
     program = (
         "from deploy.simulation import plan; from deploy.simulation.shift import play; "
-        f"print(play(plan.shift('equal', {LENGTH}, 3.0, list(plan.FAULT_KINDS))).digest)"
+        f"print(play(plan.shift('equal', {LENGTH}, 1.0, list(plan.FAULT_KINDS))).digest)"
     )
     runs = [
         subprocess.Popen(
@@ -81,6 +83,15 @@ def test_another_seed_gives_another_record() -> None:
     assert one.digest != two.digest
 
 
+BRIEF = {
+    "l1": SCENARIO["l1"],
+    "operator": {"pressed": [{"from": 0.0, "to": 4.0}]},
+    "engines": [{"at": 1.5, "command": topics.TURN_ON}],
+}
+"""An operator who falls asleep soon."""
+ASLEEP = 4.0  # s
+
+
 def with_a_bug(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let the simulated arm run an engine controller with a bug."""
     broken = [
@@ -94,8 +105,8 @@ def with_a_bug(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_a_bug_of_a_service_violates_a_promise(monkeypatch: pytest.MonkeyPatch) -> None:
     with_a_bug(monkeypatch)
-    kills = [PlannedFault(AWAKE + 1.0 + n, "kill", "operator_watchdog") for n in range(14)]
-    assert "S1" in violations(play(Shift("bug", DAY, SCENARIO, kills)))
+    kills = [PlannedFault(ASLEEP + 1.0 + n, "kill", "operator_watchdog") for n in range(11)]
+    assert "S1" in violations(play(Shift("bug", ASLEEP + 12.0, BRIEF, kills)))
 
 
 def test_a_line_is_good_again_after_overlapping_faults(tmp_path: Path) -> None:

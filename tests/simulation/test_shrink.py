@@ -8,13 +8,13 @@ from pathlib import Path
 import pytest
 
 from deploy.chaos import schedule_file
-from deploy.chaos.schedule import AWAKE, DAY, PlannedFault
+from deploy.chaos.schedule import PlannedFault
 from deploy.chaos.schedule_file import Shift
 from deploy.chaos.testbed import SCENARIO
 from deploy.simulation.shift import play
 from deploy.simulation.shrink import minimal, shrink
 from deploy.supervision.system import DeploymentError
-from tests.simulation.test_shift import with_a_bug
+from tests.simulation.test_shift import ASLEEP, BRIEF, with_a_bug
 
 
 @pytest.mark.parametrize("needed", [set(), {0}, {3}, {2, 7}, {0, 5, 9}, set(range(10))])
@@ -34,9 +34,9 @@ def test_a_schedule_is_shrunk_to_the_faults_that_violate_the_promise(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     with_a_bug(monkeypatch)
-    others = [PlannedFault(8.0, "kill", "velocity"), PlannedFault(12.0, "terminate", "config_l1")]
-    kills = [PlannedFault(AWAKE + 1.0 + 4 * n, "kill", "operator_watchdog") for n in range(3)]
-    outcome = play(Shift("bug", DAY, SCENARIO, [*others, *kills]))
+    others = [PlannedFault(2.0, "kill", "velocity"), PlannedFault(3.0, "terminate", "config_l1")]
+    kills = [PlannedFault(ASLEEP + 1.0 + 4 * n, "kill", "operator_watchdog") for n in range(3)]
+    outcome = play(Shift("bug", ASLEEP + 15.0, BRIEF, [*others, *kills]))
     assert "S1" in outcome.violated()
     left: list[int] = []
     small = shrink(outcome, left.append)
