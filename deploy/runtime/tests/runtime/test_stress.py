@@ -21,6 +21,7 @@ from std_msgs.msg import Float64
 from std_srvs.srv import SetBool
 
 CYCLES = 1000
+WARM_UP = 400  # cycles
 THREADS = 4
 MEMORY = 8.0  # MB that a process may grow; a leaked reader or writer per cycle costs about 20
 SECONDS = 30.0
@@ -144,7 +145,7 @@ def test_a_thousand_entities_of_each_kind_leave_nothing_behind(flood: Flood, con
     wait_for(lambda: node.count_publishers("flood"))
     wait_for(lambda: endpoints(other) == endpoints(node))
     before = endpoints(node)
-    run(CYCLES)  # warm-up: every pool reaches its size
+    run(WARM_UP)  # every pool reaches its size
     wait_for(lambda: endpoints(node) == endpoints(other) == before)
     size, threads = memory(), lasting_threads()
     run(CYCLES)
