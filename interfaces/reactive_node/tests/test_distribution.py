@@ -35,7 +35,13 @@ def test_wheel_holds_typed_package_only(built: Path) -> None:
 @pytest.mark.parametrize("pattern", ["*.whl", "*.tar.gz"])
 def test_distribution_installs_without_network(built: Path, tmp_path: Path, pattern: str) -> None:
     (distribution,) = built.glob(pattern)
-    options = ["--no-index", "--no-deps", "--no-build-isolation", "--disable-pip-version-check"]
+    options = [
+        "--no-index",
+        "--no-deps",
+        "--no-build-isolation",
+        "--no-compile",
+        "--disable-pip-version-check",
+    ]
     _run("-m", "pip", "install", *options, "--target", str(tmp_path), str(distribution), cwd=tmp_path)
 
     program = "import reactive_node.testing; print(reactive_node.__file__)"

@@ -12,7 +12,7 @@ import pytest
 
 RUNTIME = Path(__file__).parents[2]
 SOURCE = RUNTIME / "src"
-OFFLINE = ["--no-index", "--no-deps", "--no-build-isolation", "--quiet"]
+OFFLINE = ["--no-index", "--no-deps", "--no-build-isolation", "--no-compile", "--quiet"]
 INSTALL = [sys.executable, "-m", "pip", "install", *OFFLINE]
 PROGRAM = """
 import rclpy, std_srvs.srv, rosidl_runtime_embedded
