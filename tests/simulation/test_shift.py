@@ -14,8 +14,8 @@ from deploy.chaos import schedule
 from deploy.chaos.history import ALL, NO_TARGET
 from deploy.chaos.schedule import DAY, PlannedFault
 from deploy.chaos.schedule_file import Shift
-from deploy.chaos.testbed import SCENARIO
-from deploy.simulation import arm, plan
+from deploy.chaos.testbed import SCENARIO, sources
+from deploy.simulation import arm, people, plan
 from deploy.simulation.faults import BAD_LINE, FAULT_KINDS
 from deploy.simulation.shift import Outcome, play
 from deploy.supervision.manifest import Program
@@ -45,13 +45,13 @@ def test_the_promises_hold_in_the_scenarios_of_the_chaos_monkey(name: str) -> No
         if each.target in FAULT_KINDS[each.kind].targets or each.target == NO_TARGET
     ]
     length = max(schedule.duration(faults), DAY)
-    outcome = play(Shift(name, length, SCENARIO, faults))
+    outcome = play(Shift(name, length, {**SCENARIO, **sources(people.RATE)}, faults))
     assert not violations(outcome)
     assert next(finding for finding in outcome.findings if finding.promise == "S1").cases
 
 
 def test_a_quiet_shift_has_output_from_every_program() -> None:
-    outcome = play(Shift("quiet", 20.0, SCENARIO, []))
+    outcome = play(Shift("quiet", 10.0, SCENARIO, []))
     assert not violations(outcome)
     assert len(outcome.history.lives) == len(arm.NAMES)
     for program in arm.NAMES:
@@ -79,7 +79,7 @@ def test_equal_shifts_give_equal_records_in_any_interpreter() -> None:
 
 
 def test_another_seed_gives_another_record() -> None:
-    one, two = (play(Shift(seed, 5.0, SCENARIO, [])) for seed in ("one", "two"))
+    one, two = (play(Shift(seed, 2.0, SCENARIO, [])) for seed in ("one", "two"))
     assert one.digest != two.digest
 
 
