@@ -9,23 +9,25 @@ import argparse
 import json
 import os
 import queue
-import signal
 import sys
 import tempfile
 import threading
 import time
 import tomllib
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from deploy.mutants.bench import Bench
 from deploy.mutants.guards import GUARDS, SIMULATION
 from deploy.mutants.mutations import Mutant, mutants
+from deploy.supervision import interruption
 from deploy.supervision.processes import ROOT
 
 EQUIVALENT = Path(__file__).with_name("equivalent.toml")
 _BENCHES = 2 * (os.cpu_count() or 1)  # many tests wait
+_LOOK = 0.2  # s between two looks for an interruption or a failure
 _CLEAR = "\r\x1b[K" if sys.stdout.isatty() else ""
 
 
@@ -49,13 +51,11 @@ def main(arguments: Sequence[str]) -> int:
         print(f"No tests guard {', '.join(unknown)}. Modules: {', '.join(GUARDS)}", file=sys.stderr)
         return 2
     equivalent = tomllib.loads(EQUIVALENT.read_text(encoding="utf-8"))
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
-    signal.signal(signal.SIGINT, signal.default_int_handler)
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})  # make blocks it until here
+    interruption.install()
     scores = {module: Score() for module in modules}
     try:
         test(scores, equivalent)
-    except KeyboardInterrupt:
+    except interruption.Interrupted:
         print(f"{_CLEAR}Interrupted. Nothing in this checkout has changed. So far:")
         report(scores, {})
         return 130
@@ -94,6 +94,14 @@ def test(scores: dict[str, Score], equivalent: dict[str, dict[str, str]]) -> Non
                         print(f"{_CLEAR}{mutant.module}:{mutant.line} survives: {_quoted(mutant.change)}")
                 _show(scores, mutant.module, began)
 
+    def hand_out(mutant: Mutant | None) -> None:
+        while True:
+            interruption.check()
+            if failures:
+                raise failures[0]
+            with suppress(queue.Full):
+                return work.put(mutant, timeout=_LOOK)
+
     benches: list[Bench] = []
     threads: list[threading.Thread] = []
     with tempfile.TemporaryDirectory(prefix="mutants-", ignore_cleanup_errors=True) as directory:
@@ -104,13 +112,13 @@ def test(scores: dict[str, Score], equivalent: dict[str, dict[str, str]]) -> Non
                 threads[-1].start()
             for module in scores:
                 for mutant in mutants(ROOT, module):
-                    work.put(mutant)
-                    if failures:
-                        raise failures[0]
+                    hand_out(mutant)
             for _ in threads:
-                work.put(None)
+                hand_out(None)
             for thread in threads:
-                thread.join()
+                while thread.is_alive():
+                    interruption.check()
+                    thread.join(_LOOK)
             if failures:
                 raise failures[0]
         finally:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -130,3 +131,25 @@ def test_command_fails_unless_the_survivors_are_the_listed_ones(
 def test_unknown_module_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
     assert command.main(["services/nothing.py"]) == 2
     assert capsys.readouterr().err.startswith("No tests guard services/nothing.py.")
+
+
+INTERRUPTED = """
+import os, signal, sys
+import libcst
+from deploy.mutants import __main__ as command
+
+write = libcst.Name._codegen_impl
+
+def interrupted(name, *arguments, **options):
+    os.kill(os.getpid(), signal.SIGINT)
+    write(name, *arguments, **options)
+
+libcst.Name._codegen_impl = interrupted
+sys.exit(command.main(["interfaces/reactive_node/src/reactive_node/stamps.py"]))
+"""
+
+
+def test_ctrl_c_while_a_mutant_is_written_shows_no_traceback() -> None:
+    done = subprocess.run([sys.executable, "-c", INTERRUPTED], cwd=ROOT, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (130, "")
+    assert done.stdout.startswith("Interrupted. Nothing in this checkout has changed. So far:\n")
