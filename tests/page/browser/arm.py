@@ -66,7 +66,7 @@ def hold_with_engines_on(arm: Arm, hand: HandOnPage, *hands: Callable[[], None])
     while True:
         hand.hold(*hands)
         arm.record.turn_on(is_held)
-        arm.record.until(lambda: not is_held() or len(arm.record.beats_after(begin)) >= 3)
+        arm.record.until(lambda: len(arm.record.beats_after(begin)) >= 3 or not is_held(), period=0.05)
         if is_held():
             return
 

@@ -68,12 +68,12 @@ class Record:
 
         peer.node.create_subscription(topic.type, topic.name, receive, deep)
 
-    def until(self, condition: Callable[[], object], seconds: float = LIMIT) -> None:
-        """Wait until a condition is true."""
+    def until(self, condition: Callable[[], object], seconds: float = LIMIT, period: float = 0.005) -> None:
+        """Wait until a condition is true; look once in a period [s]."""
         deadline = time.monotonic() + seconds
         while not condition():
             assert time.monotonic() < deadline, f"not within {seconds} s"
-            time.sleep(0.005)
+            time.sleep(period)
 
     def beats_after(self, moment: float) -> list[float]:
         """The heartbeats that were published after a moment [s since 1970]."""
@@ -96,9 +96,11 @@ class Record:
         def are_on() -> bool:
             return any(state.time > begin and state.engines == topics.ON for state in self.states)
 
-        while is_held() and not are_on():
+        while not are_on():
             assert time.time() < begin + LIMIT, "the engines are not on"
             if time.monotonic() > due:
+                if not is_held():
+                    return
                 due = time.monotonic() + 0.5
                 self._commands.publish(String(data=topics.TURN_ON))
             time.sleep(0.01)
