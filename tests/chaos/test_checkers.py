@@ -495,16 +495,6 @@ def test_l4_is_unknown_if_the_sentinel_was_hit() -> None:
     assert (finding.cases, finding.unknown) == (0, 1)
 
 
-@pytest.mark.parametrize(("began", "unknown"), [(18.9, 0), (19.1, 1), (24.9, 1), (25.1, 0)])
-def test_l4_is_unknown_if_the_sentinel_was_new(began: float, unknown: int) -> None:
-    history = hung(6.5)
-    lives = [
-        life._replace(ended=began - 2.0) if life.program == "sentinel" else life for life in history.lives
-    ]
-    successor = Life("sentinel", 999, began, None)
-    assert CHECKERS["L4"](replace(history, lives=[*lives, successor])).unknown == unknown
-
-
 def test_l4_successor_of_a_hung_sentinel_is_its_replacement() -> None:
     history = silent(good(), "/diagnostics", 20.0, 23.5)
     lives = [life._replace(ended=23.0) if life.program == "sentinel" else life for life in history.lives]

@@ -657,3 +657,12 @@ def test_l4_counts_hangs_that_last() -> None:
 def test_l4_is_unknown_if_the_sentinel_was_hit_meanwhile(other: list[InjectedFault], unknown: int) -> None:
     found = CHECKERS["L4"](history(l1=back((10.0, 2.0)), faults=[stopped("config_l1", 10.0, 20.0), *other]))
     assert (found.cases, found.unknown) == (1 - unknown, unknown)
+
+
+@pytest.mark.parametrize(("began", "unknown"), [(9.0, 0), (9.5, 1), (11.5, 1), (12.0, 0)])
+def test_l4_is_unknown_if_the_sentinel_is_new_meanwhile(began: float, unknown: int) -> None:
+    lives = two_lives("sentinel", began)
+    found = CHECKERS["L4"](
+        history(l1=back((10.0, 2.0)), lives=lives, faults=[stopped("config_l1", 10.0, 20.0)])
+    )
+    assert (found.cases, found.unknown) == (1 - unknown, unknown)
