@@ -65,31 +65,32 @@ def of_system(run: Path) -> list[Process]:
     found = [
         Process(pid, environment.get("SUPERVISOR_PROCESS_NAME", ""))
         for pid, environment in _marked(str(run))
-        if environment.get(MARK) == str(run)
+        if environment[MARK] == str(run)
     ]
     return sorted(found, key=lambda process: (process.program, process.pid))
 
 
 def systems() -> dict[Path, dict[str, str]]:
     """The environments of the running systems of this user, by run directory."""
-    return {Path(environment[MARK]): environment for _, environment in _marked() if MARK in environment}
+    return {Path(environment[MARK]): environment for _, environment in _marked()}
 
 
 def using(directory: Path) -> list[Path]:
     """The run directories of the systems that run the programs of a directory."""
     first = f"{directory}{os.pathsep}"
-    marked = (environment for _, environment in _marked() if MARK in environment)
     # Any process will do: without the directory, a service that starts again finds an interpreter elsewhere.
-    return sorted({Path(each[MARK]) for each in marked if each.get("PATH", "").startswith(first)})
+    return sorted({Path(each[MARK]) for _, each in _marked() if each.get("PATH", "").startswith(first)})
 
 
 def _marked(begin: str = "") -> Iterator[tuple[int, dict[str, str]]]:
-    """Processes that may have a mark with this beginning, with their environments."""
+    """Marked processes with their environments: all whose mark begins so, and perhaps others."""
     mark = os.fsencode(f"{MARK}={begin}")
     for pid in (int(name) for name in os.listdir("/proc") if name.isdigit()):
         environ = _environ(pid)
         if mark in environ:  # a machine has many processes: only these few environments are parsed
-            yield pid, _variables(environ)
+            environment = _variables(environ)
+            if MARK in environment:
+                yield pid, environment
 
 
 def end(run: Path, pids: Iterable[int], grace: float) -> None:
