@@ -210,16 +210,15 @@ def test_another_terminal_may_have_sourced_another_rclpy(
     assert {row[-1] for row in services.values()} == {"ok"}
 
 
-def test_a_second_arm_runs_in_a_namespace_of_the_same_domain(
-    module_site: Site, small_arm: Path, tmp_path: Path
-) -> None:
+def test_a_second_arm_runs_in_a_namespace_of_the_same_domain(module_site: Site, tmp_path: Path) -> None:
     first = module_site.members
     parameters = tmp_path / "mine.yaml"
     parameters.write_text("dead_mans_switch: {ros__parameters: {pressed: true}}")
-    with closing(Site(tmp_path / "run", module_site.domain, "/second", small_arm)) as second:
+    with closing(Site(tmp_path / "run", module_site.domain, "/second")) as second:
         command = second.begin("run", STEADY, str(parameters))
         command.await_line(f"ROS domain {second.domain}, namespace /second ...")
-        command.await_line("Received signal from operator")
+        command.await_line("Position x")
+        command.await_line("Operator is alive")
         second.namespace = ""  # as in another terminal
         services = status(second, until=lambda row: row[-1] == "ok")
         assert services.keys() == second.programs

@@ -38,16 +38,16 @@ def test_a_service_that_does_not_start_shows_its_last_words(
 
 
 def test_the_scenario_begins_when_all_services_are_up(
-    small_site: Site, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    site: Site, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     slow = "import sys, time\nif 'services.dead_mans_switch' in sys.orig_argv: time.sleep(6.0)"
     (tmp_path / "sitecustomize.py").write_text(slow)
     monkeypatch.setenv("PYTHONPATH", str(tmp_path), prepend=os.pathsep)  # beside a sourced ROS 2
     scenario = tmp_path / "early.yaml"
-    scenario.write_text("engines: [{at: 1.0, command: turn_on}]")
-    command = small_site.begin("run", str(scenario))
+    scenario.write_text("operator: {pressed: [{from: 0.0}]}\nengines: [{at: 1.0, command: turn_on}]")
+    command = site.begin("run", str(scenario))
     command.await_line("All services are up")
-    time = command.await_line(r"^\[(\d+)\] Turning on engines")[1]
+    time = command.await_line(r"^\[(\d+)\] Engines are on")[1]
     assert 1000 <= int(time) < 4000
 
 
