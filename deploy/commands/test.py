@@ -12,12 +12,7 @@ PASSED, FAILED, NO_TESTS = 0, 1, 5  # exit codes of pytest
 PROCESSORS = os.cpu_count() or 1
 IN_WORKERS = ["--dist", "loadfile", "--no-loadscope-reorder", "-n"]
 PHASES = (
-    [
-        *IN_WORKERS,
-        str(2 * PROCESSORS),
-        "-m",
-        "not timed and not alone",
-    ],  # about half of their time is waiting
+    [*IN_WORKERS, str(2 * PROCESSORS), "-m", "not timed and not alone"],  # many of these tests wait
     [*IN_WORKERS, str(PROCESSORS), "-m", "timed"],
     ["-m", "alone"],
 )

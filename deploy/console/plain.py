@@ -17,7 +17,7 @@ class PlainTerminal:
     def __init__(self) -> None:
         """Read standard input, unless it is closed."""
         self._input = None if sys.stdin is None else sys.stdin.fileno()
-        self._is_terminal = self._input is not None and os.isatty(self._input)  # false after its end
+        self._is_terminal = self._input is not None and os.isatty(self._input)  # after a hang-up, no
         self._typed = b""
 
     def show(self, lines: Iterable[str]) -> None:
