@@ -122,7 +122,11 @@ def test_every_heartbeat_is_a_young_answer_of_one_held_page(history: list[tuple[
         if isinstance(event, Press | Beat):
             event = event._replace(sent=now + event.sent)  # the strategy draws ages
         hold = step(hold, event, now)
-        if isinstance(event, Release) and event.page in ("", holder):
+        if isinstance(event, Release):
+            ends = event.page in ("", holder)
+        else:
+            ends = event.page == holder and now - event.sent > MAX_NONCE_AGE
+        if ends:
             holder = ""
         if not hold.alive:
             continue
