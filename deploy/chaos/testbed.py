@@ -75,7 +75,7 @@ class Testbed:
     """Arms, and the observer that records them until the end of the `with`."""
 
     __test__ = False  # pytest shall not collect it
-    lead = 1.0  # s from the start of the first arm to the origin of the scenario
+    lead = 3.0  # s from the start of the first arm to the origin of the scenario
     discovery_range = "LOCALHOST"  # ROS_AUTOMATIC_DISCOVERY_RANGE
 
     def __init__(

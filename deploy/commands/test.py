@@ -1,4 +1,4 @@
-"""`make test`: most tests share the processors; those with bounds of time follow, few at a time or alone."""
+"""`make test`: most tests keep all processors busy; those with bounds of time follow."""
 
 from __future__ import annotations
 
@@ -10,12 +10,7 @@ from collections.abc import Sequence
 
 PASSED, FAILED, NO_TESTS = 0, 1, 5  # exit codes of pytest
 PROCESSORS = os.cpu_count() or 1
-IN_WORKERS = ["--dist", "loadfile", "--no-loadscope-reorder", "-n"]
-PHASES = (
-    [*IN_WORKERS, str(2 * PROCESSORS), "-m", "not timed and not alone"],  # many of these tests wait
-    [*IN_WORKERS, str(PROCESSORS), "-m", "timed"],
-    ["-m", "alone"],
-)
+PHASES = {"not timed": 2 * PROCESSORS, "timed": PROCESSORS + 1}  # workers: many tests wait
 
 
 def main(arguments: Sequence[str]) -> int:
@@ -23,8 +18,9 @@ def main(arguments: Sequence[str]) -> int:
     # All workers use what one of them has compiled.
     environment = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
     codes = []
-    for options in PHASES:
-        command = [sys.executable, "-m", "pytest", *options, *arguments]
+    for marked, workers in PHASES.items():
+        options = ["--dist", "loadfile", "--no-loadscope-reorder", "-n", str(workers)]
+        command = [sys.executable, "-m", "pytest", *options, "-m", marked, *arguments]
         codes.append(subprocess.call(command, env=environment))
         if codes[-1] not in (PASSED, FAILED, NO_TESTS):
             return codes[-1]

@@ -18,7 +18,7 @@ from interfaces.topics import ENGINES_STATE, OFF, ON, OPERATOR_HEARTBEAT
 from .experiments import experiment
 
 DISCOVERY = 10.0  # s until a lost host is discovered again
-pytestmark = [pytest.mark.alone, pytest.mark.timeout(120)]
+pytestmark = [pytest.mark.timed, pytest.mark.timeout(120)]
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,7 @@ from interfaces.topics import DRIVE_TIMEOUT, ENGINES, OPERATOR_HEARTBEAT, OPERAT
 
 from .experiments import Experiment, experiment
 
-pytestmark = [pytest.mark.alone, pytest.mark.timeout(180)]
+pytestmark = [pytest.mark.timed, pytest.mark.timeout(180)]
 
 
 @pytest.fixture(scope="module")

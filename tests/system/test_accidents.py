@@ -57,20 +57,20 @@ def test_it_starts_again_when_supervisord_is_killed(small_site: Site) -> None:
     assert small_site.members == {}
 
 
-def test_orphans_of_a_killed_supervisord_are_reported_until_they_are_stopped(site: Site) -> None:
-    assert site.do("start", STEADY)[0] == 0
-    console = site.begin("console")
+def test_orphans_of_a_killed_supervisord_are_reported_until_they_are_stopped(small_site: Site) -> None:
+    assert small_site.do("start", STEADY)[0] == 0
+    console = small_site.begin("console")
     console.await_line("Engines are off")
-    os.kill(site.members[""], signal.SIGKILL)
-    console.await_line(f"supervisord has died; {len(site.programs)} services go on without it")
+    os.kill(small_site.members[""], signal.SIGKILL)
+    console.await_line(f"supervisord has died; {len(small_site.programs)} services go on without it")
     assert console.wait() == 0
-    assert site.members.keys() == site.programs
-    code, printed = site.do("status")
+    assert small_site.members.keys() == small_site.programs
+    code, printed = small_site.do("status")
     assert code == 1
     assert "supervisord has died" in printed
-    assert site.do("stop")[0] == 0
-    assert site.members == {}
-    assert site.do("stop") == (0, "Nothing runs.")
+    assert small_site.do("stop")[0] == 0
+    assert small_site.members == {}
+    assert small_site.do("stop") == (0, "Nothing runs.")
 
 
 def test_start_replaces_the_orphans_of_a_killed_supervisord(small_site: Site) -> None:
