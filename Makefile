@@ -4,7 +4,7 @@ PYTHON ?=
 SCENARIO ?= demo
 PARAMETERS ?=
 WEB ?=
-TESTS ?= tests interfaces/reactive_node deploy/runtime --ignore=tests/page/browser
+TESTS ?= tests interfaces/reactive_node --ignore=tests/page/browser
 MINUTES ?= 5
 SEED ?=
 HOURS ?= 1
@@ -36,8 +36,8 @@ help:
 	@echo "make chaos    break a system on purpose and check its promises  (MINUTES=5 SEED= CHAOS=--help for more)"
 	@echo "make simulate the same in virtual time, hours in minutes  (HOURS=1 SEED= SCHEDULE=file SIMULATE=--help for more)"
 	@echo "make replay   feed a record through today's services and show what differs  (RECORD= REPLAY=--help for more)"
-	@echo "make test     run the tests                       (TESTS=tests/component for a part,"
-	@echo "                                                  TESTS=tests/page/browser for the page in a Chromium)"
+	@echo "make test     test the arm                        (TESTS=tests/component for a part, TESTS=deploy/runtime"
+	@echo "                                                  for its rclpy, TESTS=tests/page/browser for a Chromium)"
 	@echo "make mutants  change the safety path in every small way: do the tests notice?  (MODULES= for a part)"
 	@echo "make bench    measure the costs of rclpy on this machine"
 	@echo "make check    ruff, mypy, import rules, shellcheck, yamllint"

@@ -27,7 +27,8 @@ def checkout(tmp_path: Path) -> Path:
     """A checkout with the files of the set-up and of `make stop`."""
     checkout = tmp_path / "checkout"
     for name in ("requirements", "supervision", "commands", "console"):
-        shutil.copytree(ROOT / "deploy" / name, checkout / "deploy" / name)
+        ignored = shutil.ignore_patterns("__pycache__")  # other workers write there
+        shutil.copytree(ROOT / "deploy" / name, checkout / "deploy" / name, ignore=ignored)
     for name in ("Makefile", "deploy/__init__.py", "deploy/supervisord.conf"):
         shutil.copyfile(ROOT / name, checkout / name)
     return checkout

@@ -141,9 +141,10 @@ def test_released_trigger_of_a_gamepad_releases(arm: Arm, hand: HandOnPage) -> N
 @undisturbed
 def test_second_finger_changes_nothing(arm: Arm, hand: HandOnPage) -> None:
     fingers = Fingers(hand)
+    hold_with_engines_on(arm, hand, lambda: fingers.put(0, hand.point()), fingers.lift)
+    hand.page.wait_for_selector("#engines[data-state=on]", timeout=5000)  # no note moves the buttons any more
     box = hand.page.locator("#turn-off").bounding_box()
     elsewhere = (box["x"] + 20, box["y"] + 10)
-    hold_with_engines_on(arm, hand, lambda: fingers.put(0, hand.point()), fingers.lift)
     fingers.put(1, elsewhere)
     arm.record.await_beats(time.time(), 5)
     fingers.put(1, (elsewhere[0] + 3, elsewhere[1] + 3))
