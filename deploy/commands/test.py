@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 PASSED, FAILED, NO_TESTS = 0, 1, 5  # exit codes of pytest
 PROCESSORS = os.cpu_count() or 1
-PHASES = {"not timed": 2 * PROCESSORS, "timed": PROCESSORS + 1}  # workers: many tests wait
+PHASES = {"not timed": 2 * PROCESSORS, "timed": PROCESSORS}  # workers: many tests wait
 
 
 def main(arguments: Sequence[str]) -> int:

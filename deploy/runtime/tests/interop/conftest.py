@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import fcntl
 import hashlib
-import os
 import queue
 import shutil
 import subprocess
@@ -41,12 +41,13 @@ def peer_program(pytestconfig: pytest.Config, tmp_path_factory: pytest.TempPathF
     cache = getattr(pytestconfig, "cache", None)
     folder = cache.mkdir("interop") if cache is not None else tmp_path_factory.mktemp("interop")
     program: Path = folder / hashlib.sha256(SOURCE.read_bytes()).hexdigest()[:16]
-    if not program.exists():
-        built = tmp_path_factory.mktemp("build") / "peer"
-        options = ["-std=c++17", "-O1", "-Wall", "-Wextra", "-Werror"]
-        subprocess.run([compiler, *options, "-o", str(built), str(SOURCE), *LIBRARIES], check=True)
-        # The last step is a rename, so a program of this name is always complete.
-        os.replace(shutil.copy(built, program.with_suffix(".new")), program)
+    with program.with_suffix(".lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)  # one worker builds it for all
+        if not program.exists():
+            built = program.with_suffix(".new")
+            options = ["-std=c++17", "-O1", "-Wall", "-Wextra", "-Werror"]
+            subprocess.run([compiler, *options, "-o", str(built), str(SOURCE), *LIBRARIES], check=True)
+            built.rename(program)  # at once: a program of this name is always complete
     return program
 
 
