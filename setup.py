@@ -24,6 +24,7 @@ ELSEWHERE = (
     "interfaces/reactive_node",
     "deploy/runtime",
     "deploy/package",
+    "deploy/benchmarks",
     "deploy/chaos",
     "deploy/mutants",
 )

@@ -1,0 +1,39 @@
+"""rclpy with plain callbacks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import rclpy
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from std_msgs.msg import UInt8MultiArray
+
+from deploy.benchmarks.link import Item, Job, Link
+
+
+class Connection(Link):
+    """A node with publishers and subscriptions."""
+
+    make_node: Callable[[str], Node] = Node
+
+    def __init__(self, job: Job) -> None:
+        super().__init__(job)
+        rclpy.init(args=[])
+        self.node = type(self).make_node(job.role)
+        self.qos = QoSProfile(depth=job.depth)
+
+    def publisher(self, topic: str) -> Callable[[Item], object]:
+        publisher = self.node.create_publisher(UInt8MultiArray, topic, self.qos)
+        return lambda item: publisher.publish(UInt8MultiArray(data=item))
+
+    def subscribe(self, topic: str, on_item: Callable[[Any], object]) -> None:
+        self.node.create_subscription(UInt8MultiArray, topic, lambda message: on_item(message.data), self.qos)
+
+    def wait(self, seconds: float) -> None:
+        rclpy.spin_once(self.node, timeout_sec=seconds)
+
+    def close(self) -> None:
+        self.node.destroy_node()
+        rclpy.try_shutdown()
