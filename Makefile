@@ -14,6 +14,7 @@ CHAOS ?=
 RECORD ?=
 REPLAY ?=
 MODULES ?=
+BENCH ?=
 SHELL := /bin/sh
 MAKEFLAGS += --no-print-directory
 PY := .venv/bin/python
@@ -39,7 +40,7 @@ help:
 	@echo "make test     test the arm                        (TESTS=tests/component for a part, TESTS=deploy/runtime"
 	@echo "                                                  for its rclpy, TESTS=tests/page for its page)"
 	@echo "make mutants  change the safety path in every small way: do the tests notice?  (MODULES= for a part)"
-	@echo "make bench    measure the costs of rclpy on this machine"
+	@echo "make bench    compare the costs with those of the alternatives  (BENCH=\"--rounds 5\", minutes each)"
 	@echo "make check    ruff, mypy, import rules, shellcheck, yamllint"
 	@echo "make setup    only set up .venv                   (PYTHON= chooses the interpreter, 3.11 to 3.13)"
 
@@ -72,7 +73,7 @@ mutants: setup
 	@exec $(HOLD) $(PY) -m deploy.mutants $(MODULES)
 
 bench: setup
-	@$(PY) deploy/runtime/benchmarks/run.py
+	@exec $(HOLD) $(PY) -m deploy.benchmarks $(BENCH)
 
 check: setup
 	@$(PY) -m ruff check .

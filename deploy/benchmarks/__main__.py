@@ -1,0 +1,125 @@
+"""`make bench`: compare this system with its alternatives, on the same work in one interleaved run.
+
+A source publishes items, a middle process maps and publishes them again, a sink receives them. Then a source
+floods a sink, and a source starts while a sink waits. Each round measures all alternatives, so a busy machine
+affects all alike. CPU time is that of whole processes. What cannot be measured here is named with the reason.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import platform
+import subprocess
+import sys
+import time
+from collections.abc import Iterable, Iterator, Sequence
+from importlib import metadata
+from pathlib import Path
+
+from deploy.benchmarks import environment
+from deploy.benchmarks.alternatives import ALTERNATIVES, BENCH_PYTHON, Alternative
+from deploy.benchmarks.measurement import SCENARIOS, MeasurementFailed, measure
+from deploy.benchmarks.table import tables
+from deploy.commands.setup import system_rclpy
+from deploy.supervision import interruption
+from deploy.supervision.processes import ROOT, run_directory
+
+
+def present(alternatives: Iterable[Alternative], refused: dict[str, str]) -> list[Alternative]:
+    """Return the alternatives that can be measured; print the others with the reason, one line each."""
+    found = []
+    for each in alternatives:
+        interruption.check()
+        if each.ros and not system_rclpy():
+            reason = "ROS 2 is not sourced in this shell"
+        else:
+            reason = refused.get(each.requirements) or each.missing()
+        if reason:
+            print(f"absent: {each.title}: {reason}", flush=True)
+        else:
+            found.append(each)
+    return found
+
+
+def compare(alternatives: Sequence[Alternative], rounds: int) -> Iterator[tuple[str, dict[str, float]]]:
+    """Yield the figures of each measurement with the alternative's title; a round measures all of them."""
+    began = time.monotonic()
+    for number in range(1, rounds + 1):
+        for scenario in SCENARIOS:
+            print(f"round {number} of {rounds}, {scenario.key}, {time.monotonic() - began:.0f} s", flush=True)
+            for each in alternatives:
+                try:
+                    yield each.title, measure(each, scenario)
+                except MeasurementFailed as error:
+                    print(f"no figures: {each.title}, {scenario.key}: {error}", flush=True)
+
+
+def machine() -> str:
+    """Return when and where this runs, in one line."""
+    models = [
+        line for line in Path("/proc/cpuinfo").read_text().splitlines() if line.startswith("model name")
+    ]
+    model = models[0].partition(":")[2].strip() if models else platform.machine()
+    cores = len(os.sched_getaffinity(0))
+    load = os.getloadavg()[0]
+    return (
+        f"{time.strftime('%Y-%m-%d')}, {cores} cores of {model}, Linux {platform.release()}, "
+        f"Python {platform.python_version()}, load {load:.1f} at the start"
+    )
+
+
+def versions() -> str:
+    """Return the versions of what was measured from PyPI."""
+    (site,) = (BENCH_PYTHON.parents[1] / "lib").glob("python*/site-packages")
+    names = ("cyclonedds", "reactivex", "dora-rs", "eclipse-zenoh", "pyzmq", "iceoryx2")
+    found = {each.name: each.version for each in metadata.distributions(path=[str(site)])}
+    return ", ".join(f"{name} {found[name]}" for name in names if name in found)
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Run the command line; return the exit code."""
+    parser = argparse.ArgumentParser(prog="make bench", description=__doc__)
+    parser.add_argument("--rounds", type=int, default=3, help="how many times to measure (3)")
+    rounds = parser.parse_args(arguments).rounds
+    interruption.install()
+    results: dict[str, dict[str, list[float]]] = {}
+    code = 0
+    try:
+        needed = {each.requirements for each in ALTERNATIVES if each.requirements} | {environment.CHART}
+        found = present(ALTERNATIVES, environment.prepare(sorted(needed)))
+        print(f"{machine()}; {versions()}", flush=True)
+        results |= {each.title: {} for each in found}
+        for title, figures in compare(found, rounds):
+            for name, value in figures.items():
+                results[title].setdefault(name, []).append(value)
+    except interruption.Interrupted:
+        print("Interrupted. So far:", flush=True)
+        code = 130
+    except environment.EnvironmentFailed as error:
+        print(error, file=sys.stderr)
+        return 1
+    if any(results.values()):
+        interruption.ignore()
+        print(f"\n{tables(results)}\n")
+        return _write(results) or code
+    return code
+
+
+def _write(results: dict[str, dict[str, list[float]]]) -> int:
+    """Write the figures and the chart; return the exit code."""
+    directory = run_directory() / "bench"
+    directory.mkdir(parents=True, exist_ok=True)
+    file, chart = directory / "results.json", directory / "chart.svg"
+    file.write_text(json.dumps(results, indent=1))
+    command = [str(BENCH_PYTHON), "-m", "deploy.benchmarks.chart", str(file), str(chart)]
+    if subprocess.run(command, cwd=ROOT, start_new_session=True).returncode:
+        print("The chart was not drawn.", file=sys.stderr)
+        return 1
+    print(f"Figures: {file}\nChart: {chart}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

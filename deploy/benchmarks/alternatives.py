@@ -1,0 +1,99 @@
+"""The compared alternatives, and how their processes are started."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from deploy.benchmarks.link import FIRST, LAST, MIDDLE, SINK, SOURCE, Job
+from deploy.supervision.processes import ROOT
+
+BENCH_PYTHON = ROOT / ".venv-bench" / "bin" / "python"
+SYSTEM_PYTHON = ROOT / ".venv" / "bin" / "python"
+_EMBEDDED = [ROOT, ROOT / "interfaces/reactive_node/src", ROOT / "deploy/runtime/src"]
+
+Commands = Callable[["Alternative", Sequence[Job]], list[list[str]]]
+
+
+def job_command(alternative: Alternative, job: Job) -> list[str]:
+    """Return the command of a process; its job goes to a file."""
+    file = Path(job.directory, f"{job.role}.json")
+    file.write_text(json.dumps(asdict(job)))
+    return [str(alternative.python), "-m", "deploy.benchmarks.worker", str(file)]
+
+
+def processes(alternative: Alternative, jobs: Sequence[Job]) -> list[list[str]]:
+    """Return a command for each job."""
+    return [job_command(alternative, job) for job in jobs]
+
+
+def dataflow(alternative: Alternative, jobs: Sequence[Job]) -> list[list[str]]:
+    """Return the command that starts all jobs as the nodes of a dora dataflow."""
+    origin = {job.topic: SOURCE for job in jobs} | ({LAST: MIDDLE} if len(jobs) > 2 else {})
+    listens = {MIDDLE: FIRST, SINK: LAST}
+    nodes = []
+    for job in jobs:
+        python, *arguments = job_command(alternative, job)
+        node = {"id": job.role, "path": python, "args": " ".join(arguments)}
+        outputs = [topic for topic, role in origin.items() if role == job.role]
+        topic = listens.get(job.role)
+        inputs = {topic: {"source": f"{origin[topic]}/{topic}", "queue_size": job.depth}} if topic else {}
+        nodes.append(
+            node | ({"outputs": outputs} if outputs else {}) | ({"inputs": inputs} if inputs else {})
+        )
+    file = Path(jobs[0].directory, "dataflow.yml")
+    file.write_text(json.dumps({"nodes": nodes}))  # JSON is YAML
+    return [[str(BENCH_PYTHON.with_name("dora")), "run", str(file)]]
+
+
+@dataclass(frozen=True)
+class Alternative:
+    """One way to connect three processes."""
+
+    title: str
+    link: str
+    """The module of :mod:`deploy.benchmarks.links`."""
+    requirements: str = ""
+    """The file with what PyPI has of it; '' if it needs nothing but the runtime."""
+    ros: bool = False
+    """Whether it runs on the rclpy of a sourced ROS 2."""
+    commands: Commands = processes
+
+    @property
+    def python(self) -> Path:
+        """The interpreter of its processes."""
+        return SYSTEM_PYTHON if self.ros else BENCH_PYTHON
+
+    @property
+    def environment(self) -> dict[str, str]:
+        """The environment of its processes; what is not ROS 2 must not see it."""
+        inherited = [path for path in [os.environ.get("PYTHONPATH")] if path] if self.ros else []
+        paths = [ROOT] if self.ros else _EMBEDDED
+        return os.environ | {"PYTHONPATH": os.pathsep.join([*map(str, paths), *inherited])}
+
+    def missing(self) -> str:
+        """Return why it cannot be measured here; '' if it can."""
+        command = [str(self.python), "-c", f"import deploy.benchmarks.links.{self.link}"]
+        done = subprocess.run(
+            command, env=self.environment, capture_output=True, text=True, start_new_session=True
+        )
+        return (done.stderr.strip().splitlines() or ["it cannot be imported"])[-1] if done.returncode else ""
+
+
+ALTERNATIVES = (
+    Alternative("ReactiveNode", "reactive"),
+    Alternative("callbacks, same rclpy", "callbacks"),
+    Alternative("rxros2 style, same rclpy", "rxros2"),
+    Alternative("ROS 2, ReactiveNode", "reactive", ros=True),
+    Alternative("ROS 2, callbacks", "callbacks", ros=True),
+    Alternative("ROS 2, rxros2 style", "rxros2", ros=True),
+    Alternative("cyclonedds-python", "cyclone"),
+    Alternative("dora-rs", "dora_nodes", "dora.txt", commands=dataflow),
+    Alternative("eclipse-zenoh", "zenoh_peers", "zenoh.txt"),
+    Alternative("pyzmq", "zeromq", "zeromq.txt"),
+    Alternative("iceoryx2", "iceoryx", "iceoryx.txt"),
+)

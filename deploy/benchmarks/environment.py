@@ -1,0 +1,63 @@
+"""The environment of the alternatives, .venv-bench: made on first use, apart from the system's .venv."""
+
+from __future__ import annotations
+
+import hashlib
+import subprocess
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+
+from deploy.benchmarks.alternatives import BENCH_PYTHON
+from deploy.supervision import interruption
+from deploy.supervision.processes import ROOT
+
+CHART = "chart.txt"
+_REQUIREMENTS = Path(__file__).with_name("requirements")
+_RUNTIME = [ROOT / "deploy/requirements/system.txt", ROOT / "deploy/requirements/runtime.txt"]
+_VENV = BENCH_PYTHON.parents[1]
+_STAMP = _VENV / "made-from"
+
+
+class EnvironmentFailed(Exception):
+    """Why the environment could not be made; a message for the user."""
+
+
+def prepare(names: Iterable[str]) -> dict[str, str]:
+    """
+    Make the environment if it is missing or outdated.
+
+    :param names: files of requirements; each may fail for itself.
+    :return: why pip refused a file, by its name.
+    """
+    files = [*_RUNTIME, *sorted(_REQUIREMENTS.glob("*.txt"))]
+    fingerprint = hashlib.sha256(sys.version.encode() + b"".join(file.read_bytes() for file in files))
+    if _STAMP.exists() and _STAMP.read_text() == fingerprint.hexdigest():
+        return {}
+    print(f"Setting up {_VENV.name} with the alternatives, once; this takes about a minute.", flush=True)
+    _run([sys.executable, "-m", "venv", "--clear", str(_VENV)])
+    for file in _RUNTIME:
+        _install(file)
+    refused = {}
+    for name in names:
+        try:
+            _install(_REQUIREMENTS / name)
+        except EnvironmentFailed as error:
+            refused[name] = str(error)
+    if not refused:  # else the next run tries again
+        _STAMP.write_text(fingerprint.hexdigest())
+    return refused
+
+
+def _install(file: Path) -> None:
+    pip = [str(BENCH_PYTHON), "-m", "pip", "install", "--no-deps", "--no-input", "--quiet"]
+    _run([*pip, "--disable-pip-version-check", "-r", str(file)])
+
+
+def _run(command: list[str]) -> None:
+    done = subprocess.run(command, capture_output=True, text=True)
+    interruption.check()  # Ctrl-C has ended the command
+    if done.returncode:
+        lines = [*done.stdout.splitlines(), *done.stderr.splitlines()]
+        reasons = [line for line in lines if line.startswith("ERROR")] or lines[-1:] or ["no reason given"]
+        raise EnvironmentFailed(reasons[0].removeprefix("ERROR: "))

@@ -1,0 +1,210 @@
+"""Runs the processes of one measurement and returns its figures."""
+
+from __future__ import annotations
+
+import json
+import os
+import socket
+import subprocess
+import tempfile
+import time
+from collections.abc import Sequence
+from contextlib import ExitStack, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from deploy.benchmarks.alternatives import Alternative
+from deploy.benchmarks.link import FIRST, LAST, MIDDLE, SINK, SOURCE, Job
+from deploy.benchmarks.worker import REPORTS
+from deploy.supervision import interruption
+from reactive_node.domains import reserved_domain
+
+WARM_UP = 0.5  # s; connections and caches have settled by then
+SECONDS = 1.5
+_SILENCE = 20.0  # s without a report that an alternative may take
+_GRACE = 3.0  # s to end
+_LOOK = 0.2  # s between two looks for an interruption
+
+
+class MeasurementFailed(Exception):
+    """Why there are no figures; a message for the user."""
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """One kind of work."""
+
+    name: str
+    """`pipeline`, `flood` or `start`."""
+    size: int
+    """Of an item [octets]."""
+    rate: float
+    """Of the source [Hz]; 0 is as fast as it can."""
+
+    @property
+    def key(self) -> str:
+        """The beginning of the names of its figures."""
+        return f"{self.name}.{self.size}"
+
+
+SCENARIOS = (
+    Scenario("pipeline", 8, 200.0),
+    Scenario("pipeline", 1_000, 200.0),
+    Scenario("pipeline", 1_000_000, 20.0),
+    Scenario("pipeline", 10_000_000, 4.0),
+    Scenario("flood", 8, 0.0),
+    Scenario("flood", 1_000, 0.0),
+    Scenario("flood", 1_000_000, 0.0),
+    Scenario("flood", 10_000_000, 0.0),
+    Scenario("start", 8, 1000.0),
+)
+
+
+def measure(
+    alternative: Alternative, scenario: Scenario, *, warm_up: float = WARM_UP, seconds: float = SECONDS
+) -> dict[str, float]:
+    """
+    Return the figures of a scenario, named with its key.
+
+    :param warm_up: from the first item until the measurement [s].
+    :param seconds: of the measurement.
+    :raises MeasurementFailed: if the processes end early or stay silent.
+    """
+    roles = (SINK, MIDDLE, SOURCE) if scenario.name == "pipeline" else (SINK, SOURCE)
+    temporary = tempfile.TemporaryDirectory(prefix="bench-", ignore_cleanup_errors=True)
+    with reserved_domain() as domain_id, temporary as directory:
+        jobs = [
+            Job(
+                alternative.link,
+                role,
+                FIRST if MIDDLE in roles else LAST,
+                scenario.size,
+                scenario.rate,
+                warm_up,
+                seconds,
+                directory,
+            )
+            for role in roles
+        ]
+        with _Run(alternative, jobs, domain_id) as run:
+            began = run.start()
+            first = run.report(SINK, "first")
+            if scenario.name == "start":
+                return {f"{scenario.key}.seconds": first["time"] - began}
+            pid = run.pids[MIDDLE if MIDDLE in roles else SINK]
+            run.report(SINK, "begin")
+            busy = cpu_seconds(pid)
+            end = run.report(SINK, "end")
+            busy = cpu_seconds(pid) - busy
+            memory, threads = _memory(pid)
+    figures = {"cpu_us": 1e6 * busy / end["count"], "megabytes": memory, "threads": threads}
+    if scenario.name == "flood":
+        figures["per_second"] = end["count"] / end["seconds"]
+    else:
+        delivered = 100 * end["count"] / (scenario.rate * end["seconds"])
+        figures |= {"p50_ms": end["p50"], "p99_ms": end["p99"], "delivered": min(100.0, delivered)}
+    return {f"{scenario.key}.{name}": value for name, value in figures.items()}
+
+
+def cpu_seconds(pid: int) -> float:
+    """Return the processor time of a process, with all its threads, also those that have ended."""
+    return time.clock_gettime(~pid << 3 | 2)  # the kernel's name of this clock: clock_getcpuclockid(3)
+
+
+def _memory(pid: int) -> tuple[float, float]:
+    """Return the proportional set size [MB] and the number of threads of a process."""
+    rollup = Path(f"/proc/{pid}/smaps_rollup").read_text().splitlines()
+    kilobytes = next(int(line.split()[1]) for line in rollup if line.startswith("Pss:"))
+    return kilobytes / 1024, len(os.listdir(f"/proc/{pid}/task"))
+
+
+class _Run:
+    """The processes of one measurement; they end with the block."""
+
+    def __init__(self, alternative: Alternative, jobs: Sequence[Job], domain_id: int) -> None:
+        self._alternative = alternative
+        self._jobs = jobs
+        self._directory = jobs[0].directory
+        self._environment = alternative.environment | {
+            "ROS_DOMAIN_ID": str(domain_id),
+            "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+        }
+        self._processes: list[subprocess.Popen[bytes]] = []
+        self._stack = ExitStack()
+        self._seen: list[dict[str, Any]] = []
+        self.pids: dict[str, int] = {}
+
+    def __enter__(self) -> _Run:
+        with ExitStack() as stack:
+            self._reports = stack.enter_context(socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM))
+            self._reports.bind(f"{self._directory}/{REPORTS}")
+            self._reports.settimeout(_LOOK)
+            self._errors = stack.enter_context(open(f"{self._directory}/errors", "wb"))
+            stack.callback(self._end)
+            self._stack = stack.pop_all()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stack.close()
+
+    def start(self) -> float:
+        """Start the source when the others listen; return the time of its start [s, monotonic]."""
+        *listeners, source = self._alternative.commands(self._alternative, self._jobs)
+        for command in listeners:
+            self._popen(command)
+        waiting = [job.role for job in self._jobs if job.role != SOURCE]
+        if listeners:
+            self._await(waiting)
+        began = time.monotonic()
+        self._popen(source)
+        if not listeners:  # one command starts them all
+            self._await(waiting)
+        return began
+
+    def _await(self, roles: Sequence[str]) -> None:
+        for role in roles:
+            self.pids[role] = int(self.report(role, "ready")["pid"])
+
+    def _popen(self, command: list[str]) -> None:
+        process = subprocess.Popen(
+            command,
+            env=self._environment,
+            cwd=self._directory,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=self._errors,
+            start_new_session=True,  # Ctrl-C reaches only the harness, which ends them
+        )
+        self._processes.append(process)
+
+    def report(self, role: str, event: str) -> dict[str, Any]:
+        """Wait for a report of a process."""
+        deadline = time.monotonic() + _SILENCE
+        while True:
+            for report in self._seen:
+                if (report["role"], report["event"]) == (role, event):
+                    return report
+            interruption.check()
+            with suppress(TimeoutError):
+                self._seen.append(json.loads(self._reports.recv(65536)))
+                continue
+            if any(process.poll() is not None for process in self._processes):
+                raise MeasurementFailed(self._last_words() or "a process ended early")
+            if time.monotonic() > deadline:
+                raise MeasurementFailed(f"no {event!r} of the {role} within {_SILENCE:.0f} s")
+
+    def _last_words(self) -> str:
+        lines = Path(self._directory, "errors").read_text(errors="replace").strip().splitlines()
+        return lines[-1] if lines else ""
+
+    def _end(self) -> None:
+        """End all processes; those that a launcher started end when it has ended."""
+        for process in reversed(self._processes):
+            process.terminate()
+        for process in self._processes:
+            try:
+                process.wait(_GRACE)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()

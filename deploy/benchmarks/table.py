@@ -1,0 +1,63 @@
+"""The figures of all rounds as Markdown: medians, and the least and the greatest of the rounds."""
+
+from __future__ import annotations
+
+import statistics
+from collections.abc import Mapping, Sequence
+
+Results = Mapping[str, Mapping[str, Sequence[float]]]
+"""The rounds of each figure, by alternative and by name of the figure."""
+
+SIZES = {8: "8 B", 1_000: "1 kB", 1_000_000: "1 MB", 10_000_000: "10 MB"}
+
+
+def shown(value: float) -> str:
+    """Return a number with two or three digits that count."""
+    if value >= 100:
+        return f"{value:,.0f}"
+    return f"{value:.1f}" if value >= 10 else f"{value:.2f}"
+
+
+def cell(rounds: Sequence[float]) -> str:
+    """Return the median and, in brackets, the least and the greatest round."""
+    if not rounds:
+        return "–"
+    median = shown(statistics.median(rounds))
+    return median if len(rounds) == 1 else f"{median} ({shown(min(rounds))}–{shown(max(rounds))})"
+
+
+def table(title: str, results: Results, figures: Mapping[str, str]) -> str:
+    """Return a table with a row for each alternative; `figures` are headings by name of the figure."""
+    lines = [f"| {title} | {' | '.join(figures.values())} |", f"|---|{'---:|' * len(figures)}"]
+    for name, rounds in results.items():
+        cells = (cell(rounds.get(figure, ())) for figure in figures)
+        lines.append(f"| {name} | {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+def _by_size(figure: str) -> dict[str, str]:
+    return {figure.format(size): heading for size, heading in SIZES.items()}
+
+
+def tables(results: Results) -> str:
+    """Return all tables of the comparison."""
+
+    def ordered(title: str, figure: str) -> str:
+        return table(title, results, _by_size(figure))
+
+    return "\n\n".join(
+        [
+            ordered("pipeline: latency, p50 [ms]", "pipeline.{}.p50_ms"),
+            ordered("pipeline: latency, p99 [ms]", "pipeline.{}.p99_ms"),
+            ordered("pipeline: CPU of the middle process [µs/item]", "pipeline.{}.cpu_us"),
+            ordered("pipeline: proportional set size of the middle process [MB]", "pipeline.{}.megabytes"),
+            ordered("pipeline: delivered [%]", "pipeline.{}.delivered"),
+            ordered("flood: received [items/s]", "flood.{}.per_second"),
+            ordered("flood: CPU of the subscriber [µs/item]", "flood.{}.cpu_us"),
+            table(
+                "the rest",
+                results,
+                {"start.8.seconds": "start to first item [s]", "pipeline.8.threads": "threads of the middle"},
+            ),
+        ]
+    )
