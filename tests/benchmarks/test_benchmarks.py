@@ -1,0 +1,117 @@
+"""The comparison with alternatives: its tables, its absent ones, and a very short measurement."""
+
+from __future__ import annotations
+
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from deploy.benchmarks import __main__ as command
+from deploy.benchmarks import alternatives, measurement, table
+from deploy.benchmarks.alternatives import Alternative
+from deploy.benchmarks.link import LAST, SINK, SOURCE, Job
+from deploy.benchmarks.measurement import MeasurementFailed, Scenario
+from deploy.commands.setup import system_rclpy
+
+
+@pytest.fixture(autouse=True)
+def _installs_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(alternatives, "BENCH_PYTHON", Path(sys.executable))
+    monkeypatch.setattr(alternatives, "SYSTEM_PYTHON", Path(sys.executable))
+
+
+@pytest.mark.parametrize(
+    ("rounds", "text"),
+    [
+        ([], "–"),
+        ([0.1234], "0.12"),
+        ([3.0, 1.0, 20.0], "3.00 (1.00–20.0)"),
+        ([1234.5, 99.94], "667 (99.9–1,234)"),
+    ],
+)
+def test_cell_is_the_median_with_the_extremes(rounds: list[float], text: str) -> None:
+    assert table.cell(rounds) == text
+
+
+def test_table_has_a_row_for_each_alternative_and_a_dash_without_figures() -> None:
+    results = {"a": {"x": [2.0], "y": [3.0]}, "b": {"x": [4.0]}}
+
+    assert table.table("t", results, {"x": "X", "y": "Y"}).splitlines() == [
+        "| t | X | Y |",
+        "|---|---:|---:|",
+        "| a | 2.00 | 3.00 |",
+        "| b | 4.00 | – |",
+    ]
+
+
+def test_absent_alternatives_are_named_with_the_reason(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(command, "system_rclpy", lambda: "")
+    here = Alternative("here", "callbacks")
+    others = (
+        Alternative("sourced", "callbacks", ros=True),
+        Alternative("refused", "zeromq", "zeromq.txt"),
+        Alternative("unknown", "nothing"),
+    )
+
+    assert command.present((here, *others), {"zeromq.txt": "no matching distribution"}) == [here]
+
+    assert capsys.readouterr().out.splitlines() == [
+        "absent: sourced: ROS 2 is not sourced in this shell",
+        "absent: refused: no matching distribution",
+        "absent: unknown: ModuleNotFoundError: No module named 'deploy.benchmarks.links.nothing'",
+    ]
+
+
+def test_failed_measurement_leaves_the_others_their_figures(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def measure(alternative: Alternative, scenario: Scenario) -> dict[str, float]:
+        if alternative.title == "silent":
+            raise MeasurementFailed("no word")
+        return {"x": 1.0}
+
+    monkeypatch.setattr(command, "measure", measure)
+    monkeypatch.setattr(command, "SCENARIOS", (Scenario("start", 8, 0.0),))
+    silent, good = Alternative("silent", "callbacks"), Alternative("good", "callbacks")
+
+    assert list(command.compare([silent, good], 2)) == [("good", {"x": 1.0})] * 2
+    assert "no figures: silent, start.8: no word\n" in capsys.readouterr().out
+
+
+def test_dora_dataflow_joins_source_and_sink(tmp_path: Path) -> None:
+    jobs = [Job("dora_nodes", role, LAST, 8, 0.0, 0.0, 1.0, str(tmp_path)) for role in (SINK, SOURCE)]
+
+    ((_, run, file),) = alternatives.dataflow(Alternative("dora", "dora_nodes"), jobs)
+
+    assert run == "run"
+    text = Path(file).read_text()
+    assert '"outputs": ["last"]' in text
+    assert '"inputs": {"last": {"source": "source/last", "queue_size": 1000}}' in text
+
+
+def test_processor_time_of_a_process_is_that_of_all_its_threads() -> None:
+    end = time.process_time() + 0.05
+    while time.process_time() < end:
+        pass
+
+    assert measurement.cpu_seconds(0) == pytest.approx(time.process_time(), abs=0.01)
+
+
+def test_short_pipeline_of_this_system_has_figures() -> None:
+    here = Alternative("ReactiveNode", "reactive", ros=bool(system_rclpy()))
+
+    figures = measurement.measure(here, Scenario("pipeline", 8, 200.0), warm_up=0.1, seconds=0.2)
+
+    assert set(figures) == {
+        f"pipeline.8.{name}" for name in ("p50_ms", "p99_ms", "cpu_us", "megabytes", "threads", "delivered")
+    }
+    assert all(value > 0 for value in figures.values())
+
+
+def test_process_that_ends_early_is_one_line() -> None:
+    with pytest.raises(MeasurementFailed, match="No module named"):
+        measurement.measure(Alternative("x", "nothing"), Scenario("start", 8, 0.0))
