@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 from std_msgs.msg import UInt8MultiArray
 
 from deploy.benchmarks.links import callbacks
@@ -9,10 +12,17 @@ from reactive_node import ReactiveNode
 
 
 class Connection(callbacks.Connection):
-    """A reactive node; its middle process is one recipe."""
+    """A reactive node: its topics are observables, its middle process is one recipe."""
 
     make_node = ReactiveNode
     node: ReactiveNode
+
+    def subscribe(self, topic: str, on_item: Callable[[Any], object]) -> None:
+        def receive(message: Any) -> None:
+            on_item(message.data)
+
+        items = self.node.create_observable(UInt8MultiArray, topic, self.qos)
+        items.subscribe(receive, scheduler=self.node.scheduler)
 
     def forward(self, source: str, target: str) -> None:
         items = self.node.create_observable(UInt8MultiArray, source, self.qos)

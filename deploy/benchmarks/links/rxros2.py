@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from reactivex import operators
@@ -16,11 +17,19 @@ def _copy(message: Any) -> Any:
 
 
 class Connection(callbacks.Connection):
-    """A node whose subscription feeds a subject, and whose publisher observes."""
+    """A node whose subscriptions feed subjects, and whose publisher observes."""
+
+    def subscribe(self, topic: str, on_item: Callable[[Any], object]) -> None:
+        def receive(message: Any) -> None:
+            on_item(message.data)
+
+        self._from_topic(topic).subscribe(receive)
 
     def forward(self, source: str, target: str) -> None:
-        items: Subject[Any] = Subject()
         publisher = self.node.create_publisher(UInt8MultiArray, target, self.qos)
-        copies = items.pipe(operators.map(_copy))
-        copies.subscribe(publisher.publish)
-        self.node.create_subscription(UInt8MultiArray, source, items.on_next, self.qos)
+        self._from_topic(source).pipe(operators.map(_copy)).subscribe(publisher.publish)
+
+    def _from_topic(self, topic: str) -> Subject[Any]:
+        items: Subject[Any] = Subject()
+        self.node.create_subscription(UInt8MultiArray, topic, items.on_next, self.qos)
+        return items
