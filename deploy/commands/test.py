@@ -1,4 +1,4 @@
-"""`make test`: most tests keep all processors busy; those with bounds of time follow."""
+"""`make test`: most tests share the processors; those with bounds of time follow, few at a time or alone."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 PASSED, FAILED, NO_TESTS = 0, 1, 5  # exit codes of pytest
 PROCESSORS = os.cpu_count() or 1
-PHASES = {"not timed": 2 * PROCESSORS, "timed": PROCESSORS}  # workers: many tests wait
+PHASES = {"not timed and not alone": 2 * PROCESSORS, "timed": PROCESSORS, "alone": 1}  # and their workers
 
 
 def main(arguments: Sequence[str]) -> int:

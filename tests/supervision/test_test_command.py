@@ -11,7 +11,7 @@ from deploy.commands import test as command
 
 @pytest.mark.parametrize(
     ("codes", "result"),
-    [([5, 5], 5), ([0, 5], 0), ([5, 0], 0), ([1, 0], 1), ([5, 1], 1), ([2], 2), ([0, 3], 3)],
+    [([5, 5, 5], 5), ([0, 5, 5], 0), ([5, 0, 5], 0), ([1, 0, 0], 1), ([0, 5, 1], 1), ([2], 2), ([0, 3], 3)],
 )
 def test_exit_code_is_the_worst_and_an_interruption_ends_it(
     monkeypatch: pytest.MonkeyPatch, codes: list[int], result: int
@@ -29,7 +29,7 @@ def test_every_test_runs_once_and_those_with_bounds_of_time_among_themselves(
     monkeypatch.setattr(subprocess, "call", lambda command, env: commands.append(command) or 0)
     command.main(["tests/system", "-x"])
     assert [each[-4:] for each in commands] == [
-        ["-m", mark, "tests/system", "-x"] for mark in ("not timed", "timed")
+        ["-m", mark, "tests/system", "-x"] for mark in ("not timed and not alone", "timed", "alone")
     ]
 
 

@@ -33,7 +33,7 @@ def by_words(output: str) -> dict[str, list[tuple[float, list[float]]]]:
     return grouped
 
 
-@pytest.mark.timed
+@pytest.mark.alone
 def test_the_operator_reads_what_the_thesis_shows(site: Site) -> None:
     command = site.begin("run", "listing_5_9")
     command.await_line("Turning off engines", 60)
