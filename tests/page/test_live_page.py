@@ -108,7 +108,7 @@ def hold(hand: Hand, observer: Observer) -> None:
 def test_release_is_visible_at_once(hand: Hand, observer: Observer) -> None:
     hold(hand, observer)
     delays = []
-    for _ in range(10):
+    for _ in range(20):
         hand.press()
         observer.watch(0.2)
         released = hand.release()

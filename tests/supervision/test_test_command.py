@@ -22,7 +22,7 @@ def test_exit_code_is_the_worst_and_an_interruption_ends_it(
     assert left == []
 
 
-def test_every_test_runs_once_and_those_with_bounds_of_time_among_themselves(
+def test_every_test_runs_once_and_those_with_bounds_of_time_beside_few(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     commands: list[list[str]] = []
@@ -31,6 +31,9 @@ def test_every_test_runs_once_and_those_with_bounds_of_time_among_themselves(
     assert [each[-4:] for each in commands] == [
         ["-m", mark, "tests/system", "-x"] for mark in ("not timed and not alone", "timed", "alone")
     ]
+    many, few, one = (int(each[each.index("-n") + 1]) for each in commands)
+    assert many > few
+    assert one == 1
 
 
 def test_workers_share_compiled_modules(monkeypatch: pytest.MonkeyPatch) -> None:
