@@ -21,7 +21,8 @@ from interfaces.topics import ALIVE, INCAPACITATED, MISSED, TURN_OFF
 from reactive_node import stamps
 from reactive_node.stamps import Timestamp
 
-FIRST_SAMPLE_AFTER_RESTART = 0.1  # s, so that a successor soon reports the operator
+READING = 0.05  # s between two looks for a heartbeat: thousands of them cost no more than those of a switch
+FIRST_SAMPLE_AFTER_RESTART = 2.5 * READING  # so that a successor soon reports the operator
 
 
 class Activity(NamedTuple):
@@ -90,7 +91,10 @@ def wire(node: ServiceNode) -> None:
     def warn(activity: Activity) -> None:
         node.get_logger().warning(f"operator {activity.conclusion}")
 
-    heartbeats = node.observe(topics.OPERATOR_HEARTBEAT, timestamped=True, max_age=given.lifespan)
+    reading = min(READING, given.sampling, given.lifespan / 2)
+    heartbeats = node.observe(
+        topics.OPERATOR_HEARTBEAT, timestamped=True, sampled=reading, max_age=given.lifespan
+    )
     first = min(FIRST_SAMPLE_AFTER_RESTART, given.sampling) if origin.is_past else given.sampling
     # Silences count from the origin of the scenario: before it, no operator is expected.
     activity = origin.delay_subscription(operator_activity(heartbeats, given, first=first)).share()

@@ -44,6 +44,7 @@ GUARDS: dict[str, tuple[str, ...]] = {
         for name in (
             "publishing",
             "observables",
+            "sampled",
             "parameters",
             "events",
             "calls",
@@ -52,6 +53,7 @@ GUARDS: dict[str, tuple[str, ...]] = {
             "actions",
         )
     ),
+    f"{REACTIVE_NODE}/sampled_reader.py": (f"{_NODE_TESTS}/test_sampled.py",),
     f"{REACTIVE_NODE}/shared_reader.py": (
         f"{_NODE_TESTS}/test_observables.py",
         f"{_NODE_TESTS}/test_events.py",

@@ -75,17 +75,25 @@ class ServiceNode(ReactiveNode):
         return self.declare_parameter(name, default, descriptor).value
 
     def observe(
-        self, topic: Topic, *, timestamped: bool = False, max_age: float | None = None
+        self,
+        topic: Topic,
+        *,
+        timestamped: bool = False,
+        sampled: float | None = None,
+        max_age: float | None = None,
     ) -> Observable[Any]:
         """
         Return the good messages of a topic; the others are dropped and reported.
 
         :param timestamped: see :meth:`ReactiveNode.create_observable`.
+        :param sampled: the same; not for a latched topic.
         :param max_age: a message that is older [s], or this much ahead of the local clock, is not good.
         """
         self._observed[self.resolve_topic_name(topic.name)] = topic
         samples = (
-            self._from_every_publisher(topic) if is_latched(topic.qos) else self._samples(topic, topic.qos)
+            self._from_every_publisher(topic)
+            if is_latched(topic.qos)
+            else self._samples(topic, topic.qos, sampled=sampled)
         )
 
         def read(sample: Timestamp[bytes]) -> Any | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from typing import Any
 from unittest import mock
@@ -10,6 +11,7 @@ import pytest
 from rclpy.parameter import Parameter
 from std_msgs.msg import Bool
 
+from interfaces.service import ServiceNode
 from interfaces.topics import (
     ALIVE,
     ENGINES,
@@ -79,26 +81,61 @@ def test_heartbeat_older_than_the_lifespan_is_dropped_and_counted(
     assert watchdog.reports()[-1]["dropped"] == "1"
 
 
+def test_of_a_burst_of_heartbeats_the_newest_is_judged(
+    wired: Any, spin_until: SpinUntil, spin_for: SpinFor, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    watchdog = wired()
+    monkeypatch.setattr(watchdog.service, "age", lambda _: 0.501)
+    for _ in range(50):
+        watchdog.publish(OPERATOR_HEARTBEAT, Bool(data=True))
+    spin_until(lambda: watchdog.service.health._dropped)
+    spin_for(0.1)
+    watchdog.remarks()
+    assert int(watchdog.reports()[-1]["dropped"]) < 5
+
+
+@pytest.mark.parametrize(
+    ("sampling", "lifespan", "period"), [(0.5, 0.5, 0.05), (0.02, 0.5, 0.02), (0.5, 0.06, 0.03)]
+)
+def test_heartbeats_are_read_by_the_clock_before_they_are_old(
+    wired: Any, monkeypatch: pytest.MonkeyPatch, sampling: float, lifespan: float, period: float
+) -> None:
+    observe = mock.Mock(wraps=ServiceNode.observe)
+    monkeypatch.setattr(ServiceNode, "observe", lambda *given, **options: observe(*given, **options))
+    wired(sampling=sampling, lifespan=lifespan)
+    (call,) = (each for each in observe.mock_calls if each.args[1] is OPERATOR_HEARTBEAT)
+    assert call.kwargs["sampled"] == pytest.approx(period)
+    assert call.kwargs["max_age"] == lifespan
+
+
 def test_silences_are_missed_then_incapacitated_then_turn_off(
     wired: Any, spin_until: SpinUntil, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     begin = time.monotonic()
-    watchdog = wired(silence=0.4, strikes=2, repeat=0.1)
+    repeat = 0.05  # s
+    watchdog = wired(silence=0.4, strikes=2, repeat=repeat)
     logged: list[str] = []
+    threads: set[int] = set()
     logger = watchdog.service.get_logger()
-    monkeypatch.setattr(logger, "warning", logged.append)
+
+    def warn(text: str) -> None:
+        logged.append(text)
+        threads.add(threading.get_ident())
+
+    monkeypatch.setattr(logger, "warning", warn)
     monkeypatch.setattr(watchdog.service, "get_logger", lambda: logger)
-    spin_until(lambda: len(watchdog.heard[ENGINES.name]) >= 4)
+    spin_until(lambda: len(watchdog.heard[ENGINES.name]) >= 40)  # at the default period, they would take 20 s
     took = time.monotonic() - begin
 
     assert data(watchdog, OPERATOR_ACTIVITY) == [MISSED, MISSED, INCAPACITATED]
     assert data(watchdog, ENGINES) == [TURN_OFF] * len(watchdog.heard[ENGINES.name])
     assert watchdog.heard[OPERATOR_PRESENCE.name] == []
     assert logged == [f"operator {MISSED}", f"operator {MISSED}", f"operator {INCAPACITATED}"]
-    assert 0.8 + 0.3 <= took < 0.8 + 3 * 0.5  # three of the repetitions
+    assert threads == {threading.get_ident()}, "that of the executor"
+    assert took >= 2 * 0.4 + 38 * repeat
 
 
-@pytest.mark.parametrize(("sampling", "first"), [(9.0, 0.1), (0.02, 0.02)])
+@pytest.mark.parametrize(("sampling", "first"), [(9.0, 0.125), (0.02, 0.02)])
 def test_watchdog_that_resumes_soon_reports_the_operator(
     wired: Any, monkeypatch: pytest.MonkeyPatch, sampling: float, first: float
 ) -> None:

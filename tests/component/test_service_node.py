@@ -482,3 +482,19 @@ def test_new_subscriber_receives_the_health_at_once(
         heard: list[Any] = []
         make_node(listener).create_subscription(topic.type, topic.name, heard.append, topic.qos)
         spin_until(lambda heard=heard: heard)
+
+
+def test_sampled_topic_is_read_at_its_ticks_only(
+    service: ServiceNode, peer: Node, spin_until: SpinUntil, spin_for: SpinFor
+) -> None:
+    topic = topics.OPERATOR_HEARTBEAT
+    sampled: list[Any] = []
+    each: list[Any] = []
+    service.observe(topic, sampled=3600.0).subscribe(sampled.append)
+    spin_for(0.1)  # the first tick
+    service.observe(topic).subscribe(each.append)
+    publisher = peer.create_publisher(topic.type, topic.name, topic.qos)
+    spin_until(lambda: publisher.get_subscription_count() == 2)
+    publisher.publish(Bool(data=True))
+    spin_until(lambda: each)
+    assert sampled == []

@@ -44,9 +44,10 @@ class Wired:
             topic.name: self.peer.create_publisher(topic.type, topic.name, topic.qos) for topic in inputs
         }
         names = {self.service.resolve_topic_name(topic.name) for topic in outputs}
-        writers = [each for each in self.service.publishers if each.topic_name in names]
-        assert {each.topic_name for each in writers} == names
-        spin_until(lambda: all(each.get_subscription_count() for each in writers))
+        assert names <= {each.topic_name for each in self.service.publishers}
+        own = [each.topic_name for each in self.service.subscriptions]  # it may hear itself
+        # Not by get_subscription_count, which with ROS 2 takes the event `matched` away from health.
+        spin_until(lambda: all(self.service.count_subscribers(name) > own.count(name) for name in names))
         spin_until(self.reports)  # the peer hears all further ones
 
     def publish(self, topic: Topic, message: Any) -> None:

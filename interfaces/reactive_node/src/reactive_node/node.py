@@ -14,7 +14,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import reactivex as rx
-from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.callback_groups import CallbackGroup, ReentrantCallbackGroup
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -25,6 +25,7 @@ from reactivex.disposable import CompositeDisposable, Disposable
 from reactivex.subject import AsyncSubject
 
 from reactive_node import calls
+from reactive_node.sampled_reader import newest, sampled_messages
 from reactive_node.scheduler import NodeScheduler
 from reactive_node.services import Requests
 from reactive_node.shared_reader import SharedReader, retention
@@ -52,6 +53,7 @@ class ReactiveNode(Node):
         qos_profile: QoSProfile | int = 10,
         *,
         timestamped: bool = False,
+        sampled: float | Observable[Any] | None = None,
         **options: Any,
     ) -> Observable[Any]:
         """
@@ -66,8 +68,15 @@ class ReactiveNode(Node):
 
         :param timestamped: whether items are :class:`Timestamp` s of a message and its DDS source time,
             instead of messages.
-        :param options: further arguments of :meth:`rclpy.node.Node.create_subscription`.
+        :param sampled: like the argument of the operator ``sample``, a period [s] or an observable of ticks.
+            At each tick the newest message becomes an item, if it has come since the tick before. What comes
+            in between costs no Python: the reader keeps one message, and only a tick reads it. Late observers
+            get no retained samples, and QoS events are not warned of.
+        :param options: further arguments of :meth:`rclpy.node.Node.create_subscription`; with ``sampled``
+            without ``callback_group`` and ``event_callbacks``.
         """
+        if sampled is not None:
+            return self._create_sampled(msg_type, topic, qos_profile, timestamped, sampled, options)
 
         def create_reader(callback: Callable[..., None]) -> Subscription:
             return self.create_subscription(msg_type, topic, callback, qos_profile, **options)
@@ -81,6 +90,26 @@ class ReactiveNode(Node):
             timestamped=timestamped,
         )
         return Observable(reader.subscribe)
+
+    def _create_sampled(
+        self,
+        msg_type: Any,
+        topic: str,
+        qos_profile: QoSProfile | int,
+        timestamped: bool,
+        sampled: float | Observable[Any],
+        options: dict[str, Any],
+    ) -> Observable[Any]:
+        ticks = sampled if isinstance(sampled, Observable) else rx.timer(0.0, sampled, self.scheduler)
+
+        def create_reader(group: CallbackGroup) -> Subscription:
+            # No QoS events: with Fast DDS, unread messages would end each wait for them at once.
+            events = SubscriptionEventCallbacks(use_default_callbacks=False)
+            given = {"callback_group": group, "event_callbacks": events, **options}
+            return self.create_subscription(msg_type, topic, lambda _: None, newest(qos_profile), **given)
+
+        messages = sampled_messages(self, create_reader, ticks, timestamped=timestamped)
+        return messages.take_until(self._end).share()
 
     def create_parameter_observable(self, name: str) -> Observable[Any]:
         """

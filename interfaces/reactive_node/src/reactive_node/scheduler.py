@@ -59,6 +59,8 @@ class NodeScheduler(PeriodicScheduler):
     simulation that stands still.
     """
 
+    _before_jump: int  # [ns]
+
     def __init__(self, node: Node) -> None:
         """Schedule on the executor of ``node``, in its default callback group."""
         super().__init__()
@@ -76,6 +78,7 @@ class NodeScheduler(PeriodicScheduler):
             self._offset = node.get_clock().now().nanoseconds - self._read()
         self._jumps = node.get_clock().create_jump_callback(
             JumpThreshold(min_forward=Duration(nanoseconds=1), min_backward=Duration(nanoseconds=-1)),
+            pre_callback=self._time_will_jump,
             post_callback=self._time_has_jumped,
         )
 
@@ -223,6 +226,9 @@ class NodeScheduler(PeriodicScheduler):
         clock = self._node.get_clock()
         return isinstance(clock, ROSClock) and bool(clock.ros_time_is_active)
 
+    def _time_will_jump(self) -> None:
+        self._before_jump = self._read()
+
     def _time_has_jumped(self, jump: TimeJump) -> None:
         """Continue this scheduler's time without a jump back, by the same clock or by another one."""
         with self._lock:
@@ -230,11 +236,10 @@ class NodeScheduler(PeriodicScheduler):
                 return
             simulated = self._time_is_simulated()
             if simulated != self._simulated:
-                # If simulated time has ended, its clock already reads real time.
-                before = self._read() - (jump.delta.nanoseconds if self._simulated else 0)
+                # Not by the jump's delta, which ROS 2 leaves at 0 where simulated time begins or ends.
                 self._node.destroy_timer(self._timer)
                 self._use_clock(simulated)
-                self._offset += before - self._read()
+                self._offset += self._before_jump - self._read()
             elif not simulated:
                 return
             elif jump.delta.nanoseconds < 0:

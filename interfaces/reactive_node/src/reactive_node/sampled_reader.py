@@ -1,0 +1,95 @@
+"""A DDS reader that is read by the clock: what arrives between two ticks is never taken from DDS."""
+
+from __future__ import annotations
+
+import copy
+import threading
+from collections.abc import Callable
+from typing import Any
+
+from rclpy.callback_groups import CallbackGroup
+from rclpy.node import Node
+from rclpy.qos import HistoryPolicy, QoSProfile
+from rclpy.subscription import Subscription
+from reactivex import Observable, abc
+from reactivex.disposable import CompositeDisposable, Disposable
+
+from reactive_node import stamps
+from reactive_node.stamps import Timestamp
+
+
+class Unattended(CallbackGroup):
+    """Keeps its entities out of the wait set of an executor."""
+
+    def can_execute(self, entity: Any) -> bool:
+        """Return False."""
+        return False
+
+    def beginning_execution(self, entity: Any) -> bool:
+        """Return False."""
+        return False
+
+    def ending_execution(self, entity: Any) -> None:
+        """Do nothing."""
+
+
+def newest(qos_profile: QoSProfile | int) -> QoSProfile:
+    """Return a QoS whose reader keeps only the newest message."""
+    qos = QoSProfile(depth=qos_profile) if isinstance(qos_profile, int) else copy.copy(qos_profile)
+    qos.history = HistoryPolicy.KEEP_LAST
+    qos.depth = 1
+    return qos
+
+
+def sampled_messages(
+    node: Node,
+    create: Callable[[CallbackGroup], Subscription],
+    ticks: Observable[Any],
+    *,
+    timestamped: bool = False,
+) -> Observable[Any]:
+    """
+    Return the message that a reader holds at each tick, if it has come since the tick before.
+
+    :param create: creates the reader of ``node`` in a callback group.
+    :param timestamped: whether items are :class:`Timestamp` s instead of messages.
+    """
+
+    def subscribe(
+        observer: abc.ObserverBase[Any], scheduler: abc.SchedulerBase | None = None
+    ) -> abc.DisposableBase:
+        subscription = create(Unattended())
+        lock = threading.Lock()
+        is_live = True
+
+        def take() -> tuple[Any, Any] | None:
+            with lock:  # another thread may destroy the reader
+                if not is_live:
+                    return None
+                with subscription.handle:
+                    taken: tuple[Any, Any] | None = subscription.handle.take_message(
+                        subscription.msg_type, subscription.raw
+                    )
+                    return taken
+
+        def read(_: Any) -> None:
+            try:
+                taken = take()
+            except RuntimeError as error:  # RCLError: the octets are no message of this type
+                node.get_logger().warning(f"{subscription.topic_name}: {error}")
+                return
+            if taken is not None:
+                message, info = taken
+                time = stamps.from_nanoseconds(info["source_timestamp"])
+                observer.on_next(Timestamp(message, time) if timestamped else message)
+
+        def destroy() -> None:
+            nonlocal is_live
+            with lock:
+                is_live = False
+                node.destroy_subscription(subscription)
+
+        reading = ticks.subscribe(read, observer.on_error, observer.on_completed, scheduler=scheduler)
+        return CompositeDisposable(reading, Disposable(destroy))
+
+    return Observable(subscribe)

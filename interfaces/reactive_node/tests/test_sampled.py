@@ -1,0 +1,252 @@
+"""Topics that are read by the clock, not when a message arrives."""
+
+from __future__ import annotations
+
+import threading
+import time
+from datetime import UTC, datetime, timedelta
+from typing import Any
+from unittest import mock
+
+import pytest
+import reactivex as rx
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from reactivex.subject import Subject
+from std_msgs.msg import Float64, String
+
+from reactive_node import ReactiveNode
+from reactive_node.sampled_reader import Unattended, sampled_messages
+from reactive_node.testing import SpinUntil, VirtualTime
+
+NOW = None  # an item of the ticks
+
+
+class Talker:
+    """Publishes numbers that the peer's own reader has heard when `say` returns."""
+
+    def __init__(self, peer: Node, spin_until: SpinUntil) -> None:
+        self.publisher = peer.create_publisher(Float64, "topic", 10)
+        self._heard: list[float] = []
+        peer.create_subscription(Float64, "topic", lambda message: self._heard.append(message.data), 10)
+        self._spin_until = spin_until
+        self.await_readers(1)
+
+    def await_readers(self, count: int) -> None:
+        self._spin_until(lambda: self.publisher.get_subscription_count() == count)
+
+    def say(self, *numbers: float) -> None:
+        self._heard.clear()
+        for number in numbers:
+            self.publisher.publish(Float64(data=number))
+        self._spin_until(lambda: self._heard == list(numbers))
+
+
+@pytest.fixture
+def talker(peer: Node, spin_until: SpinUntil) -> Talker:
+    return Talker(peer, spin_until)
+
+
+@pytest.fixture
+def ticks() -> Subject[None]:
+    return Subject()
+
+
+def test_tick_reads_the_newest_message_once(
+    node: ReactiveNode, talker: Talker, ticks: Subject[None], spin_until: SpinUntil
+) -> None:
+    received: list[float] = []
+    topic = node.create_observable(Float64, "topic", sampled=ticks)
+    topic.map(lambda message: message.data).subscribe(received.append)
+    talker.await_readers(2)
+
+    ticks.on_next(NOW)
+    assert received == []
+    talker.say(1.0, 2.0, 3.0)
+    assert received == [], "nothing is read between two ticks"
+    spin_until(lambda: ticks.on_next(NOW) or received)
+    assert received == [3.0]
+    ticks.on_next(NOW)
+    assert received == [3.0]
+    talker.say(4.0)
+    spin_until(lambda: ticks.on_next(NOW) or received[1:])
+    assert received == [3.0, 4.0]
+
+
+def test_period_ticks_at_once_and_by_the_scheduler_of_the_node(
+    node: ReactiveNode, scheduler: VirtualTime
+) -> None:
+    subscription = mock.MagicMock(topic_name="/topic")
+    subscription.handle.take_message.return_value = (Float64(), {"source_timestamp": 0})
+    reads: list[float] = []
+    with mock.patch.multiple(node, create_subscription=lambda *_, **__: subscription, scheduler=scheduler):
+        topic = node.create_observable(Float64, "topic", sampled=0.2)
+        topic.subscribe(lambda _: reads.append(scheduler.clock))
+        scheduler.advance_to(0.5)
+    assert reads == pytest.approx([0.0, 0.2, 0.4])
+
+
+def test_message_comes_with_its_source_time(
+    node: ReactiveNode, talker: Talker, ticks: Subject[None], spin_until: SpinUntil
+) -> None:
+    received: list[Any] = []
+    node.create_observable(Float64, "topic", sampled=ticks, timestamped=True).subscribe(received.append)
+    talker.await_readers(2)
+    before = datetime.now(UTC)
+    talker.say(1.0)
+    after = datetime.now(UTC)
+    time.sleep(0.05)
+    spin_until(lambda: ticks.on_next(NOW) or received)
+    assert received[0].value == Float64(data=1.0)
+    assert before - timedelta(milliseconds=1) <= received[0].timestamp <= after
+
+
+def test_raw_message_stays_serialized(
+    node: ReactiveNode, talker: Talker, ticks: Subject[None], spin_until: SpinUntil
+) -> None:
+    received: list[Any] = []
+    node.create_observable(Float64, "topic", sampled=ticks, raw=True).subscribe(received.append)
+    talker.await_readers(2)
+    talker.say(1.0)
+    spin_until(lambda: ticks.on_next(NOW) or received)
+    assert bytes(received[0]) == b"\x00\x01\x00\x00" + b"\x00" * 6 + b"\xf0\x3f"
+
+
+def test_observers_share_a_reader_that_ends_with_the_last(
+    node: ReactiveNode, talker: Talker, ticks: Subject[None], spin_until: SpinUntil
+) -> None:
+    topic = node.create_observable(Float64, "topic", sampled=ticks)
+    assert node.count_subscribers("topic") <= 1, "none but the talker's own"
+    received: tuple[list[Any], list[Any]] = ([], [])
+    first, second = (topic.subscribe(each.append) for each in received)
+    talker.await_readers(2)
+    talker.say(1.0)
+    spin_until(lambda: ticks.on_next(NOW) or all(received))
+    assert [len(each) for each in received] == [1, 1]
+    first.dispose()
+    talker.say(2.0)
+    spin_until(lambda: ticks.on_next(NOW) or received[1][1:])
+    assert [len(each) for each in received] == [1, 2]
+    second.dispose()
+    assert not ticks.observers
+    talker.await_readers(1)
+
+    topic.subscribe(received[0].append)
+    talker.await_readers(2)
+    talker.say(3.0)
+    spin_until(lambda: ticks.on_next(NOW) or received[0][1:])
+
+
+def test_end_of_the_node_completes_it(node: ReactiveNode, ticks: Subject[None]) -> None:
+    ended: list[str] = []
+    topic = node.create_observable(Float64, "topic", sampled=ticks)
+    topic.subscribe(on_completed=lambda: ended.append("early"))
+    node.destroy_node()
+    topic.subscribe(on_completed=lambda: ended.append("late"))
+    assert ended == ["early", "late"]
+    ticks.on_next(NOW)
+
+
+@pytest.mark.parametrize("end", ["on_completed", "on_error"])
+def test_end_of_the_ticks_is_its_end(node: ReactiveNode, ticks: Subject[None], end: str) -> None:
+    ended: list[str] = []
+    node.create_observable(Float64, "topic", sampled=ticks).subscribe(
+        on_error=lambda _: ended.append("on_error"), on_completed=lambda: ended.append("on_completed")
+    )
+    assert list(node.subscriptions)
+    getattr(ticks, end)(*([ValueError()] if end == "on_error" else []))
+    assert ended == [end]
+    assert not [each for each in node.subscriptions if each.topic_name == "/topic"]
+
+
+def test_other_thread_may_dispose_while_it_is_read(node: ReactiveNode, talker: Talker) -> None:
+    for _ in range(50):
+        ticks: Subject[None] = Subject()
+        subscription = node.create_observable(Float64, "topic", sampled=ticks).subscribe()
+        reader = threading.Thread(target=lambda ticks=ticks: [ticks.on_next(NOW) for _ in range(20)])
+        reader.start()
+        subscription.dispose()
+        reader.join()
+
+
+def test_refused_message_is_told_and_the_next_one_read(ticks: Subject[None]) -> None:
+    """Not every middleware refuses the same messages, so a reader of the test does."""
+    taken = mock.Mock(side_effect=[RuntimeError("no String"), (String(data="good"), {"source_timestamp": 0})])
+    subscription = mock.MagicMock(topic_name="/text", handle=mock.MagicMock(take_message=taken))
+    warnings: list[str] = []
+    stub = mock.Mock()
+    stub.get_logger.return_value.warning = warnings.append
+    received: list[Any] = []
+    sampled_messages(stub, lambda group: subscription, ticks).subscribe(received.append)
+    ticks.on_next(NOW)
+    assert (received, warnings) == ([], ["/text: no String"])
+    ticks.on_next(NOW)
+    assert received == [String(data="good")]
+
+
+def test_reading_goes_on_after_a_malformed_message(
+    node: ReactiveNode, peer: Node, ticks: Subject[None], spin_until: SpinUntil
+) -> None:
+    received: list[Any] = []
+    node.create_observable(String, "text", sampled=ticks).subscribe(received.append)
+    publisher = peer.create_publisher(String, "text", 10)
+    spin_until(lambda: publisher.get_subscription_count() == 1)
+    publisher.publish(b"\x00\x01\x00\x00\xff\xff\xff\x7f")
+    ticks.on_next(NOW)
+    publisher.publish(String(data="good"))
+    spin_until(lambda: ticks.on_next(NOW) or (received and received[-1].data == "good"))
+
+
+def test_flood_wakes_no_executor(
+    node: ReactiveNode, talker: Talker, ticks: Subject[None], executor: SingleThreadedExecutor
+) -> None:
+    node.create_observable(Float64, "topic", sampled=ticks).subscribe()
+    talker.await_readers(2)
+    (subscription,) = (each for each in node.subscriptions if each.topic_name == "/topic")
+    subscription.callback = lambda _: pytest.fail("the executor has taken a message")
+    talker.say(*map(float, range(10)))
+    executor.spin_once(timeout_sec=0.1)  # the embedded runtime notices here that it need not wait
+    used = time.process_time()
+    spins = 0
+    end = time.monotonic() + 0.5
+    while time.monotonic() < end:
+        executor.spin_once(timeout_sec=0.1)
+        spins += 1
+    assert spins < 20, "an unread message ends no wait"
+    assert time.process_time() - used < 0.25
+
+
+def test_no_executor_may_run_an_unattended_entity() -> None:
+    group = Unattended()
+    assert not group.can_execute(mock.Mock())
+    assert not group.beginning_execution(mock.Mock())
+
+
+def test_ticks_of_the_user_run_on_the_scheduler_of_the_observer(
+    node: ReactiveNode, talker: Talker, spin_until: SpinUntil
+) -> None:
+    threads: list[int] = []
+    topic = node.create_observable(Float64, "topic", sampled=rx.interval(0.01))
+    topic.subscribe(lambda _: threads.append(threading.get_ident()), scheduler=node.scheduler)
+    talker.await_readers(2)
+    spin_until(lambda: talker.publisher.publish(Float64()) or threads)
+    assert set(threads) == {threading.get_ident()}
+
+
+def test_reader_keeps_the_other_policies_of_its_topic_and_has_no_events(
+    node: ReactiveNode, ticks: Subject[None]
+) -> None:
+    qos = QoSProfile(
+        depth=7,
+        history=HistoryPolicy.KEEP_ALL,
+        reliability=ReliabilityPolicy.BEST_EFFORT,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL,
+    )
+    node.create_observable(Float64, "topic", qos, sampled=ticks).subscribe()
+    (subscription,) = (each for each in node.subscriptions if each.topic_name == "/topic")
+    used = subscription.qos_profile
+    assert (used.history, used.depth) == (HistoryPolicy.KEEP_LAST, 1)
+    assert (used.reliability, used.durability) == (qos.reliability, qos.durability)
+    assert (qos.history, qos.depth) == (HistoryPolicy.KEEP_ALL, 7)
+    assert list(subscription.event_handlers) == [], "with Fast DDS, they would end each wait at once"
