@@ -23,7 +23,7 @@ class Cost:
     arms: int
     processes: int
     memory: float
-    """Resident [MB]."""
+    """Proportional set size [MB]: the services share the memory of supervisord."""
     threads: int
 
     @classmethod
@@ -36,10 +36,8 @@ class Cost:
                 if member.program == BABBLER:
                     continue
                 with suppress(OSError, KeyError):
-                    lines = Path(f"/proc/{member.pid}/status").read_text().splitlines()
-                    fields = dict(line.split(":", 1) for line in lines)
-                    memory += int(fields["VmRSS"].split()[0]) / 1024
-                    threads += int(fields["Threads"])
+                    memory += int(_field(member.pid, "smaps_rollup", "Pss")) / 1024
+                    threads += int(_field(member.pid, "status", "Threads"))
                     processes += 1
         busy = sum(arm.processor_time() for arm in arms)
         return cls(time.monotonic(), busy, len(arms), processes, memory, threads)
@@ -54,3 +52,8 @@ class Cost:
             f"{threads:.0f} threads ({threads - before.threads / self.arms:+.0f}) "
             f"in {self.processes / self.arms:.0f} processes per arm"
         )
+
+
+def _field(pid: int, file: str, name: str) -> str:
+    lines = Path(f"/proc/{pid}/{file}").read_text().splitlines()
+    return dict(line.split(":", 1) for line in lines if ":" in line)[name].split()[0]

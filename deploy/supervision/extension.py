@@ -23,6 +23,7 @@ from typing import Any
 from supervisor import events, loggers
 from supervisor.states import ProcessStates, SupervisorStates, getProcessStateDescription
 
+from deploy.supervision import warm
 from deploy.supervision.manifest import SENTINEL
 from deploy.supervision.system import PARAMETERS
 
@@ -152,4 +153,6 @@ def make_interface(supervisord: Any, **config: str) -> ArmInterface:
     loggers.RotatingFileHandler = LossyLog  # for the programs: each start opens its log
     for handler in supervisord.options.logger.handlers:
         handler.__class__ = LossyLog  # supervisord's own log is open already
+    warm.import_libraries()
+    supervisord.options.execve = warm.executor(os.execve)
     return ArmInterface(supervisord)

@@ -18,6 +18,7 @@ import pytest
 from geometry_msgs.msg import Point, PointStamped
 from std_msgs.msg import Bool, Float64, String
 
+from deploy.supervision import processes
 from interfaces import topics
 from tests.system.sites import LIMIT, ROOT, STEADY, Peer, Site
 
@@ -94,6 +95,11 @@ def test_no_shell_stands_between_supervisord_and_a_service(module_site: Site) ->
             parent = int(Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[1])
             assert parent == module_site.members[""]
             assert Path(f"/proc/{pid}/cmdline").read_bytes().split(b"\0")[1:3][0] == b"-m"
+
+
+def test_services_are_forks_of_supervisord(module_site: Site) -> None:
+    begins_of_stack = {processes.stat_of(pid)[25] for pid in module_site.members.values()}
+    assert len(begins_of_stack) == 1, "it is random for each new interpreter"
 
 
 def test_each_service_has_a_log_of_its_own(module_site: Site) -> None:

@@ -1,0 +1,144 @@
+"""Starts Python programs from a warm supervisord: its fork runs the program, without a new interpreter.
+
+Most of a start is the import of rclpy and ReactiveX. supervisord imports them once; the fork that it makes
+for each program has them already and shares their memory. The code of this checkout is read at each start, so
+an edited service counts from its next restart.
+
+For the process table, the fork gets the command line and the environment that a new interpreter would have
+(prctl(2), PR_SET_MM_MAP). Where the kernel cannot do that, and for programs that are no modules of this
+environment's Python, supervisord starts a new interpreter as it always does.
+"""
+
+from __future__ import annotations
+
+import atexit
+import ctypes
+import gc
+import importlib
+import mmap
+import os
+import runpy
+import signal
+import struct
+import sys
+import threading
+import traceback
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import NoReturn
+
+from deploy.supervision import processes
+
+LIBRARIES = (
+    "reactive_node",
+    "rclpy.executors",
+    "rclpy.serialization",
+    "diagnostic_msgs.msg",
+    "geometry_msgs.msg",
+    "rcl_interfaces.srv",
+    "sensor_msgs.msg",
+    "std_msgs.msg",
+    "tf2_msgs.msg",
+    "websockets.server",
+    "yaml",
+)
+"""What the services import from outside of this checkout."""
+
+_PR_SET_MM, _PR_SET_MM_MAP = 35, 14
+_NO_FILE = 0xFFFFFFFF
+
+_names: mmap.mmap  # the command line and the environment of this process, for as long as it lives
+
+
+def import_libraries() -> None:
+    """Import what programs need; what cannot be imported is an error of the program that imports it."""
+    for name in LIBRARIES:
+        with suppress(Exception):
+            importlib.import_module(name)
+    gc.collect()
+    gc.freeze()  # a collection in a fork would copy the memory that it shares
+
+
+def executor(execve: Callable[..., NoReturn]) -> Callable[[str, Sequence[str], Mapping[str, str]], NoReturn]:
+    """Return a stand-in for :func:`os.execve` that runs a Python module in this process."""
+    programs = Path(sys.executable).parent
+
+    def execute(filename: str, argv: Sequence[str], environment: Mapping[str, str]) -> NoReturn:
+        if argv[1:2] == ["-m"] and Path(filename).parent == programs:
+            with suppress(OSError):  # a kernel that cannot do this
+                rename(argv, environment)
+                _run(argv, environment)
+        execve(filename, argv, environment)
+
+    return execute
+
+
+def rename(argv: Sequence[str], environment: Mapping[str, str]) -> None:
+    """
+    Give this process another command line and environment in the process table.
+
+    :raises OSError: if the kernel cannot do this.
+    """
+    global _names
+    arguments = b"".join(os.fsencode(word) + b"\0" for word in argv)
+    variables = b"".join(os.fsencode(f"{name}={value}") + b"\0" for name, value in environment.items())
+    _names = mmap.mmap(-1, len(arguments + variables), mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
+    _names.write(arguments + variables)
+    begin = ctypes.addressof(ctypes.c_char.from_buffer(_names))
+    middle, end = begin + len(arguments), begin + len(arguments + variables)
+    libc = ctypes.CDLL(None, use_errno=True)
+    libc.sbrk.restype = ctypes.c_void_p
+    start_code, end_code, start_stack = map(int, processes.stat_of(os.getpid())[23:26])
+    start_data, end_data, start_brk = map(int, processes.stat_of(os.getpid())[42:45])
+    layout = struct.pack(
+        "12Q2I",  # struct prctl_mm_map
+        *(start_code, end_code, start_data, end_data, start_brk, libc.sbrk(0), start_stack),
+        *(begin, middle, middle, end),
+        *(0, 0, _NO_FILE),  # the auxiliary vector and the executable stay
+    )
+    if libc.prctl(_PR_SET_MM, _PR_SET_MM_MAP, layout, ctypes.c_ulong(len(layout)), 0):
+        raise OSError(ctypes.get_errno(), "this kernel renames no process")
+
+
+def _run(argv: Sequence[str], environment: Mapping[str, str]) -> NoReturn:
+    """Run the module of a `python -m` in this process, and end with its exit code."""
+    for number in signal.valid_signals():
+        if callable(signal.getsignal(number)):  # a handler of supervisord
+            signal.signal(number, signal.SIG_DFL)
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    os.environ.clear()
+    os.environ.update(environment)
+    sys.orig_argv, sys.argv = list(argv), list(argv[2:])
+    code = 1
+    try:
+        if "sitecustomize" in sys.modules:  # Python imports it at each start
+            importlib.reload(sys.modules["sitecustomize"])
+        runpy.run_module(argv[2], run_name="__main__", alter_sys=True)
+        code = 0
+    except SystemExit as end:
+        code = _exit_code(end)
+    except BaseException:
+        traceback.print_exc()
+    finally:
+        _end(code)
+
+
+def _exit_code(end: SystemExit) -> int:
+    if end.code is None or isinstance(end.code, int):
+        return end.code or 0
+    print(end.code, file=sys.stderr)
+    return 1
+
+
+def _end(code: int) -> NoReturn:
+    """End as an interpreter does, but without a way back into supervisord's code."""
+    try:
+        for thread in threading.enumerate():
+            if thread is not threading.current_thread() and not thread.daemon:
+                thread.join()
+        atexit._run_exitfuncs()
+        sys.stdout.flush()
+        sys.stderr.flush()
+    finally:
+        os._exit(code)

@@ -1,0 +1,107 @@
+"""Programs that a warm supervisord runs in its fork, as a new interpreter would run them."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from deploy.supervision.processes import ROOT
+
+PYTHON = str(Path(sys.executable).with_name("python3"))
+WARM = """
+import os, signal, sys
+from deploy.supervision import warm
+signal.signal(signal.SIGTERM, lambda number, frame: print("supervisord's handler"))
+{more}
+warm.executor(os.execve)(sys.argv[1], sys.argv[1:], {{**os.environ, "SUPERVISOR_PROCESS_NAME": "probe"}})
+"""
+WORDS = ("Zürich", "", "--ros-args")
+
+
+def run(
+    folder: Path, program: str, *, more: str = "", python: str = PYTHON
+) -> subprocess.CompletedProcess[str]:
+    """Run the module `probe` as a fork of supervisord does."""
+    (folder / "probe.py").write_text("import atexit, os, signal, sys, threading\n" + program)
+    return subprocess.run(
+        [sys.executable, "-c", WARM.format(more=more), python, "-m", "probe", *WORDS],
+        env=os.environ | {"PYTHONPATH": f"{ROOT}{os.pathsep}{folder}"},
+        capture_output=True,
+        text=True,
+        timeout=30.0,
+    )
+
+
+FORKED = "print('warm' in str(sys.modules.get('deploy.supervision.warm')))"
+
+
+def test_program_sees_its_own_command_line_and_environment(tmp_path: Path) -> None:
+    done = run(
+        tmp_path,
+        "assert __name__ == '__main__'\n"
+        "read = lambda name: open(f'/proc/self/{name}', 'rb').read().decode().split(chr(0))\n"
+        "assert read('cmdline')[1:] == ['-m', 'probe', *sys.argv[1:], ''], read('cmdline')\n"
+        "assert sorted(read('environ')[:-1]) == sorted(f'{k}={v}' for k, v in os.environ.items())\n"
+        f"print(os.environ['SUPERVISOR_PROCESS_NAME'], sys.argv[1:]); {FORKED}",
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (0, f"probe {list(WORDS)}\nTrue\n", "")
+
+
+@pytest.mark.parametrize(
+    ("end", "code", "printed"),
+    [
+        ("", 0, ""),
+        ("sys.exit()", 0, ""),
+        ("sys.exit(3)", 3, ""),
+        ("sys.exit('what, where')", 1, "what, where\n"),
+        ("os.kill(os.getpid(), signal.SIGTERM)", -signal.SIGTERM, ""),
+        ("os._exit(4)", 4, ""),
+    ],
+)
+def test_program_ends_with_its_exit_code(tmp_path: Path, end: str, code: int, printed: str) -> None:
+    done = run(tmp_path, f"{FORKED}\n{end}")
+    assert (done.returncode, done.stdout, done.stderr) == (code, "True\n", printed)
+
+
+def test_error_of_a_program_is_a_traceback(tmp_path: Path) -> None:
+    done = run(tmp_path, "raise ValueError('what')")
+    assert done.returncode == 1
+    assert done.stderr.startswith("Traceback")
+    assert done.stderr.endswith("ValueError: what\n")
+
+
+def test_threads_and_exit_handlers_end_before_the_program(tmp_path: Path) -> None:
+    done = run(
+        tmp_path,
+        "atexit.register(print, 'exit handler')\n"
+        "threading.Timer(0.2, print, ['thread']).start()\n"
+        "threading.Thread(target=signal.pause, daemon=True).start()",
+    )
+    assert (done.returncode, done.stdout) == (0, "thread\nexit handler\n")
+
+
+def test_customization_of_the_site_runs_for_each_program(tmp_path: Path) -> None:
+    (tmp_path / "sitecustomize.py").write_text("import os; name = os.environ.get('SUPERVISOR_PROCESS_NAME')")
+    done = run(tmp_path, "import sitecustomize; print(sitecustomize.name)")
+    assert done.stdout == "probe\n"
+
+
+@pytest.mark.parametrize(
+    ("more", "python"),
+    [("warm.rename = lambda *_: os.stat('/no/such/kernel')", PYTHON), ("", os.path.realpath(PYTHON))],
+    ids=["a kernel that cannot rename", "a Python elsewhere"],
+)
+def test_new_interpreter_runs_where_a_fork_cannot(tmp_path: Path, more: str, python: str) -> None:
+    done = run(tmp_path, FORKED, more=more, python=python)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "False\n", "")
+
+
+def test_library_that_fails_does_not_end_supervisord(tmp_path: Path) -> None:
+    (tmp_path / "yaml.py").write_text("raise RuntimeError('broken')")
+    done = run(tmp_path, FORKED, more="warm.import_libraries()")
+    assert (done.returncode, done.stdout) == (0, "True\n")
