@@ -8,7 +8,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING
 
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from deploy.commands.member import Member
 
 START_LIMIT = 60.0  # s until all services have to report their health
+BEGIN_LEAD = 0.3  # s from the choice of the scenario's origin to the origin: all services know it by then
 BEGIN_LIMIT = 5.0  # s that the services have to confirm the origin of the scenario
 STATUS_LIMIT = 1.5  # s for the health of services that are up: they report at 1 Hz
 START_ATTEMPTS = 3  # of a service that dies so slowly that supervisord does not count it as an early death
@@ -40,6 +41,16 @@ ADOPTED = (
 )
 
 # rclpy takes its time to load: each command imports it when it surely needs it.
+
+
+def place(environment: Mapping[str, str]) -> str:
+    """Return where the nodes of an environment are: the domain, and what is not as ever."""
+    words = [f"ROS domain {environment.get('ROS_DOMAIN_ID') or 0}"]
+    if namespace := environment.get(NAMESPACE):
+        words.append(f"namespace {namespace}")
+    if (reach := environment.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")) != "LOCALHOST":
+        words.append(f"discovery range {reach}")
+    return ", ".join(words)
 
 
 def run(system: System, scenario: str, parameter_file: str) -> None:
@@ -129,12 +140,9 @@ def _started(system: System, scenario: str, parameter_file: str) -> Iterator[Mem
         interruption.check()  # the last time before there is anything to stop
         system.start(given)
         try:
-            place = f"ROS domain {os.environ.get('ROS_DOMAIN_ID') or 0}"
-            if namespace := os.environ.get(NAMESPACE):
-                place += f", namespace {namespace}"
-            print(f"Starting the services, scenario {scenario}, {place} ...", flush=True)
+            print(f"Starting the services, scenario {scenario}, {place(os.environ)} ...", flush=True)
             _await_services(system, member, log_sizes)
-            origin = time.monotonic()
+            origin = time.monotonic() + BEGIN_LEAD
             system.keep_origin(origin)
             member.set_everywhere("scenario_epoch", origin, BEGIN_LIMIT)
             print(f"All services are up after {time.monotonic() - began:.1f} s.", flush=True)
