@@ -151,6 +151,8 @@ class Context(AbstractContextManager["Context"]):
         :raises RCLError: if the context is not initialized or already shut down.
         """
         if not self._end():
+            if self._initialized:
+                raise RCLError("failed to shutdown: rcl_shutdown already called on the given context")
             raise RCLError("Context must be initialized before it can be shutdown")
 
     def try_shutdown(self) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import time
 from typing import Any
 
 import pytest
@@ -12,12 +13,24 @@ from ros2cli.node.strategy import NodeStrategy, add_arguments
 from ros2topic.api import get_msg_class, get_topic_names, get_topic_names_and_types
 from std_msgs.msg import Float64, String
 
+LIMIT = 10.0  # s
+
+
+def publish(node: Node, message_type: Any, topic: str) -> None:
+    """Create a publisher; return when the graph shows it."""
+    node.create_publisher(message_type, topic, 10)
+    name = f"std_msgs/msg/{message_type.__name__}"
+    deadline = time.monotonic() + LIMIT
+    while name not in dict(node.get_topic_names_and_types()).get(topic, []):
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+
 
 @pytest.fixture
 def talker(node: Node) -> Node:
     """A node with a topic and a hidden topic."""
-    node.create_publisher(String, "/chatter", 10)
-    node.create_publisher(Float64, "/_hidden", 10)
+    publish(node, String, "/chatter")
+    publish(node, Float64, "/_hidden")
     return node
 
 
@@ -42,7 +55,7 @@ def test_message_class_may_be_waited_for(talker: Node) -> None:
 
 
 def test_a_topic_of_two_types_has_no_message_class(talker: Node) -> None:
-    talker.create_publisher(Float64, "/chatter", 10)
+    publish(talker, Float64, "/chatter")
     with pytest.raises(RuntimeError, match="more than one type"):
         get_msg_class(talker, "/chatter")
 

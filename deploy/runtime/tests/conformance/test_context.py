@@ -9,6 +9,7 @@ import pytest
 
 import rclpy
 from rclpy.context import Context
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.logging import LoggingSeverity, clear_config, get_logger, get_logger_effective_level
 from rclpy.signals import SignalHandlerOptions, get_current_signal_handlers_options
 from rclpy.utilities import get_default_context
@@ -88,6 +89,19 @@ def test_after_a_signal_and_try_shutdown_init_works_again() -> None:
     rclpy.try_shutdown()
     rclpy.init(args=[])
     assert rclpy.ok()
+
+
+def test_shutdown_after_a_signal_says_that_it_is_the_second() -> None:
+    context = Context()
+    rclpy.init(context=context)
+    context.shutdown()  # as a signal does
+    with pytest.raises(rclpy_implementation.RCLError, match="already called"):
+        rclpy.shutdown(context=context)
+
+
+def test_shutdown_before_init_says_so() -> None:
+    with pytest.raises(RuntimeError, match="must be initialized"):
+        Context().shutdown()
 
 
 def test_shutdown_of_the_default_context_removes_the_signal_handlers() -> None:
