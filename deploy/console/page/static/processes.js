@@ -110,7 +110,10 @@ export class Processes {
   }
 
   _act(name, action) {
-    if (!this._send({ type: "process", name, action })) return;
+    if (!this._send({ type: "process", name, action })) {
+      this._note("Not done. The page was not connected at that moment.");
+      return;
+    }
     this._note("");
     announce(`${name}: ${action} was sent.`);
   }
