@@ -49,8 +49,10 @@ def test_table_has_a_row_for_each_alternative_and_a_dash_without_figures() -> No
 def test_absent_alternatives_are_named_with_the_reason(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(command, "system_rclpy", lambda: "")
-    here = Alternative("here", "callbacks")
+    on_ros = bool(system_rclpy())
+    here = Alternative("here", "callbacks", ros=on_ros)
+    answers = iter(["/opt/ros"] * on_ros + [""])
+    monkeypatch.setattr(command, "system_rclpy", lambda: next(answers))
     others = (
         Alternative("sourced", "callbacks", ros=True),
         Alternative("refused", "zeromq", "zeromq.txt"),
