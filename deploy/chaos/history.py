@@ -32,6 +32,8 @@ loses packets, the operator released the switch."""
 
 PARTITION = "partition"
 """A fault of the network between the operator's host and the robot's."""
+BAD_LINE = "bad_line"
+"""A fault of the same network: it delays messages, and DDS has to send some of them again."""
 REDISCOVERY = 10.0  # s after a partition until the hosts have discovered each other again
 
 SUSPENDING = ("stop", "hang", "hog", "slow")

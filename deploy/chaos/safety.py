@@ -12,6 +12,7 @@ from deploy.chaos.clock import SPREAD, STEP
 from deploy.chaos.findings import Evidence, Finding, count, how_often
 from deploy.chaos.history import (
     ALL,
+    BAD_LINE,
     CONTROLLER,
     PARTITION,
     REDISCOVERY,
@@ -34,6 +35,7 @@ PRESENCE_TIMEOUT = 10.0  # s without a presence after which the controller turns
 STRIKE, STRIKES = 3.0, 3  # s; silences after which the operator watchdog turns the engines off
 SAMPLING = 0.5  # s by which the watchdog may date the beginning of a silence too early
 TRANSPORT = 0.15  # s that a message may take on a busy machine
+BAD_TRANSPORT = 0.6  # s that it may take on a bad line
 STARTING = 2.0  # s within which a process has become an instance, or has ended because there is one
 
 
@@ -189,9 +191,15 @@ def _was_present(history: History, time: float) -> bool:
 def _commanded(history: History, off: Sample) -> bool:
     """Return whether the watchdog commanded `turn_off` just before, after as many strikes as that takes."""
     commands = [s for s in history.stream(topics.ENGINES) if s.value == TURN_OFF]
-    if not between(commands, off.sent - TRANSPORT, off.sent + 0.01):
+    if not between(commands, off.sent - _transport(history, off.sent), off.sent + 0.01):
         return False
     return _strikes(history, off.sent) >= STRIKES
+
+
+def _transport(history: History, time: float) -> float:
+    """Return how long a message may have taken that arrived then [s]."""
+    lines = (fault for fault in history.faults if fault.kind == BAD_LINE)
+    return BAD_TRANSPORT if any(line.overlaps(time - BAD_TRANSPORT, time) for line in lines) else TRANSPORT
 
 
 def _strikes(history: History, time: float) -> float:

@@ -12,6 +12,7 @@ from deploy.chaos.clock import STEP
 from deploy.chaos.findings import Evidence, Finding
 from deploy.chaos.history import (
     ALL,
+    BAD_LINE,
     CONTROLLER,
     KINEMATICS,
     NO_TARGET,
@@ -161,6 +162,10 @@ def stopped(program: str, begin: float, end: float, kind: str = "stop") -> Injec
     return InjectedFault(kind, program, begin, end)
 
 
+def bad_line(begin: float, end: float) -> InjectedFault:
+    return InjectedFault(BAD_LINE, ALL, begin, end)
+
+
 def heard_but_in(*silences: tuple[float, float]) -> list[tuple[float, bool]]:
     """Return heartbeats from 0.25 s on, with these silences."""
     return [beat for beat in steps(0.25, 40) if not any(begin < beat[0] < end for begin, end in silences)]
@@ -206,6 +211,13 @@ def suspended_with_a_presence_at(time: float) -> dict[str, Any]:
             },
             False,
         ),
+        # a bad line delays the command
+        (COMMANDED | {"commands": [(19.75, TURN_OFF)]}, False),
+        (COMMANDED | {"commands": [(19.75, TURN_OFF)], "faults": [bad_line(19.0, 19.5)]}, True),
+        (COMMANDED | {"commands": [(19.5, TURN_OFF)], "faults": [bad_line(19.75, 25.0)]}, True),
+        (COMMANDED | {"commands": [(19.75, TURN_OFF)], "faults": [bad_line(19.0, 19.375)]}, False),
+        (COMMANDED | {"commands": [(19.75, TURN_OFF)], "faults": [bad_line(20.25, 25.0)]}, False),
+        (COMMANDED | {"commands": [(19.375, TURN_OFF)], "faults": [bad_line(19.0, 25.0)]}, False),
         # a suspended watchdog hears nothing
         (COMMANDED | {"faults": [stopped(WATCHDOG, 13.0, 14.0)]}, True),
         (COMMANDED | {"faults": [stopped(WATCHDOG, 25.0, 26.0)]}, True),
