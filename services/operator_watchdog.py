@@ -6,6 +6,7 @@ incapacitated, that is, releases the dead man's switch 3 times for longer than 3
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from datetime import datetime
 from typing import Any, NamedTuple
@@ -91,7 +92,8 @@ def wire(node: ServiceNode) -> None:
     def warn(activity: Activity) -> None:
         node.get_logger().warning(f"operator {activity.conclusion}")
 
-    reading = min(READING, given.sampling, given.lifespan / 2)
+    # Samples come equally long after a look, or the jitter would add to a silence.
+    reading = given.sampling / math.ceil(given.sampling / min(READING, given.lifespan / 2))
     heartbeats = node.observe(
         topics.OPERATOR_HEARTBEAT, timestamped=True, sampled=reading, max_age=given.lifespan
     )

@@ -95,7 +95,8 @@ def test_of_a_burst_of_heartbeats_the_newest_is_judged(
 
 
 @pytest.mark.parametrize(
-    ("sampling", "lifespan", "period"), [(0.5, 0.5, 0.05), (0.02, 0.5, 0.02), (0.5, 0.06, 0.03)]
+    ("sampling", "lifespan", "period"),
+    [(0.5, 0.5, 0.05), (0.02, 0.5, 0.02), (0.5, 0.06, 0.5 / 17), (0.07, 0.5, 0.035)],
 )
 def test_heartbeats_are_read_by_the_clock_before_they_are_old(
     wired: Any, monkeypatch: pytest.MonkeyPatch, sampling: float, lifespan: float, period: float
