@@ -17,14 +17,17 @@ import time
 from collections.abc import Iterable, Iterator, Sequence
 from importlib import metadata
 from pathlib import Path
+from typing import Any
 
-from deploy.benchmarks import environment
+from deploy.benchmarks import environment, scale
 from deploy.benchmarks.alternatives import ALTERNATIVES, BENCH_PYTHON, Alternative
 from deploy.benchmarks.measurement import SCENARIOS, MeasurementFailed, measure
 from deploy.benchmarks.table import tables
 from deploy.commands.setup import system_rclpy
 from deploy.supervision import interruption
 from deploy.supervision.processes import ROOT, run_directory
+
+COMPARISON, SCALE = "comparison", "scale"
 
 
 def present(alternatives: Iterable[Alternative], refused: dict[str, str]) -> list[Alternative]:
@@ -81,19 +84,22 @@ def versions() -> str:
 def main(arguments: Sequence[str]) -> int:
     """Run the command line; return the exit code."""
     parser = argparse.ArgumentParser(prog="make bench", description=__doc__)
-    parser.add_argument("--rounds", type=int, default=3, help="how many times to measure (3)")
-    rounds = parser.parse_args(arguments).rounds
+    kinds = {
+        COMPARISON: "this system and its alternatives (the default)",
+        SCALE: "many arms, many subscribers",
+    }
+    shown = "; ".join(f"{name}: {meaning}" for name, meaning in kinds.items())
+    parser.add_argument("kind", nargs="?", choices=kinds, default=COMPARISON, metavar="KIND", help=shown)
+    parser.add_argument("--rounds", type=int, default=3, help="how many times to compare (3)")
+    options = parser.parse_args(arguments)
     interruption.install()
-    results: dict[str, dict[str, list[float]]] = {}
+    results: dict[str, Any] = {}
     code = 0
     try:
-        needed = {each.requirements for each in ALTERNATIVES if each.requirements} | {environment.CHART}
-        found = present(ALTERNATIVES, environment.prepare(sorted(needed)))
-        print(f"{machine()}; {versions()}", flush=True)
-        results |= {each.title: {} for each in found}
-        for title, figures in compare(found, rounds):
-            for name, value in figures.items():
-                results[title].setdefault(name, []).append(value)
+        if options.kind == SCALE:
+            _scale(results)
+        else:
+            _compare(results, options.rounds)
     except interruption.Interrupted:
         print("Interrupted. So far:", flush=True)
         code = 130
@@ -102,18 +108,37 @@ def main(arguments: Sequence[str]) -> int:
         return 1
     if any(results.values()):
         interruption.ignore()
-        print(f"\n{tables(results)}\n")
-        return _write(results) or code
+        print(f"\n{scale.tables(results) if options.kind == SCALE else tables(results)}\n")
+        return _write(options.kind, results) or code
     return code
 
 
-def _write(results: dict[str, dict[str, list[float]]]) -> int:
+def _compare(results: dict[str, Any], rounds: int) -> None:
+    """Collect the rounds of each figure, by alternative."""
+    needed = {each.requirements for each in ALTERNATIVES if each.requirements} | {environment.CHART}
+    found = present(ALTERNATIVES, environment.prepare(sorted(needed)))
+    print(f"{machine()}; {versions()}", flush=True)
+    results |= {each.title: {} for each in found}
+    for title, figures in compare(found, rounds):
+        for name, value in figures.items():
+            results[title].setdefault(name, []).append(value)
+
+
+def _scale(results: dict[str, Any]) -> None:
+    """Collect the figures of each number of arms and subscribers, by kind."""
+    environment.prepare([environment.CHART])
+    print(machine(), flush=True)
+    for kind, number, figures in scale.measure():
+        results.setdefault(kind, {})[number] = {name: [value] for name, value in figures.items()}
+
+
+def _write(kind: str, results: dict[str, Any]) -> int:
     """Write the figures and the chart; return the exit code."""
     directory = run_directory() / "bench"
     directory.mkdir(parents=True, exist_ok=True)
-    file, chart = directory / "results.json", directory / "chart.svg"
+    file, chart = directory / f"{kind}.json", directory / f"{kind}.svg"
     file.write_text(json.dumps(results, indent=1))
-    command = [str(BENCH_PYTHON), "-m", "deploy.benchmarks.chart", str(file), str(chart)]
+    command = [str(BENCH_PYTHON), "-m", f"deploy.benchmarks.{kind}_chart", str(file), str(chart)]
     if subprocess.run(command, cwd=ROOT, start_new_session=True).returncode:
         print("The chart was not drawn.", file=sys.stderr)
         return 1

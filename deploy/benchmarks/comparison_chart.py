@@ -1,4 +1,4 @@
-"""Draws the comparison: `python -m deploy.benchmarks.chart RESULTS SVG` in .venv-bench."""
+"""Draws the comparison: `python -m deploy.benchmarks.comparison_chart RESULTS SVG` in .venv-bench."""
 
 from __future__ import annotations
 

@@ -8,8 +8,8 @@ import socket
 import subprocess
 import tempfile
 import time
-from collections.abc import Sequence
-from contextlib import ExitStack, suppress
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -72,32 +72,17 @@ def measure(
     :raises MeasurementFailed: if the processes end early or stay silent.
     """
     roles = (SINK, MIDDLE, SOURCE) if scenario.name == "pipeline" else (SINK, SOURCE)
-    temporary = tempfile.TemporaryDirectory(prefix="bench-", ignore_cleanup_errors=True)
-    with reserved_domain() as domain_id, temporary as directory:
-        jobs = [
-            Job(
-                alternative.link,
-                role,
-                FIRST if MIDDLE in roles else LAST,
-                scenario.size,
-                scenario.rate,
-                warm_up,
-                seconds,
-                directory,
-            )
-            for role in roles
-        ]
-        with _Run(alternative, jobs, domain_id) as run:
-            began = run.start()
-            first = run.report(SINK, "first")
-            if scenario.name == "start":
-                return {f"{scenario.key}.seconds": first["time"] - began}
-            pid = run.pids[MIDDLE if MIDDLE in roles else SINK]
-            run.report(SINK, "begin")
-            busy = cpu_seconds(pid)
-            end = run.report(SINK, "end")
-            busy = cpu_seconds(pid) - busy
-            memory, threads = _memory(pid)
+    with _run(alternative, roles, scenario, warm_up, seconds) as run:
+        began = run.start()
+        first = run.report(SINK, "first")
+        if scenario.name == "start":
+            return {f"{scenario.key}.seconds": first["time"] - began}
+        pid = run.pids[MIDDLE if MIDDLE in roles else SINK]
+        run.report(SINK, "begin")
+        busy = cpu_seconds(pid)
+        end = run.report(SINK, "end")
+        busy = cpu_seconds(pid) - busy
+        memory, threads = _memory(pid)
     figures = {"cpu_us": 1e6 * busy / end["count"], "megabytes": memory, "threads": threads}
     if scenario.name == "flood":
         figures["per_second"] = end["count"] / end["seconds"]
@@ -105,6 +90,26 @@ def measure(
         delivered = 100 * end["count"] / (scenario.rate * end["seconds"])
         figures |= {"p50_ms": end["p50"], "p99_ms": end["p99"], "delivered": min(100.0, delivered)}
     return {f"{scenario.key}.{name}": value for name, value in figures.items()}
+
+
+def measure_subscribers(
+    alternative: Alternative, count: int, rate: float, *, warm_up: float = WARM_UP, seconds: float = SECONDS
+) -> dict[str, float]:
+    """
+    Return the processor time that an item of 8 B costs its publisher and each of ``count`` subscribers [µs].
+
+    :param rate: of the publisher [Hz].
+    :raises MeasurementFailed: if the processes end early or stay silent.
+    """
+    roles = (*[SINK] * count, SOURCE)
+    with _run(alternative, roles, Scenario("subscribers", 8, rate), warm_up, seconds) as run:
+        run.start()
+        run.report(SINK, "begin")
+        pids = (run.pids[SOURCE], run.pids[SINK])
+        before = [cpu_seconds(pid) for pid in pids]
+        items = run.report(SINK, "end")["count"]
+        publisher, subscriber = (cpu_seconds(pid) - busy for pid, busy in zip(pids, before, strict=True))
+    return {"publisher_us": 1e6 * publisher / items, "subscriber_us": 1e6 * subscriber / items}
 
 
 def cpu_seconds(pid: int) -> float:
@@ -117,6 +122,20 @@ def _memory(pid: int) -> tuple[float, float]:
     rollup = Path(f"/proc/{pid}/smaps_rollup").read_text().splitlines()
     kilobytes = next(int(line.split()[1]) for line in rollup if line.startswith("Pss:"))
     return kilobytes / 1024, len(os.listdir(f"/proc/{pid}/task"))
+
+
+@contextmanager
+def _run(
+    alternative: Alternative, roles: Sequence[str], scenario: Scenario, warm_up: float, seconds: float
+) -> Iterator[_Run]:
+    """Prepare a process for each role, in a ROS domain and a directory of their own."""
+    temporary = tempfile.TemporaryDirectory(prefix="bench-", ignore_cleanup_errors=True)
+    with reserved_domain() as domain_id, temporary as directory:
+        topic = FIRST if MIDDLE in roles else LAST
+        fields = (topic, scenario.size, scenario.rate, warm_up, seconds, directory)
+        jobs = [Job(alternative.link, role, *fields) for role in roles]
+        with _Run(alternative, jobs, domain_id) as run:
+            yield run
 
 
 class _Run:
@@ -157,16 +176,16 @@ class _Run:
         if listeners:
             self._await(waiting)
         began = time.monotonic()
-        self._popen(source)
+        self.pids[SOURCE] = self._popen(source)
         if not listeners:  # one command starts them all
             self._await(waiting)
         return began
 
     def _await(self, roles: Sequence[str]) -> None:
-        for role in roles:
-            self.pids[role] = int(self.report(role, "ready")["pid"])
+        for role in set(roles):
+            self.pids[role] = int(self.report(role, "ready", roles.count(role))["pid"])
 
-    def _popen(self, command: list[str]) -> None:
+    def _popen(self, command: list[str]) -> int:
         process = subprocess.Popen(
             command,
             env=self._environment,
@@ -177,14 +196,15 @@ class _Run:
             start_new_session=True,  # Ctrl-C reaches only the harness, which ends them
         )
         self._processes.append(process)
+        return process.pid
 
-    def report(self, role: str, event: str) -> dict[str, Any]:
-        """Wait for a report of a process."""
+    def report(self, role: str, event: str, count: int = 1) -> dict[str, Any]:
+        """Wait for so many reports of the processes with a role; return the first."""
         deadline = time.monotonic() + _SILENCE
         while True:
-            for report in self._seen:
-                if (report["role"], report["event"]) == (role, event):
-                    return report
+            reports = [each for each in self._seen if (each["role"], each["event"]) == (role, event)]
+            if len(reports) >= count:
+                return reports[0]
             interruption.check()
             with suppress(TimeoutError):
                 self._seen.append(json.loads(self._reports.recv(65536)))
