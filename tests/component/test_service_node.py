@@ -11,9 +11,11 @@ from datetime import UTC, datetime, timedelta
 from typing import Any
 
 import pytest
+import rclpy
 import reactivex as rx
 from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import Point, PointStamped
+from rclpy.context import Context
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
 from rclpy.node import Node
@@ -190,13 +192,20 @@ def test_publisher_of_another_type_is_reported(
     for topic in (topics.L2, topics.L1):
         service.observe(topic).subscribe()
     peer.create_publisher(Float64, "l2", topics.L2.qos)
-    peer.create_publisher(String, "l1", topics.L1.qos)
-    spin_until(lambda: service.count_publishers("l1") == service.count_publishers("l2") == 1)
+    name, elsewhere = "stranger", Context()  # Fast DDS has no topic of two types within a context
+    rclpy.init(context=elsewhere)
+    try:
+        stranger = rclpy.create_node(name, context=elsewhere)
+        stranger.create_publisher(String, "l1", topics.L1.qos)
+        spin_until(lambda: service.count_publishers("l2") == 1)
+        spin_until(lambda: [it.node_name for it in service.get_publishers_info_by_topic("l1")] == [name])
 
-    report = health()
+        report = health()
+    finally:
+        rclpy.shutdown(context=elsewhere)
 
     assert report["level"] == DiagnosticStatus.WARN
-    assert report["message"] == "l1: peer publishes std_msgs/msg/String"
+    assert report["message"] == f"l1: {name} publishes std_msgs/msg/String"
 
 
 def test_latched_topic_receives_from_volatile_publishers_too(

@@ -7,6 +7,7 @@ import time
 from pathlib import Path
 
 import pytest
+from rclpy.utilities import get_rmw_implementation_identifier
 
 from interfaces.service import instance
 from tests.system.sites import STEADY, Site
@@ -62,6 +63,9 @@ def test_an_impossible_namespace_is_reported(site: Site) -> None:
     assert "\n" not in printed
 
 
+@pytest.mark.skipif(
+    get_rmw_implementation_identifier() != "rmw_cyclonedds_cpp", reason="platform: another DDS than Cyclone"
+)
 def test_an_impossible_dds_configuration_is_reported(site: Site, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("CYCLONEDDS_URI", "<no xml")
     code, printed = site.do("run", STEADY)
