@@ -40,7 +40,7 @@ def draw(results: Results, file: Path) -> None:
 
 
 def _panel(axes: Any, results: Mapping[str, Mapping[str, Sequence[float]]], key: str) -> None:
-    width = 0.8 / len(results)
+    width, colors = 0.8 / len(results), matplotlib.colormaps["tab20"]
     for number, (name, figures) in enumerate(results.items()):
         measured = {
             place: spread(rounds)
@@ -50,7 +50,9 @@ def _panel(axes: Any, results: Mapping[str, Mapping[str, Sequence[float]]], key:
         places = [place + (number - (len(results) - 1) / 2) * width for place in measured]
         medians, below, above = zip(*measured.values(), strict=True) if measured else ((), (), ())
         errors = {"elinewidth": 0.7, "ecolor": "#444"}
-        axes.bar(places, medians, width, yerr=[below, above], error_kw=errors, label=name, color=f"C{number}")
+        axes.bar(
+            places, medians, width, yerr=[below, above], error_kw=errors, label=name, color=colors(number)
+        )
     axes.set_yscale("log")
     axes.set_xticks(range(len(SIZES)), SIZES.values())
     axes.grid(axis="y", color="#ddd", linewidth=0.5)

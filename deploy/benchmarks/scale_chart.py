@@ -13,9 +13,9 @@ from matplotlib.figure import Figure
 from deploy.benchmarks.table import Results
 
 PANELS = {
-    "cpu": "CPU of one arm among so many [% of a core]",
-    "packets": "Packets of one arm among so many [1/s]",
-    "publisher_us": "CPU of a publisher with so many subscribers [µs/item]",
+    "cpu": ("CPU of an arm [% of a core]", "arms"),
+    "packets": ("Packets of an arm [1/s]", "arms"),
+    "publisher_us": ("CPU of the publisher [µs/item]", "subscribers"),
 }
 
 
@@ -24,17 +24,19 @@ def draw(results: Mapping[str, Results], file: Path) -> None:
     # Text stays text, and the same figures give the same file.
     matplotlib.rcParams.update({"svg.fonttype": "none", "svg.hashsalt": "benchmarks", "font.size": 9})
     figure = Figure(figsize=(9, 3.2), layout="constrained")
-    for axes, (name, title) in zip(figure.subplots(1, len(PANELS)), PANELS.items(), strict=True):
+    for axes, (name, (title, number)) in zip(figure.subplots(1, len(PANELS)), PANELS.items(), strict=True):
         for color, (kind, rows) in enumerate(results.items()):
-            points = [(int(number), figures[name][0]) for number, figures in rows.items() if name in figures]
+            points = [(int(count), figures[name][0]) for count, figures in rows.items() if name in figures]
             if points:
                 axes.plot(*zip(*points, strict=True), marker="o", label=kind, color=f"C{color}")
-        axes.set_title(title, loc="left", fontsize=8)
+        axes.set_title(title, loc="left", fontsize=10)
+        axes.set_xlabel(number)
         axes.set_xlim(left=0)
         axes.set_ylim(bottom=0)
         axes.grid(color="#ddd", linewidth=0.5)
         axes.spines[["top", "right"]].set_visible(False)
-        axes.legend(frameon=False, fontsize=7)
+    lines = {line.get_label(): line for axes in figure.axes for line in axes.get_lines()}
+    figure.legend(lines.values(), lines, loc="outside lower center", ncols=len(lines), frameon=False)
     figure.savefig(file, format="svg", metadata={"Date": None})
 
 
