@@ -111,6 +111,8 @@ def test_short_pipeline_of_this_system_has_figures() -> None:
     assert set(figures) == {
         f"pipeline.8.{name}" for name in ("p50_ms", "p99_ms", "cpu_us", "megabytes", "threads", "delivered")
     }
+    # A busy machine may let both looks at the processor time come after the items.
+    assert figures.pop("pipeline.8.cpu_us") >= 0
     assert all(value > 0 for value in figures.values())
 
 

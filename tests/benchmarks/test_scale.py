@@ -78,12 +78,12 @@ def test_fleet_grows_until_the_machine_is_full(monkeypatch: pytest.MonkeyPatch) 
     assert numbers == ["1", "5", "10"]
 
 
-def test_item_costs_its_publisher_more_with_more_subscribers(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_item_costs_its_publisher_and_its_subscribers(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(alternatives, "BENCH_PYTHON", alternatives.SYSTEM_PYTHON)
     here = Alternative("ReactiveNode", "reactive", ros=bool(system_rclpy()))
     figures = measurement.measure_subscribers(here, 3, 200.0, warm_up=0.2, seconds=0.3)
     assert figures.keys() == scale.HEADINGS[scale.SUBSCRIBERS].keys()
-    assert all(value > 0 for value in figures.values())
+    assert all(value >= 0 for value in figures.values()), "both looks may come after the items"
 
 
 def test_kinds_are_measured_one_after_the_other(
