@@ -89,8 +89,9 @@ def rename(argv: Sequence[str], environment: Mapping[str, str]) -> None:
     middle, end = begin + len(arguments), begin + len(arguments + variables)
     libc = ctypes.CDLL(None, use_errno=True)
     libc.sbrk.restype = ctypes.c_void_p
-    start_code, end_code, start_stack = map(int, processes.stat_of(os.getpid())[23:26])
-    start_data, end_data, start_brk = map(int, processes.stat_of(os.getpid())[42:45])
+    stat = processes.stat_of(os.getpid())
+    start_code, end_code, start_stack = map(int, stat[23:26])
+    start_data, end_data, start_brk = map(int, stat[42:45])
     layout = struct.pack(
         "12Q2I",  # struct prctl_mm_map
         *(start_code, end_code, start_data, end_data, start_brk, libc.sbrk(0), start_stack),
