@@ -17,6 +17,7 @@ from typing import Any
 from deploy.benchmarks.alternatives import Alternative
 from deploy.benchmarks.link import FIRST, LAST, MIDDLE, SINK, SOURCE, Job
 from deploy.benchmarks.worker import REPORTS
+from deploy.chaos.cost import proportional_set_size
 from deploy.supervision import interruption
 from reactive_node.domains import reserved_domain
 
@@ -78,12 +79,9 @@ def measure(
         if scenario.name == "start":
             return {f"{scenario.key}.seconds": first["time"] - began}
         pid = run.pids[MIDDLE if MIDDLE in roles else SINK]
-        run.report(SINK, "begin")
-        busy = cpu_seconds(pid)
-        end = run.report(SINK, "end")
-        busy = cpu_seconds(pid) - busy
-        memory, threads = _memory(pid)
-    figures = {"cpu_us": 1e6 * busy / end["count"], "megabytes": memory, "threads": threads}
+        end, (cpu,) = _cost(run, [pid], seconds)
+        megabytes, threads = proportional_set_size(pid), len(os.listdir(f"/proc/{pid}/task"))
+    figures = {"cpu_us": cpu, "megabytes": megabytes, "threads": threads}
     if scenario.name == "flood":
         figures["per_second"] = end["count"] / end["seconds"]
     else:
@@ -104,24 +102,28 @@ def measure_subscribers(
     roles = (*[SINK] * count, SOURCE)
     with _run(alternative, roles, Scenario("subscribers", 8, rate), warm_up, seconds) as run:
         run.start()
-        run.report(SINK, "begin")
-        pids = (run.pids[SOURCE], run.pids[SINK])
-        before = [cpu_seconds(pid) for pid in pids]
-        items = run.report(SINK, "end")["count"]
-        publisher, subscriber = (cpu_seconds(pid) - busy for pid, busy in zip(pids, before, strict=True))
-    return {"publisher_us": 1e6 * publisher / items, "subscriber_us": 1e6 * subscriber / items}
+        _, (publisher, subscriber) = _cost(run, [run.pids[SOURCE], run.pids[SINK]], seconds)
+    return {"publisher_us": publisher, "subscriber_us": subscriber}
+
+
+def _cost(run: _Run, pids: Sequence[int], seconds: float) -> tuple[dict[str, Any], list[float]]:
+    """
+    Return what the sink has seen at the end, and the processor time of an item in each process [µs].
+
+    The items go on, so this process may read the clocks later than the sink reports, but as long after each
+    other as the measurement takes.
+    """
+    run.report(SINK, "begin")
+    began, before = time.monotonic(), [cpu_seconds(pid) for pid in pids]
+    end = run.report(SINK, "end")
+    time.sleep(max(0.0, began + seconds - time.monotonic()))
+    items = end["count"] / end["seconds"] * (time.monotonic() - began)
+    return end, [1e6 * (cpu_seconds(pid) - busy) / items for pid, busy in zip(pids, before, strict=True)]
 
 
 def cpu_seconds(pid: int) -> float:
     """Return the processor time of a process, with all its threads, also those that have ended."""
     return time.clock_gettime(~pid << 3 | 2)  # the kernel's name of this clock: clock_getcpuclockid(3)
-
-
-def _memory(pid: int) -> tuple[float, float]:
-    """Return the proportional set size [MB] and the number of threads of a process."""
-    rollup = Path(f"/proc/{pid}/smaps_rollup").read_text().splitlines()
-    kilobytes = next(int(line.split()[1]) for line in rollup if line.startswith("Pss:"))
-    return kilobytes / 1024, len(os.listdir(f"/proc/{pid}/task"))
 
 
 @contextmanager

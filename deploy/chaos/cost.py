@@ -36,7 +36,7 @@ class Cost:
                 if member.program == BABBLER:
                     continue
                 with suppress(OSError, KeyError):
-                    memory += int(_field(member.pid, "smaps_rollup", "Pss")) / 1024
+                    memory += proportional_set_size(member.pid)
                     threads += int(_field(member.pid, "status", "Threads"))
                     processes += 1
         busy = sum(arm.processor_time() for arm in arms)
@@ -52,6 +52,11 @@ class Cost:
             f"{threads:.0f} threads ({threads - before.threads / self.arms:+.0f}) "
             f"in {self.processes / self.arms:.0f} processes per arm"
         )
+
+
+def proportional_set_size(pid: int) -> float:
+    """Return the memory of a process [MB]; of what it shares with others, its part."""
+    return int(_field(pid, "smaps_rollup", "Pss")) / 1024
 
 
 def _field(pid: int, file: str, name: str) -> str:

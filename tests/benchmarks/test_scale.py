@@ -83,7 +83,7 @@ def test_item_costs_its_publisher_and_its_subscribers(monkeypatch: pytest.Monkey
     here = Alternative("ReactiveNode", "reactive", ros=bool(system_rclpy()))
     figures = measurement.measure_subscribers(here, 3, 200.0, warm_up=0.2, seconds=0.3)
     assert figures.keys() == scale.HEADINGS[scale.SUBSCRIBERS].keys()
-    assert all(value >= 0 for value in figures.values()), "both looks may come after the items"
+    assert all(value > 0 for value in figures.values())
 
 
 def test_kinds_are_measured_one_after_the_other(
