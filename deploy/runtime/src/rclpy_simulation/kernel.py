@@ -5,6 +5,7 @@ from __future__ import annotations
 import heapq
 import itertools
 import random
+import threading
 from collections import deque
 from collections.abc import Callable, MutableMapping
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -23,9 +24,16 @@ _LAST_ENDS = 8
 State = tuple[MutableMapping[str, Any], str]
 """A mapping and a key: a variable that each process has for itself, such as ``(sys.__dict__, "argv")``."""
 
-current: Process | None = None
-"""The process whose code runs now; ``None`` for the code of the simulation itself."""
-current_thread: Thread | None = None
+
+class _Here(threading.local):
+    """What runs now in the real thread of the simulation; other real threads run nothing simulated."""
+
+    process: Process | None = None
+    """The process whose code runs; ``None`` for the code of the simulation itself."""
+    thread: Thread | None = None
+
+
+here = _Here()
 
 
 class End(NamedTuple):
@@ -91,7 +99,7 @@ class Kernel:
 
         :return: whether the condition is true; without one, ``False``.
         """
-        if current is not None:
+        if here.process is not None:
             raise RuntimeError("a simulated program cannot run the simulation")
         self.hub = getcurrent()
         events, pop = self._events, heapq.heappop
@@ -121,14 +129,13 @@ class Kernel:
 
     def switch(self, process: Process, thread: Thread, enter: Callable[[], Any]) -> None:
         """Run a thread until it waits or ends."""
-        global current, current_thread
         if self._loaded is not process:
             self.load(process)
-        current, current_thread = process, thread
+        here.process, here.thread = process, thread
         try:
             enter()
         finally:
-            current = current_thread = None
+            here.process = here.thread = None
 
     def load(self, process: Process | None) -> None:
         """Put the variables of a process in place of those of the last one."""
@@ -149,6 +156,6 @@ class Kernel:
 
 def running() -> Thread:
     """Return the thread that runs now. Raises RuntimeError outside of simulated programs."""
-    if current_thread is None:
+    if here.thread is None:
         raise RuntimeError("only simulated programs can do this: start them with Simulation.start")
-    return current_thread
+    return here.thread

@@ -32,9 +32,10 @@ def _in_process(simulated: Callable[..., Any], real: Callable[..., Any]) -> Call
     """Return a function that does one thing in a simulated process, and the real one elsewhere."""
 
     def call(*arguments: Any, **options: Any) -> Any:
-        if kernel.current is None:
+        process = kernel.here.process
+        if process is None:
             return real(*arguments, **options)
-        return simulated(kernel.current, *arguments, **options)
+        return simulated(process, *arguments, **options)
 
     return call
 
@@ -43,7 +44,7 @@ def _clock(read: Callable[[Process], Any], real: Callable[[], Any]) -> Callable[
     """As :func:`_in_process`, without arguments: clocks are read often."""
 
     def call() -> Any:
-        process = kernel.current
+        process = kernel.here.process
         return real() if process is None else read(process)
 
     return call
@@ -130,7 +131,7 @@ def _join(thread: Thread, timeout: float | None = None) -> None:
 
 def _get_ident(real: Callable[[], int]) -> Callable[[], int]:
     def call() -> int:
-        thread = kernel.current_thread
+        thread = kernel.here.thread
         return real() if thread is None else thread.ident
 
     return call
