@@ -122,7 +122,8 @@ def spin():
     try:
         rclpy.spin(node)
     except ExternalShutdownException:
-        print("ended", flush=True)
+        pass  # or spin() returns, if the signal came while the callback ran
+    print("ended", flush=True)
 threading.Thread(target=spin).start()
 libc.pthread_mutex_lock(mutex)
 libc.pthread_mutex_lock(mutex)  # for ever
