@@ -1,8 +1,9 @@
 """`make bench`: compare this system with its alternatives, on the same work in one interleaved run.
 
 A source publishes items, a middle process maps and publishes them again, a sink receives them. Then a source
-floods a sink, and a source starts while a sink waits. Each round measures all alternatives, so a busy machine
-affects all alike. CPU time is that of whole processes. What cannot be measured here is named with the reason.
+floods a sink, and a source starts while a sink waits. `chain` compares the arm's kinematics and velocity with
+the same in plain callbacks. Each round measures all alternatives, so a busy machine affects all alike. CPU
+time is that of whole processes. What cannot be measured here is named with the reason.
 """
 
 from __future__ import annotations
@@ -14,20 +15,21 @@ import platform
 import subprocess
 import sys
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from importlib import metadata
 from pathlib import Path
 from typing import Any
 
 from deploy.benchmarks import environment, scale
-from deploy.benchmarks.alternatives import ALTERNATIVES, BENCH_PYTHON, Alternative
-from deploy.benchmarks.measurement import SCENARIOS, MeasurementFailed, measure
-from deploy.benchmarks.table import tables
+from deploy.benchmarks.alternatives import ALTERNATIVES, BENCH_PYTHON, CHAINS, Alternative
+from deploy.benchmarks.measurement import CHAIN_SCENARIOS, SCENARIOS, MeasurementFailed, Scenario, measure
+from deploy.benchmarks.table import chain_tables, tables
 from deploy.commands.setup import system_rclpy
 from deploy.supervision import interruption
 from deploy.supervision.processes import ROOT, run_directory
 
-COMPARISON, SCALE = "comparison", "scale"
+COMPARISON, CHAIN, SCALE = "comparison", "chain", "scale"
+TABLES: dict[str, Callable[[Any], str]] = {COMPARISON: tables, CHAIN: chain_tables, SCALE: scale.tables}
 
 
 def present(alternatives: Iterable[Alternative], refused: dict[str, str]) -> list[Alternative]:
@@ -46,11 +48,13 @@ def present(alternatives: Iterable[Alternative], refused: dict[str, str]) -> lis
     return found
 
 
-def compare(alternatives: Sequence[Alternative], rounds: int) -> Iterator[tuple[str, dict[str, float]]]:
+def compare(
+    alternatives: Sequence[Alternative], scenarios: Sequence[Scenario], rounds: int
+) -> Iterator[tuple[str, dict[str, float]]]:
     """Yield the figures of each measurement with the alternative's title; a round measures all of them."""
     began = time.monotonic()
     for number in range(1, rounds + 1):
-        for scenario in SCENARIOS:
+        for scenario in scenarios:
             print(f"round {number} of {rounds}, {scenario.key}, {time.monotonic() - began:.0f} s", flush=True)
             for each in alternatives:
                 try:
@@ -86,6 +90,7 @@ def main(arguments: Sequence[str]) -> int:
     parser = argparse.ArgumentParser(prog="make bench", description=__doc__)
     kinds = {
         COMPARISON: "this system and its alternatives (the default)",
+        CHAIN: "the arm's own services and the same in plain callbacks",
         SCALE: "many arms, many subscribers",
     }
     shown = "; ".join(f"{name}: {meaning}" for name, meaning in kinds.items())
@@ -99,7 +104,7 @@ def main(arguments: Sequence[str]) -> int:
         if options.kind == SCALE:
             _scale(results)
         else:
-            _compare(results, options.rounds)
+            _compare(results, options.kind, options.rounds)
     except interruption.Interrupted:
         print("Interrupted. So far:", flush=True)
         code = 130
@@ -108,18 +113,19 @@ def main(arguments: Sequence[str]) -> int:
         return 1
     if any(results.values()):
         interruption.ignore()
-        print(f"\n{scale.tables(results) if options.kind == SCALE else tables(results)}\n")
+        print(f"\n{TABLES[options.kind](results)}\n")
         return _write(options.kind, results) or code
     return code
 
 
-def _compare(results: dict[str, Any], rounds: int) -> None:
+def _compare(results: dict[str, Any], kind: str, rounds: int) -> None:
     """Collect the rounds of each figure, by alternative."""
-    needed = {each.requirements for each in ALTERNATIVES if each.requirements} | {environment.CHART}
-    found = present(ALTERNATIVES, environment.prepare(sorted(needed)))
+    alternatives, scenarios = (CHAINS, CHAIN_SCENARIOS) if kind == CHAIN else (ALTERNATIVES, SCENARIOS)
+    needed = {each.requirements for each in alternatives if each.requirements} | {environment.CHART}
+    found = present(alternatives, environment.prepare(sorted(needed)))
     print(f"{machine()}; {versions()}", flush=True)
     results |= {each.title: {} for each in found}
-    for title, figures in compare(found, rounds):
+    for title, figures in compare(found, scenarios, rounds):
         for name, value in figures.items():
             results[title].setdefault(name, []).append(value)
 
@@ -133,11 +139,14 @@ def _scale(results: dict[str, Any]) -> None:
 
 
 def _write(kind: str, results: dict[str, Any]) -> int:
-    """Write the figures and the chart; return the exit code."""
+    """Write the figures and, if the kind has one, the chart; return the exit code."""
     directory = run_directory() / "bench"
     directory.mkdir(parents=True, exist_ok=True)
     file, chart = directory / f"{kind}.json", directory / f"{kind}.svg"
     file.write_text(json.dumps(results, indent=1))
+    if kind == CHAIN:
+        print(f"Figures: {file}")
+        return 0
     command = [str(BENCH_PYTHON), "-m", f"deploy.benchmarks.{kind}_chart", str(file), str(chart)]
     if subprocess.run(command, cwd=ROOT, start_new_session=True).returncode:
         print("The chart was not drawn.", file=sys.stderr)

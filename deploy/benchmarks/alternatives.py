@@ -97,3 +97,10 @@ ALTERNATIVES = (
     Alternative("pyzmq", "zeromq", "zeromq.txt"),
     Alternative("iceoryx2", "iceoryx", "iceoryx.txt"),
 )
+CHAINS = (
+    Alternative("services", "chain_services"),
+    Alternative("callbacks, same rclpy", "chain"),
+    Alternative("ROS 2, services", "chain_services", ros=True),
+    Alternative("ROS 2, callbacks", "chain", ros=True),
+)
+"""The arm's own chain, from an angle to a speed."""

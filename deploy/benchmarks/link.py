@@ -12,6 +12,8 @@ Item: TypeAlias = "array[int]"
 """Octets; the first eight are the time of sending, see :func:`stamp`."""
 
 SOURCE, MIDDLE, SINK = "source", "middle", "sink"
+KINEMATICS, VELOCITY = "kinematics", "velocity"
+"""The middle processes of the arm's own chain, from an angle to a speed."""
 FIRST, LAST = "first", "last"
 """The topics: the middle process listens to the first one, the sink to the last one."""
 

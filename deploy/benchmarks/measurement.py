@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from deploy.benchmarks.alternatives import Alternative
-from deploy.benchmarks.link import FIRST, LAST, MIDDLE, SINK, SOURCE, Job
+from deploy.benchmarks.link import FIRST, KINEMATICS, LAST, MIDDLE, SINK, SOURCE, VELOCITY, Job
 from deploy.benchmarks.worker import REPORTS
 from deploy.chaos.cost import proportional_set_size
 from deploy.supervision import interruption
@@ -37,7 +37,7 @@ class Scenario:
     """One kind of work."""
 
     name: str
-    """`pipeline`, `flood` or `start`."""
+    """`pipeline`, `flood`, `start` or `chain` (from an angle to a speed)."""
     size: int
     """Of an item [octets]."""
     rate: float
@@ -46,9 +46,15 @@ class Scenario:
     @property
     def key(self) -> str:
         """The beginning of the names of its figures."""
-        return f"{self.name}.{self.size}"
+        return f"{self.name}.{self.rate:.0f}" if self.name == CHAIN else f"{self.name}.{self.size}"
+
+    @property
+    def middle(self) -> tuple[str, ...]:
+        """The roles between sink and source, the last one first."""
+        return {"pipeline": (MIDDLE,), CHAIN: (VELOCITY, KINEMATICS)}.get(self.name, ())
 
 
+CHAIN = "chain"
 SCENARIOS = (
     Scenario("pipeline", 8, 200.0),
     Scenario("pipeline", 1_000, 200.0),
@@ -60,6 +66,7 @@ SCENARIOS = (
     Scenario("flood", 10_000_000, 0.0),
     Scenario("start", 8, 1000.0),
 )
+CHAIN_SCENARIOS = tuple(Scenario(CHAIN, 8, rate) for rate in (100.0, 500.0, 1000.0, 4000.0))
 
 
 def measure(
@@ -72,16 +79,17 @@ def measure(
     :param seconds: of the measurement.
     :raises MeasurementFailed: if the processes end early or stay silent.
     """
-    roles = (SINK, MIDDLE, SOURCE) if scenario.name == "pipeline" else (SINK, SOURCE)
+    roles = (SINK, *scenario.middle, SOURCE)
     with _run(alternative, roles, scenario, warm_up, seconds) as run:
         began = run.start()
         first = run.report(SINK, "first")
         if scenario.name == "start":
             return {f"{scenario.key}.seconds": first["time"] - began}
-        pid = run.pids[MIDDLE if MIDDLE in roles else SINK]
-        end, (cpu,) = _cost(run, [pid], seconds)
-        megabytes, threads = proportional_set_size(pid), len(os.listdir(f"/proc/{pid}/task"))
-    figures = {"cpu_us": cpu, "megabytes": megabytes, "threads": threads}
+        pids = [run.pids[role] for role in scenario.middle or (SINK,)]
+        end, cpu = _cost(run, pids, seconds)
+        megabytes = sum(map(proportional_set_size, pids))
+        threads = sum(len(os.listdir(f"/proc/{pid}/task")) for pid in pids)
+    figures = {"cpu_us": sum(cpu), "megabytes": megabytes, "threads": threads}
     if scenario.name == "flood":
         figures["per_second"] = end["count"] / end["seconds"]
     else:

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 Results = Mapping[str, Mapping[str, Sequence[float]]]
 """The rounds of each figure, by alternative and by name of the figure."""
 
+RATES = {100: "100 Hz", 500: "500 Hz", 1000: "1 kHz", 4000: "4 kHz"}
 SIZES = {8: "8 B", 1_000: "1 kB", 1_000_000: "1 MB", 10_000_000: "10 MB"}
 
 
@@ -37,6 +38,21 @@ def table(title: str, results: Results, figures: Mapping[str, str]) -> str:
 
 def _by_size(figure: str) -> dict[str, str]:
     return {figure.format(size): heading for size, heading in SIZES.items()}
+
+
+def chain_tables(results: Results) -> str:
+    """Return all tables of the arm's own chain."""
+    titles = {
+        "p50_ms": "θ1 to speed: latency, p50 [ms]",
+        "p99_ms": "θ1 to speed: latency, p99 [ms]",
+        "cpu_us": "θ1 to speed: CPU of both processes [µs/item]",
+        "delivered": "θ1 to speed: delivered [%]",
+        "megabytes": "θ1 to speed: proportional set size of both processes [MB]",
+    }
+    return "\n\n".join(
+        table(title, results, {f"chain.{rate}.{figure}": heading for rate, heading in RATES.items()})
+        for figure, title in titles.items()
+    )
 
 
 def tables(results: Results) -> str:

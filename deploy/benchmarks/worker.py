@@ -17,7 +17,7 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
-from deploy.benchmarks.link import FIRST, LAST, MIDDLE, SOURCE, Job, Link
+from deploy.benchmarks.link import FIRST, LAST, SINK, SOURCE, Job, Link
 
 REPORTS = "reports"  # the name of the socket in the directory of a measurement
 _TURN = 0.1  # s at most between two looks whether to end
@@ -107,10 +107,10 @@ def main() -> None:
         if job.role == SOURCE:
             publish(link, job, life)
             return
-        if job.role == MIDDLE:
-            link.forward(FIRST, LAST)
-        else:
+        if job.role == SINK:
             link.subscribe(LAST, Meter(job, reports).receive)
+        else:
+            link.forward(FIRST, LAST)
         reports.send("ready", pid=os.getpid())
         while life.goes_on():
             link.wait(_TURN)

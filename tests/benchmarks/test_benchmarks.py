@@ -78,10 +78,11 @@ def test_failed_measurement_leaves_the_others_their_figures(
         return {"x": 1.0}
 
     monkeypatch.setattr(command, "measure", measure)
-    monkeypatch.setattr(command, "SCENARIOS", (Scenario("start", 8, 0.0),))
     silent, good = Alternative("silent", "callbacks"), Alternative("good", "callbacks")
 
-    assert list(command.compare([silent, good], 2)) == [("good", {"x": 1.0})] * 2
+    rounds = command.compare([silent, good], [Scenario("start", 8, 0.0)], 2)
+
+    assert list(rounds) == [("good", {"x": 1.0})] * 2
     assert "no figures: silent, start.8: no word\n" in capsys.readouterr().out
 
 
@@ -113,6 +114,18 @@ def test_short_pipeline_of_this_system_has_figures() -> None:
         f"pipeline.8.{name}" for name in ("p50_ms", "p99_ms", "cpu_us", "megabytes", "threads", "delivered")
     }
     assert all(value > 0 for value in figures.values())
+
+
+@pytest.mark.parametrize("link", ["chain", "chain_services"])
+def test_short_chain_has_figures(link: str) -> None:
+    here = Alternative("here", link, ros=bool(system_rclpy()))
+
+    figures = measurement.measure(here, Scenario("chain", 8, 100.0), warm_up=0.1, seconds=0.3)
+
+    names = ("p50_ms", "p99_ms", "cpu_us", "megabytes", "threads", "delivered")
+    assert set(figures) == {f"chain.100.{name}" for name in names}
+    assert all(value > 0 for value in figures.values())
+    assert figures["chain.100.p50_ms"] < 1000 / 100, "the latency is that of the latest angle"
 
 
 def test_processor_time_is_measured_although_all_reports_have_waited(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,0 +1,115 @@
+"""The arm's own chain in plain callbacks: θ1 → kinematics → velocity → speed, as a ROS 2 program has it."""
+
+from __future__ import annotations
+
+import math
+import mmap
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import rclpy
+from geometry_msgs.msg import PointStamped
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.task import Future
+from std_msgs.msg import Float64
+
+from deploy.benchmarks.link import KINEMATICS, Item, Job, Link
+from interfaces.topics import EFFECTOR_POSITION, EFFECTOR_SPEED, L1, L2, THETA1, THETA2, Topic
+
+
+class Connection(Link):
+    """A node of the chain. A speed tells no time of sending, so the source leaves it in shared memory."""
+
+    make_node: Callable[[str], Node] = Node
+
+    def __init__(self, job: Job) -> None:
+        super().__init__(job)
+        rclpy.init(args=[])
+        self.node = type(self).make_node(job.role)
+        self.executor = SingleThreadedExecutor()
+        self.executor.add_node(self.node)
+        file = os.open(Path(job.directory, "sent"), os.O_RDWR | os.O_CREAT, 0o600)
+        os.ftruncate(file, 8)
+        self.sent = mmap.mmap(file, 8)
+        os.close(file)
+
+    def publisher(self, topic: str) -> Callable[[Item], object]:
+        """Return a function that publishes the next angle, which differs from the one before."""
+        for fixed in (L1, L2, THETA2):
+            self._publisher(fixed)(Float64(data=1.0))
+        publish = self._publisher(THETA1)
+        angle = 0.0
+
+        def turn(item: Item) -> None:
+            nonlocal angle
+            angle = (angle + 1e-3) % 1.0
+            self.sent[:] = item.tobytes()
+            publish(Float64(data=angle))
+
+        return turn
+
+    def subscribe(self, topic: str, on_item: Callable[[Any], object]) -> None:
+        """Call back with the latest time of sending when a speed arrives."""
+        self._listen(EFFECTOR_SPEED, lambda _: on_item(self.sent))
+
+    def forward(self, source: str, target: str) -> None:
+        if self.job.role == KINEMATICS:
+            self._kinematics()
+        else:
+            self._velocity()
+
+    def _kinematics(self) -> None:
+        publish = self._publisher(EFFECTOR_POSITION)
+        known: dict[str, float] = {}
+
+        def remember(topic: Topic) -> None:
+            def on_message(message: Float64) -> None:
+                known[topic.name] = message.data
+                if len(known) == 4:
+                    move()
+
+            self._listen(topic, on_message)
+
+        def move() -> None:
+            heading = known["theta1"] + known["theta2"]
+            position = PointStamped()
+            position.header.stamp = self.node.get_clock().now().to_msg()
+            position.header.frame_id = "base"
+            position.point.x = known["l1"] * math.cos(known["theta1"]) + known["l2"] * math.cos(heading)
+            position.point.y = known["l1"] * math.sin(known["theta1"]) + known["l2"] * math.sin(heading)
+            publish(position)
+
+        for topic in (L1, L2, THETA1, THETA2):
+            remember(topic)
+
+    def _velocity(self) -> None:
+        publish = self._publisher(EFFECTOR_SPEED)
+        before: PointStamped | None = None
+
+        def on_message(message: PointStamped) -> None:
+            nonlocal before
+            if before is not None:
+                then, now = before.header.stamp, message.header.stamp
+                seconds = now.sec - then.sec + (now.nanosec - then.nanosec) / 1e9
+                if seconds > 0:
+                    x, y = message.point.x - before.point.x, message.point.y - before.point.y
+                    publish(Float64(data=math.hypot(x, y) / seconds))
+            before = message
+
+        self._listen(EFFECTOR_POSITION, on_message)
+
+    def _publisher(self, topic: Topic) -> Callable[[Any], object]:
+        return self.node.create_publisher(topic.type, topic.name, topic.qos).publish
+
+    def _listen(self, topic: Topic, callback: Callable[[Any], object]) -> None:
+        self.node.create_subscription(topic.type, topic.name, callback, topic.qos)
+
+    def wait(self, seconds: float) -> None:
+        self.executor.spin_until_future_complete(Future(), seconds)
+
+    def close(self) -> None:
+        self.node.destroy_node()
+        rclpy.try_shutdown()
