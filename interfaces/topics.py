@@ -62,7 +62,9 @@ def _not_finite(message: Any) -> str:
 
 
 def _not_a_length(message: Any) -> str:
-    return _not_finite(message) or ("" if message.data >= 0 else f"{message.data} is negative")
+    if 0 <= message.data < math.inf:
+        return ""
+    return _not_finite(message) or f"{message.data} is negative"
 
 
 def _not_a_position(message: Any) -> str:

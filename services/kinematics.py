@@ -54,7 +54,7 @@ def wire(node: ServiceNode) -> None:
     l1, l2, theta1, theta2 = (
         node.observe(topic).map(lambda message: message.data) for topic in (L1, L2, THETA1, THETA2)
     )
-    node.publish(EFFECTOR_POSITION, effector_position(l1, l2, theta1, theta2).map(message))
+    node.publish(EFFECTOR_POSITION, effector_position(l1, l2, theta1, theta2), message)
 
 
 if __name__ == "__main__":

@@ -26,6 +26,7 @@ GUARDS: dict[str, tuple[str, ...]] = {
         "tests/component/test_health.py",
         "tests/component/test_service_node.py",
     ),
+    "interfaces/service/inputs.py": ("tests/component/test_service_node.py",),
     "interfaces/service/instance.py": ("tests/component/test_instance.py",),
     "interfaces/service/node.py": ("tests/component/test_service_node.py",),
     "interfaces/service/parameters.py": (

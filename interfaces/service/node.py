@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import datetime
@@ -15,21 +14,18 @@ from rcl_interfaces.msg import (
     ParameterDescriptor,
     SetParametersResult,
 )
-from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.parameter import Parameter
-from rclpy.qos import DurabilityPolicy, QoSProfile
-from rclpy.serialization import deserialize_message
+from rclpy.qos import QoSProfile
 from reactivex import Observable, abc
-from reactivex.disposable import CompositeDisposable
 
 from interfaces.service.health import HealthReporter
+from interfaces.service.inputs import Input
 from interfaces.service.parameters import Declaration, declarations
 from interfaces.topics import Topic, is_latched
 from reactive_node import ReactiveNode, stamps
 from reactive_node.stamps import Timestamp
 
 T = TypeVar("T")
-_RECENT = 16  # messages of which a second reader may deliver a copy
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,70 +86,30 @@ class ServiceNode(ReactiveNode):
         :param max_age: a message that is older [s], or this much ahead of the local clock, is not good.
         """
         self._observed[self.resolve_topic_name(topic.name)] = topic
-        samples = (
-            self._from_every_publisher(topic)
-            if is_latched(topic.qos)
-            else self._samples(topic, topic.qos, sampled=sampled)
-        )
 
-        def read(sample: Timestamp[bytes]) -> Any | None:
-            message = self._read(topic, sample, max_age)
-            return Timestamp(message, sample.timestamp) if timestamped and message is not None else message
+        def create(qos: QoSProfile, **options: Any) -> Observable[Timestamp[bytes]]:
+            # Raw, because rclpy on Cyclone DDS would deliver a truncated message as one of zeros.
+            return self.create_observable(topic.type, topic.name, qos, timestamped=True, raw=True, **options)
 
-        return samples.map(read).filter(lambda item: item is not None)
+        shared = None if is_latched(topic.qos) else create(topic.qos, sampled=sampled)
 
-    def _samples(self, topic: Topic, qos: QoSProfile, **options: Any) -> Observable[Timestamp[bytes]]:
-        """
-        Return the messages of a reader as they came.
-
-        rclpy on Cyclone DDS would deliver a truncated message as one of zeros.
-        """
-        return self.create_observable(topic.type, topic.name, qos, timestamped=True, raw=True, **options)
-
-    def _read(self, topic: Topic, sample: Timestamp[bytes], max_age: float | None) -> Any | None:
-        """Return the message of a sample; ``None`` if it is not good, which is reported."""
-        try:
-            message = deserialize_message(sample.value, topic.type)
-        except RuntimeError:  # RMWError, which the rclpy of ROS 2 does not export
-            self.health.drop(topic.name, f"{len(sample.value)} octets are no {topic.type_name}")
-            return None
-        is_good = self._is_good(topic, message) and (
-            max_age is None or self._is_fresh(topic, sample.timestamp, max_age)
-        )
-        return message if is_good else None
-
-    def _from_every_publisher(self, topic: Topic) -> Observable[Timestamp[bytes]]:
-        """
-        Return the samples of a latched topic, also those of publishers that are not latched.
-
-        A transient-local reader receives nothing from a volatile publisher, such as ``ros2 topic pub``; if
-        there is one, a volatile reader listens as well.
-        """
+        def staleness(stamp: datetime) -> str:
+            age = self.age(stamp)
+            if max_age is None or abs(age) <= max_age:
+                return ""
+            return f"it is {age:.3f} s old" if age > 0 else f"its clock is {-age:.3f} s ahead of ours"
 
         def subscribe(
-            observer: abc.ObserverBase[Timestamp[bytes]], scheduler: abc.SchedulerBase | None = None
+            observer: abc.ObserverBase[Any], _: abc.SchedulerBase | None = None
         ) -> abc.DisposableBase:
-            readers = CompositeDisposable()
-            recent: deque[datetime] = deque(maxlen=_RECENT)
-            has_volatile_reader = False
-
-            def forward(sample: Timestamp[bytes]) -> None:
-                if sample.timestamp not in recent:
-                    recent.append(sample.timestamp)
-                    observer.on_next(sample)
-
-            def add(qos: QoSProfile, **options: Any) -> None:
-                samples = self._samples(topic, qos, **options)
-                readers.add(samples.subscribe(forward, observer.on_error, observer.on_completed))
-
-            def on_incompatible_qos(_: Any) -> None:
-                nonlocal has_volatile_reader
-                if not has_volatile_reader:
-                    has_volatile_reader = True
-                    add(QoSProfile(depth=topic.qos.depth, durability=DurabilityPolicy.VOLATILE))
-
-            add(topic.qos, event_callbacks=SubscriptionEventCallbacks(incompatible_qos=on_incompatible_qos))
-            return readers
+            messages = Input(
+                topic,
+                observer,
+                drop=self.health.drop,
+                staleness=None if max_age is None else staleness,
+                timestamped=timestamped,
+            )
+            return messages.read_every_publisher(create) if shared is None else messages.read(shared)
 
         return Observable(subscribe)
 
@@ -169,18 +125,28 @@ class ServiceNode(ReactiveNode):
         :param message: makes a message of an item.
         """
 
-        def good_message(item: Any) -> Any | None:
-            if isinstance(item, Rejected):
-                self.health.drop(item.topic.name, item.reason)
-                return None
-            result = message(item)
-            if not self._is_good(topic, result):
-                return None
-            self.health.count_output()
-            return result
+        def subscribe(
+            observer: abc.ObserverBase[Any], scheduler: abc.SchedulerBase | None = None
+        ) -> abc.DisposableBase:
+            def make(item: Any) -> None:
+                if isinstance(item, Rejected):
+                    self.health.drop(item.topic.name, item.reason)
+                    return
+                try:
+                    result = message(item)
+                except Exception as error:
+                    observer.on_error(error)
+                    return
+                problem = topic.problem(result)
+                if problem:
+                    self.health.drop(topic.name, problem)
+                    return
+                self.health.count_output()
+                observer.on_next(result)
 
-        messages = items.map(good_message).filter(lambda message: message is not None)
-        self.publish_observable(messages, topic.type, topic.name, topic.qos)
+            return items.subscribe(make, observer.on_error, observer.on_completed, scheduler=scheduler)
+
+        self.publish_observable(Observable(subscribe), topic.type, topic.name, topic.qos)
 
     def age(self, stamp: datetime) -> float:
         """
@@ -194,19 +160,6 @@ class ServiceNode(ReactiveNode):
     def remark(self, subject: str, reason: str) -> None:
         """Make the next health report a warning with this reason."""
         self.health.remark(subject, reason)
-
-    def _is_good(self, topic: Topic, message: Any) -> bool:
-        problem = topic.problem(message)
-        if problem:
-            self.health.drop(topic.name, problem)
-        return not problem
-
-    def _is_fresh(self, topic: Topic, stamp: datetime, max_age: float) -> bool:
-        age = self.age(stamp)
-        if abs(age) > max_age:
-            problem = f"it is {age:.3f} s old" if age > 0 else f"its clock is {-age:.3f} s ahead of ours"
-            self.health.drop(topic.name, problem)
-        return abs(age) <= max_age
 
     def _remark_other_types(self) -> None:
         """Remark publishers that use an observed topic with another type: nothing arrives from them."""

@@ -312,10 +312,19 @@ def readers(service: ServiceNode, monkeypatch: pytest.MonkeyPatch) -> Readers:
 def test_copies_of_latched_messages_are_dropped(service: ServiceNode, readers: Readers) -> None:
     received: list[Any] = []
     service.observe(topics.L1, timestamped=True).subscribe(received.append)
+    readers.events[0].incompatible_qos(None)  # from now on, a second reader listens
+    readers.samples.observers.pop()  # the test delivers the copies
     readers.receive(number(1.5), *range(17), *range(1, 17))
     assert received == [Timestamp(number(1.5), at_time(at)) for at in range(17)]
     readers.receive(number(1.5), 0.0)  # forgotten: only the last sixteen are known
     assert len(received) == 18
+
+
+def test_one_reader_delivers_no_copies(service: ServiceNode, readers: Readers) -> None:
+    received: list[Any] = []
+    service.observe(topics.L1).subscribe(received.append)
+    readers.receive(number(1.5), 1.0, 1.0)
+    assert received == [number(1.5)] * 2
 
 
 def test_events_of_one_time_are_no_copies(service: ServiceNode, readers: Readers) -> None:

@@ -364,6 +364,8 @@ class Executor(AbstractContextManager["Executor"]):
                 self._ready.append((guard, False))
         next_timer: Timer | None = None
         for timer in self._timers:
+            if timer._canceled:  # most timers of schedulers are: saves the call
+                continue
             remaining = timer._remaining()
             if remaining <= 0:
                 if self.can_execute(timer):

@@ -32,9 +32,11 @@ def deserialize_message(serialized_message: bytes, message_type: type[_Message])
     :raises RMWError: if the bytes are not a message of this type.
     """
     type_: Any = message_type
-    check_is_valid_msg_type(type_)
     try:
         message: _Message = type_._deserialize(serialized_message)
     except ValueError as error:
         raise RMWError(f"failed to deserialize ROS message: {error}") from None
+    except AttributeError:
+        check_is_valid_msg_type(type_)
+        raise
     return message

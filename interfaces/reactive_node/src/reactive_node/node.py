@@ -21,7 +21,7 @@ from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 from reactivex import Observable, abc
-from reactivex.disposable import CompositeDisposable, Disposable
+from reactivex.disposable import CompositeDisposable, Disposable, SingleAssignmentDisposable
 from reactivex.subject import AsyncSubject
 
 from reactive_node import calls
@@ -261,9 +261,17 @@ class ReactiveNode(Node):
             ``event_callbacks=PublisherEventCallbacks(deadline=subject.on_next)``.
         """
         publisher = self.create_publisher(msg_type, topic, qos_profile, **options)
-        subscription = observable.do_action(publisher.publish).subscribe(
-            on_error=self.fail, scheduler=self.scheduler
-        )
+        subscription = SingleAssignmentDisposable()
+
+        def publish(message: Any) -> None:
+            try:
+                publisher.publish(message)
+            except Exception as error:
+                if not subscription.is_disposed:  # by an earlier error, while the observable emits at once
+                    subscription.dispose()
+                    self.fail(error)
+
+        subscription.disposable = observable.subscribe(publish, self.fail, scheduler=self.scheduler)
 
         def end() -> None:
             subscription.dispose()

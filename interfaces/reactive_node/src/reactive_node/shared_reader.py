@@ -14,7 +14,6 @@ from reactivex import abc
 from reactivex.disposable import Disposable
 from reactivex.subject import AsyncSubject
 
-from reactive_node import stamps
 from reactive_node.stamps import Timestamp
 
 
@@ -96,7 +95,12 @@ class SharedReader:
             observer.on_next(item)
 
     def _receive_with_info(self, message: Any, info: Any) -> None:
-        self._receive(Timestamp(message, stamps.from_nanoseconds(info["source_timestamp"])))
+        # Without Timestamp() and _receive(): where messages are rare, each call costs most.
+        item: Timestamp[Any] = tuple.__new__(Timestamp, (message, info["source_timestamp"]))
+        if self._retained is not None:
+            self._retained.append(item)
+        for observer in self._listening:
+            observer.on_next(item)
 
     def _leave(self, observer: abc.ObserverBase[Any]) -> None:
         with self._lock:

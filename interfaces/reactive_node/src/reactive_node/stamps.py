@@ -7,9 +7,8 @@ and may differ between hosts. Where safety depends on an age, take only the age 
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
-from typing import Generic, TypeVar
+from typing import Generic, NamedTuple, TypeVar
 
 from builtin_interfaces.msg import Time
 
@@ -27,12 +26,30 @@ _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 _MICROSECOND = timedelta(microseconds=1)
 
 
-@dataclass(slots=True)
-class Timestamp(Generic[_T]):
-    """A value and its time, with the attributes of the items that RxPY's ``timestamp`` operator emits."""
-
+class _Stamped(NamedTuple, Generic[_T]):
     value: _T
-    timestamp: datetime
+    nanoseconds: int
+
+
+class Timestamp(_Stamped[_T]):
+    """
+    A value and its time, with the attributes of the items that RxPY's ``timestamp`` operator emits.
+
+    Its time is kept in nanoseconds since 1970: most messages need no :attr:`timestamp`, which costs more.
+    """
+
+    __slots__ = ()
+
+    def __new__(cls, value: _T, timestamp: datetime) -> Timestamp[_T]:
+        return tuple.__new__(cls, (value, to_nanoseconds(timestamp)))
+
+    @property
+    def timestamp(self) -> datetime:
+        """The time, rounded down to microseconds."""
+        return from_nanoseconds(self.nanoseconds)
+
+    def __repr__(self) -> str:
+        return f"Timestamp({self.value!r}, {self.timestamp!r})"
 
 
 def now() -> datetime:
