@@ -39,6 +39,8 @@ if TYPE_CHECKING:
 # For this long after a wait [ns], ready readers take further messages in turn. Then timers are checked again.
 # So a flood of messages needs few waits, and a slow callback delays the others only by its own duration.
 _BURST = 200_000
+# A wait that took longer [ns] has slept: the message is the first one, and a second look would find nothing.
+_ASLEEP = 20_000
 _WAKE = 0  # the wait set's token of the guard condition
 
 
@@ -376,11 +378,13 @@ class Executor(AbstractContextManager["Executor"]):
         watch = self._watch
         if watch is not None and (remaining := watch.prepare()) < timeout:
             next_timer, timeout = None, remaining
+        began = time.monotonic_ns()
         tokens = self._waitset.wait(timeout)
         if not tokens and next_timer is not None:
             self._ready.append((next_timer, False))  # the wait lasted until the timer was due
         if tokens:
-            self._burst_end = time.monotonic_ns() + _BURST
+            ended = time.monotonic_ns()
+            self._burst_end = ended + _BURST if ended - began < _ASLEEP else 0
             if len(tokens) > 1:
                 tokens.sort()  # subscriptions before services and clients, as in rclpy
         woken = False

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import threading
+from collections import Counter
 from collections.abc import Callable
+from typing import Any
 
 import pytest
 
 import rclpy
+from rclpy import executors
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.context import Context
 from rclpy.executors import Executor, MultiThreadedExecutor, SingleThreadedExecutor
@@ -185,3 +188,40 @@ def test_a_thousand_entities_under_traffic_leave_nothing_behind(
     assert node.count_subscribers("x") == 0
     assert node.count_publishers("y") == 0
     assert threading.active_count() <= before
+
+
+@pytest.mark.parametrize(("asleep", "waits", "looks"), [(10**12, 1, 6), (-1, 5, 5)])
+def test_a_reader_is_asked_again_only_after_a_wait_without_sleep(
+    executor: SingleThreadedExecutor,
+    monkeypatch: pytest.MonkeyPatch,
+    node: Node,
+    asleep: int,
+    waits: int,
+    looks: int,
+) -> None:
+    monkeypatch.setattr(executors, "_BURST", 10**12)
+    monkeypatch.setattr(executors, "_ASLEEP", asleep)  # ns: every wait is shorter, or every wait is longer
+    received: list[float] = []
+    subscription = node.create_subscription(Float64, "x", lambda message: received.append(message.data), 10)
+    publisher = node.create_publisher(Float64, "x", 10)
+    executor.spin_once(timeout_sec=0)  # takes the reader into the wait set
+    calls = Counter[str]()
+
+    def counted(name: str, call: Callable[..., Any]) -> Callable[..., Any]:
+        def count(*arguments: Any) -> Any:
+            calls[name] += 1
+            return call(*arguments)
+
+        return count
+
+    monkeypatch.setattr(executor._waitset, "wait", counted("waits", executor._waitset.wait))
+    monkeypatch.setattr(subscription, "_take", counted("looks", subscription._take))
+    for number in range(5):
+        publisher.publish(Float64(data=float(number)))
+    while len(received) < 5:
+        executor.spin_once(timeout_sec=5)
+    monkeypatch.setattr(executor._waitset, "wait", lambda timeout: [])
+    executor.spin_once(timeout_sec=0)  # ends the burst
+
+    assert received == [0.0, 1.0, 2.0, 3.0, 4.0]
+    assert (calls["waits"], calls["looks"]) == (waits, looks)
