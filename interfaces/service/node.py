@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import datetime
+from functools import partial
 from typing import Any, TypeVar
 
 from rcl_interfaces.msg import (
@@ -93,12 +94,6 @@ class ServiceNode(ReactiveNode):
 
         shared = None if is_latched(topic.qos) else create(topic.qos, sampled=sampled)
 
-        def staleness(stamp: datetime) -> str:
-            age = self.age(stamp)
-            if max_age is None or abs(age) <= max_age:
-                return ""
-            return f"it is {age:.3f} s old" if age > 0 else f"its clock is {-age:.3f} s ahead of ours"
-
         def subscribe(
             observer: abc.ObserverBase[Any], _: abc.SchedulerBase | None = None
         ) -> abc.DisposableBase:
@@ -106,7 +101,7 @@ class ServiceNode(ReactiveNode):
                 topic,
                 observer,
                 drop=self.health.drop,
-                staleness=None if max_age is None else staleness,
+                staleness=None if max_age is None else partial(self._staleness, max_age),
                 timestamped=timestamped,
             )
             return messages.read_every_publisher(create) if shared is None else messages.read(shared)
@@ -144,7 +139,7 @@ class ServiceNode(ReactiveNode):
                 self.health.count_output()
                 observer.on_next(result)
 
-            return items.subscribe(make, observer.on_error, observer.on_completed, scheduler=scheduler)
+            return items.subscribe(make, observer.on_error, scheduler=scheduler)
 
         self.publish_observable(Observable(subscribe), topic.type, topic.name, topic.qos)
 
@@ -156,6 +151,13 @@ class ServiceNode(ReactiveNode):
         between hosts: safety takes only the age at arrival from it, and counts on by the Rx clock.
         """
         return (stamps.now() - stamp).total_seconds()
+
+    def _staleness(self, max_age: float, stamp: datetime) -> str:
+        """Return why a source time is too old [s], or too much ahead; empty if it is neither."""
+        age = self.age(stamp)
+        if abs(age) <= max_age:
+            return ""
+        return f"it is {age:.3f} s old" if age > 0 else f"its clock is {-age:.3f} s ahead of ours"
 
     def remark(self, subject: str, reason: str) -> None:
         """Make the next health report a warning with this reason."""

@@ -250,6 +250,7 @@ def test_bad_messages_are_not_published(
     spin_until(lambda: received == [1.0, 2.0])
 
     report = health()
+    assert report["message"] == "effector/speed: inf is not finite"
     assert (report["published"], report["dropped"]) == ("2", "1")
     assert 0 <= float(report["seconds_since_output"]) < 5
 
@@ -275,6 +276,26 @@ def test_rejected_items_are_reported_instead_of_published(
     report = health()
     assert report["message"] == "effector/position: its time stands still"
     assert (report["published"], report["dropped"]) == ("1", "1")
+
+
+@pytest.mark.parametrize("fails", ["items", "message"])
+def test_errors_of_published_items_are_raised_by_spin(
+    service: ServiceNode, spin_until: SpinUntil, fails: str
+) -> None:
+    error = LookupError("planted")
+
+    def message(speed: float) -> Float64:
+        raise error
+
+    items: Subject[float] = Subject()
+    service.publish(topics.EFFECTOR_SPEED, items, message)
+    if fails == "message":
+        items.on_next(1.0)
+    else:
+        items.on_error(error)
+
+    with pytest.raises(LookupError, match="planted"):
+        spin_until(lambda: False)
 
 
 class Readers:

@@ -153,10 +153,19 @@ def test_new_subscription_creates_new_reader(
     assert received == ["first", "second"]
 
 
+@pytest.mark.parametrize("timestamped", [False, True])
 def test_late_observer_of_latched_topic_gets_retained_samples(
-    node: ReactiveNode, latched_talker: Talker, spin_until: SpinUntil, spin_for: SpinFor
+    node: ReactiveNode,
+    latched_talker: Talker,
+    spin_until: SpinUntil,
+    spin_for: SpinFor,
+    timestamped: bool,
 ) -> None:
-    shared, own = (node.create_observable(String, "topic", LATCHED) for _ in range(2))
+    def messages() -> rx.Observable[String]:
+        items = node.create_observable(String, "topic", LATCHED, timestamped=timestamped)
+        return items.map(lambda item: item.value) if timestamped else items
+
+    shared, own = messages(), messages()
     first: list[str] = []
     late: list[str] = []
     late_with_own: list[str] = []
@@ -372,6 +381,22 @@ def test_thousand_disposals_on_other_threads_under_traffic_are_safe(
 
 
 # Errors
+
+
+def test_observable_can_be_subscribed_after_its_reader_could_not_be_created(
+    node: ReactiveNode, talker: Talker, spin_until: SpinUntil, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    received: list[str] = []
+    observable = node.create_observable(String, "topic")
+    with monkeypatch.context() as patch:
+        patch.setattr(node, "create_subscription", lambda *_, **__: 1 / 0)
+        with pytest.raises(ZeroDivisionError):
+            observable.subscribe(texts_into(received))
+
+    observable.subscribe(texts_into(received))
+
+    talker.say_when_heard("heard")
+    spin_until(lambda: received == ["heard"])
 
 
 def test_error_in_observer_is_raised_by_spin(
