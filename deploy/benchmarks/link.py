@@ -67,5 +67,9 @@ class Link(ABC):
     def wait(self, seconds: float) -> None:
         """Call back with what arrives, for about so many seconds or until something has arrived."""
 
+    def sent(self) -> int:
+        """Return how many items the source has sent by now; 0 if this process cannot know."""
+        return 0
+
     def close(self) -> None:  # noqa: B027, most have nothing to release
         """Release what would outlive this process."""

@@ -93,7 +93,8 @@ def measure(
     if scenario.name == "flood":
         figures["per_second"] = end["count"] / end["seconds"]
     else:
-        delivered = 100 * end["count"] / (scenario.rate * end["seconds"])
+        sent = end.get("sent") or scenario.rate * end["seconds"]
+        delivered = 100 * end["count"] / sent
         figures |= {"p50_ms": end["p50"], "p99_ms": end["p99"], "delivered": min(100.0, delivered)}
     return {f"{scenario.key}.{name}": value for name, value in figures.items()}
 

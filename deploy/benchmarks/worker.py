@@ -13,6 +13,7 @@ import socket
 import sys
 import time
 from array import array
+from collections.abc import Callable
 from pathlib import Path
 from types import FrameType
 from typing import Any
@@ -39,9 +40,11 @@ class Reports:
 class Meter:
     """Receives items in the sink, and reports when the measurement begins and what it has seen at its end."""
 
-    def __init__(self, job: Job, reports: Reports) -> None:
+    def __init__(self, job: Job, reports: Reports, sent: Callable[[], int]) -> None:
         self._job = job
         self._reports = reports
+        self._sent = sent
+        self._sent_before = 0
         self._phase_began = 0
         self._measuring = False
         self._latencies: list[int] = []
@@ -56,9 +59,11 @@ class Meter:
         seconds = (now - self._phase_began) / 1e9
         if not self._measuring and seconds >= self._job.warm_up:
             self._measuring, self._phase_began, self._latencies = True, now, []
+            self._sent_before = self._sent()
             self._reports.send("begin")
         elif self._measuring and seconds >= self._job.seconds:
-            self._reports.send("end", seconds=seconds, **self._figures())
+            sent = self._sent() - self._sent_before
+            self._reports.send("end", seconds=seconds, sent=sent, **self._figures())
             self._phase_began = sys.maxsize  # once
 
     def _figures(self) -> dict[str, float]:
@@ -84,7 +89,7 @@ class Life:
 
 
 def publish(link: Link, job: Job, life: Life) -> None:
-    """Publish stamped items at the rate of the job."""
+    """Publish stamped items at the rate of the job; one that is late shifts the following ones."""
     send = link.publisher(job.topic)
     item = array("B", bytes(job.size))
     due = time.monotonic()
@@ -93,8 +98,9 @@ def publish(link: Link, job: Job, life: Life) -> None:
             octets[:8] = time.monotonic_ns().to_bytes(8, "little")
         send(item)
         if job.rate:
-            due += 1 / job.rate
-            time.sleep(max(0.0, due - time.monotonic()))
+            now = time.monotonic()
+            due = max(due + 1 / job.rate, now)
+            time.sleep(due - now)
 
 
 def main() -> None:
@@ -108,7 +114,7 @@ def main() -> None:
             publish(link, job, life)
             return
         if job.role == SINK:
-            link.subscribe(LAST, Meter(job, reports).receive)
+            link.subscribe(LAST, Meter(job, reports, link.sent).receive)
         else:
             link.forward(FIRST, LAST)
         reports.send("ready", pid=os.getpid())

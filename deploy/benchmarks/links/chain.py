@@ -21,7 +21,7 @@ from interfaces.topics import EFFECTOR_POSITION, EFFECTOR_SPEED, L1, L2, THETA1,
 
 
 class Connection(Link):
-    """A node of the chain. A speed tells no time of sending, so the source leaves it in shared memory."""
+    """A node of the chain. The source leaves in shared memory what a speed does not tell: time and number."""
 
     make_node: Callable[[str], Node] = Node
 
@@ -32,8 +32,8 @@ class Connection(Link):
         self.executor = SingleThreadedExecutor()
         self.executor.add_node(self.node)
         file = os.open(Path(job.directory, "sent"), os.O_RDWR | os.O_CREAT, 0o600)
-        os.ftruncate(file, 8)
-        self.sent = mmap.mmap(file, 8)
+        os.ftruncate(file, 16)
+        self.memory = mmap.mmap(file, 16)  # the time of the latest item, and how many there were
         os.close(file)
 
     def publisher(self, topic: str) -> Callable[[Item], object]:
@@ -41,19 +41,22 @@ class Connection(Link):
         for fixed in (L1, L2, THETA2):
             self._publisher(fixed)(Float64(data=1.0))
         publish = self._publisher(THETA1)
-        angle = 0.0
+        count = 0
 
         def turn(item: Item) -> None:
-            nonlocal angle
-            angle = (angle + 1e-3) % 1.0
-            self.sent[:] = item.tobytes()
-            publish(Float64(data=angle))
+            nonlocal count
+            count += 1
+            self.memory[:] = item.tobytes() + count.to_bytes(8, "little")
+            publish(Float64(data=count % 1000 / 1000))
 
         return turn
 
     def subscribe(self, topic: str, on_item: Callable[[Any], object]) -> None:
         """Call back with the latest time of sending when a speed arrives."""
-        self._listen(EFFECTOR_SPEED, lambda _: on_item(self.sent))
+        self._listen(EFFECTOR_SPEED, lambda _: on_item(self.memory))
+
+    def sent(self) -> int:
+        return int.from_bytes(self.memory[8:], "little")
 
     def forward(self, source: str, target: str) -> None:
         if self.job.role == KINEMATICS:
