@@ -353,7 +353,7 @@ class Executor(AbstractContextManager["Executor"]):
 
         :return: whether :meth:`wake` was called.
         """
-        timeout = _remaining(deadline)
+        timeout = INFINITY if deadline is None else _remaining(deadline)
         if self._tasks:
             self._tasks_were_first = not self._tasks_were_first
             if self._tasks_were_first:  # as in rclpy; the next time, they come after the data
@@ -559,6 +559,14 @@ class _BuiltInExecutor(Executor):
 
     _SPIN_ENDS: tuple[type[Exception], ...] = (TimeoutException, ShutdownException, ConditionReachedException)
     """These end the spinning without an error."""
+
+    def spin(self) -> None:
+        """Run callbacks until the context or this executor is shut down."""
+        if type(self).spin_once is not _BuiltInExecutor.spin_once:
+            super().spin()  # a user's class has a spin_once() of its own
+            return
+        while self._context._valid and not self._is_shutdown:
+            self._spin(None, None)
 
     def spin_once(self, timeout_sec: float | None = None) -> None:
         """Run one callback; wait for it at most ``timeout_sec`` (``None`` or negative: for ever)."""

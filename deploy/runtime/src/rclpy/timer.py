@@ -157,7 +157,8 @@ class Timer:
     def _take(self) -> tuple[()] | None:
         if self._destroyed or self._canceled:
             return None
-        now = self._source.nanoseconds()
+        override = self._source._override
+        now = self._source._read() if override is None else override
         if now < self._next_call:
             return None
         self._last_call = now

@@ -225,3 +225,30 @@ def test_a_reader_is_asked_again_only_after_a_wait_without_sleep(
 
     assert received == [0.0, 1.0, 2.0, 3.0, 4.0]
     assert (calls["waits"], calls["looks"]) == (waits, looks)
+
+
+def test_spin_calls_the_spin_once_of_a_subclass(context: Context, make_node: MakeNode) -> None:
+    class Counting(SingleThreadedExecutor):
+        turns = 0
+
+        def spin_once(self, timeout_sec: float | None = None) -> None:
+            self.turns += 1
+            super().spin_once(timeout_sec)
+
+    node = make_node()
+    with Counting(context=context) as executor:
+        guards: list[bool] = []
+
+        def on_guard() -> None:
+            guards.append(True)
+            if len(guards) == 2:
+                executor.shutdown(timeout_sec=0)
+            else:
+                guard.trigger()
+
+        guard = node.create_guard_condition(on_guard)
+        executor.add_node(node)
+        guard.trigger()
+        executor.spin()
+
+    assert (len(guards), executor.turns) == (2, 2)
