@@ -12,6 +12,7 @@ from rclpy.duration import Duration
 from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.exceptions import RCLError
 from rclpy.qos import QoSProfile
+from rosidl_runtime_embedded.pieces import Pieces
 
 
 class Publisher(Owner):
@@ -62,7 +63,7 @@ class Publisher(Owner):
         if not self._context._valid:
             raise RCLError(f"cannot publish on {self._name}: the context was shut down")
         if msg.__class__ is self.msg_type or isinstance(msg, self.msg_type):
-            self._writer.write(self._serialize(msg))
+            self._writer.write(self._serialize(msg, Pieces))
         elif isinstance(msg, bytes):
             self._writer.write(msg)
         else:

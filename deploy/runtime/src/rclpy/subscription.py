@@ -78,7 +78,7 @@ class Subscription(Owner):
 
     def _take(self) -> tuple[Any, ...] | None:
         """Return the arguments for the callback; drop and count malformed messages."""
-        while not self._destroyed and (sample := self._reader.take()) is not None:
+        while not self._destroyed and (sample := self._reader.take(not self.raw)) is not None:
             try:
                 message = sample.data if self.raw else self._deserialize(sample.data)
             except ValueError as error:

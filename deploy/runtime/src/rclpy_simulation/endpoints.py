@@ -18,6 +18,7 @@ from rclpy_simulation.host import SECOND
 from rclpy_simulation.link import Link
 from rclpy_simulation.statuses import Statuses
 from rclpy_simulation.watchdog import Watchdog
+from rosidl_runtime_embedded.pieces import Pieces
 
 if TYPE_CHECKING:
     from rclpy_simulation.participant import Participant
@@ -131,8 +132,9 @@ class Writer(Endpoint):
             self._lease.renew()
             self._watchdogs.append(self._lease)
 
-    def write(self, data: bytes) -> None:
+    def write(self, data: bytes | Pieces) -> None:
         """Write CDR with its encapsulation header. Raises InvalidHandle if the writer is closed."""
+        data = bytes(data)
         participant = self.participant
         if self.is_closed:
             raise InvalidHandle("cannot use a writer that was destroyed")
@@ -259,7 +261,7 @@ class Reader(Endpoint):
             self._queue.append((self.participant.kernel.now + lifespan, sample))
             self.condition.set()
 
-    def take(self) -> Sample | None:
+    def take(self, lend: bool = False) -> Sample | None:
         """Return the next message, ``None`` if there is none."""
         now = self.participant.kernel.now
         while self._queue:

@@ -1,9 +1,10 @@
 """Generates the functions that read messages from little-endian XCDR1, one for each type.
 
-The counterpart of :mod:`.serializer`. Samples are untrusted: a count allocates and repeats nothing if the
-sample is too short for it, and every malformed sample raises ValueError. Only the bounds of strings are not
-checked, as in ROS 2, where C++ sends longer strings. With ROS_PYTHON_CHECK_FIELDS=1 the assignment to the
-field checks them; its AssertionError becomes a ValueError.
+The counterpart of :mod:`.serializer`. A message keeps none of the bytes, which may be lent. Samples are
+untrusted: a count allocates and repeats nothing if the sample is too short for it, and every malformed
+sample raises ValueError. Only the bounds of strings are not checked, as in ROS 2, where C++ sends longer
+strings. With ROS_PYTHON_CHECK_FIELDS=1 the assignment to the field checks them; its AssertionError becomes a
+ValueError.
 """
 
 from __future__ import annotations
@@ -35,33 +36,35 @@ if TYPE_CHECKING:
 
 def make_deserializer(
     definition: MessageDefinition, message_class: Callable[[str], type]
-) -> Callable[[bytes], Any]:
+) -> Callable[[bytes | memoryview], Any]:
     """Function from bytes to a message. It raises ValueError, and only that, for malformed bytes."""
     return _DeserializerGenerator(definition, message_class).compile()
 
 
-def _malformed(cls: Any, data: bytes, reason: object) -> ValueError:
+def _malformed(cls: Any, data: bytes | memoryview, reason: object) -> ValueError:
     return ValueError(f"{len(data)} bytes are not a valid {cls._TYPE_NAME}: {reason}")
 
 
-def _bools(data: bytes) -> list[bool]:
+def _bools(data: bytes | memoryview) -> list[bool]:
     if data and max(data) > 1:
         raise ValueError("a bool is neither 0 nor 1")
     return [byte == 1 for byte in data]
 
 
-def _octets(data: bytes) -> list[bytes]:
-    return [data[index : index + 1] for index in range(len(data))]
+def _octets(data: bytes | memoryview) -> list[bytes]:
+    octets = bytes(data)
+    return [octets[index : index + 1] for index in range(len(octets))]
 
 
-def _text(data: bytes) -> str:
+def _text(data: bytes | memoryview) -> str:
     # as in rclpy: a string ends at its first NUL, and invalid UTF-8 is replaced
-    return data.decode("utf-8", "replace").partition("\0")[0]
+    text = data.decode("utf-8", "replace") if type(data) is bytes else str(data, "utf-8", "replace")
+    return text.partition("\0")[0]
 
 
-def _wide_text(data: bytes) -> str:
+def _wide_text(data: bytes | memoryview) -> str:
     try:
-        units = array("H", array("I", data))
+        units = array("H", array("I", bytes(data)))
     except OverflowError:
         raise ValueError("a wide string is not UTF-16") from None
     return units.tobytes().decode("utf-16-le")
@@ -85,7 +88,7 @@ class _DeserializerGenerator(Generator):
         )
         self._after: list[str] = []  # lines to emit after the run is read
 
-    def compile(self) -> Callable[[bytes], Any]:
+    def compile(self) -> Callable[[bytes | memoryview], Any]:
         self._run.append(Item("H2x", HEADER_SIZE, 1, "h"))
         self._after.append(
             f"if h != {LITTLE_ENDIAN_CDR}: raise ValueError('its header is not that of little-endian CDR')"

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from rosidl_parser.definition import AbstractType
 
     from .definition import Field, MessageDefinition
+    from .pieces import Pieces
 
 _CHECK_FIELDS = os.environ.get("ROS_PYTHON_CHECK_FIELDS") == "1"
 """Whether messages check assigned values by default."""
@@ -157,11 +158,14 @@ class Message:
         """The types of the fields, in order."""
 
         @staticmethod
-        def _serialize(message: Any) -> bytes:
-            """Little-endian XCDR1. Raises TypeError or ValueError naming type, field and value."""
+        def _serialize(message: Any, pieces: type[Pieces] | None = None) -> Any:
+            """Little-endian XCDR1: bytes, or, if asked for, the pieces of a message with a long sequence.
+
+            Raises TypeError or ValueError naming type, field and value.
+            """
 
         @classmethod
-        def _deserialize(cls, data: bytes) -> Self:
+        def _deserialize(cls, data: bytes | memoryview) -> Self:
             """Message from little-endian XCDR1 with its header. Raises ValueError for other bytes."""
     else:
 

@@ -3,7 +3,8 @@
 A generated function reads every field once, checks its type, and packs each run of values of fixed size
 with one ``struct`` call. After a string or a sequence, the padding within a run depends on its position:
 such a run has a table of packers, indexed by the position modulo its alignment. If a check fails,
-:mod:`.validation` decides and finds the reason.
+:mod:`.validation` decides and finds the reason. A long sequence of numbers, such as an image, is not copied
+if the caller takes :class:`.Pieces`.
 """
 
 from __future__ import annotations
@@ -11,18 +12,20 @@ from __future__ import annotations
 from array import array
 from struct import Struct
 from struct import error as struct_error
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from .definition_files import message_definition
 from .fields import ARRAY_CODES, slot_of
 from .generator import Generator
 from .layout import CODES, HEADER_SIZE, SIZES, Item, run_alignment, run_format
+from .pieces import LARGE
 from .validation import elements, validate
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from .definition import Field, FieldType, MessageDefinition
+    from .pieces import Pieces
 
 _PYTHON_TYPES = {
     "boolean": "bool",
@@ -37,8 +40,12 @@ _NUL = Item("x", 1)
 
 def make_serializer(
     definition: MessageDefinition, message_class: Callable[[str], type]
-) -> Callable[[Any], bytes]:
-    """Function from a message to bytes. It raises TypeError or ValueError with type, field and value."""
+) -> Callable[..., bytes | Pieces]:
+    """
+    Function from a message to bytes. It raises TypeError or ValueError with type, field and value.
+
+    With :class:`.Pieces` as its second argument, it returns one for a message with a long sequence.
+    """
     return _SerializerGenerator(definition, message_class).compile()
 
 
@@ -49,7 +56,7 @@ class _SerializerGenerator(Generator):
         )
         self._checks: list[str] = []  # conditions that must be false for the values in the run
 
-    def compile(self) -> Callable[[Any], bytes]:
+    def compile(self) -> Callable[..., bytes | Pieces]:
         self._checks.append("type(m) is not cls")
         self._run.append(Item("xB2x", HEADER_SIZE, 1, "1"))
         self._message("m", self._definition)
@@ -61,10 +68,10 @@ class _SerializerGenerator(Generator):
             self._lines[first] = self._lines[first].replace("out = ", "out = bytearray(") + ")"
             self._lines.insert(0, "  valid = False")
         code = [
-            "def serialize(m):",
+            "def serialize(m, pieces=None):",
             " try:",
             *self._lines,
-            "  return bytes(out)" if has_loop else "  return out",
+            "  return bytes(out) if type(out) is bytearray else out" if has_loop else "  return out",
             " except (error, AttributeError, TypeError, ValueError, OverflowError) as error_:",
             "  problem = error_",
             " validate(m, cls)",
@@ -127,6 +134,7 @@ class _SerializerGenerator(Generator):
         if size > 4:
             padding = self._name(tuple(bytes((HEADER_SIZE - position) % size) for position in range(size)))
             self._emit(f"if {value}: out += {padding}[len(out) & {size - 1}]")
+        self._emit(f"if pieces and len({value}) >= {LARGE // size}: out = pieces(out); pieces = None")
         self._append(value)
 
     def _list(self, value: str, type_: FieldType) -> None:

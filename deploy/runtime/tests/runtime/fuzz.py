@@ -72,12 +72,15 @@ def decoder(name: str) -> Decoder:
         )
     cls: Any = message_class(name)
 
+    def read(data: bytes) -> Any:
+        return cls._deserialize(memoryview(data) if len(data) & 1 else data)  # large samples are lent
+
     def is_written_as_it_is_read(message: Any) -> None:
         written = cls._serialize(message)
         assert cls._serialize(cls._deserialize(written)) == written
 
     samples = [cls._serialize(cls()), cls._serialize(populated(name))]
-    return Decoder(cls._deserialize, samples, is_written_as_it_is_read)
+    return Decoder(read, samples, is_written_as_it_is_read)
 
 
 def _discovery() -> Decoder:

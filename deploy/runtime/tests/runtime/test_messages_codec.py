@@ -101,6 +101,7 @@ def test_any_message_is_written_as_by_rosbags_and_read_back(name: str, data: st.
     written = cls._serialize(message)
     assert written == bytes(STORE.serialize_cdr(as_rosbags(message), name))
     assert cls._deserialize(written) == message
+    assert cls._deserialize(memoryview(written)) == message
     assert cls._deserialize(written + b"\0\0\0") == message
 
 
@@ -115,6 +116,8 @@ def test_every_truncation_of_a_sample_is_refused(name: str, data: st.DataObject)
     for shorter in data.draw(st.lists(st.integers(0, len(written) - 1), min_size=8, max_size=8)):
         with pytest.raises(ValueError, match=f"{shorter} bytes are not a valid {name}: "):
             cls._deserialize(written[:shorter])
+        with pytest.raises(ValueError, match=f"{shorter} bytes are not a valid {name}: "):
+            cls._deserialize(memoryview(written)[:shorter])
 
 
 @pytest.mark.parametrize("header", ["00000000", "00020000", "00030000", "01000000", "00070000", "ffff0000"])

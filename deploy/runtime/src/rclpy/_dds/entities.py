@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import ctypes as ct
 import time
+import weakref
+from functools import cache
 from typing import Any, NamedTuple
 
 from rclpy._handle import Handle
 from rclpy.exceptions import InvalidHandle, RCLError
 from rclpy.qos import QoSProfile
+from rosidl_runtime_embedded.pieces import LARGE, Pieces
 
 from . import domain, qos, status
 from .discovery import Discovery
@@ -36,9 +39,13 @@ _OPAQUE = (ct.c_uint32 * 3)(0x01010000, 0, 0)
 
 
 class Sample(NamedTuple):
-    """A received message: CDR with encapsulation header, source time [ns since 1970], and its writer."""
+    """
+    A received message: CDR with encapsulation header, source time [ns since 1970], and its writer.
 
-    data: bytes
+    The CDR is bytes, or a read-only memoryview if it is lent.
+    """
+
+    data: Any
     source_timestamp: int
     publication_handle: int
 
@@ -127,6 +134,35 @@ class Participant:
             blocking.dds_delete(handle)
 
 
+@cache
+def _keep_memory() -> None:
+    """
+    Make malloc keep what large messages free: new memory from the kernel costs ten times as much as a copy.
+
+    By default, glibc keeps up to twice the largest block that was ever freed, of at most 32 MiB (mallopt(3),
+    M_MMAP_THRESHOLD). This one is never touched, so it takes no memory.
+    """
+    bytes(30_000_000)
+
+
+def _loan(serdata: Pointer, size: int) -> memoryview:
+    """Return the octets of a sample in DDS's own memory, which is freed when nothing refers to them."""
+    _keep_memory()
+    vector = (ct.c_size_t * 2)()  # struct iovec
+    lent = quick.ddsi_serdata_to_ser_ref(serdata, 0, size, vector)
+    octets = (ct.c_ubyte * size).from_address(vector[0])
+    weakref.finalize(octets, quick.ddsi_serdata_to_ser_unref, lent, vector).atexit = False
+    return memoryview(octets).cast("B").toreadonly()
+
+
+def _vectors(data: Pieces) -> tuple[int, Any]:
+    """Return the number of the pieces, and an array of where they are; they must not be freed before it."""
+    _keep_memory()
+    pieces = [piece for piece in data.pieces if piece]
+    vectors = (IoVector(ct.addressof(ct.c_char.from_buffer(piece)), len(piece)) for piece in pieces)
+    return len(pieces), (IoVector * len(pieces))(*vectors)
+
+
 class _Endpoint(Handle):
     """A DDS writer or reader. Wait sets attach its ``handle`` for its statuses."""
 
@@ -160,20 +196,24 @@ class Writer(_Endpoint):
         checked(quick.dds_get_instance_handle(handle, ct.byref(instance)), "cannot read a writer's handle")
         self.instance_handle = instance.value
 
-    def write(self, data: bytes) -> None:
+    def write(self, data: bytes | Pieces) -> None:
         """
         Write CDR with its encapsulation header. May block if the writer is reliable.
 
         :raises InvalidHandle: if another thread closes the writer during the call.
         """
         if len(data) & 3:  # RTPS pads to four octets; Cyclone would pad with uninitialized memory
-            data += bytes(-len(data) & 3)
+            data += bytes(-len(data) & 3)  # type: ignore[operator]
         size = len(data)
-        vector = IoVector(data, size)
+        if isinstance(data, Pieces):
+            count, vectors = _vectors(data)
+        else:
+            count, vectors = 1, IoVector(data, size)
         sertype = self._sertype  # until the end of the next call, no other thread runs Python code
         if sertype is None:
             raise InvalidHandle("cannot use a writer that was destroyed")
-        serdata = quick.ddsi_serdata_from_ser_iov(sertype, SERDATA_KIND_DATA, 1, vector, size)
+        serdata = quick.ddsi_serdata_from_ser_iov(sertype, SERDATA_KIND_DATA, count, vectors, size)
+        del data  # other threads may change the message from here on
         if not serdata:
             raise ValueError(f"invalid CDR of {size} octets: it needs an encapsulation header and data")
         result = blocking.dds_writecdr(self.handle, serdata)
@@ -216,8 +256,12 @@ class Reader(_Endpoint):
         # DDS returns a sample in a buffer. Each taking thread uses one; they are reused, as creation is slow.
         self._buffers: list[tuple[Pointer, int, SampleInfo, int]] = []
 
-    def take(self) -> Sample | None:
-        """Return the next message, ``None`` if there is none. Several threads may take."""
+    def take(self, lend: bool = False) -> Sample | None:
+        """
+        Return the next message, ``None`` if there is none. Several threads may take.
+
+        :param lend: whether the data of a large message may be a view of DDS's own memory instead of bytes.
+        """
         try:
             buffer = self._buffers.pop()
         except IndexError:
@@ -228,8 +272,11 @@ class Reader(_Endpoint):
         while quick.dds_takecdr(self.handle, serdata_address, 1, info_address, ANY_STATE) > 0:
             if info.valid_data:
                 size = quick.ddsi_serdata_size(serdata)
-                data = bytes(size)  # no other reference exists yet, so it may be written to
-                quick.ddsi_serdata_to_ser(serdata, 0, size, data)
+                if lend and size >= LARGE:
+                    data: Any = _loan(serdata, size)
+                else:
+                    data = bytes(size)  # no other reference exists yet, so it may be written to
+                    quick.ddsi_serdata_to_ser(serdata, 0, size, data)
                 sample = Sample(data, info.source_timestamp, info.publication_handle)
             quick.ddsi_serdata_unref(serdata)
             if sample is not None:  # else the sample is a change of state without a message
@@ -244,7 +291,7 @@ class Reader(_Endpoint):
         :param raw: whether to return the serialized message.
         :raises RCLError: if it is not a message of ``msg_type``.
         """
-        sample = self.take()
+        sample = self.take(not raw)
         if sample is None:
             return None
         try:

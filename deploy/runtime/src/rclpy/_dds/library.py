@@ -172,6 +172,8 @@ _QUICK: dict[str, tuple[Any, list[Any]]] = {
     "dds_takecdr": (ct.c_int32, [Entity, Pointer, ct.c_uint32, Pointer, ct.c_uint32]),
     "ddsi_serdata_size": (ct.c_uint32, [Pointer]),
     "ddsi_serdata_to_ser": (None, [Pointer, ct.c_size_t, ct.c_size_t, Pointer]),
+    "ddsi_serdata_to_ser_ref": (Pointer, [Pointer, ct.c_size_t, ct.c_size_t, Pointer]),
+    "ddsi_serdata_to_ser_unref": (None, [Pointer, Pointer]),
     "ddsi_serdata_unref": (None, [Pointer]),
     "ddsi_serdata_from_ser_iov": (
         Pointer,

@@ -1,0 +1,319 @@
+"""Large messages: no copy that can be avoided, and memory of DDS that is lent while a message is read."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tracemalloc
+from array import array
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from threading import Barrier
+from typing import Any
+
+import pytest
+
+from rclpy._dds import INFINITY, Participant, Reader, WaitSet, Writer, entities
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.context import Context
+from rclpy.executors import MultiThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from rclpy.serialization import deserialize_message
+from rclpy.task import Future
+from rosidl_runtime_embedded import message_class, pieces, serializer
+from rosidl_runtime_embedded.pieces import Pieces
+from rosidl_runtime_embedded.serializer import make_serializer
+from sensor_msgs.msg import Image, PointCloud2
+from std_msgs.msg import ByteMultiArray, Float64MultiArray, UInt8MultiArray
+
+from .fuzz import populated
+from .test_bad_input_memory import resident
+from .test_messages_codec import MESSAGES
+
+SpinUntil = Callable[..., None]
+MEGABYTE = 1_000_000
+QOS = QoSProfile(depth=10)
+TYPE_NAME = "std_msgs::msg::dds_::UInt8MultiArray_"
+
+
+def image(size: int = MEGABYTE, octet: int = 7) -> Image:
+    """An image whose octets are all the same."""
+    return Image(height=1, width=size, encoding="mono8", step=size, data=bytes([octet]) * size)
+
+
+@contextmanager
+def allocations() -> Iterator[Callable[[], int]]:
+    """Measure the most memory that Python has allocated at once since the block began [octets]."""
+    tracemalloc.start()
+    try:
+        yield lambda: tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+
+
+# Writing
+
+
+@pytest.mark.parametrize("name", MESSAGES)
+def test_pieces_are_the_octets_of_any_message(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    cls: Any = message_class(name)
+    expected = [(message, cls._serialize(message)) for message in (cls(), populated(name))]
+    monkeypatch.setattr(serializer, "LARGE", 1)
+    monkeypatch.setattr(pieces, "LARGE", 1)
+    serialize = make_serializer(cls._DEFINITION, message_class)
+    for message, octets in expected:
+        assert bytes(serialize(message, Pieces)) == octets
+        assert len(serialize(message, Pieces)) == len(octets)
+
+
+def test_only_long_sequences_are_pieces() -> None:
+    small: Any = UInt8MultiArray(data=bytes(pieces.LARGE - 1))
+    assert type(small._serialize(small, Pieces)) is bytes
+    large: Any = UInt8MultiArray(data=bytes(pieces.LARGE))
+    assert type(large._serialize(large, Pieces)) is Pieces
+    assert type(large._serialize(large)) is bytes
+
+
+def test_read_only_octets_are_copied() -> None:
+    octets = Pieces(b"beginning")
+    octets += b"text" * pieces.LARGE
+    assert not any(piece.readonly for piece in octets.pieces if isinstance(piece, memoryview))
+    assert bytes(octets) == b"beginning" + b"text" * pieces.LARGE
+
+
+@pytest.mark.parametrize("cls", [Image, PointCloud2, UInt8MultiArray, Float64MultiArray])
+def test_publishing_copies_no_long_sequence(cls: Any, node: Node) -> None:
+    publisher = node.create_publisher(cls, "x", 10)
+    message = cls(data=array("d" if cls is Float64MultiArray else "B", bytes(8 * MEGABYTE)))
+    publisher.publish(message)
+    with allocations() as most:
+        publisher.publish(message)
+        assert most() < MEGABYTE
+
+
+REPEATED = """
+import resource
+import rclpy
+from std_msgs.msg import UInt8MultiArray
+
+rclpy.init()
+publisher = rclpy.create_node("node").create_publisher(UInt8MultiArray, "x", 10)
+pixels = UInt8MultiArray(data=bytes(8_000_000)).data
+for round in range(6):
+    if round == 3:
+        before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
+    publisher.publish(UInt8MultiArray(data=pixels))
+print(resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before)
+"""
+
+
+def test_later_large_messages_take_no_new_memory(domain_id: int) -> None:
+    environment = {**os.environ, "ROS_DOMAIN_ID": str(domain_id), "ROS_AUTOMATIC_DISCOVERY_RANGE": "OFF"}
+    pages = subprocess.check_output([sys.executable, "-c", REPEATED], env=environment, timeout=60)
+    assert int(pages) < 1000  # of 2000 for each copy of the octets
+
+
+def test_message_may_grow_while_its_publisher_waits(node: Node, monkeypatch: pytest.MonkeyPatch) -> None:
+    publisher = node.create_publisher(Image, "x", 10)
+    message = image()
+    write = entities.blocking.dds_writecdr
+
+    def blocked(*arguments: Any) -> int:
+        message.data.append(1)  # another thread
+        return int(write(*arguments))
+
+    monkeypatch.setattr(entities.blocking, "dds_writecdr", blocked)
+    publisher.publish(message)
+    assert len(message.data) == MEGABYTE + 1
+
+
+# Reading
+
+
+@pytest.fixture
+def writer(participant: Participant) -> Writer:
+    """A writer that is matched with the test's reader."""
+    return participant.create_writer("rt/x", TYPE_NAME, QOS, "")
+
+
+@pytest.fixture
+def reader(participant: Participant) -> Reader:
+    """A reader of the test's participant."""
+    return participant.create_reader("rt/x", TYPE_NAME, QOS, "")
+
+
+def lent(reader: Reader) -> Any:
+    """Wait for a sample, and return its octets in the memory of DDS."""
+    waitset = WaitSet()
+    waitset.attach(reader.condition, 0)
+    waitset.wait(INFINITY)
+    waitset.close()
+    sample = reader.take(lend=True)
+    assert sample is not None
+    return sample.data
+
+
+def octets(value: int) -> bytes:
+    """A serialized UInt8MultiArray of a megabyte of equal octets."""
+    message: Any = UInt8MultiArray(data=bytes([value]) * MEGABYTE)
+    return bytes(message._serialize(message))
+
+
+def test_lent_octets_outlive_later_messages_and_the_reader(reader: Reader, writer: Writer) -> None:
+    writer.write(octets(1))
+    first = lent(reader)
+    for value in range(2, 12):
+        writer.write(octets(value))
+        assert bytes(lent(reader)) == octets(value)
+    reader.close()
+    writer.close()
+    assert bytes(first) == octets(1)
+
+
+def test_lent_octets_outlive_the_participant(domain_id: int) -> None:
+    participant = Participant(domain_id, "")
+    reader = participant.create_reader("rt/x", TYPE_NAME, QOS, "")
+    participant.create_writer("rt/x", TYPE_NAME, QOS, "").write(octets(1))
+    first = lent(reader)
+    participant.close()
+    assert bytes(first) == octets(1)
+    del first  # and they may be freed
+
+
+def test_lent_octets_cannot_be_changed(reader: Reader, writer: Writer) -> None:
+    writer.write(octets(1))
+    with pytest.raises(TypeError):
+        lent(reader)[0] = 1  # other readers of this process have the same memory
+
+
+def test_lent_octets_are_returned_when_nothing_refers_to_them(
+    reader: Reader, writer: Writer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    returned: list[int] = []
+    give_back = entities.quick.ddsi_serdata_to_ser_unref
+    monkeypatch.setattr(
+        entities.quick,
+        "ddsi_serdata_to_ser_unref",
+        lambda serdata, vector: (returned.append(serdata), give_back(serdata, vector)),
+    )
+    writer.write(octets(1))
+    part = lent(reader)[-4:]
+    assert not returned
+    assert bytes(part) == b"\1\1\1\1"
+    del part
+    assert len(returned) == 1
+
+
+def test_reading_copies_a_long_sequence_once(node: Node, spin_until: SpinUntil) -> None:
+    received: list[Image] = []
+    node.create_subscription(Image, "x", received.append, 10)
+    publisher = node.create_publisher(Image, "x", 10)
+    spin_until(publisher.get_subscription_count)
+    message = image(10 * MEGABYTE)
+    publisher.publish(message)
+    spin_until(lambda: received)
+    with allocations() as most:
+        publisher.publish(message)
+        spin_until(lambda: len(received) == 2)
+        assert most() < 11 * MEGABYTE
+    assert received == [message, message]
+
+
+def test_readers_of_a_process_have_messages_of_their_own(node: Node, spin_until: SpinUntil) -> None:
+    received: list[Image] = []
+    for _ in range(2):
+        node.create_subscription(Image, "x", received.append, 10)
+    publisher = node.create_publisher(Image, "x", 10)
+    spin_until(lambda: publisher.get_subscription_count() == 2)
+    publisher.publish(image())
+    spin_until(lambda: len(received) == 2)
+    received[0].data[0] = 0
+    assert received[1] == image()
+
+
+def test_message_outlives_its_context(
+    make_node: Callable[..., Node], context: Context, spin_until: SpinUntil, executor: Any
+) -> None:
+    received: list[Image] = []
+    node = make_node()
+    executor.add_node(node)
+    node.create_subscription(Image, "x", received.append, 10)
+    publisher = node.create_publisher(Image, "x", 10)
+    spin_until(publisher.get_subscription_count)
+    publisher.publish(image())
+    spin_until(lambda: received)
+    node.destroy_node()
+    context.shutdown()
+    assert received == [image()]
+
+
+def test_raw_subscription_gets_bytes(node: Node, spin_until: SpinUntil) -> None:
+    received: list[bytes] = []
+    node.create_subscription(Image, "x", received.append, 10, raw=True)
+    publisher = node.create_publisher(Image, "x", 10)
+    spin_until(publisher.get_subscription_count)
+    publisher.publish(image())
+    spin_until(lambda: received)
+    assert type(received[0]) is bytes
+    assert deserialize_message(received[0], Image) == image()
+    publisher.publish(received[0])
+    spin_until(lambda: len(received) == 2)
+    assert received[0] == received[1]
+
+
+def test_bytes_of_a_large_message_are_of_length_one(node: Node, spin_until: SpinUntil) -> None:
+    received: list[ByteMultiArray] = []
+    node.create_subscription(ByteMultiArray, "x", received.append, 10)
+    publisher = node.create_publisher(ByteMultiArray, "x", 10)
+    spin_until(publisher.get_subscription_count)
+    message = ByteMultiArray(data=[b"a", b"b"] * pieces.LARGE)
+    publisher.publish(message)
+    spin_until(lambda: received)
+    assert type(received[0].data[0]) is bytes
+    assert received == [message]
+
+
+def test_damaged_large_samples_are_dropped_and_leave_no_memory(
+    node: Node, participant: Participant, spin_until: SpinUntil
+) -> None:
+    subscription = node.create_subscription(UInt8MultiArray, "x", lambda _: None, QOS)
+    writer = participant.create_writer("rt/x", TYPE_NAME, QOS, "")
+    spin_until(writer.matched)
+    good = octets(1)
+    damaged = [good[:-4], good[: MEGABYTE // 2], good[:4] + b"\xff" * (len(good) - 4)]
+
+    def drop(samples: list[bytes]) -> None:
+        for sample in samples:
+            dropped = subscription._bad_input.count + 1
+            writer.write(sample)
+            spin_until(lambda: subscription._bad_input.count == dropped)  # noqa: B023, it is called at once
+
+    drop(damaged)
+    before = resident()
+    drop(damaged * 25)
+    assert resident() - before < 20 * MEGABYTE
+
+
+def test_threads_read_messages_at_the_same_time(make_node: Callable[..., Node], context: Context) -> None:
+    node = make_node()
+    received: list[Image] = []
+    done = Future()
+    two = Barrier(2, timeout=10.0)  # s
+
+    def receive(message: Image) -> None:
+        two.wait()  # for a callback on another thread
+        received.append(message)
+        if len(received) == 8:
+            done.set_result(None)
+
+    node.create_subscription(Image, "x", receive, 10, callback_group=ReentrantCallbackGroup())
+    publisher = node.create_publisher(Image, "x", 10)
+    with MultiThreadedExecutor(4, context=context) as executor:
+        executor.add_node(node)
+        for octet in range(8):
+            publisher.publish(image(octet=octet))
+        executor.spin_until_future_complete(done, 20.0)
+    assert sorted(message.data[0] for message in received) == list(range(8))
+    assert all(message == image(octet=message.data[0]) for message in received)
