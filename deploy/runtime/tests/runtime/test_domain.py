@@ -103,6 +103,19 @@ def test_localhost_without_loopback_leaves_choice_to_cyclone(interfaces: list[tu
     assert "<ExtendedPacketInfo>false</ExtendedPacketInfo>" in configuration
 
 
+@pytest.mark.parametrize(
+    ("environment", "large"),
+    [
+        ({RANGE: "LOCALHOST"}, True),
+        ({RANGE: "LOCALHOST", "ROS_STATIC_PEERS": "10.0.0.7"}, False),
+        ({RANGE: "LOCALHOST", "CYCLONEDDS_URI": "<NetworkInterface/>"}, False),
+        ({RANGE: "SUBNET"}, False),
+    ],
+)
+def test_only_what_stays_on_the_host_is_in_large_datagrams(environment: dict[str, str], large: bool) -> None:
+    assert ("<MaxMessageSize>65000 B</MaxMessageSize>" in domain.configuration(environment)) == large
+
+
 def test_interfaces_of_the_host_are_listed() -> None:
     found = domain._ipv4_interfaces()
     assert {name for name, _ in found} <= {name for _, name in socket.if_nameindex()}

@@ -27,6 +27,10 @@ _CHOICE = re.compile(r"<(networkinterface|transport|useipv6)\b", re.IGNORECASE) 
 _NO_MULTICAST = "<AllowMulticast>false</AllowMulticast>"
 # Packets to localhost arrive on the loopback interface. Otherwise, Cyclone drops them if it does not use it.
 _FROM_ANY_INTERFACE = "<Internal><ExtendedPacketInfo>false</ExtendedPacketInfo></Internal>"
+# On loopback, the fewer datagrams a large message needs, the less time it takes. If they overflow
+# the receiving socket, whose size the kernel limits (net.core.rmem_max), one request covers 256 fragments.
+_LARGE_DATAGRAMS = "<MaxMessageSize>65000 B</MaxMessageSize><FragmentSize>64000 B</FragmentSize>"
+_LARGE_BURSTS = '<Internal><SocketReceiveBufferSize max="16 MiB"/><NackDelay>10 ms</NackDelay></Internal>'
 _AF_INET = 2
 _IFF_UP, _IFF_LOOPBACK = 0x1, 0x8
 
@@ -91,7 +95,8 @@ def _localhost(peers: list[str], choices: set[str]) -> tuple[str, str]:
     interface is Cyclone's choice, as in ROS 2.
     """
     interfaces = "" if peers or choices else _loopback_and_default()
-    general = f"<General>{_NO_MULTICAST}{interfaces}</General>{'' if interfaces else _FROM_ANY_INTERFACE}"
+    datagrams, internal = (_LARGE_DATAGRAMS, _LARGE_BURSTS) if interfaces else ("", _FROM_ANY_INTERFACE)
+    general = f"<General>{_NO_MULTICAST}{interfaces}{datagrams}</General>{internal}"
     # By default, Cyclone 11 asks every 30 s, and only for 30 s.
     return general, "<SPDPInterval>8s</SPDPInterval>" + _peers(peers, choices, ' PruneDelay="inf"')
 
