@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from deploy.benchmarks import c_program
 from deploy.benchmarks.link import FIRST, LAST, MIDDLE, SINK, SOURCE, Job
 from deploy.supervision.processes import ROOT
 
@@ -50,18 +51,25 @@ def dataflow(alternative: Alternative, jobs: Sequence[Job]) -> list[list[str]]:
     return [[str(BENCH_PYTHON.with_name("dora")), "run", str(file)]]
 
 
+def c_processes(_: Alternative, jobs: Sequence[Job]) -> list[list[str]]:
+    """Return a command of the program in C for each job."""
+    return [c_program.command(job) for job in jobs]
+
+
 @dataclass(frozen=True)
 class Alternative:
     """One way to connect three processes."""
 
     title: str
     link: str
-    """The module of :mod:`deploy.benchmarks.links`."""
+    """The module of :mod:`deploy.benchmarks.links`, if it is in Python."""
     requirements: str = ""
     """The file with what PyPI has of it; '' if it needs nothing but the runtime."""
     ros: bool = False
     """Whether it runs on the rclpy of a sourced ROS 2."""
     commands: Commands = processes
+    build: Callable[[], str] | None = None
+    """Compiles its program, and returns why that is not possible here; none if it is in Python."""
 
     @property
     def python(self) -> Path:
@@ -77,6 +85,8 @@ class Alternative:
 
     def missing(self) -> str:
         """Return why it cannot be measured here; '' if it can."""
+        if self.build:
+            return self.build()
         command = [str(self.python), "-c", f"import deploy.benchmarks.links.{self.link}"]
         done = subprocess.run(
             command, env=self.environment, capture_output=True, text=True, start_new_session=True
@@ -92,6 +102,7 @@ ALTERNATIVES = (
     Alternative("ROS 2, callbacks", "callbacks", ros=True),
     Alternative("ROS 2, rxros2 style", "rxros2", ros=True),
     Alternative("cyclonedds-python", "cyclone"),
+    Alternative("Cyclone DDS, C program", "c_program", commands=c_processes, build=c_program.build),
     Alternative("dora-rs", "dora_nodes", "dora.txt", commands=dataflow),
     Alternative("eclipse-zenoh", "zenoh_peers", "zenoh.txt"),
     Alternative("pyzmq", "zeromq", "zeromq.txt"),

@@ -16,6 +16,8 @@ KINEMATICS, VELOCITY = "kinematics", "velocity"
 """The middle processes of the arm's own chain, from an angle to a speed."""
 FIRST, LAST = "first", "last"
 """The topics: the middle process listens to the first one, the sink to the last one."""
+REPORTS = "reports"
+"""The name of the socket in the directory of a measurement."""
 
 
 @dataclass(frozen=True)

@@ -15,8 +15,17 @@ from pathlib import Path
 from typing import Any
 
 from deploy.benchmarks.alternatives import Alternative
-from deploy.benchmarks.link import FIRST, KINEMATICS, LAST, MIDDLE, SINK, SOURCE, VELOCITY, Job
-from deploy.benchmarks.worker import REPORTS
+from deploy.benchmarks.link import (
+    FIRST,
+    KINEMATICS,
+    LAST,
+    MIDDLE,
+    REPORTS,
+    SINK,
+    SOURCE,
+    VELOCITY,
+    Job,
+)
 from deploy.chaos.cost import proportional_set_size
 from deploy.supervision import interruption
 from reactive_node.domains import reserved_domain

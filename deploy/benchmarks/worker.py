@@ -18,9 +18,8 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
-from deploy.benchmarks.link import FIRST, LAST, SINK, SOURCE, Job, Link
+from deploy.benchmarks.link import FIRST, LAST, REPORTS, SINK, SOURCE, Job, Link
 
-REPORTS = "reports"  # the name of the socket in the directory of a measurement
 _TURN = 0.1  # s at most between two looks whether to end
 
 

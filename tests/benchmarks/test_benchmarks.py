@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from deploy.benchmarks import __main__ as command
-from deploy.benchmarks import alternatives, measurement, table
+from deploy.benchmarks import alternatives, c_program, measurement, table
 from deploy.benchmarks.alternatives import Alternative
 from deploy.benchmarks.link import LAST, SINK, SOURCE, Job
 from deploy.benchmarks.measurement import MeasurementFailed, Scenario
@@ -126,6 +126,19 @@ def test_short_chain_has_figures(link: str) -> None:
     assert set(figures) == {f"chain.100.{name}" for name in names}
     assert all(value > 0 for value in figures.values())
     assert figures["chain.100.p50_ms"] < 1000 / 100, "the latency is that of the latest angle"
+
+
+def test_missing_compiler_is_named_with_its_packages(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PATH", "/nowhere")
+    assert c_program.build() == "apt-get install gcc libc6-dev cyclonedds-tools cyclonedds-dev"
+
+
+def test_short_pipeline_of_the_c_program_has_figures() -> None:
+    program = Alternative("C", "c_program", commands=alternatives.c_processes, build=c_program.build)
+    if reason := program.missing():
+        pytest.skip(reason)
+    figures = measurement.measure(program, Scenario("pipeline", 1_000_000, 50.0), warm_up=0.1, seconds=0.2)
+    assert all(value > 0 for value in figures.values())
 
 
 def test_processor_time_is_measured_although_all_reports_have_waited(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -4,6 +4,7 @@
 import os
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from cyclonedds.core import InstanceState, Policy, Qos, ReadCondition, SampleState, ViewState, WaitSet
@@ -17,11 +18,7 @@ from cyclonedds.util import duration
 
 from deploy.benchmarks.link import Item, Job, Link
 
-_LOOPBACK = """<CycloneDDS><Domain>
-<General><Interfaces><NetworkInterface name="lo"/></Interfaces>
-<AllowMulticast>false</AllowMulticast></General>
-<Discovery><ParticipantIndex>auto</ParticipantIndex><Peers><Peer address="127.0.0.1"/></Peers></Discovery>
-</Domain></CycloneDDS>"""
+_LOOPBACK = Path(__file__).with_name("loopback.xml")
 
 
 @dataclass
@@ -37,7 +34,7 @@ class Connection(Link):
     def __init__(self, job: Job) -> None:
         super().__init__(job)
         number = int(os.environ["ROS_DOMAIN_ID"])
-        self.domain = Domain(number, _LOOPBACK)
+        self.domain = Domain(number, _LOOPBACK.read_text())
         self.participant = DomainParticipant(number)
         self.qos = Qos(Policy.Reliability.Reliable(duration(seconds=1)), Policy.History.KeepLast(job.depth))
         self.arrivals = WaitSet(self.participant)
