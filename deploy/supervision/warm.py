@@ -108,6 +108,7 @@ def _run(argv: Sequence[str], environment: Mapping[str, str]) -> NoReturn:
         if callable(signal.getsignal(number)):  # a handler of supervisord
             signal.signal(number, signal.SIG_DFL)
     signal.signal(signal.SIGINT, signal.default_int_handler)
+    signal.set_wakeup_fd(-1)
     os.environ.clear()
     os.environ.update(environment)
     sys.orig_argv, sys.argv = list(argv), list(argv[2:])

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import os
+import signal
+import threading
 import time
-from contextlib import closing
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
 from supervisor import events, loggers
+from supervisor.poller import Poller
 from supervisor.states import ProcessStates
 
-from deploy.supervision.extension import ArmInterface, LossyLog, make_interface
+from deploy.supervision.extension import LONGEST_WAIT, ArmInterface, LossyLog, make_interface
 
 LIMIT = 10  # bytes of a log until it is rolled over
 
@@ -19,6 +25,27 @@ LIMIT = 10  # bytes of a log until it is rolled over
 def log_to(file: Path) -> closing[loggers.Logger]:
     """A logger as supervisord makes one."""
     return closing(loggers.Logger(handlers=[LossyLog(str(file), "a", LIMIT, 1)]))
+
+
+@contextmanager
+def own_signals() -> Iterator[None]:
+    """Restore what signals wake."""
+    before = signal.set_wakeup_fd(-1)
+    try:
+        yield
+    finally:
+        signal.set_wakeup_fd(before)
+
+
+def interface_of(*states: int, poller: Any) -> ArmInterface:
+    """The interface of a supervisord whose programs are in these states."""
+    processes = {
+        str(number): SimpleNamespace(get_state=lambda state=state: state)
+        for number, state in enumerate(states)
+    }
+    group = SimpleNamespace(processes=processes)
+    options = SimpleNamespace(poller=poller)
+    return ArmInterface(SimpleNamespace(options=options, process_groups={"arm": group}))
 
 
 def test_a_full_disk_costs_only_the_lines_meanwhile(tmp_path: Path) -> None:
@@ -67,11 +94,9 @@ def test_supervisord_uses_it_from_then_on(tmp_path: Path, monkeypatch: pytest.Mo
     monkeypatch.setattr(loggers, "RotatingFileHandler", loggers.RotatingFileHandler)  # restored at the end
     monkeypatch.setattr(events, "callbacks", [])
     file = tmp_path / "supervisord.log"
-    with closing(loggers.Logger()) as own, closing(loggers.Logger()) as program:
+    with closing(loggers.Logger()) as own, closing(loggers.Logger()) as program, own_signals():
         loggers.handle_file(own, str(file), "%(message)s", True, LIMIT, 1)
-        make_interface(
-            SimpleNamespace(options=SimpleNamespace(logger=own, poller=SimpleNamespace(poll=None)))
-        )
+        make_interface(SimpleNamespace(options=SimpleNamespace(logger=own, poller=Poller(None))))
         (tmp_path / "supervisord.log.1").mkdir()
         own.info(b"too long a line\n")
         own.info(b"short\n")
@@ -99,3 +124,37 @@ def test_setting_the_clock_changes_no_uptime(monkeypatch: pytest.MonkeyPatch) ->
         monkeypatch.setattr(time, "time", lambda hours=hours: real() + hours * 3600)
         (state,) = arm.programs()
         assert 0.0 < state["uptime"] < 60.0
+
+
+@pytest.mark.parametrize("state", [ProcessStates.STARTING, ProcessStates.BACKOFF, ProcessStates.STOPPING])
+def test_supervisord_sleeps_unless_a_program_changes(state: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(events, "callbacks", [])
+    waits: list[float] = []
+
+    def poll(timeout: float) -> tuple[list[int], list[int]]:
+        waits.append(timeout)
+        return [], []
+
+    settled, changing = SimpleNamespace(poll=poll), SimpleNamespace(poll=poll)
+    interface_of(ProcessStates.RUNNING, ProcessStates.FATAL, poller=settled)
+    interface_of(ProcessStates.RUNNING, state, poller=changing)
+    settled.poll(1.0)
+    changing.poll(1.0)
+    assert waits == [1.0, LONGEST_WAIT]
+
+
+def test_signal_wakes_supervisord(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(events, "callbacks", [])
+    poller = Poller(None)
+    killed = threading.Timer(0.1, os.kill, (os.getpid(), signal.SIGUSR2))
+    before = signal.signal(signal.SIGUSR2, lambda number, frame: None)
+    try:
+        with own_signals():
+            interface_of(ProcessStates.RUNNING, poller=poller).wake_at_signals()
+            killed.start()
+            began = time.monotonic()
+            assert poller.poll(30.0) == ([], [])
+            assert time.monotonic() - began < 10.0
+    finally:
+        killed.join()
+        signal.signal(signal.SIGUSR2, before)

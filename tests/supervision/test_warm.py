@@ -105,3 +105,9 @@ def test_library_that_fails_does_not_end_supervisord(tmp_path: Path) -> None:
     (tmp_path / "yaml.py").write_text("raise RuntimeError('broken')")
     done = run(tmp_path, FORKED, more="warm.import_libraries()")
     assert (done.returncode, done.stdout) == (0, "True\n")
+
+
+def test_signals_of_a_program_do_not_wake_supervisord(tmp_path: Path) -> None:
+    more = "pipe = os.pipe(); os.set_blocking(pipe[1], False); signal.set_wakeup_fd(pipe[1])"
+    done = run(tmp_path, f"print(signal.set_wakeup_fd(-1)); {FORKED}", more=more)
+    assert (done.stdout, done.stderr) == ("-1\nTrue\n", "")
