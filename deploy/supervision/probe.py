@@ -11,7 +11,10 @@ from deploy.supervision.policy import Observation
 from deploy.supervision.system import DeploymentError, Program, System
 from interfaces.service.health import Health
 
+ASKING_PERIOD = 1.0  # s between two questions to supervisord, of which each costs both of us a millisecond
 DUPLICATES_PERIOD = 1.0  # s between two searches for duplicates, which read the whole process table
+SEARCHING = 1000  # on a machine with many processes, so many times as long as a search takes
+LONGEST_PERIOD = 10.0  # s
 
 
 class Probe:
@@ -20,6 +23,8 @@ class Probe:
     def __init__(self, system: System, supervisor: int) -> None:
         self._system = system
         self._supervisor = supervisor
+        self._programs: list[Program] = []
+        self._next_question = 0.0
         self._last_health: dict[tuple[str, int], float] = {}
         self._next_search = 0.0
         self._duplicates: frozenset[processes.Process] = frozenset()
@@ -30,22 +35,40 @@ class Probe:
             self._last_health[program, health.pid] = health.heard
 
     def observe(self) -> Observation:
-        """Return an observation. Raises DeploymentError where supervisord is gone or does not answer."""
+        """
+        Return an observation. Raises DeploymentError where supervisord is gone or does not answer.
+
+        While all its processes live, supervisord is asked only now and then.
+        """
         if os.getppid() != self._supervisor:
             raise DeploymentError("supervisord has died: a killed process would not be replaced")
-        programs = self._system.watch(self._supervisor)
+        states = self._states()
+        if time.monotonic() >= self._next_question or not all(map(self._runs, self._programs, states)):
+            self._programs = self._system.watch(self._supervisor)
+            self._next_question = time.monotonic() + ASKING_PERIOD
+            states = self._states()
         now = time.monotonic()
         if now >= self._next_search:
-            self._next_search = now + DUPLICATES_PERIOD
-            self._duplicates = self._find_duplicates(programs)
-        for gone in self._last_health.keys() - {(program.name, program.pid) for program in programs}:
+            self._duplicates = self._find_duplicates()
+            period = 0.0 if self._duplicates else SEARCHING * (time.monotonic() - now)
+            self._next_search = now + min(max(period, DUPLICATES_PERIOD), LONGEST_PERIOD)
+        for gone in self._last_health.keys() - {(program.name, program.pid) for program in self._programs}:
             del self._last_health[gone]  # of dead processes and of other hosts
-        stopped = frozenset(p.pid for p in programs if p.pid and _state_of(p.pid)[0] == "T")
-        return Observation(now, programs, dict(self._last_health), stopped, self._duplicates)
+        pids = (program.pid for program in self._programs)
+        stopped = frozenset(pid for pid, (state, _) in zip(pids, states, strict=True) if state == "T")
+        return Observation(now, self._programs, dict(self._last_health), stopped, self._duplicates)
 
-    def _find_duplicates(self, programs: list[Program]) -> frozenset[processes.Process]:
+    def _states(self) -> list[tuple[str, int]]:
+        """State and parent of the process of each program."""
+        return [_state_of(program.pid) for program in self._programs]
+
+    def _runs(self, program: Program, state: tuple[str, int]) -> bool:
+        """Whether supervisord knows nothing new about a program."""
+        return program.state == "RUNNING" and state[0] != "Z" and state[1] == self._supervisor
+
+    def _find_duplicates(self) -> frozenset[processes.Process]:
         """The processes of a program that supervisord has not started and is not about to start."""
-        supervised = {program.name: program.pid for program in programs}
+        supervised = {program.name: program.pid for program in self._programs}
         return frozenset(
             process
             for process in processes.of_system(self._system.run)
@@ -55,6 +78,6 @@ class Probe:
 
 
 def _state_of(pid: int) -> tuple[str, int]:
-    """State and parent of a process; ('', 0) if it has ended."""
-    stat = processes.stat_of(pid)
+    """State and parent of a process; ('', 0) if it has ended, or if the pid is 0."""
+    stat = processes.stat_of(pid) if pid else []
     return (stat[0], int(stat[1])) if stat else ("", 0)

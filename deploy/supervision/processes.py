@@ -55,7 +55,8 @@ def _environ(pid: int) -> bytes:
 def stat_of(pid: int) -> list[str]:
     """State, parent and the further fields of /proc/PID/stat (proc(5)); empty when the process has ended."""
     try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(") ")[2].split()
+        with open(f"/proc/{pid}/stat", "rb") as file:
+            return file.read().decode(errors="replace").rpartition(") ")[2].split()
     except OSError:
         return []
 

@@ -74,12 +74,13 @@ def _state(program: Program, reason: str, recent_restarts: int, node: str) -> Di
 
 
 def carry_out(action: Action, system: System, supervisor: int) -> None:
-    """Carry out an action, unless its process has changed meanwhile."""
-    if action.verb == "kill":
-        processes.send_signal(system.run, action.program, action.pid, signal.SIGKILL)
-        return
+    """Carry out an action, unless its process has changed meanwhile, or supervisord does not answer."""
     with suppress(DeploymentError):  # the next observation shows whether it worked
-        system.revive(supervisor, action.program)
+        if action.verb == "kill":
+            system.watch(supervisor)  # a supervisord that hangs would not replace the process
+            processes.send_signal(system.run, action.program, action.pid, signal.SIGKILL)
+        else:
+            system.revive(supervisor, action.program)
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
 
+from deploy.supervision import processes
 from deploy.supervision.manifest import SENTINEL
 from deploy.supervision.policy import Action, Observation, Policy, Timeouts
 from deploy.supervision.probe import Probe
@@ -243,3 +244,93 @@ def test_observes_nothing_when_supervisord_is_gone(tmp_path: Path) -> None:
         Probe(System(tmp_path), os.getpid()).observe()  # which is not whose child this process is
     with pytest.raises(DeploymentError, match="does not answer"):
         Probe(System(tmp_path), os.getppid()).observe()
+
+
+class Machine:
+    """A supervisord and its processes, with a clock of its own."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, run: Path) -> None:
+        self.now = 0.0
+        self.questions: list[float] = []
+        self.searches: list[float] = []
+        self.search_time = 0.0
+        self.found: list[Process] = []
+        self.programs = [program("velocity"), program("kinematics")]
+        self.states = {each.pid: ["S", str(os.getppid())] for each in self.programs}
+        machine = self
+
+        class Asked(System):
+            def watch(self, supervisor: int) -> list[Program]:
+                machine.questions.append(machine.now)
+                return list(machine.programs)
+
+        def search(run: Path) -> list[Process]:
+            self.searches.append(self.now)
+            self.now += self.search_time
+            return self.found
+
+        monkeypatch.setattr("time.monotonic", lambda: self.now)
+        monkeypatch.setattr(processes, "stat_of", lambda pid: self.states.get(pid, []))
+        monkeypatch.setattr(processes, "of_system", search)
+        self.probe = Probe(Asked(run), os.getppid())
+
+    def observe(self, times: int = 1) -> Observation:
+        """Observe so many times; return the last observation."""
+        for _ in range(times):
+            self.now += PERIOD
+            observation = self.probe.observe()
+        return observation
+
+
+@pytest.fixture
+def machine(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Machine:
+    return Machine(monkeypatch, tmp_path)
+
+
+def test_asks_supervisord_once_a_second_while_all_run(machine: Machine) -> None:
+    machine.observe(times=12)
+    assert machine.questions == [0.25, 1.25, 2.25]
+
+
+@pytest.mark.parametrize("state", [[], ["Z", str(os.getppid())], ["S", "1"]], ids=["no", "dead", "another"])
+def test_asks_supervisord_at_once_when_a_process_has_ended(machine: Machine, state: list[str]) -> None:
+    machine.observe(times=2)
+    machine.states[PIDS["velocity"]] = state
+    machine.programs[0] = program("velocity", pid=900)
+    machine.states[900] = ["T", str(os.getppid())]
+    observation = machine.observe()
+    assert machine.questions == [0.25, 0.75]
+    assert observation.programs == machine.programs
+    assert observation.stopped == {900}
+
+
+@pytest.mark.parametrize("state", ["STARTING", "BACKOFF", "FATAL"])
+def test_asks_supervisord_often_while_a_program_does_not_run(machine: Machine, state: str) -> None:
+    machine.programs[0] = program("velocity", state)
+    assert machine.observe(times=3).programs == machine.programs
+    assert machine.questions == [0.25, 0.5, 0.75]
+
+
+def test_sees_a_stopped_process_at_once(machine: Machine) -> None:
+    assert machine.observe(times=2).stopped == frozenset()
+    machine.states[PIDS["velocity"]][0] = "T"
+    assert machine.observe().stopped == {PIDS["velocity"]}
+    assert machine.questions == [0.25]
+
+
+def test_searches_for_duplicates_are_rare_where_they_take_long(machine: Machine) -> None:
+    machine.search_time = 0.002
+    machine.observe(times=9)
+    assert [round(each) for each in machine.searches] == [0, 2]
+    machine.search_time = 1.0
+    machine.observe(times=60)
+    assert [round(each) for each in machine.searches[2:]] == [4, 14]
+
+
+def test_duplicate_is_searched_for_again_within_a_second(machine: Machine) -> None:
+    machine.search_time = 0.002
+    machine.found = [Process(777, "velocity")]
+    machine.states[777] = ["S", "1"]
+    assert machine.observe().duplicates == {Process(777, "velocity")}
+    machine.found = []
+    assert machine.observe(times=4).duplicates == frozenset()

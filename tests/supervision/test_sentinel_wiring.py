@@ -194,6 +194,14 @@ def test_failed_observation_is_reported_and_not_the_last(wired: Any, spin_until:
 # Actions
 
 
+class Answering(System):
+    """A system whose supervisord answers."""
+
+    def watch(self, supervisor: int) -> list[Program]:
+        """Return no program."""
+        return []
+
+
 def test_kill_reaches_the_process_of_the_program_only(tmp_path: Path) -> None:
     mark = {processes.MARK: str(tmp_path), "SUPERVISOR_PROCESS_NAME": "velocity"}
     code = "import signal; print(flush=True); signal.pause()"
@@ -202,10 +210,12 @@ def test_kill_reaches_the_process_of_the_program_only(tmp_path: Path) -> None:
         try:
             assert process.stdout is not None
             process.stdout.readline()
-            sentinel.carry_out(Action("kill", "kinematics", process.pid, ""), System(tmp_path), 1)
-            sentinel.carry_out(Action("kill", "velocity", process.pid, ""), System(tmp_path / "other"), 1)
-            assert process.poll() is None
+            sentinel.carry_out(Action("kill", "kinematics", process.pid, ""), Answering(tmp_path), 1)
+            sentinel.carry_out(Action("kill", "velocity", process.pid, ""), Answering(tmp_path / "other"), 1)
+            # A supervisord that does not answer would not replace the process.
             sentinel.carry_out(Action("kill", "velocity", process.pid, ""), System(tmp_path), 1)
+            assert process.poll() is None
+            sentinel.carry_out(Action("kill", "velocity", process.pid, ""), Answering(tmp_path), 1)
             assert process.wait(5.0) == -signal.SIGKILL
         finally:
             process.kill()
