@@ -51,9 +51,9 @@ def configurations(
     return rx.combine_latest(l1, l2, theta1, theta2).starmap(Configuration).publish(repeated)
 
 
-def lengths(configurations: Observable[Configuration]) -> Observable[tuple[float, float]]:
+def lengths(l1: Observable[float], l2: Observable[float]) -> Observable[tuple[float, float]]:
     """Emit the lengths of both links [m] when they have changed, at most once a second."""
-    return configurations.map(lambda it: (it.l1, it.l2)).distinct_until_changed().sample(DESCRIPTION_PERIOD)
+    return rx.combine_latest(l1, l2).distinct_until_changed().sample(DESCRIPTION_PERIOD)
 
 
 @dataclass(frozen=True)
@@ -88,11 +88,12 @@ def wire(node: ServiceNode) -> None:
     l1, l2, theta1, theta2 = (
         node.observe(topic).map(lambda message: message.data) for topic in (L1, L2, THETA1, THETA2)
     )
-    states = configurations(l1, l2, theta1, theta2, node.declare(Parameters).rate).share()
+    states = configurations(l1, l2, theta1, theta2, node.declare(Parameters).rate)
     stamped = states.map(lambda it: (node.get_clock().now().to_msg(), it)).share()
-    node.publish(JOINT_STATES, stamped.starmap(joint_state))
-    node.publish(TF, stamped.starmap(transforms))
-    node.publish(ROBOT_DESCRIPTION, lengths(states).starmap(description))
+    # Most of the time nobody looks.
+    node.publish(JOINT_STATES, stamped.starmap(joint_state), on_demand=True)
+    node.publish(TF, stamped.starmap(transforms), on_demand=True)
+    node.publish(ROBOT_DESCRIPTION, lengths(l1, l2).starmap(description))
 
 
 if __name__ == "__main__":

@@ -23,6 +23,7 @@ from deploy.replay.lives import ReplayedLife, Suspension, lives, origin
 from deploy.replay.record import Message, Record
 from deploy.simulation.arm import ROBOT
 from deploy.simulation.machine import simulated_services
+from deploy.simulation.viewer import view
 from deploy.supervision import manifest
 from deploy.supervision.system import NAMESPACE
 from interfaces.scenario.origin import EPOCH
@@ -56,6 +57,8 @@ def play(record: Record, namespace: str, chain: Chain, parameters: Path | None =
         for service in chain:
             player.start(service, parameters)
         player.hear(chain)
+        environment = {NAMESPACE: namespace}
+        simulation.start(view, name="viewer", host=ROBOT, environment=environment, delay=Delay(0.0, 0.0))
         player.feed(chains.inputs(record, namespace, chain))
         simulation.run((record.end - player.boot) / SECOND)
         return player.result

@@ -14,10 +14,11 @@ from deploy.chaos.promises import CHECKERS
 from deploy.chaos.schedule import PlannedFault
 from deploy.chaos.schedule_file import Shift
 from deploy.simulation import people
-from deploy.simulation.arm import NAMES, Arm, simulated_arm
+from deploy.simulation.arm import NAMES, ROBOT, Arm, simulated_arm
 from deploy.simulation.calibration import Calibration
 from deploy.simulation.faults import FAULT_KINDS
 from deploy.simulation.observer import Observer
+from deploy.simulation.viewer import view
 from deploy.supervision.system import DeploymentError
 
 
@@ -55,6 +56,7 @@ def play(shift: Shift, durations: Calibration | None = None) -> Outcome:
     with tempfile.TemporaryDirectory(prefix="reactive-arm-") as directory:
         with simulated_arm(shift.seed, Path(directory), shift.scenario, durations) as arm:
             observer = Observer(arm.simulation, arm.origin)
+            arm.simulation.start(view, name="viewer", host=ROBOT)
             injected: list[InjectedFault] = []
             for planned in shift.faults:
                 arm.simulation.at(arm.origin + planned.at, _injection(arm, planned, injected))

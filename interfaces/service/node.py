@@ -113,11 +113,14 @@ class ServiceNode(ReactiveNode):
         topic: Topic,
         items: Observable[Any],
         message: Callable[[Any], Any] = lambda item: item,
+        *,
+        on_demand: bool = False,
     ) -> None:
         """
         Publish items on a topic. Bad messages and items that are :class:`Rejected` are dropped and reported.
 
         :param message: makes a message of an item.
+        :param on_demand: see :meth:`ReactiveNode.publish_observable`.
         """
 
         def subscribe(
@@ -141,7 +144,8 @@ class ServiceNode(ReactiveNode):
 
             return items.subscribe(make, observer.on_error, scheduler=scheduler)
 
-        self.publish_observable(Observable(subscribe), topic.type, topic.name, topic.qos)
+        messages = Observable(subscribe)
+        self.publish_observable(messages, topic.type, topic.name, topic.qos, on_demand=on_demand)
 
     def age(self, stamp: datetime) -> float:
         """

@@ -54,9 +54,10 @@ def test_configuration_is_repeated_while_nothing_changes(scheduler: VirtualTime)
 
 
 def test_lengths_are_emitted_on_change_at_most_once_a_second(scheduler: VirtualTime) -> None:
-    sweep = ((0.1 * at, Configuration(2.0 + min(at, 25), 3.0, 0.1 * at, 0.0)) for at in range(60))
+    l1 = scheduler.hot(*((0.1 * at, 2.0 + min(at, 25)) for at in range(60)))
+    l2 = scheduler.hot(*((0.1 * at, 3.0) for at in range(60)))
 
-    recording = scheduler.record(lengths(scheduler.hot(*sweep)), until=6.0)
+    recording = scheduler.record(lengths(l1, l2), until=6.0)
 
     assert recording.items == [(1, (12.0, 3.0)), (2, (22.0, 3.0)), (3, (27.0, 3.0))]
 
@@ -163,6 +164,23 @@ def test_node_in_a_namespace_describes_its_arm(make_node: MakeNode, spin_until: 
     publishers["l1"].publish(Float64(data=4.0))
     spin_until(lambda: last[ROBOT_DESCRIPTION.name].data == urdf(4.0, 3.0, "/arm1"))
     spin_until(lambda: last[TF.name].transforms[1].transform.translation.x == 4.0)
+
+
+def test_angles_are_read_only_while_somebody_looks(make_node: MakeNode, spin_until: SpinUntil) -> None:
+    node, peer = make_node("robot_state", kind=ServiceNode), make_node("peer", kind=Node)
+    wire(node)
+
+    def read() -> set[str]:
+        return {each.topic_name for each in node.subscriptions}
+
+    spin_until(lambda: peer.count_publishers(TF.name) == 1)
+    assert {"/l1", "/l2"} <= read()
+    assert not {"/theta1", "/theta2"} & read()
+    for topic in (JOINT_STATES, TF):
+        viewer = peer.create_subscription(topic.type, topic.name, lambda _: None, topic.qos)
+        spin_until(lambda: {"/theta1", "/theta2"} <= read())
+        peer.destroy_subscription(viewer)
+        spin_until(lambda: not {"/theta1", "/theta2"} & read())
 
 
 def test_joints_are_named_after_the_topics_of_their_angles() -> None:

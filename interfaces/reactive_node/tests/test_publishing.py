@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 import reactivex as rx
 from rclpy.node import Node
+from reactivex.disposable import Disposable
 from reactivex.subject import Subject
 from std_msgs.msg import Float64, String
 
@@ -39,6 +40,36 @@ def test_publisher_lives_from_wiring_until_disposal(
     sink.dispose()
     sink.dispose()
     spin_until(lambda: peer.count_publishers("numbers") == 0)
+
+
+def test_observable_on_demand_is_observed_while_there_are_subscribers(
+    node: ReactiveNode, peer: Node, spin_until: SpinUntil
+) -> None:
+    observers: list[bool] = []
+    received: list[float] = []
+
+    def subscribe(observer: Any, scheduler: Any = None) -> Disposable:
+        observers.append(scheduler is node.scheduler)
+        observer.on_next(Float64(data=float(len(observers))))
+        return Disposable(observers.clear)
+
+    node.publish_observable(rx.Observable(subscribe), Float64, "numbers", on_demand=True)
+    spin_until(lambda: peer.count_publishers("numbers") == 1)
+    assert observers == []
+
+    first, second = (
+        peer.create_subscription(Float64, "numbers", lambda message: received.append(message.data), 10)
+        for _ in range(2)
+    )
+    spin_until(lambda: received)
+    spin_until(lambda: node.count_subscribers("numbers") == 2)
+    assert observers == [True]
+
+    peer.destroy_subscription(first)
+    spin_until(lambda: node.count_subscribers("numbers") == 1)
+    assert observers == [True]
+    peer.destroy_subscription(second)
+    spin_until(lambda: observers == [])
 
 
 def test_publisher_is_forgotten_after_disposal(node: ReactiveNode) -> None:

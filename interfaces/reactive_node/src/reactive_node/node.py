@@ -15,14 +15,14 @@ from typing import TYPE_CHECKING, Any
 
 import reactivex as rx
 from rclpy.callback_groups import CallbackGroup, ReentrantCallbackGroup
-from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 from reactivex import Observable, abc
 from reactivex.disposable import CompositeDisposable, Disposable, SingleAssignmentDisposable
-from reactivex.subject import AsyncSubject
+from reactivex.subject import AsyncSubject, BehaviorSubject
 
 from reactive_node import calls
 from reactive_node.sampled_reader import newest, sampled_messages
@@ -247,6 +247,8 @@ class ReactiveNode(Node):
         msg_type: Any,
         topic: str,
         qos_profile: QoSProfile | int = 10,
+        *,
+        on_demand: bool = False,
         **options: Any,
     ) -> abc.DisposableBase:
         """
@@ -256,10 +258,21 @@ class ReactiveNode(Node):
         with the first message loses it. An error of the observable, or a message of another type, is raised
         once out of the spinning of this node.
 
-        :param options: further arguments of :meth:`rclpy.node.Node.create_publisher`. A subject makes an
-            observable of the publisher's QoS events:
+        :param on_demand: whether the observable is observed only while the topic has subscribers, each time
+            anew. Without them it costs nothing, down to its own topics.
+        :param options: further arguments of :meth:`rclpy.node.Node.create_publisher`; with ``on_demand``
+            without ``event_callbacks``. A subject makes an observable of the publisher's QoS events:
             ``event_callbacks=PublisherEventCallbacks(deadline=subject.on_next)``.
         """
+        if on_demand:
+            demanded: BehaviorSubject[bool] = BehaviorSubject(False)
+            options["event_callbacks"] = PublisherEventCallbacks(
+                matched=lambda subscribers: demanded.on_next(subscribers.current_count > 0)
+            )
+            offered = observable
+            observable = demanded.distinct_until_changed().switch_map(
+                lambda is_demanded: offered if is_demanded else rx.never()
+            )
         publisher = self.create_publisher(msg_type, topic, qos_profile, **options)
         subscription = SingleAssignmentDisposable()
 
