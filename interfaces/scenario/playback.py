@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from datetime import datetime, timedelta
 from typing import Any, TypeVar
@@ -50,8 +51,14 @@ def _samples(sweep: Sweep, elapsed: float) -> Observable[float]:
     def begin(scheduler: abc.SchedulerBase) -> Observable[float]:
         origin = scheduler.now - timedelta(seconds=elapsed)
         ticks = rx.interval(1.0 / sweep.rate).start_with(0)
-        values = ticks.map(lambda _: sweep.at((scheduler.now - origin).total_seconds()))
-        return values.distinct_until_changed()
+        times = ticks.map(lambda _: (scheduler.now - origin).total_seconds())
+        moving = times.take_while(lambda time: not sweep.rest_left(time), inclusive=True)
+
+        def resting(scheduler: abc.SchedulerBase) -> Observable[float]:
+            rest = sweep.rest_left((scheduler.now - origin).total_seconds())
+            return rx.timer(math.ceil(rest * sweep.rate) / sweep.rate).ignore_elements()
+
+        return moving.concat(rx.defer(resting)).repeat().map(sweep.at).distinct_until_changed()
 
     return rx.defer(begin)
 

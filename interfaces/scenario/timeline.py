@@ -57,8 +57,16 @@ class Sweep:
 
     def at(self, time: float) -> float:
         """Return the value at a time."""
+        ends, since_end = self._since_end(time)
+        moved = min(since_end / (self.period / 2 - self.rest), 1.0)
+        return self.center - self.amplitude * math.cos(math.pi * (ends + moved))
+
+    def rest_left(self, time: float) -> float:
+        """Return the time [s] from ``time`` until the end of a rest; 0 while it moves."""
+        left = self.period / 2 - self._since_end(time)[1]
+        return left if left <= self.rest else 0.0
+
+    def _since_end(self, time: float) -> tuple[float, float]:
+        """Return the number of movements before a time since a low end, and the time since the last began."""
         half = self.period / 2
-        movement = half - self.rest
-        since_low_end = time + self.period * self.phase / math.tau + movement / 2
-        ends, since_end = divmod(since_low_end, half)
-        return self.center - self.amplitude * math.cos(math.pi * (ends + min(since_end / movement, 1.0)))
+        return divmod(time + self.period * self.phase / math.tau + (half - self.rest) / 2, half)

@@ -6,6 +6,7 @@ import math
 from itertools import islice, pairwise
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
 import pytest
 import reactivex as rx
@@ -136,6 +137,24 @@ def test_sweep_is_sampled_at_its_rate_and_not_while_it_rests(scheduler: TestSche
 
     times = [0.0, 0.1, 0.2, 0.9, 1.0, 1.1, 1.2, 1.9, 2.0, 2.1, 2.2]
     assert samples[:11] == [(time, pytest.approx(sweep.at(10.0 + time))) for time in times]
+
+
+def test_sampled_sweep_reaches_its_ends(scheduler: TestScheduler) -> None:
+    sweep = Sweep(center=1.0, amplitude=0.5, period=2.0, rate=10.0, rest=0.57)  # moves for 0.43 s
+    ends = [value for _, value in played(scheduler, playback.state(sweep, 10.0)) if abs(value - 1.0) == 0.5]
+    assert ends[:4] == [1.5, 0.5, 1.5, 0.5]
+
+
+def test_sweep_sets_no_timer_while_it_rests(scheduler: TestScheduler) -> None:
+    sweep = Sweep(center=1.0, amplitude=0.5, period=20.0, rest=6.0)  # moves for 4 s, from -2 to 2
+    playback.state(sweep, 1.9).subscribe(scheduler=scheduler)
+    scheduler.advance_to(1.0)
+
+    with mock.patch.object(scheduler, "invoke_action", side_effect=scheduler.invoke_action) as invoked:
+        scheduler.advance_to(6.0)
+        assert invoked.call_count == 0
+        scheduler.advance_to(7.1)
+        assert 20 < invoked.call_count < 50
 
 
 def test_held_up_sweep_skips_samples_and_stays_true(scheduler: TestScheduler) -> None:
