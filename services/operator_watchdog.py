@@ -22,8 +22,8 @@ from interfaces.topics import ALIVE, INCAPACITATED, MISSED, TURN_OFF
 from reactive_node import stamps
 from reactive_node.stamps import Timestamp
 
-READING = 0.05  # s between two looks for a heartbeat: thousands of them cost no more than those of a switch
-FIRST_SAMPLE_AFTER_RESTART = 2.5 * READING  # so that a successor soon reports the operator
+READING = 0.1  # s between two looks for a heartbeat: thousands of them cost no more than those of a switch
+FIRST_SAMPLE_AFTER_RESTART = 1.5 * READING  # so that a successor soon reports the operator
 
 
 class Activity(NamedTuple):
