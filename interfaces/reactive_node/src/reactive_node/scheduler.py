@@ -10,6 +10,7 @@ from __future__ import annotations
 import heapq
 import itertools
 import threading
+import time
 from datetime import datetime
 from typing import Any, TypeVar
 
@@ -220,7 +221,9 @@ class NodeScheduler(PeriodicScheduler):
         self._timer: Timer = self._node.create_timer(1.0, self._run, clock=self._clock, autostart=False)
 
     def _read(self) -> int:
-        return int(self._clock.now().nanoseconds) + self._offset
+        # Without a simulation, not by the steady clock of rclpy, which reads the same in six calls.
+        now = int(self._clock.now().nanoseconds) if self._simulated else time.monotonic_ns()
+        return now + self._offset
 
     def _time_is_simulated(self) -> bool:
         clock = self._node.get_clock()
