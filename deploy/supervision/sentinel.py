@@ -22,7 +22,6 @@ from pathlib import Path
 
 import reactivex as rx
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from reactivex import Observable
 
 from deploy.supervision import processes
 from deploy.supervision.manifest import SENTINEL
@@ -103,12 +102,12 @@ def wire(node: ServiceNode) -> None:
     own_name = node.get_fully_qualified_name()
     namespace = node.get_namespace().rstrip("/")
 
-    def observe(_: int) -> Observable[Observation]:
+    def observe(_: int) -> Observation | None:
         try:
-            return rx.of(probe.observe())
+            return probe.observe()
         except DeploymentError as error:
             node.remark(SENTINEL, str(error))
-            return rx.empty()
+            return None
 
     def act(actions: list[Action]) -> None:
         for action in actions:
@@ -123,7 +122,7 @@ def wire(node: ServiceNode) -> None:
         return array
 
     reports = node.observe(DIAGNOSTICS).map(lambda array: healths(array, namespace))
-    observations = rx.timer(0.0, timeouts.period).flat_map(observe).share()
+    observations = rx.timer(0.0, timeouts.period).map(observe).filter(lambda it: it is not None).share()
     programs = observations.map(lambda observation: observation.programs)
     changed = programs.distinct_until_changed(lambda each: [program._replace(uptime=0.0) for program in each])
     repeated = rx.timer(DISCOVERY, 1.0).with_latest_from(programs).map(lambda pair: pair[1])
