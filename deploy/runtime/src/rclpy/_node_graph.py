@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from typing import TYPE_CHECKING
 
 from rclpy import _names
@@ -133,5 +134,5 @@ def _info(
         topic_type_hash=TypeHash._parse(user_data_value(endpoint.user_data, "typehash")),
         endpoint_type=kind,
         endpoint_gid=list(endpoint.gid),
-        qos_profile=endpoint.profile,
+        qos_profile=copy(endpoint.profile),  # the user may change it
     )

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import pytest
 
+from rclpy.node import Node
 from rclpy.serialization import deserialize_message
 from rclpy.type_hash import TypeHash
+from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 HASH = "RIHS01_" + "0123456789abcdef" * 4
@@ -28,3 +32,14 @@ def test_an_invalid_text_is_the_unknown_type_hash(text: str) -> None:
 def test_a_service_type_cannot_be_deserialized() -> None:
     with pytest.raises(RuntimeError, match="might be a service"):
         deserialize_message(b"", Trigger)
+
+
+def test_changed_profile_of_an_endpoint_changes_no_other(make_node: Callable[..., Node]) -> None:
+    node = make_node("talker")
+    for topic in ("first", "second"):
+        node.create_publisher(String, topic, 10)
+    (first,) = node.get_publishers_info_by_topic("first")
+    first.qos_profile.depth = 99
+    for topic in ("first", "second"):
+        (again,) = node.get_publishers_info_by_topic(topic)
+        assert again.qos_profile.depth == 10

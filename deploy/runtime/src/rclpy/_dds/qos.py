@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes as ct
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import lru_cache
 
 from rclpy.duration import Duration
 from rclpy.exceptions import RCLError
@@ -112,16 +113,18 @@ def user_data_value(data: str, key: str) -> str:
 
 
 def profile_of(qos: int | None) -> QoSProfile:
-    """Return the ROS profile of a discovered endpoint; history is UNKNOWN if it is not announced."""
+    """
+    Return the ROS profile of a discovered endpoint; history is UNKNOWN if it is not announced.
+
+    Endpoints with equal policies share it: a domain has many endpoints, and few profiles.
+    """
     kind, depth, duration = ct.c_int(), ct.c_int32(), library.Duration()
 
-    def duration_of(getter: str) -> Duration:
-        if not qos or not getattr(quick, getter)(qos, ct.byref(duration)):
-            return Duration(nanoseconds=INFINITY)
-        return Duration(nanoseconds=duration.value)
+    def duration_of(getter: str) -> int:
+        return duration.value if qos and getattr(quick, getter)(qos, ct.byref(duration)) else INFINITY
 
     reliability, durability = ReliabilityPolicy.BEST_EFFORT, DurabilityPolicy.VOLATILE
-    liveliness, lease = LivelinessPolicy.AUTOMATIC, Duration(nanoseconds=INFINITY)
+    liveliness, lease = LivelinessPolicy.AUTOMATIC, INFINITY
     history = HistoryPolicy.UNKNOWN
     if qos and quick.dds_qget_history(qos, ct.byref(kind), ct.byref(depth)):
         history = HistoryPolicy.KEEP_ALL if kind.value == _KEEP_ALL else HistoryPolicy.KEEP_LAST
@@ -132,14 +135,30 @@ def profile_of(qos: int | None) -> QoSProfile:
     if qos and quick.dds_qget_liveliness(qos, ct.byref(kind), ct.byref(duration)):
         manual = kind.value == _MANUAL_BY_TOPIC
         liveliness = LivelinessPolicy.MANUAL_BY_TOPIC if manual else LivelinessPolicy.AUTOMATIC
-        lease = Duration(nanoseconds=duration.value)
+        lease = duration.value
+    lifespan, deadline = duration_of("dds_qget_lifespan"), duration_of("dds_qget_deadline")
+    policies = history, max(0, depth.value), reliability, durability, liveliness
+    return _profile(*policies, lifespan, deadline, lease)
+
+
+@lru_cache(maxsize=256)
+def _profile(
+    history: HistoryPolicy,
+    depth: int,
+    reliability: ReliabilityPolicy,
+    durability: DurabilityPolicy,
+    liveliness: LivelinessPolicy,
+    lifespan: int,
+    deadline: int,
+    lease: int,
+) -> QoSProfile:
     return QoSProfile(
         history=history,
-        depth=max(0, depth.value),
+        depth=depth,
         reliability=reliability,
         durability=durability,
-        lifespan=duration_of("dds_qget_lifespan"),
-        deadline=duration_of("dds_qget_deadline"),
+        lifespan=Duration(nanoseconds=lifespan),
+        deadline=Duration(nanoseconds=deadline),
         liveliness=liveliness,
-        liveliness_lease_duration=lease,
+        liveliness_lease_duration=Duration(nanoseconds=lease),
     )
