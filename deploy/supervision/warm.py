@@ -17,6 +17,7 @@ import gc
 import importlib
 import mmap
 import os
+import pkgutil
 import runpy
 import signal
 import struct
@@ -26,24 +27,41 @@ import traceback
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from deploy.supervision import processes
 
 LIBRARIES = (
     "reactive_node",
+    "reactivex.operators",
+    "rclpy._graph",
+    "rclpy._parameter_files",
     "rclpy.executors",
     "rclpy.serialization",
-    "diagnostic_msgs.msg",
-    "geometry_msgs.msg",
-    "rcl_interfaces.srv",
-    "sensor_msgs.msg",
-    "std_msgs.msg",
-    "tf2_msgs.msg",
     "websockets.server",
     "yaml",
 )
-"""What the services import from outside of this checkout."""
+"""What the services import from outside of this checkout, also late."""
+TYPES = (
+    "diagnostic_msgs.msg.DiagnosticArray",
+    "geometry_msgs.msg.PointStamped",
+    "rcl_interfaces.msg.Log",
+    "rcl_interfaces.msg.ParameterEvent",
+    "rcl_interfaces.srv.DescribeParameters",
+    "rcl_interfaces.srv.GetParameters",
+    "rcl_interfaces.srv.GetParameterTypes",
+    "rcl_interfaces.srv.ListParameters",
+    "rcl_interfaces.srv.SetParameters",
+    "rcl_interfaces.srv.SetParametersAtomically",
+    "sensor_msgs.msg.JointState",
+    "std_msgs.msg.Bool",
+    "std_msgs.msg.Float64",
+    "std_msgs.msg.Header",
+    "std_msgs.msg.String",
+    "tf2_msgs.msg.TFMessage",
+    "type_description_interfaces.srv.GetTypeDescription",
+)
+"""The types of messages and of the services that each node has."""
 
 _PR_SET_MM, _PR_SET_MM_MAP = 35, 14
 _NO_FILE = 0xFFFFFFFF
@@ -56,8 +74,20 @@ def import_libraries() -> None:
     for name in LIBRARIES:
         with suppress(Exception):
             importlib.import_module(name)
+    for name in TYPES:
+        with suppress(Exception):
+            _use(pkgutil.resolve_name(name))
     gc.collect()
     gc.freeze()  # a collection in a fork would copy the memory that it shares
+
+
+def _use(type_: Any) -> None:
+    """Let a type make what it makes on its first use: its hash, and the code of a message."""
+    from rclpy.serialization import deserialize_message, serialize_message
+
+    getattr(type_, "_TYPE_HASH", "")
+    if hasattr(type_, "get_fields_and_field_types"):
+        deserialize_message(serialize_message(type_()), type_)
 
 
 def executor(execve: Callable[..., NoReturn]) -> Callable[[str, Sequence[str], Mapping[str, str]], NoReturn]:

@@ -111,3 +111,16 @@ def test_signals_of_a_program_do_not_wake_supervisord(tmp_path: Path) -> None:
     more = "pipe = os.pipe(); os.set_blocking(pipe[1], False); signal.set_wakeup_fd(pipe[1])"
     done = run(tmp_path, f"print(signal.set_wakeup_fd(-1)); {FORKED}", more=more)
     assert (done.stdout, done.stderr) == ("-1\nTrue\n", "")
+
+
+def test_program_imports_no_library_again(tmp_path: Path) -> None:
+    use = (
+        "before = set(sys.modules)\n"
+        "from rclpy.serialization import deserialize_message, serialize_message\n"
+        "from reactivex import operators\n"
+        "from std_msgs.msg import Float64\n"
+        "assert deserialize_message(serialize_message(Float64(data=1.5)), Float64).data == 1.5\n"
+        "print(sorted(set(sys.modules) - before))\n"
+    )
+    done = run(tmp_path, f"{use}{FORKED}", more="warm.import_libraries()")
+    assert (done.stdout, done.stderr) == ("[]\nTrue\n", "")
