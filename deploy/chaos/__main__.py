@@ -25,7 +25,7 @@ from deploy.chaos.pictures import framed, timeline
 from deploy.chaos.promises import CHECKERS
 from deploy.chaos.report import text
 from deploy.supervision import interruption, processes
-from deploy.supervision.system import DeploymentError, System
+from deploy.supervision.system import DeploymentError, System, set_middleware
 
 KEPT = 10  # records
 
@@ -33,6 +33,7 @@ KEPT = 10  # records
 def main(arguments: Sequence[str]) -> int:
     """Run the command line; return the exit code."""
     interruption.install()
+    set_middleware(os.environ)
     options = plan.parse(arguments)
     try:
         if options.replay:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 from deploy.commands.stop import stop
 from deploy.console.output import say
 from deploy.supervision import interruption
-from deploy.supervision.system import NAMESPACE, DeploymentError, Program, System
+from deploy.supervision.system import NAMESPACE, DeploymentError, Program, System, set_middleware
 
 if TYPE_CHECKING:
     from deploy.commands.member import Member
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 START_LIMIT = 60.0  # s until all services have to report their health
 BEGIN_LEAD = 0.3  # s from the choice of the scenario's origin to the origin: all services know it by then
 BEGIN_LIMIT = 5.0  # s that the services have to confirm the origin of the scenario
-STATUS_LIMIT = 1.5  # s for the health of services that are up: they report at 1 Hz
+STATUS_LIMIT = 3.0  # s for the health of services: the sentinel takes one without for hung after 2.7 s
 START_ATTEMPTS = 3  # of a service that dies so slowly that supervisord does not count it as an early death
 RECORDS = "records"  # in the run directory
 LOG_LINES = 15  # of a service that does not start
@@ -233,7 +233,7 @@ def main(arguments: list[str]) -> int:
         commands.add_parser(name)
     options = parser.parse_args(arguments)
 
-    os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    set_middleware(os.environ)
     system = System()
     try:
         match options.command:

@@ -8,7 +8,7 @@ import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, MutableMapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, NamedTuple, NoReturn
@@ -27,6 +27,7 @@ SETTINGS = "settings"  # in the run directory: where services keep the values th
 PAGE_FILE = "page.txt"  # in the settings: the line that tells the address of the page
 PARAMETERS = "parameters.yaml"  # in the run directory: the ROS parameter file of all services
 ALL, KEY = "/**", "ros__parameters"  # the form of ROS 2's parameter files
+FASTDDS_PROFILES = Path(__file__).resolve().parents[1] / "fastdds.xml"
 NOT_YET = -1.0  # scenario_epoch: the scenario waits until this parameter is set
 
 
@@ -280,7 +281,7 @@ class System:
         environment = dict(self._environment)
         environment[processes.MARK] = str(self.run)
         environment[NAMESPACE] = namespace_of(environment)
-        environment.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+        set_middleware(environment)
         environment["PYTHONUNBUFFERED"] = "1"
         _prepend(environment, "PATH", str(Path(sys.executable).parent))
         _prepend(environment, "PYTHONPATH", str(processes.ROOT))
@@ -311,6 +312,14 @@ def scenario_parameters(scenario: Path, origin: float) -> dict[str, object]:
     """
     shared = {"scenario": str(scenario), "scenario_epoch": origin, "settings": SETTINGS}
     return {ALL: {KEY: shared}}
+
+
+def set_middleware(environment: MutableMapping[str, str]) -> None:
+    """Set what the nodes of an arm need from the middleware, where the user has not set it."""
+    environment.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    environment.setdefault("FASTRTPS_DEFAULT_PROFILES_FILE", str(FASTDDS_PROFILES))
+    # In LOCALHOST, rmw_fastrtps_cpp always adds shared memory; there, the profile keeps messages out of it.
+    environment.setdefault("FASTDDS_BUILTIN_TRANSPORTS", "UDPv4")
 
 
 def namespace_of(environment: Mapping[str, str]) -> str:

@@ -1,12 +1,8 @@
-"""The promises in one short play with a real system: every kind of fault, and every program killed.
-
-They are judged with Cyclone DDS only (deploy/SAFETY.md).
-"""
+"""The promises in one short play with a real system: every kind of fault, and every program killed."""
 
 from __future__ import annotations
 
 import pytest
-from rclpy.utilities import get_rmw_implementation_identifier
 
 from deploy.chaos.clock import STEP, missing
 from deploy.chaos.findings import HOLDS
@@ -17,14 +13,7 @@ from interfaces.topics import DRIVE_TIMEOUT, ENGINES, OPERATOR_HEARTBEAT, OPERAT
 
 from .experiments import Experiment, experiment
 
-pytestmark = [
-    pytest.mark.timed,
-    pytest.mark.timeout(180),
-    pytest.mark.skipif(
-        get_rmw_implementation_identifier() == "rmw_fastrtps_cpp",
-        reason="platform: Fast DDS repeats the discovery of endpoints only once a second",
-    ),
-]
+pytestmark = [pytest.mark.timed, pytest.mark.timeout(180)]
 
 
 @pytest.fixture(scope="module")

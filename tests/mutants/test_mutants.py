@@ -78,7 +78,7 @@ def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Bench]:
     monkeypatch.setattr(benches, "_ALLOWANCE", 1.0)
     checkout = tmp_path / "checkout"
     (checkout / "deploy" / "mutants").mkdir(parents=True)
-    for name in ("conftest.py", "deploy/mutants/runner.py"):
+    for name in ("conftest.py", "pyproject.toml", "deploy/mutants/runner.py"):
         shutil.copy(ROOT / name, checkout / name)
     (checkout / "clamp.py").write_text(CLAMP)
     (checkout / "test_clamp.py").write_text(
