@@ -61,8 +61,8 @@ def is_numeric(field: Field) -> bool:
 
 
 def slot_of(field: Field) -> str:
-    """Name of the slot that holds the field's value. No field name ends with an underscore."""
-    return f"{field.name}_" if is_numeric(field) else field.name
+    """Name of the slot that holds the field's value. No field name begins or ends with an underscore."""
+    return f"_{field.name}_" if is_numeric(field) else field.name
 
 
 def python_value(base: str, value: Literal | tuple[Literal, ...]) -> Any:

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 
 _CHECK_FIELDS = os.environ.get("ROS_PYTHON_CHECK_FIELDS") == "1"
 """Whether messages check assigned values by default."""
-_FLAG = "_check_fields_"
-"""The slot for ``check_fields`` of the constructor. No field name ends with an underscore."""
+_FLAG = "_check__fields"
+"""The slot for ``check_fields`` of the constructor. No field name contains two underscores in a row."""
 
 
 class _OnFirstUse:

@@ -98,6 +98,13 @@ def test_messages_are_unhashable_as_they_can_change() -> None:
         hash(Float64())
 
 
+@pytest.mark.parametrize("cls", [Float64, JointState, PoseWithCovariance])
+def test_the_public_names_of_a_message_are_its_fields(cls: Any) -> None:
+    # py_trees_ros, for one, lists them to its users
+    public = {name for name in dir(cls) if not name.startswith("_")}
+    assert public == {*cls.get_fields_and_field_types(), "SLOT_TYPES", "get_fields_and_field_types"}
+
+
 def test_every_slot_of_a_message_is_set() -> None:
     for message in (
         Float64(data=1.0),

@@ -106,7 +106,7 @@ def creation(
 
 def uuid_bytes(goal_id: Any) -> bytes:
     """Return the 16 bytes of a ``unique_identifier_msgs/msg/UUID``, read without importing NumPy."""
-    data: bytes = goal_id.uuid_.tobytes()
+    data: bytes = goal_id._uuid_.tobytes()
     return data
 
 
