@@ -1,13 +1,16 @@
-"""A node beside the arm that records, with their source times, the messages that the switch moves."""
+"""A node beside the arm that records, with their source times, the messages that the switch moves.
+
+It is a process of its own, because it may have to be in the network namespace of the arm.
+"""
 
 from __future__ import annotations
 
-import ctypes
-import os
+import json
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any, NamedTuple
 
 from rclpy.duration import Duration
@@ -15,10 +18,10 @@ from rclpy.qos import QoSProfile
 from std_msgs.msg import String
 
 from interfaces import topics
-from tests.system.sites import LIMIT, Peer
+from tests.system.sites import LIMIT, ROOT, Peer
 
-CLONE_NEWNET = 0x40000000  # linux/sched.h
 DEPTH = 500  # messages that may wait while this process is not scheduled
+RECORDED = (topics.OPERATOR_HEARTBEAT, topics.ENGINES_STATE)
 
 
 class State(NamedTuple):
@@ -36,37 +39,26 @@ class Record:
         self.beats: list[float] = []
         """Source times [s since 1970]."""
         self.states: list[State] = []
-        self._ended = threading.Event()
-        self._ready = threading.Event()
-        self._thread = threading.Thread(target=self._run, args=(domain, namespace), daemon=True)
+        within = ["ip", "netns", "exec", namespace] if namespace else []
+        self._process = subprocess.Popen(
+            [*within, sys.executable, "-m", __name__, str(domain)],
+            cwd=ROOT,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            bufsize=1,
+        )
+        self._thread = threading.Thread(target=self._read)
         self._thread.start()
-        assert self._ready.wait(LIMIT)
 
-    def _run(self, domain: int, namespace: str) -> None:
-        if namespace:  # the threads and sockets of DDS begin in the namespace of this thread
-            with Path("/run/netns", namespace).open() as file:
-                entered = ctypes.CDLL(None, use_errno=True).setns(file.fileno(), CLONE_NEWNET)
-                assert entered == 0, os.strerror(ctypes.get_errno())
-        peer = Peer(domain)
-        try:
-            self._subscribe(peer, topics.OPERATOR_HEARTBEAT, lambda at, _: self.beats.append(at))
-            self._subscribe(peer, topics.ENGINES_STATE, lambda at, it: self.states.append(State(at, it.data)))
-            self._commands = peer.publisher(topics.ENGINES)
-            self._ready.set()
-            while not self._ended.is_set():
-                peer.spin_once(0.1)
-        finally:
-            peer.close()
-
-    @staticmethod
-    def _subscribe(peer: Peer, topic: topics.Topic, take: Callable[[float, Any], None]) -> None:
-        qos = topic.qos
-        deep = QoSProfile(depth=DEPTH, reliability=qos.reliability, lifespan=Duration())
-
-        def receive(message: Any, info: Any) -> None:
-            take(info["source_timestamp"] / 1e9, message)
-
-        peer.node.create_subscription(topic.type, topic.name, receive, deep)
+    def _read(self) -> None:
+        assert self._process.stdout is not None
+        for line in self._process.stdout:
+            topic, at, value = json.loads(line)
+            if topic == topics.ENGINES_STATE.name:
+                self.states.append(State(at, value))
+            else:
+                self.beats.append(at)
 
     def until(self, condition: Callable[[], object], seconds: float = LIMIT, period: float = 0.005) -> None:
         """Wait until a condition is true; look once in a period [s]."""
@@ -102,7 +94,8 @@ class Record:
                 if not is_held():
                     return
                 due = time.monotonic() + 0.5
-                self._commands.publish(String(data=topics.TURN_ON))
+                assert self._process.stdin is not None
+                self._process.stdin.write(f"{topics.TURN_ON}\n")
             time.sleep(0.01)
 
     def await_off(self, moment: float) -> float:
@@ -122,5 +115,36 @@ class Record:
 
     def close(self) -> None:
         """Leave the domain."""
-        self._ended.set()
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        self._process.stdin.close()
+        self._process.wait(LIMIT)
         self._thread.join()
+        self._process.stdout.close()
+
+
+def main(domain: int) -> None:
+    """Print topic, source time and value of each message; publish each line of the input as a command."""
+    peer = Peer(domain)
+    commands = peer.publisher(topics.ENGINES)
+    for topic in RECORDED:
+        deep = QoSProfile(depth=DEPTH, reliability=topic.qos.reliability, lifespan=Duration())
+        peer.node.create_subscription(topic.type, topic.name, _printer(topic), deep)
+    reader = threading.Thread(
+        target=lambda: [commands.publish(String(data=line.strip())) for line in sys.stdin]
+    )
+    reader.start()
+    while reader.is_alive():
+        peer.spin_once(0.1)
+    peer.close()
+
+
+def _printer(topic: topics.Topic) -> Callable[[Any, Any], None]:
+    def receive(message: Any, info: Any) -> None:
+        print(json.dumps([topic.name, info["source_timestamp"] / 1e9, message.data]), flush=True)
+
+    return receive
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]))
