@@ -50,7 +50,7 @@ def urdf(l1: float, l2: float, namespace: str = "/") -> str:
     return f"""\
 <?xml version="1.0"?>
 <robot name="reactive_arm">
-  {_link(base, f'<cylinder radius="{2 * THICKNESS}" length="{half}"/>', "0.25 0.27 0.3", z=-half)}
+  {_link(base, f'<cylinder radius="{2 * THICKNESS}" length="{half}"/>', "0.6 0.63 0.67", z=-half)}
   {_link(link1, f'<box size="{l1} {THICKNESS} {half}"/>', "0.2 0.4 0.8", x=l1 / 2)}
   {_link(link2, f'<box size="{l2} {THICKNESS} {half}"/>', "0.2 0.6 0.9", x=l2 / 2)}
   {_link(effector, f'<sphere radius="{THICKNESS}"/>', "0.9 0.5 0.1")}

@@ -124,6 +124,14 @@ def test_pictured_links_reach_from_joint_to_joint() -> None:
     assert pictured == {LINK1: ("2.5", 1.25), LINK2: ("0.75", 0.375)}
 
 
+def test_pictured_links_stand_out_from_the_background_of_rviz() -> None:
+    background = 48 / 255  # RViz's default, in each channel
+    colors = [color.attrib["rgba"] for color in ElementTree.fromstring(urdf(2.0, 3.0)).iter("color")]
+    assert len(colors) == 4
+    for color in colors:
+        assert max(abs(float(channel) - background) for channel in color.split()[:3]) > 0.3
+
+
 @pytest.mark.parametrize(
     ("namespace", "prefix"), [("/", ""), ("/arm1", "arm1/"), ("/site/arm1", "site/arm1/")]
 )
