@@ -62,6 +62,8 @@ def test_rviz_shows_the_model_in_the_frame_of_the_arm() -> None:
     window = settings["Window Geometry"]
     assert {"Hide Left Dock", "Hide Right Dock"} <= window.keys(), "RViz takes random values for absent ones"
     view = settings["Visualization Manager"]
+    shown = [each["Name"] for each in view["Displays"]]
+    assert shown == ["Grid", "RobotModel"], "a TF display warns about the frames of other arms on /tf"
     assert view["Global Options"]["Fixed Frame"] == robot_model.BASE
     model = next(each for each in view["Displays"] if each["Name"] == "RobotModel")
     assert model["Description Topic"]["Value"] == topics.ROBOT_DESCRIPTION.name
