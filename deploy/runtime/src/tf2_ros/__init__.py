@@ -1,5 +1,15 @@
 """Transforms between coordinate frames on ROS topics, with the API of ROS 2's tf2_ros."""
 
+from geometry_msgs.msg import (
+    PointStamped,
+    PoseStamped,
+    PoseWithCovarianceStamped,
+    TransformStamped,
+    Vector3Stamped,
+)
+from rclpy.duration import Duration
+from rclpy.time import Time
+from tf2_msgs.msg import TFMessage
 from tf2_py import (
     BufferCore,
     ConnectivityException,
@@ -44,4 +54,13 @@ __all__ = [
     "TimeoutException",
     "TypeException",
     "NotImplementedException",
+    # programs import these from here too: the original exports what its modules import
+    "Duration",
+    "PointStamped",
+    "PoseStamped",
+    "PoseWithCovarianceStamped",
+    "TFMessage",
+    "Time",
+    "TransformStamped",
+    "Vector3Stamped",
 ]

@@ -1,4 +1,4 @@
-"""Names that can be imported from rclpy's modules, besides those of facts/rclpy_api.json."""
+"""Names that can be imported from rclpy's and tf2's modules, besides those of facts/rclpy_api.json."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import importlib
 
 import pytest
 
-# Public programs import these. Most are defined elsewhere: rclpy's modules import them for their own use.
+# Public programs import these. Most are defined elsewhere: the modules import them for their own use.
 NAMES = {
     "rclpy.client": "Future SrvType SrvTypeRequest SrvTypeResponse",
     "rclpy.clock": "ClockType Duration JumpHandlePreCallbackType Time",
@@ -32,6 +32,10 @@ NAMES = {
     "rclpy.subscription": "MsgType",
     "rclpy.time": "ClockType Duration",
     "rclpy.waitable": "NumberOfEntities Waitable",
+    "tf2_geometry_msgs": "Point PointStamped PolygonStamped Pose PoseStamped PoseWithCovarianceStamped"
+    " TransformStamped Vector3Stamped",
+    "tf2_ros": "Duration PointStamped PoseStamped PoseWithCovarianceStamped TFMessage Time TransformStamped"
+    " Vector3Stamped",
 }
 
 
@@ -42,6 +46,9 @@ def test_names_that_programs_import_are_there(module: str) -> None:
 
 
 def test_imported_name_is_the_original() -> None:
+    import tf2_geometry_msgs
+    import tf2_ros
+    from geometry_msgs.msg import TransformStamped
     from rcl_interfaces.msg import Parameter, ParameterDescriptor
     from rclpy import callback_groups, executors, guard_condition, node, parameter
 
@@ -50,6 +57,7 @@ def test_imported_name_is_the_original() -> None:
     assert node.Executor is executors.Executor
     assert parameter.ParameterMsg is Parameter
     assert executors.GuardCondition is guard_condition.GuardCondition
+    assert tf2_ros.TransformStamped is tf2_geometry_msgs.TransformStamped is TransformStamped
 
 
 def test_interface_is_importable_from_its_module_of_ros_2() -> None:
