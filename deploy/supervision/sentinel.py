@@ -121,8 +121,10 @@ def wire(node: ServiceNode) -> None:
         array.header.stamp = node.get_clock().now().to_msg()
         return array
 
-    reports = node.observe(DIAGNOSTICS).map(lambda array: healths(array, namespace))
-    observations = rx.timer(0.0, timeouts.period).map(observe).filter(lambda it: it is not None).share()
+    # One wake-up for all reports and the processes: a dozen services report each second.
+    looks = rx.timer(0.0, timeouts.period, node.scheduler).share()
+    reports = node.observe(DIAGNOSTICS, buffered=looks).map(lambda array: healths(array, namespace))
+    observations = looks.map(observe).filter(lambda it: it is not None).share()
     programs = observations.map(lambda observation: observation.programs)
     changed = programs.distinct_until_changed(lambda each: [program._replace(uptime=0.0) for program in each])
     repeated = rx.timer(DISCOVERY, 1.0).with_latest_from(programs).map(lambda pair: pair[1])

@@ -77,6 +77,7 @@ class ServiceNode(ReactiveNode):
         *,
         timestamped: bool = False,
         sampled: float | None = None,
+        buffered: Observable[Any] | None = None,
         max_age: float | None = None,
     ) -> Observable[Any]:
         """
@@ -84,6 +85,7 @@ class ServiceNode(ReactiveNode):
 
         :param timestamped: see :meth:`ReactiveNode.create_observable`.
         :param sampled: the same; not for a latched topic.
+        :param buffered: the same.
         :param max_age: a message that is older [s], or this much ahead of the local clock, is not good.
         """
         self._observed[self.resolve_topic_name(topic.name)] = topic
@@ -92,7 +94,8 @@ class ServiceNode(ReactiveNode):
             # Raw, because rclpy on Cyclone DDS would deliver a truncated message as one of zeros.
             return self.create_observable(topic.type, topic.name, qos, timestamped=True, raw=True, **options)
 
-        shared = None if is_latched(topic.qos) else create(topic.qos, sampled=sampled)
+        read_by = {"sampled": sampled, "buffered": buffered}
+        shared = None if is_latched(topic.qos) else create(topic.qos, **read_by)
 
         def subscribe(
             observer: abc.ObserverBase[Any], _: abc.SchedulerBase | None = None

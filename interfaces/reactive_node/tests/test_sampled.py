@@ -74,6 +74,23 @@ def test_tick_reads_the_newest_message_once(
     assert received == [3.0, 4.0]
 
 
+def test_tick_of_a_buffer_reads_all_messages_once(
+    node: ReactiveNode, talker: Talker, ticks: Subject[None], spin_until: SpinUntil
+) -> None:
+    received: list[float] = []
+    topic = node.create_observable(Float64, "topic", 3, buffered=ticks)
+    topic.map(lambda message: message.data).subscribe(received.append)
+    talker.await_readers(2)
+
+    talker.say(1.0, 2.0, 3.0, 4.0, 5.0)
+    assert received == [], "nothing is read between two ticks"
+    spin_until(lambda: ticks.on_next(NOW) or len(received) == 5)
+    ticks.on_next(NOW)
+    talker.say(6.0)
+    spin_until(lambda: ticks.on_next(NOW) or received[5:])
+    assert received == [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]
+
+
 def test_period_ticks_at_once_and_by_the_scheduler_of_the_node(
     node: ReactiveNode, scheduler: VirtualTime
 ) -> None:

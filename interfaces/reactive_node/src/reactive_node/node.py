@@ -25,7 +25,7 @@ from reactivex.disposable import CompositeDisposable, Disposable, SingleAssignme
 from reactivex.subject import AsyncSubject, BehaviorSubject
 
 from reactive_node import calls
-from reactive_node.sampled_reader import newest, sampled_messages
+from reactive_node.sampled_reader import BUFFER, newest, sampled_messages
 from reactive_node.scheduler import NodeScheduler
 from reactive_node.services import Requests
 from reactive_node.shared_reader import SharedReader, retention
@@ -54,6 +54,7 @@ class ReactiveNode(Node):
         *,
         timestamped: bool = False,
         sampled: float | Observable[Any] | None = None,
+        buffered: float | Observable[Any] | None = None,
         **options: Any,
     ) -> Observable[Any]:
         """
@@ -72,11 +73,17 @@ class ReactiveNode(Node):
             At each tick the newest message becomes an item, if it has come since the tick before. What comes
             in between costs no Python: the reader keeps one message, and only a tick reads it. Late observers
             get no retained samples, and QoS events are not warned of.
-        :param options: further arguments of :meth:`rclpy.node.Node.create_subscription`; with ``sampled``
-            without ``callback_group`` and ``event_callbacks``.
+        :param buffered: the same for topics of which each message counts: at each tick, all messages become
+            items that have come since the tick before, one after the other. The reader keeps 1000.
+        :param options: further arguments of :meth:`rclpy.node.Node.create_subscription`; with ``sampled`` or
+            ``buffered`` without ``callback_group`` and ``event_callbacks``.
         """
         if sampled is not None:
-            return self._create_sampled(msg_type, topic, qos_profile, timestamped, sampled, options)
+            qos = newest(qos_profile, 1)
+            return self._create_sampled(msg_type, topic, qos, timestamped, sampled, options)
+        if buffered is not None:
+            qos = newest(qos_profile, BUFFER)
+            return self._create_sampled(msg_type, topic, qos, timestamped, buffered, options)
 
         def create_reader(callback: Callable[..., None]) -> Subscription:
             return self.create_subscription(msg_type, topic, callback, qos_profile, **options)
@@ -95,20 +102,20 @@ class ReactiveNode(Node):
         self,
         msg_type: Any,
         topic: str,
-        qos_profile: QoSProfile | int,
+        qos: QoSProfile,
         timestamped: bool,
-        sampled: float | Observable[Any],
+        period: float | Observable[Any],
         options: dict[str, Any],
     ) -> Observable[Any]:
-        ticks = sampled if isinstance(sampled, Observable) else rx.timer(0.0, sampled, self.scheduler)
+        ticks = period if isinstance(period, Observable) else rx.timer(0.0, period, self.scheduler)
 
         def create_reader(group: CallbackGroup) -> Subscription:
             # No QoS events: with Fast DDS, unread messages would end each wait for them at once.
             events = SubscriptionEventCallbacks(use_default_callbacks=False)
             given = {"callback_group": group, "event_callbacks": events, **options}
-            return self.create_subscription(msg_type, topic, lambda _: None, newest(qos_profile), **given)
+            return self.create_subscription(msg_type, topic, lambda _: None, qos, **given)
 
-        messages = sampled_messages(self, create_reader, ticks, timestamped=timestamped)
+        messages = sampled_messages(self, create_reader, ticks, timestamped=timestamped, most=qos.depth)
         return messages.take_until(self._end).share()
 
     def create_parameter_observable(self, name: str) -> Observable[Any]:

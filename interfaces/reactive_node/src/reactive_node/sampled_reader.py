@@ -17,6 +17,8 @@ from reactivex.disposable import CompositeDisposable, Disposable
 from reactive_node import stamps
 from reactive_node.stamps import Timestamp
 
+BUFFER = 1000  # messages that a reader keeps for a tick that reads all of them
+
 
 class Unattended(CallbackGroup):
     """Keeps its entities out of the wait set of an executor."""
@@ -33,11 +35,11 @@ class Unattended(CallbackGroup):
         """Do nothing."""
 
 
-def newest(qos_profile: QoSProfile | int) -> QoSProfile:
-    """Return a QoS whose reader keeps only the newest message."""
+def newest(qos_profile: QoSProfile | int, count: int) -> QoSProfile:
+    """Return a QoS whose reader keeps so many messages."""
     qos = QoSProfile(depth=qos_profile) if isinstance(qos_profile, int) else copy.copy(qos_profile)
     qos.history = HistoryPolicy.KEEP_LAST
-    qos.depth = 1
+    qos.depth = count
     return qos
 
 
@@ -47,12 +49,14 @@ def sampled_messages(
     ticks: Observable[Any],
     *,
     timestamped: bool = False,
+    most: int = 1,
 ) -> Observable[Any]:
     """
-    Return the message that a reader holds at each tick, if it has come since the tick before.
+    Return the messages that a reader holds at each tick, those that have come since the tick before.
 
     :param create: creates the reader of ``node`` in a callback group.
     :param timestamped: whether items are :class:`Timestamp` s instead of messages.
+    :param most: as many messages as a tick reads.
     """
 
     def subscribe(
@@ -73,12 +77,14 @@ def sampled_messages(
                     return taken
 
         def read(_: Any) -> None:
-            try:
-                taken = take()
-            except RuntimeError as error:  # RCLError: the octets are no message of this type
-                node.get_logger().warning(f"{subscription.topic_name}: {error}")
-                return
-            if taken is not None:
+            for _ in range(most):
+                try:
+                    taken = take()
+                except RuntimeError as error:  # RCLError: the octets are no message of this type
+                    node.get_logger().warning(f"{subscription.topic_name}: {error}")
+                    continue
+                if taken is None:
+                    return
                 message, info = taken
                 time = stamps.from_nanoseconds(info["source_timestamp"])
                 observer.on_next(Timestamp(message, time) if timestamped else message)
