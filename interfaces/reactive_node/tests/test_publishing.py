@@ -15,7 +15,7 @@ from reactivex.subject import Subject
 from std_msgs.msg import Float64, String
 
 from reactive_node import ReactiveNode
-from reactive_node.testing import SpinUntil
+from reactive_node.testing import SpinFor, SpinUntil
 
 
 def test_observable_is_published(node: ReactiveNode, peer: Node, spin_until: SpinUntil) -> None:
@@ -43,33 +43,32 @@ def test_publisher_lives_from_wiring_until_disposal(
 
 
 def test_observable_on_demand_is_observed_while_there_are_subscribers(
-    node: ReactiveNode, peer: Node, spin_until: SpinUntil
+    node: ReactiveNode, peer: Node, spin_until: SpinUntil, spin_for: SpinFor
 ) -> None:
-    observers: list[bool] = []
+    happened: list[str] = []
     received: list[float] = []
 
     def subscribe(observer: Any, scheduler: Any = None) -> Disposable:
-        observers.append(scheduler is node.scheduler)
-        observer.on_next(Float64(data=float(len(observers))))
-        return Disposable(observers.clear)
+        happened.append("observed" if scheduler is node.scheduler else "another scheduler")
+        observer.on_next(Float64(data=1.5))
+        return Disposable(lambda: happened.append("disposed"))
 
     node.publish_observable(rx.Observable(subscribe), Float64, "numbers", on_demand=True)
     spin_until(lambda: peer.count_publishers("numbers") == 1)
-    assert observers == []
+    assert happened == []
 
-    first, second = (
-        peer.create_subscription(Float64, "numbers", lambda message: received.append(message.data), 10)
-        for _ in range(2)
-    )
-    spin_until(lambda: received)
+    first = peer.create_subscription(Float64, "numbers", lambda message: received.append(message.data), 10)
+    spin_until(lambda: received == [1.5])
+    second = peer.create_subscription(Float64, "numbers", lambda _: None, 10)
     spin_until(lambda: node.count_subscribers("numbers") == 2)
-    assert observers == [True]
-
+    spin_for(0.1)  # the second one is no reason to begin anew
     peer.destroy_subscription(first)
     spin_until(lambda: node.count_subscribers("numbers") == 1)
-    assert observers == [True]
+    spin_for(0.1)
+    assert happened == ["observed"]
     peer.destroy_subscription(second)
-    spin_until(lambda: observers == [])
+    spin_until(lambda: happened[1:])
+    assert happened == ["observed", "disposed"]
 
 
 def test_publisher_is_forgotten_after_disposal(node: ReactiveNode) -> None:
