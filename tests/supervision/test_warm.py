@@ -37,7 +37,7 @@ def run(
     )
 
 
-FORKED = "print('warm' in str(sys.modules.get('deploy.supervision.warm')))"
+FORKED = "print('warm' in str(sys.modules.get('deploy.supervision.warm')), flush=True)"
 
 
 def test_program_sees_its_own_command_line_and_environment(tmp_path: Path) -> None:
