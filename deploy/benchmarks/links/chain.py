@@ -9,26 +9,21 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import rclpy
 from geometry_msgs.msg import PointStamped
 from rclpy.executors import SingleThreadedExecutor
-from rclpy.node import Node
 from rclpy.task import Future
 from std_msgs.msg import Float64
 
-from deploy.benchmarks.link import KINEMATICS, Item, Job, Link
+from deploy.benchmarks.link import KINEMATICS, Item, Job
+from deploy.benchmarks.links import callbacks
 from interfaces.topics import EFFECTOR_POSITION, EFFECTOR_SPEED, L1, L2, THETA1, THETA2, Topic
 
 
-class Connection(Link):
+class Connection(callbacks.Connection):
     """A node of the chain. The source leaves in shared memory what a speed does not tell: time and number."""
-
-    make_node: Callable[[str], Node] = Node
 
     def __init__(self, job: Job) -> None:
         super().__init__(job)
-        rclpy.init(args=[])
-        self.node = type(self).make_node(job.role)
         self.executor = SingleThreadedExecutor()
         self.executor.add_node(self.node)
         file = os.open(Path(job.directory, "sent"), os.O_RDWR | os.O_CREAT, 0o600)
@@ -112,7 +107,3 @@ class Connection(Link):
 
     def wait(self, seconds: float) -> None:
         self.executor.spin_until_future_complete(Future(), seconds)
-
-    def close(self) -> None:
-        self.node.destroy_node()
-        rclpy.try_shutdown()
