@@ -27,10 +27,11 @@ def run(
     folder: Path, program: str, *, more: str = "", python: str = PYTHON
 ) -> subprocess.CompletedProcess[str]:
     """Run the module `probe` as a fork of supervisord does."""
+    path = [os.environ["PYTHONPATH"]] if "PYTHONPATH" in os.environ else []  # where ROS 2 has its packages
     (folder / "probe.py").write_text("import atexit, os, signal, sys, threading\n" + program)
     return subprocess.run(
         [sys.executable, "-c", WARM.format(more=more), python, "-m", "probe", *WORDS],
-        env=os.environ | {"PYTHONPATH": f"{ROOT}{os.pathsep}{folder}"},
+        env=os.environ | {"PYTHONPATH": os.pathsep.join([str(ROOT), str(folder), *path])},
         capture_output=True,
         text=True,
         timeout=30.0,
