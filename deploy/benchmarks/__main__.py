@@ -1,9 +1,10 @@
 """`make bench`: compare this system with its alternatives, on the same work in one interleaved run.
 
 A source publishes items, a middle process maps and publishes them again, a sink receives them. Then a source
-floods a sink, and a source starts while a sink waits. `chain` compares the arm's kinematics and velocity with
-the same in plain callbacks. Each round measures all alternatives, so a busy machine affects all alike. CPU
-time is that of whole processes. What cannot be measured here is named with the reason.
+floods a sink, and a source starts while a sink waits. `chain` compares the arm's kinematics and velocity, and
+its operator watchdog, with the same in plain callbacks. Each round measures all alternatives, so a busy
+machine affects all alike. CPU time is that of whole processes. What cannot be measured here is named with the
+reason.
 """
 
 from __future__ import annotations
@@ -22,7 +23,14 @@ from typing import Any
 
 from deploy.benchmarks import environment, scale
 from deploy.benchmarks.alternatives import ALTERNATIVES, BENCH_PYTHON, CHAINS, Alternative
-from deploy.benchmarks.measurement import CHAIN_SCENARIOS, SCENARIOS, MeasurementFailed, Scenario, measure
+from deploy.benchmarks.measurement import (
+    CHAIN_SCENARIOS,
+    SCENARIOS,
+    WATCHDOG_SCENARIOS,
+    MeasurementFailed,
+    Scenario,
+    measure,
+)
 from deploy.benchmarks.table import chain_tables, tables
 from deploy.commands.setup import system_rclpy
 from deploy.supervision import interruption
@@ -123,6 +131,8 @@ def _compare(results: dict[str, Any], kind: str, rounds: int) -> None:
     alternatives, scenarios = (CHAINS, CHAIN_SCENARIOS) if kind == CHAIN else (ALTERNATIVES, SCENARIOS)
     needed = {each.requirements for each in alternatives if each.requirements} | {environment.CHART}
     found = present(alternatives, environment.prepare(sorted(needed)))
+    if kind == CHAIN and any(each.build for each in found):  # the source of the heartbeats is in C
+        scenarios += WATCHDOG_SCENARIOS
     print(f"{machine()}; {versions()}", flush=True)
     results |= {each.title: {} for each in found}
     for title, figures in compare(found, scenarios, rounds):

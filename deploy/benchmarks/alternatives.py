@@ -10,7 +10,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from deploy.benchmarks import c_program
-from deploy.benchmarks.link import FIRST, LAST, MIDDLE, SINK, SOURCE, Job
+from deploy.benchmarks.link import FIRST, HEARTBEATS, LAST, MIDDLE, SINK, SOURCE, Job
 from deploy.supervision.processes import ROOT
 
 BENCH_PYTHON = ROOT / ".venv-bench" / "bin" / "python"
@@ -51,9 +51,17 @@ def dataflow(alternative: Alternative, jobs: Sequence[Job]) -> list[list[str]]:
     return [[str(BENCH_PYTHON.with_name("dora")), "run", str(file)]]
 
 
-def c_processes(_: Alternative, jobs: Sequence[Job]) -> list[list[str]]:
-    """Return a command of the program in C for each job."""
-    return [c_program.command(job) for job in jobs]
+def services(alternative: Alternative, jobs: Sequence[Job]) -> list[list[str]]:
+    """Return a command for each job; Python would be too slow as the source of heartbeats."""
+    *others, source = jobs
+    if source.topic != HEARTBEATS:
+        return processes(alternative, jobs)
+    return [*processes(alternative, others), c_program.command(c_program.SERVICES, source)]
+
+
+def c_processes(alternative: Alternative, jobs: Sequence[Job]) -> list[list[str]]:
+    """Return a command of a program in C for each job."""
+    return [c_program.command(alternative.link, job) for job in jobs]
 
 
 @dataclass(frozen=True)
@@ -62,7 +70,7 @@ class Alternative:
 
     title: str
     link: str
-    """The module of :mod:`deploy.benchmarks.links`, if it is in Python."""
+    """The module of :mod:`deploy.benchmarks.links`, or the program of :mod:`deploy.benchmarks.c_program`."""
     requirements: str = ""
     """The file with what PyPI has of it; '' if it needs nothing but the runtime."""
     ros: bool = False
@@ -102,16 +110,18 @@ ALTERNATIVES = (
     Alternative("ROS 2, callbacks", "callbacks", ros=True),
     Alternative("ROS 2, rxros2 style", "rxros2", ros=True),
     Alternative("cyclonedds-python", "cyclone"),
-    Alternative("Cyclone DDS, C program", "c_program", commands=c_processes, build=c_program.build),
+    Alternative("Cyclone DDS, C program", c_program.PIPELINE, commands=c_processes, build=c_program.build),
     Alternative("dora-rs", "dora_nodes", "dora.txt", commands=dataflow),
     Alternative("eclipse-zenoh", "zenoh_peers", "zenoh.txt"),
     Alternative("pyzmq", "zeromq", "zeromq.txt"),
     Alternative("iceoryx2", "iceoryx", "iceoryx.txt"),
 )
 CHAINS = (
-    Alternative("services", "chain_services"),
-    Alternative("callbacks, same rclpy", "chain"),
-    Alternative("ROS 2, services", "chain_services", ros=True),
-    Alternative("ROS 2, callbacks", "chain", ros=True),
+    Alternative("services", "chain_services", commands=services),
+    Alternative("services without the contract", "chain_recipes", commands=services),
+    Alternative("callbacks, same rclpy", "chain", commands=services),
+    Alternative("ROS 2, services", "chain_services", ros=True, commands=services),
+    Alternative("ROS 2, callbacks", "chain", ros=True, commands=services),
+    Alternative("Cyclone DDS, C program", c_program.SERVICES, commands=c_processes, build=c_program.build),
 )
-"""The arm's own chain, from an angle to a speed."""
+"""The arm's own chain, from an angle to a speed, and its operator watchdog."""

@@ -1,4 +1,4 @@
-"""The program in C on Cyclone DDS: what the same work costs without any Python (``c/peer.c``)."""
+"""The programs in C on Cyclone DDS: what the same work costs without any Python (``c/``)."""
 
 from __future__ import annotations
 
@@ -6,9 +6,10 @@ import shutil
 import subprocess
 from pathlib import Path
 
-from deploy.benchmarks.link import REPORTS, Job
+from deploy.benchmarks.link import Job
 from deploy.supervision.processes import run_directory
 
+PIPELINE, SERVICES = "pipeline", "services"
 _SOURCES = Path(__file__).with_name("c")
 _CONFIGURATION = Path(__file__).with_name("links") / "loopback.xml"
 _PACKAGES = {"cc": "gcc libc6-dev", "idlc": "cyclonedds-tools cyclonedds-dev"}
@@ -16,29 +17,32 @@ _PACKAGES = {"cc": "gcc libc6-dev", "idlc": "cyclonedds-tools cyclonedds-dev"}
 
 
 def build() -> str:
-    """Compile the program; return why that is not possible here, '' if it is."""
+    """Compile the programs; return why that is not possible here, '' if it is."""
     absent = [packages for tool, packages in _PACKAGES.items() if not shutil.which(tool)]
     if absent:
         return f"apt-get install {' '.join(absent)}"
-    _program().parent.mkdir(parents=True, exist_ok=True)
-    for command in (
-        ["idlc", str(_SOURCES / "octets.idl")],
-        ["cc", "-O2", "-I.", "-o", str(_program()), str(_SOURCES / "peer.c"), "octets.c", "-lddsc"],
-    ):
-        done = subprocess.run(
-            command, cwd=_program().parent, capture_output=True, text=True, start_new_session=True
-        )
-        if done.returncode:
-            return (done.stderr.strip().splitlines() or [f"{command[0]} failed"])[0]
+    directory = _directory()
+    directory.mkdir(parents=True, exist_ok=True)
+    for name in (PIPELINE, SERVICES):
+        sources = [str(_SOURCES / f"{name}.c"), str(_SOURCES / "process.c"), f"{name}.c"]
+        for command in (
+            ["idlc", str(_SOURCES / f"{name}.idl")],
+            ["cc", "-O2", "-I.", f"-I{_SOURCES}", "-o", name, *sources, "-lddsc", "-lm"],
+        ):
+            done = subprocess.run(
+                command, cwd=directory, capture_output=True, text=True, start_new_session=True
+            )
+            if done.returncode:
+                return (done.stderr.strip().splitlines() or [f"{command[0]} failed"])[0]
     return ""
 
 
-def command(job: Job) -> list[str]:
-    """Return the command of a process."""
+def command(program: str, job: Job) -> list[str]:
+    """Return the command of a process of PIPELINE or SERVICES."""
     numbers = (job.size, job.rate, job.warm_up, job.seconds, job.depth)
-    reports = f"{job.directory}/{REPORTS}"
-    return [str(_program()), job.role, job.topic, *map(str, numbers), reports, _CONFIGURATION.read_text()]
+    words = [job.role, job.topic, *map(str, numbers), job.directory, _CONFIGURATION.read_text()]
+    return [str(_directory() / program), *words]
 
 
-def _program() -> Path:
-    return run_directory() / "bench" / "c" / "peer"
+def _directory() -> Path:
+    return run_directory() / "bench" / "c"

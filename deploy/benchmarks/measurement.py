@@ -17,6 +17,7 @@ from typing import Any
 from deploy.benchmarks.alternatives import Alternative
 from deploy.benchmarks.link import (
     FIRST,
+    HEARTBEATS,
     KINEMATICS,
     LAST,
     MIDDLE,
@@ -24,6 +25,7 @@ from deploy.benchmarks.link import (
     SINK,
     SOURCE,
     VELOCITY,
+    WATCHDOG,
     Job,
 )
 from deploy.chaos.cost import proportional_set_size
@@ -46,7 +48,7 @@ class Scenario:
     """One kind of work."""
 
     name: str
-    """`pipeline`, `flood`, `start` or `chain` (from an angle to a speed)."""
+    """`pipeline`, `flood`, `start`, `chain` (from an angle to a speed) or `watchdog` (heartbeats)."""
     size: int
     """Of an item [octets]."""
     rate: float
@@ -55,7 +57,7 @@ class Scenario:
     @property
     def key(self) -> str:
         """The beginning of the names of its figures."""
-        return f"{self.name}.{self.rate:.0f}" if self.name == CHAIN else f"{self.name}.{self.size}"
+        return f"{self.name}.{self.rate if self.name in (CHAIN, WATCHDOG) else self.size:.0f}"
 
     @property
     def middle(self) -> tuple[str, ...]:
@@ -76,6 +78,7 @@ SCENARIOS = (
     Scenario("start", 8, 1000.0),
 )
 CHAIN_SCENARIOS = tuple(Scenario(CHAIN, 8, rate) for rate in (100.0, 500.0, 1000.0, 4000.0))
+WATCHDOG_SCENARIOS = tuple(Scenario(WATCHDOG, 1, rate) for rate in (20.0, 10_000.0))
 
 
 def measure(
@@ -88,6 +91,8 @@ def measure(
     :param seconds: of the measurement.
     :raises MeasurementFailed: if the processes end early or stay silent.
     """
+    if scenario.name == WATCHDOG:
+        return _measure_watchdog(alternative, scenario, warm_up, seconds)
     roles = (SINK, *scenario.middle, SOURCE)
     with _run(alternative, roles, scenario, warm_up, seconds) as run:
         began = run.start()
@@ -106,6 +111,18 @@ def measure(
         delivered = 100 * end["count"] / sent
         figures |= {"p50_ms": end["p50"], "p99_ms": end["p99"], "delivered": min(100.0, delivered)}
     return {f"{scenario.key}.{name}": value for name, value in figures.items()}
+
+
+def _measure_watchdog(
+    alternative: Alternative, scenario: Scenario, warm_up: float, seconds: float
+) -> dict[str, float]:
+    with _run(alternative, (WATCHDOG, SOURCE), scenario, warm_up, seconds) as run:
+        run.start()
+        time.sleep(2 * warm_up)  # until it hears the heartbeats
+        began, before = time.monotonic(), cpu_seconds(run.pids[WATCHDOG])
+        time.sleep(2 * seconds)
+        busy = cpu_seconds(run.pids[WATCHDOG]) - before
+        return {f"{scenario.key}.cpu_percent": 100 * busy / (time.monotonic() - began)}
 
 
 def measure_subscribers(
@@ -151,7 +168,7 @@ def _run(
     """Prepare a process for each role, in a ROS domain and a directory of their own."""
     temporary = tempfile.TemporaryDirectory(prefix="bench-", ignore_cleanup_errors=True)
     with reserved_domain() as domain_id, temporary as directory:
-        topic = FIRST if MIDDLE in roles else LAST
+        topic = HEARTBEATS if WATCHDOG in roles else FIRST if MIDDLE in roles else LAST
         fields = (topic, scenario.size, scenario.rate, warm_up, seconds, directory)
         jobs = [Job(alternative.link, role, *fields) for role in roles]
         with _Run(alternative, jobs, domain_id) as run:

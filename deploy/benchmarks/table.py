@@ -41,7 +41,7 @@ def _by_size(figure: str) -> dict[str, str]:
 
 
 def chain_tables(results: Results) -> str:
-    """Return all tables of the arm's own chain."""
+    """Return all tables of the arm's own chain and watchdog."""
     titles = {
         "p50_ms": "θ1 to speed: latency, p50 [ms]",
         "p99_ms": "θ1 to speed: latency, p99 [ms]",
@@ -49,10 +49,12 @@ def chain_tables(results: Results) -> str:
         "delivered": "θ1 to speed: delivered [%]",
         "megabytes": "θ1 to speed: proportional set size of both processes [MB]",
     }
-    return "\n\n".join(
+    chain = [
         table(title, results, {f"chain.{rate}.{figure}": heading for rate, heading in RATES.items()})
         for figure, title in titles.items()
-    )
+    ]
+    heartbeats = {"watchdog.20.cpu_percent": "20 Hz", "watchdog.10000.cpu_percent": "10 kHz"}
+    return "\n\n".join([*chain, table("operator watchdog: CPU [% of a core]", results, heartbeats)])
 
 
 def tables(results: Results) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -116,7 +117,7 @@ def test_short_pipeline_of_this_system_has_figures() -> None:
     assert all(value > 0 for value in figures.values())
 
 
-@pytest.mark.parametrize("link", ["chain", "chain_services"])
+@pytest.mark.parametrize("link", ["chain", "chain_services", "chain_recipes"])
 def test_short_chain_has_figures(link: str) -> None:
     here = Alternative("here", link, ros=bool(system_rclpy()))
 
@@ -133,12 +134,43 @@ def test_missing_compiler_is_named_with_its_packages(monkeypatch: pytest.MonkeyP
     assert c_program.build() == "apt-get install gcc libc6-dev cyclonedds-tools cyclonedds-dev"
 
 
-def test_short_pipeline_of_the_c_program_has_figures() -> None:
-    program = Alternative("C", "c_program", commands=alternatives.c_processes, build=c_program.build)
-    if reason := program.missing():
+@pytest.fixture
+def in_c() -> Callable[[str], Alternative]:
+    if reason := c_program.build():
         pytest.skip(reason)
-    figures = measurement.measure(program, Scenario("pipeline", 1_000_000, 50.0), warm_up=0.1, seconds=0.2)
+    return lambda name: Alternative("C", name, commands=alternatives.c_processes)
+
+
+@pytest.mark.parametrize(
+    ("program", "scenario"),
+    [
+        (c_program.PIPELINE, Scenario("pipeline", 1_000_000, 50.0)),
+        (c_program.SERVICES, Scenario("chain", 8, 100.0)),
+        (c_program.SERVICES, Scenario("watchdog", 1, 1000.0)),
+    ],
+    ids=lambda value: value if isinstance(value, str) else value.name,
+)
+def test_short_measurement_of_the_c_program_has_figures(
+    in_c: Callable[[str], Alternative], program: str, scenario: Scenario
+) -> None:
+    figures = measurement.measure(in_c(program), scenario, warm_up=0.1, seconds=0.2)
     assert all(value > 0 for value in figures.values())
+
+
+@pytest.mark.usefixtures("in_c")  # the source of the heartbeats
+def test_watchdog_that_hears_each_heartbeat_costs_more_than_the_service() -> None:
+    ros = bool(system_rclpy())
+    scenario = Scenario("watchdog", 1, 2000.0)
+    service, callbacks = (
+        measurement.measure(
+            Alternative(link, link, ros=ros, commands=alternatives.services),
+            scenario,
+            warm_up=1.0,
+            seconds=0.5,
+        )["watchdog.2000.cpu_percent"]
+        for link in ("chain_services", "chain")
+    )
+    assert 0 < service < callbacks
 
 
 def test_processor_time_is_measured_although_all_reports_have_waited(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,4 +1,7 @@
-"""The arm's own chain in plain callbacks: θ1 → kinematics → velocity → speed, as a ROS 2 program has it."""
+"""The arm's own chain in plain callbacks: θ1 → kinematics → velocity → speed, as a ROS 2 program has it.
+
+Its watchdog hears each heartbeat and reports the operator twice a second, as the thesis throttles them.
+"""
 
 from __future__ import annotations
 
@@ -12,11 +15,21 @@ from typing import Any
 from geometry_msgs.msg import PointStamped
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.task import Future
-from std_msgs.msg import Float64
+from std_msgs.msg import Bool, Float64, Header
 
-from deploy.benchmarks.link import KINEMATICS, Item, Job
+from deploy.benchmarks.link import KINEMATICS, VELOCITY, Item, Job
 from deploy.benchmarks.links import callbacks
-from interfaces.topics import EFFECTOR_POSITION, EFFECTOR_SPEED, L1, L2, THETA1, THETA2, Topic
+from interfaces.topics import (
+    EFFECTOR_POSITION,
+    EFFECTOR_SPEED,
+    L1,
+    L2,
+    OPERATOR_HEARTBEAT,
+    OPERATOR_PRESENCE,
+    THETA1,
+    THETA2,
+    Topic,
+)
 
 
 class Connection(callbacks.Connection):
@@ -56,8 +69,10 @@ class Connection(callbacks.Connection):
     def forward(self, source: str, target: str) -> None:
         if self.job.role == KINEMATICS:
             self._kinematics()
-        else:
+        elif self.job.role == VELOCITY:
             self._velocity()
+        else:
+            self._watchdog()
 
     def _kinematics(self) -> None:
         publish = self._publisher(EFFECTOR_POSITION)
@@ -98,6 +113,23 @@ class Connection(callbacks.Connection):
             before = message
 
         self._listen(EFFECTOR_POSITION, on_message)
+
+    def _watchdog(self) -> None:
+        publish = self._publisher(OPERATOR_PRESENCE)
+        is_alive = False
+
+        def on_heartbeat(_: Bool) -> None:
+            nonlocal is_alive
+            is_alive = True
+
+        def report() -> None:
+            nonlocal is_alive
+            if is_alive:
+                publish(Header(stamp=self.node.get_clock().now().to_msg()))
+            is_alive = False
+
+        self._listen(OPERATOR_HEARTBEAT, on_heartbeat)
+        self.node.create_timer(0.5, report)
 
     def _publisher(self, topic: Topic) -> Callable[[Any], object]:
         return self.node.create_publisher(topic.type, topic.name, topic.qos).publish

@@ -1,19 +1,25 @@
-"""The arm's own chain as it runs in the arm: the recipes and the wiring of its services."""
+"""The arm's own chain and watchdog as they run in the arm: the recipes and the wiring of its services."""
 
 from __future__ import annotations
 
-from deploy.benchmarks.link import KINEMATICS
+from collections.abc import Callable
+
+from deploy.benchmarks.link import KINEMATICS, VELOCITY, WATCHDOG
 from deploy.benchmarks.links import chain
 from interfaces.service import ServiceNode
-from services import kinematics, velocity
+from services import kinematics, operator_watchdog, velocity
+
+_SERVICES = {KINEMATICS: kinematics, VELOCITY: velocity, WATCHDOG: operator_watchdog}
 
 
 class Connection(chain.Connection):
     """A service in the middle; source and sink are those of the chain in callbacks."""
 
+    make_service: Callable[[str], ServiceNode] = ServiceNode
+
     def forward(self, source: str, target: str) -> None:
-        node = ServiceNode(self.job.role)
-        (kinematics if self.job.role == KINEMATICS else velocity).wire(node)
+        node = type(self).make_service(self.job.role)
+        _SERVICES[self.job.role].wire(node)
         self.executor.remove_node(self.node)
         self.node.destroy_node()
         self.node = node

@@ -1,9 +1,10 @@
 """Measures the costs of rclpy: ``make bench`` or ``python run.py [OPTION ...] [NAME=COMMAND ...]``.
 
 Each COMMAND starts a Python with an rclpy, such as ``embedded=.venv/bin/python`` or a script that sources
-ROS 2 and ends with ``exec python "$@"``. The default is this interpreter. Every round measures all of them,
-so a busy machine affects all alike. The table shows the medians of the rounds. With ``--awake`` no processor
-sleeps during a measurement, see :mod:`awake`. CPU time is that of the whole process, with all its threads.
+ROS 2 and ends with ``exec python "$@"``. The default is this interpreter. ``nodes.c`` shows what the
+middleware itself costs. Every round measures all of them, so a busy machine affects all alike. The table
+shows the medians of the rounds. With ``--awake`` no processor sleeps during a measurement, see :mod:`awake`.
+CPU time is that of the whole process, with all its threads.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import statistics
 import subprocess
 import sys
 from collections import defaultdict
+from collections.abc import Sequence
 from contextlib import nullcontext
 from pathlib import Path
 
@@ -73,10 +75,16 @@ def table(results: dict[str, dict[str, list[float]]]) -> str:
     """Return a Markdown table of medians: a row for each figure, a column for each rclpy."""
     lines = [f"| | | {' | '.join(results)} |", f"|---|---|{'---:|' * len(results)}"]
     for key, (name, unit) in FIGURES.items():
-        medians = [statistics.median(figures[key]) for figures in results.values()]
-        values = " | ".join(f"{value:,.{0 if value >= 100 else 2}f}" for value in medians)
+        values = " | ".join(_median(figures.get(key, ())) for figures in results.values())
         lines.append(f"| {name} | {unit} | {values} |")
     return "\n".join(lines)
+
+
+def _median(values: Sequence[float]) -> str:
+    if not values:
+        return "–"
+    median = statistics.median(values)
+    return f"{median:,.{0 if median >= 100 else 2}f}"
 
 
 def main() -> None:
