@@ -6,12 +6,12 @@ import shutil
 import subprocess
 from pathlib import Path
 
-from deploy.benchmarks.link import Job
+from deploy.benchmarks.link import HEARTBEATS, Job
 from deploy.supervision.processes import run_directory
 
 PIPELINE, SERVICES = "pipeline", "services"
 _SOURCES = Path(__file__).with_name("c")
-_CONFIGURATION = Path(__file__).with_name("links") / "loopback.xml"
+_CONFIGURATIONS = Path(__file__).with_name("links")
 _PACKAGES = {"cc": "gcc libc6-dev", "idlc": "cyclonedds-tools cyclonedds-dev"}
 """What compiles it, and the packages of Debian and Ubuntu that bring it."""
 
@@ -40,7 +40,8 @@ def build() -> str:
 def command(program: str, job: Job) -> list[str]:
     """Return the command of a process of PIPELINE or SERVICES."""
     numbers = (job.size, job.rate, job.warm_up, job.seconds, job.depth)
-    words = [job.role, job.topic, *map(str, numbers), job.directory, _CONFIGURATION.read_text()]
+    configuration = _CONFIGURATIONS / ("localhost.xml" if job.topic == HEARTBEATS else "loopback.xml")
+    words = [job.role, job.topic, *map(str, numbers), job.directory, configuration.read_text()]
     return [str(_directory() / program), *words]
 
 
