@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import subprocess
 import sys
-from collections.abc import Iterable
+from collections.abc import Collection
 from pathlib import Path
 
 from deploy.benchmarks.alternatives import BENCH_PYTHON
@@ -23,7 +23,7 @@ class EnvironmentFailed(Exception):
     """Why the environment could not be made; a message for the user."""
 
 
-def prepare(names: Iterable[str]) -> dict[str, str]:
+def prepare(names: Collection[str]) -> dict[str, str]:
     """
     Make the environment if it is missing or outdated.
 
@@ -31,26 +31,34 @@ def prepare(names: Iterable[str]) -> dict[str, str]:
     :return: why pip refused a file, by its name.
     """
     files = [*_RUNTIME, *sorted(_REQUIREMENTS.glob("*.txt"))]
-    fingerprint = hashlib.sha256(sys.version.encode() + b"".join(file.read_bytes() for file in files))
-    if _STAMP.exists() and _STAMP.read_text() == fingerprint.hexdigest():
+    hashed = hashlib.sha256(sys.version.encode() + b"".join(file.read_bytes() for file in files))
+    fingerprint = hashed.hexdigest()
+    made_from = _STAMP.read_text().split() if _STAMP.exists() else []
+    installed = made_from[1:] if made_from[:1] == [fingerprint] else None
+    if installed is not None and set(names) <= set(installed):
         return {}
     print(f"Setting up {_VENV.name} with the alternatives, once; this takes about a minute.", flush=True)
-    _run([sys.executable, "-m", "venv", "--clear", str(_VENV)])
-    for file in _RUNTIME:
-        _install(file)
+    if installed is None:
+        _run([sys.executable, "-m", "venv", "--clear", str(_VENV)])
+        for file in _RUNTIME:
+            _install(file)
+        installed = []
     refused = {}
     for name in names:
+        if name in installed:
+            continue
         try:
             _install(_REQUIREMENTS / name)
+            installed.append(name)
         except EnvironmentFailed as error:
-            refused[name] = str(error)
-    if not refused:  # else the next run tries again
-        _STAMP.write_text(fingerprint.hexdigest())
+            refused[name] = str(error)  # the next run tries again
+    _STAMP.write_text(" ".join([fingerprint, *installed]))
     return refused
 
 
 def _install(file: Path) -> None:
-    pip = [str(BENCH_PYTHON), "-m", "pip", "install", "--no-deps", "--no-input", "--quiet"]
+    # Isolated: pip takes what a sourced ROS 2 has on its path for installed.
+    pip = [str(BENCH_PYTHON), "-I", "-m", "pip", "install", "--no-deps", "--no-input", "--quiet"]
     _run([*pip, "--disable-pip-version-check", "-r", str(file)])
 
 
