@@ -96,7 +96,9 @@ def test_metadata_omits_requests_and_responses(introspected: Introspected) -> No
     assert all(event.request == event.response == [] for event in introspected.call())
 
 
-def test_changing_the_state_and_destroying_leaves_no_publisher(introspected: Introspected) -> None:
+def test_changing_the_state_and_destroying_leaves_no_publisher(
+    introspected: Introspected, spin_until: SpinUntil
+) -> None:
     introspected.configure(CONTENTS)
     introspected.configure(METADATA)
     assert not any(event.request for event in introspected.call())
@@ -105,7 +107,7 @@ def test_changing_the_state_and_destroying_leaves_no_publisher(introspected: Int
     introspected.configure(CONTENTS, qos_profile_system_default)
     introspected.node.destroy_service(introspected.service)
     introspected.node.destroy_client(introspected.client)
-    assert introspected.node.count_publishers("negate/_service_event") == 0
+    spin_until(lambda: introspected.node.count_publishers("negate/_service_event") == 0)
 
 
 def test_the_event_publisher_is_not_listed_among_the_nodes_publishers(introspected: Introspected) -> None:
