@@ -15,29 +15,19 @@ from interfaces.topics import Topic
 class UncheckedNode(ServiceNode):
     """A node of a service that hands all messages on."""
 
-    def observe(
-        self,
-        topic: Topic,
-        *,
-        timestamped: bool = False,
-        sampled: float | None = None,
-        buffered: Observable[Any] | None = None,
-        max_age: float | None = None,
-    ) -> Observable[Any]:
+    def observe(self, topic: Topic, *, max_age: float | None = None, **read_by: Any) -> Observable[Any]:
         """Return all messages of a topic."""
-        read_by = {"timestamped": timestamped, "sampled": sampled, "buffered": buffered}
-        return self.create_observable(topic.type, topic.name, topic.qos, **read_by)  # type: ignore[arg-type]
+        return self.create_observable(topic.type, topic.name, topic.qos, **read_by)
 
     def publish(
         self,
         topic: Topic,
         items: Observable[Any],
         message: Callable[[Any], Any] = lambda item: item,
-        *,
-        on_demand: bool = False,
+        **options: Any,
     ) -> None:
         """Publish all items on a topic."""
-        self.publish_observable(items.map(message), topic.type, topic.name, topic.qos, on_demand=on_demand)
+        self.publish_observable(items.map(message), topic.type, topic.name, topic.qos, **options)
 
 
 class Connection(chain_services.Connection):
