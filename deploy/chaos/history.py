@@ -27,8 +27,8 @@ OPERATOR, ALL, NO_TARGET = "operator", "all", "nothing"
 
 OVERLOAD, LOSS, SILENCE = "overload", "loss", "silence"
 CONDITIONS = (OVERLOAD, LOSS, SILENCE)
-"""Recorded like faults, but not injected into a process: the observer was not scheduled in time, the network
-loses packets, the operator released the switch."""
+"""Recorded like faults, but not injected into a process: the observer was not scheduled in time, messages
+to it were lost, the operator released the switch."""
 
 PARTITION = "partition"
 """A fault of the network between the operator's host and the robot's."""

@@ -16,6 +16,7 @@ import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +26,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
-from deploy.chaos.history import NO_TARGET, OVERLOAD, InjectedFault, Life
+from deploy.chaos.history import LOSS, NO_TARGET, OVERLOAD, InjectedFault, Life
 from deploy.chaos.process_monitor import ProcessMonitor
 from deploy.chaos.record import FAULTS, PROCESSES
 from deploy.recording.recorder import Recorder, record
@@ -45,14 +46,16 @@ def _on_thread(work: Callable[[threading.Event], None]) -> Iterator[None]:
 
 
 @contextmanager
-def _recording(namespace: str, domain: int, recorder: Recorder) -> Iterator[None]:
+def _recording(
+    namespace: str, domain: int, recorder: Recorder, lost: Callable[[float, float], None]
+) -> Iterator[None]:
     """Record the messages of an arm on a thread; print `seen NAME` at the first message of each topic."""
     context = Context()
     rclpy.init(args=[], context=context, domain_id=domain, signal_handler_options=SignalHandlerOptions.NO)
     executor = SingleThreadedExecutor(context=context)
     node = Node(f"observer_{os.getpid()}", context=context, namespace=namespace)
     executor.add_node(node)
-    record(node, recorder, _report_first)
+    record(node, recorder, _report_first, lost)
 
     def spin(ended: threading.Event) -> None:
         while not ended.is_set():
@@ -83,13 +86,15 @@ def main(arguments: list[str]) -> int:
     def report(namespace: str, life: Life) -> None:
         write(PROCESSES, life._asdict() | {"namespace": namespace}, "began", "ended")
 
-    def overload(begin: float, end: float) -> None:
-        write(FAULTS, InjectedFault(OVERLOAD, NO_TARGET, begin, end)._asdict(), "begin", "end")
+    def blind(kind: str, begin: float, end: float) -> None:
+        write(FAULTS, InjectedFault(kind, NO_TARGET, begin, end)._asdict(), "begin", "end")
 
-    monitor = ProcessMonitor({Path(run): namespace for namespace, _, run in arms}, report, overload)
+    monitor = ProcessMonitor(
+        {Path(run): namespace for namespace, _, run in arms}, report, partial(blind, OVERLOAD)
+    )
     with ExitStack() as stack:
         for namespace, domain, _ in arms:
-            stack.enter_context(_recording(namespace, int(domain), recorder))
+            stack.enter_context(_recording(namespace, int(domain), recorder, partial(blind, LOSS)))
         stack.enter_context(_on_thread(monitor.run))
         stack.callback(recorder.close)  # first, and for all arms at once: shutting the nodes down takes time
         print(f"observing {origin}", flush=True)

@@ -8,13 +8,14 @@ from __future__ import annotations
 import json
 import threading
 import time
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 import yaml
 from mcap.writer import Writer
+from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.serialization import serialize_message
@@ -103,30 +104,49 @@ def qos_profiles(topic: topics.Topic) -> str:
     return str(yaml.safe_dump([profile]))
 
 
-def record(node: Node, recorder: Recorder, first: Callable[[str], None] = lambda name: None) -> None:
+def record(
+    node: Node,
+    recorder: Recorder,
+    first: Callable[[str], None] = lambda name: None,
+    lost: Callable[[float, float], None] = lambda begin, end: None,
+) -> None:
     """
     Record all topics of the contract in the namespace of a node, for as long as the node is spun.
 
     :param first: is called with the name of each topic at its first message.
+    :param lost: is called if the middleware has lost messages, with the begin and the end of the time in
+        which they were sent, on the monotonic clock [s]. Lost heartbeats do not count: a flood has too many.
     """
     for topic in topics.CONTRACT:
-        _record(node, topic, recorder, first)
+        _record(node, topic, recorder, first, lost)
 
 
-def _record(node: Node, topic: topics.Topic, recorder: Recorder, first: Callable[[str], None]) -> None:
+def _record(
+    node: Node,
+    topic: topics.Topic,
+    recorder: Recorder,
+    first: Callable[[str], None],
+    lost: Callable[[float, float], None],
+) -> None:
     name = node.resolve_topic_name(topic.name)
     offered = qos_profiles(topic)
-    seen = False
+    # The loss is reported before or after the next message is: the one before both is among the last two.
+    last_two: deque[int] = deque(maxlen=2)
 
     def write(data: bytes, info: Any) -> None:
-        nonlocal seen
-        if not seen:
-            seen = True
+        if not last_two:
             first(name)
         now = time.monotonic_ns()
+        last_two.append(now)
         age = time.time_ns() - info["source_timestamp"]
         recorder.message(name, topic.type_name, offered, data, now, now - age)
 
+    def report_loss(info: Any) -> None:
+        now = time.monotonic_ns()
+        if topic is not topics.OPERATOR_HEARTBEAT:
+            lost(min(last_two, default=now) / 1e9, now / 1e9)
+
     depth = HEARTBEAT_DEPTH if topic is topics.OPERATOR_HEARTBEAT else DEPTH
     qos = QoSProfile(depth=depth, reliability=topic.qos.reliability, durability=topic.qos.durability)
-    node.create_subscription(topic.type, name, write, qos, raw=True)
+    events = SubscriptionEventCallbacks(message_lost=report_loss)
+    node.create_subscription(topic.type, name, write, qos, raw=True, event_callbacks=events)

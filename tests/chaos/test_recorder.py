@@ -1,0 +1,104 @@
+"""The recorder reports in which time the middleware has lost messages."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from deploy.recording import recorder
+from interfaces import topics
+
+
+class Subscriptions:
+    """In place of a node: keeps what the recorder subscribes to, by topic name."""
+
+    def __init__(self) -> None:
+        self.write: dict[str, Any] = {}
+        self.lose: dict[str, Any] = {}
+
+    def resolve_topic_name(self, name: str) -> str:
+        return name
+
+    def create_subscription(
+        self, kind: type, name: str, write: Any, qos: Any, *, raw: bool, event_callbacks: Any
+    ) -> None:
+        self.write[name] = write
+        self.lose[name] = event_callbacks.message_lost
+
+
+class Clock:
+    """In place of `time`: a monotonic clock that the test sets [s]."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.now = 0.0
+        monkeypatch.setattr(time, "monotonic_ns", lambda: round(self.now * 1e9))
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
+    return Clock(monkeypatch)
+
+
+@pytest.fixture
+def reports() -> list[tuple[float, float]]:
+    return []
+
+
+@pytest.fixture
+def node(tmp_path: Path, reports: list[tuple[float, float]]) -> Iterator[Subscriptions]:
+    subscriptions: Any = Subscriptions()
+    file = recorder.Recorder(tmp_path / "record.mcap", 0, 10**18)
+    recorder.record(subscriptions, file, lost=lambda begin, end: reports.append((begin, end)))
+    yield subscriptions
+    file.close()
+
+
+def receive(node: Subscriptions, clock: Clock, at: float) -> None:
+    clock.now = at
+    node.write[topics.L2.name](b"", {"source_timestamp": time.time_ns()})
+
+
+def lose(node: Subscriptions, clock: Clock, at: float, topic: topics.Topic = topics.L2) -> None:
+    clock.now = at
+    node.lose[topic.name](SimpleNamespace(total_count=1, total_count_change=1))
+
+
+def covered(reports: list[tuple[float, float]], moment: float) -> bool:
+    return any(begin <= moment <= end for begin, end in reports)
+
+
+@pytest.mark.parametrize("first", ["the loss", "the next message"])
+def test_a_loss_is_reported_from_the_last_message_before_it(
+    node: Subscriptions, clock: Clock, reports: list[tuple[float, float]], first: str
+) -> None:
+    receive(node, clock, 1.0)
+    receive(node, clock, 2.0)
+    if first == "the loss":
+        lose(node, clock, 4.0)
+        receive(node, clock, 4.0)
+    else:
+        receive(node, clock, 4.0)
+        lose(node, clock, 4.001)
+    assert covered(reports, 2.0)
+    assert covered(reports, 4.0)
+    assert not covered(reports, 0.9)
+    assert not covered(reports, 4.1)
+
+
+def test_a_loss_before_the_first_message_is_a_moment(
+    node: Subscriptions, clock: Clock, reports: list[tuple[float, float]]
+) -> None:
+    lose(node, clock, 4.0)
+    assert reports == [(4.0, 4.0)]
+
+
+def test_lost_heartbeats_are_not_reported(
+    node: Subscriptions, clock: Clock, reports: list[tuple[float, float]]
+) -> None:
+    lose(node, clock, 4.0, topics.OPERATOR_HEARTBEAT)
+    assert not reports
