@@ -116,6 +116,21 @@ def test_only_what_stays_on_the_host_is_in_large_datagrams(environment: dict[str
     assert ("<MaxMessageSize>65000 B</MaxMessageSize>" in domain.configuration(environment)) == large
 
 
+@pytest.mark.parametrize(
+    ("largest_socket", "limited"), [("212992\n", False), ("4194304\n", True), ("", False), (None, False)]
+)
+def test_first_burst_fits_into_a_large_socket(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, largest_socket: str | None, limited: bool
+) -> None:
+    file = tmp_path / "rmem_max"
+    if largest_socket is not None:
+        file.write_text(largest_socket)
+    monkeypatch.setattr(domain, "_LARGEST_SOCKET", file)
+    configuration = domain.configuration({RANGE: "LOCALHOST"})
+    assert ("<MaxInitTransmit>90</MaxInitTransmit>" in configuration) == limited
+    assert '<SocketReceiveBufferSize max="16 MiB"/>' in configuration
+
+
 def test_interfaces_of_the_host_are_listed() -> None:
     found = domain._ipv4_interfaces()
     assert {name for name, _ in found} <= {name for _, name in socket.if_nameindex()}

@@ -30,7 +30,13 @@ _FROM_ANY_INTERFACE = "<Internal><ExtendedPacketInfo>false</ExtendedPacketInfo><
 # On loopback, the fewer datagrams a large message needs, the less time it takes. If they overflow
 # the receiving socket, whose size the kernel limits (net.core.rmem_max), one request covers 256 fragments.
 _LARGE_DATAGRAMS = "<MaxMessageSize>65000 B</MaxMessageSize><FragmentSize>64000 B</FragmentSize>"
-_LARGE_BURSTS = '<Internal><SocketReceiveBufferSize max="16 MiB"/><NackDelay>10 ms</NackDelay></Internal>'
+_LARGE_BURSTS = '<SocketReceiveBufferSize max="16 MiB"/><NackDelay>10 ms</NackDelay>'
+# A writer sends what the socket holds [%], and the reader asks for the rest. Otherwise the end of a larger
+# message is lost, which the reader notices with the next heartbeat, 100 ms later. With a small socket, asking
+# takes longer.
+_AS_MUCH_AS_FITS = "<BurstSize><MaxInitTransmit>90</MaxInitTransmit></BurstSize>"
+_LARGE_SOCKET = 1_000_000  # octets
+_LARGEST_SOCKET = Path("/proc/sys/net/core/rmem_max")
 _AF_INET = 2
 _IFF_UP, _IFF_LOOPBACK = 0x1, 0x8
 
@@ -95,10 +101,18 @@ def _localhost(peers: list[str], choices: set[str]) -> tuple[str, str]:
     interface is Cyclone's choice, as in ROS 2.
     """
     interfaces = "" if peers or choices else _loopback_and_default()
-    datagrams, internal = (_LARGE_DATAGRAMS, _LARGE_BURSTS) if interfaces else ("", _FROM_ANY_INTERFACE)
+    datagrams, internal = (_LARGE_DATAGRAMS, _large_bursts()) if interfaces else ("", _FROM_ANY_INTERFACE)
     general = f"<General>{_NO_MULTICAST}{interfaces}{datagrams}</General>{internal}"
     # By default, Cyclone 11 asks every 30 s, and only for 30 s.
     return general, "<SPDPInterval>8s</SPDPInterval>" + _peers(peers, choices, ' PruneDelay="inf"')
+
+
+def _large_bursts() -> str:
+    """Return the settings for messages that are larger than the receiving socket."""
+    with suppress(OSError, ValueError):
+        if int(_LARGEST_SOCKET.read_text()) >= _LARGE_SOCKET:
+            return f"<Internal>{_LARGE_BURSTS}{_AS_MUCH_AS_FITS}</Internal>"
+    return f"<Internal>{_LARGE_BURSTS}</Internal>"
 
 
 def _subnet(peers: list[str], choices: set[str]) -> tuple[str, str]:
