@@ -117,7 +117,18 @@ def test_short_pipeline_of_this_system_has_figures() -> None:
     assert all(value > 0 for value in figures.values())
 
 
-@pytest.mark.parametrize("link", ["chain", "chain_services", "chain_recipes"])
+EMBEDDED_ONLY = pytest.mark.skipif(bool(system_rclpy()), reason="platform: the embedded runtime's DDS")
+
+
+@pytest.mark.parametrize(
+    "link",
+    [
+        "chain",
+        "chain_services",
+        "chain_operators",
+        pytest.param("chain_ctypes", marks=EMBEDDED_ONLY),
+    ],
+)
 def test_short_chain_has_figures(link: str) -> None:
     here = Alternative("here", link, ros=bool(system_rclpy()))
 
