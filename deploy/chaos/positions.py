@@ -12,6 +12,7 @@ from interfaces import topics
 
 ROUNDING = 1e-8  # m
 LONGEST_PAUSE = 20.0  # s for which a process may be suspended, and its values become old
+ORDER = 0.1  # s by which the observer may receive a value later than a position that follows from it
 DISCOVERY = 1.0  # s from the first message that the observer received until every reader knows the publisher
 
 
@@ -43,8 +44,12 @@ class PublishedValues:
 
 
 def may_have_missed_values(history: History, time: float) -> bool:
-    """Return whether a reader may have received values before the observer discovered their publisher."""
-    if history.may_have_missed(time - DISCOVERY, time):
+    """
+    Return whether the record may lack values that a reader received.
+
+    It does before the observer has discovered their publisher, and at its end.
+    """
+    if history.may_have_missed(time - DISCOVERY, time) or time > history.end - ORDER:
         return True
     for life in history.lives:
         if life.program in SOURCES and life.began < time:

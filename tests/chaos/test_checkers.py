@@ -268,6 +268,13 @@ def test_s4_is_unknown_on_a_lossy_network() -> None:
     assert (finding.verdict, finding.unknown) == (HOLDS, 1)
 
 
+def test_s4_is_unknown_if_the_record_may_have_ended_before_the_value() -> None:
+    history = added(good(), "effector/position", (END - 0.01, (1.0, 9.0)))
+    finding = CHECKERS["S4"](history)
+    assert (finding.verdict, finding.unknown) == (HOLDS, 1)
+    assert verdict("S4", added(good(), "effector/position", (END - 0.2, (1.0, 9.0)))) == VIOLATED
+
+
 # S5
 
 
