@@ -12,12 +12,7 @@ from std_msgs.msg import Float64, Header
 from deploy.benchmarks.links import chain
 from interfaces.topics import EFFECTOR_POSITION, EFFECTOR_SPEED, L1, L2, THETA1, THETA2, Topic
 from services.kinematics import effector_position
-from services.velocity import Position, effector_speed
-
-
-def _position(message: PointStamped) -> Position:
-    stamp = message.header.stamp
-    return Position(stamp.sec * 10**9 + stamp.nanosec, message.point.x, message.point.y)
+from services.velocity import _position, effector_speed
 
 
 class Connection(chain.Connection):
