@@ -124,10 +124,13 @@ def wire(node: ServiceNode) -> None:
     # One wake-up for all reports and the processes: a dozen services report each second.
     looks = rx.timer(0.0, timeouts.period, node.scheduler).share()
     reports = node.observe(DIAGNOSTICS, buffered=looks).map(lambda array: healths(array, namespace))
-    observations = looks.map(observe).filter(lambda it: it is not None).share()
+    attempts = looks.map(observe).share()
+    observations = attempts.filter(lambda it: it is not None)
     programs = observations.map(lambda observation: observation.programs)
     changed = programs.distinct_until_changed(lambda each: [program._replace(uptime=0.0) for program in each])
-    repeated = rx.timer(DISCOVERY, 1.0).with_latest_from(programs).map(lambda pair: pair[1])
+    # A failed attempt ends the repetition: old states must not look fresh.
+    latest = rx.timer(DISCOVERY, 1.0).with_latest_from(attempts).map(lambda pair: pair[1])
+    repeated = latest.filter(lambda it: it is not None).map(lambda observation: observation.programs)
 
     reports.subscribe(probe.hear, scheduler=node.scheduler)
     observations.map(policy.decide).subscribe(act, scheduler=node.scheduler)

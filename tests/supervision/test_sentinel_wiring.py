@@ -191,6 +191,21 @@ def test_failed_observation_is_reported_and_not_the_last(wired: Any, spin_until:
     spin_until(lambda: watching.states()[-1:] and "FATAL" in watching.states()[-1].status[0].message)
 
 
+def test_states_are_not_repeated_while_observations_fail(
+    wired: Any, spin_until: SpinUntil, spin_for: SpinFor
+) -> None:
+    watching = wired()
+    spin_until(lambda: len(watching.states()) >= 2)
+    watching.probe.failure = "supervisord has died"
+    spin_until(lambda: watching.service.health._remarks)
+    before = len(watching.states())
+    spin_for(1.5)
+    assert len(watching.states()) == before
+
+    watching.probe.failure = ""
+    spin_until(lambda: len(watching.states()) > before)
+
+
 # Actions
 
 
