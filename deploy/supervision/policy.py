@@ -72,7 +72,7 @@ class Policy:
         self._deaf_since = math.inf
         self._stopped_since: dict[int, float] = {}
         self._duplicate_since: dict[int, float] = {}
-        self._revivals: dict[str, tuple[int, float]] = {}  # how many, and when the next is due
+        self._revivals: dict[str, tuple[float, float]] = {}  # delay of the next, and when it is due
         self._restarts: dict[str, list[tuple[float, int]]] = {}  # times and counts; the first is not recent
         self._last_time: float | None = None
         self._paused = 0.0  # [s] that the sentinel could not observe
@@ -171,16 +171,15 @@ class Policy:
     def _revive(self, observation: Observation) -> list[Action]:
         actions = []
         for program in observation.programs:
-            times, due = self._revivals.get(program.name, (0, math.nan))
-            delay = min(self._timeouts.first_revival * 2.0**times, self._timeouts.longest_revival)
-            if program.state != "FATAL":
-                if program.state == "RUNNING":
-                    self._revivals.pop(program.name, None)
-                elif times:
-                    self._revivals[program.name] = (times, math.nan)
+            delay, due = self._revivals.get(program.name, (self._timeouts.first_revival, math.nan))
+            if program.state == "RUNNING":
+                self._revivals.pop(program.name, None)
+            elif program.state != "FATAL":
+                self._revivals[program.name] = (delay, math.nan)
             elif math.isnan(due):
-                self._revivals[program.name] = (times, observation.time + delay)
+                self._revivals[program.name] = (delay, observation.time + delay)
             elif observation.time >= due:
-                self._revivals[program.name] = (times + 1, math.nan)
+                longer = min(2 * delay, self._timeouts.longest_revival)
+                self._revivals[program.name] = (longer, math.nan)
                 actions.append(Action("revive", program.name, 0, f"FATAL; revived after {delay:g} s"))
         return actions

@@ -231,6 +231,25 @@ def test_revival_waits_twice_as_long_each_time_up_to_the_longest() -> None:
     assert delays == [1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 60.0, 60.0]
 
 
+def test_program_is_revived_however_often_it_was_in_vain() -> None:
+    policy = Policy(Timeouts(first_revival=0.25, longest_revival=0.25))
+    observations = (Observation(0.25 * number, [program("a", "FATAL")]) for number in range(2200))
+
+    assert sum(len(policy.decide(each)) for each in observations) == 1100  # 2.0**1024 overflows
+
+
+def test_program_started_by_hand_in_vain_waits_its_whole_delay_again() -> None:
+    run = Run(program("a", "FATAL"))
+    run.now = 0.5
+    assert run.decide() == []
+    run.programs["a"] = program("a", "STARTING")
+    assert run.decide() == []
+    run.programs["a"] = program("a", "FATAL")
+    run.now = 5.0
+
+    assert run.first(9.0)[0] == 6.0
+
+
 def test_program_that_ran_again_is_revived_after_the_first_delay() -> None:
     run = Run(program("a", "FATAL"))
     assert run.first(9.0)[0] == 1.0
