@@ -1,7 +1,8 @@
 """Reads scenarios: YAML files that state what the virtual sources do, and when (``deploy/scenarios/*.yaml``).
 
-Times are seconds since the scenario's origin, values are SI units. Every key is optional; a source without a
-key follows its parameters. Before the origin, the sources play nothing. ::
+Times are seconds since the scenario's origin, values are SI units. No number is larger than 1e9, no period
+shorter than 1 ms. Every key is optional; a source without a key follows its parameters. Before the origin,
+the sources play nothing. ::
 
     l1: 2.0                                 # a constant
     l2:                                     # values, each from its time on
@@ -43,6 +44,9 @@ from interfaces.service.errors import UserError
 
 T = TypeVar("T")
 
+LARGEST = 1e9  # of all numbers: a timer waits for no time after the year 9999
+SHORTEST = 0.001  # s, of a period
+
 
 @dataclass(frozen=True)
 class Scenario:
@@ -60,7 +64,7 @@ def load(path: str | Path) -> Scenario:
     document = yaml_file.load(path)
     root = _Item({} if document is None else document, str(path), "")
     root.require(optional={*topics.CONFIGURATION, "operator", "engines", "repeat"})
-    repeat = root["repeat"].number(above=0.0) if "repeat" in root else None
+    repeat = root["repeat"].number(SHORTEST) if "repeat" in root else None
     configuration = {
         name: _values(root[name], topic, repeat)
         for name, topic in topics.CONFIGURATION.items()
@@ -107,8 +111,8 @@ class _Item:
     def number(self, least: float = -math.inf, *, above: float = -math.inf, most: float = math.inf) -> float:
         if isinstance(self.value, bool) or not isinstance(self.value, int | float):
             raise self.error(f"must be a number, not {self.value!r}")
-        if not math.isfinite(self.value):
-            raise self.error(f"must be finite, not {self.value}")
+        if not -LARGEST <= self.value <= LARGEST:  # NaN is refused, too
+            raise self.error(f"must be from {-LARGEST:g} to {LARGEST:g}")
         if self.value < least:
             raise self.error(f"must be at least {least:g}, not {self.value:g}")
         if self.value <= above:
@@ -167,8 +171,8 @@ def _sweep(item: _Item) -> Sweep:
     sweep = Sweep(
         item["center"].number(),
         item["amplitude"].number(0.0),
-        item["period"].number(above=0.0),
-        rate=item["rate"].number(above=0.0, most=1000.0) if "rate" in item else Sweep.rate,
+        item["period"].number(SHORTEST),
+        rate=item["rate"].number(0.001, most=1000.0) if "rate" in item else Sweep.rate,
         phase=item["phase"].number() if "phase" in item else Sweep.phase,
         rest=item["rest"].number(0.0) if "rest" in item else Sweep.rest,
     )

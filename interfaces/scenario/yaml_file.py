@@ -40,5 +40,8 @@ def load(path: str | Path) -> Any:
         mark = error.problem_mark or error.context_mark
         place = f"line {mark.line + 1}, column {mark.column + 1}: " if mark else ""
         raise UserError(f"{path}: {place}{error.problem or error.context}") from error
-    except (yaml.YAMLError, ValueError) as error:  # a character outside YAML; a date such as 2024-02-30
+    except RecursionError as error:
+        raise UserError(f"{path}: is nested too deeply") from error
+    except (yaml.YAMLError, ValueError, OverflowError) as error:
+        # a character outside YAML; a date such as 2024-02-30; a number too large for a float
         raise UserError(f"{path}: {' '.join(str(error).split())}") from error
