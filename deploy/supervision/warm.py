@@ -142,6 +142,9 @@ def _run(argv: Sequence[str], environment: Mapping[str, str]) -> NoReturn:
     os.environ.clear()
     os.environ.update(environment)
     sys.orig_argv, sys.argv = list(argv), list(argv[2:])
+    for name in [*sys.modules]:
+        if name.partition(".")[0] == "deploy":  # supervisord's own part of this checkout, as old as its start
+            del sys.modules[name]
     code = 1
     try:
         if "sitecustomize" in sys.modules:  # Python imports it at each start

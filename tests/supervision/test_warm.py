@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -16,6 +17,7 @@ PYTHON = str(Path(sys.executable).with_name("python3"))
 WARM = """
 import os, signal, sys
 from deploy.supervision import warm
+sys.is_supervisord = True
 signal.signal(signal.SIGTERM, lambda number, frame: print("supervisord's handler"))
 {more}
 warm.executor(os.execve)(sys.argv[1], sys.argv[1:], {{**os.environ, "SUPERVISOR_PROCESS_NAME": "probe"}})
@@ -31,14 +33,15 @@ def run(
     (folder / "probe.py").write_text("import atexit, os, signal, sys, threading\n" + program)
     return subprocess.run(
         [sys.executable, "-c", WARM.format(more=more), python, "-m", "probe", *WORDS],
-        env=os.environ | {"PYTHONPATH": os.pathsep.join([str(ROOT), str(folder), *path])},
+        cwd=folder,  # comes first in the path
+        env=os.environ | {"PYTHONPATH": os.pathsep.join([str(ROOT), *path])},
         capture_output=True,
         text=True,
         timeout=30.0,
     )
 
 
-FORKED = "print('warm' in str(sys.modules.get('deploy.supervision.warm')), flush=True)"
+FORKED = "print(hasattr(sys, 'is_supervisord'), flush=True)"
 
 
 def test_program_sees_its_own_command_line_and_environment(tmp_path: Path) -> None:
@@ -112,6 +115,14 @@ def test_signals_of_a_program_do_not_wake_supervisord(tmp_path: Path) -> None:
     more = "pipe = os.pipe(); os.set_blocking(pipe[1], False); signal.set_wakeup_fd(pipe[1])"
     done = run(tmp_path, f"print(signal.set_wakeup_fd(-1)); {FORKED}", more=more)
     assert (done.stdout, done.stderr) == ("-1\nTrue\n", "")
+
+
+def test_edited_module_of_the_checkout_counts_at_the_next_start(tmp_path: Path) -> None:
+    shutil.copytree(ROOT / "deploy" / "supervision", tmp_path / "deploy" / "supervision")
+    (tmp_path / "deploy" / "__init__.py").touch()
+    edit = "from deploy.supervision import rpc; open('deploy/supervision/rpc.py', 'a').write('EDITED = True')"
+    done = run(tmp_path, f"from deploy.supervision import rpc; print(rpc.EDITED); {FORKED}", more=edit)
+    assert (done.stdout, done.stderr) == ("True\nTrue\n", "")
 
 
 def test_program_imports_no_library_again(tmp_path: Path) -> None:
