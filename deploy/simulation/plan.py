@@ -10,18 +10,17 @@ from deploy.chaos.schedule_file import Shift
 from deploy.simulation import people
 from deploy.simulation.faults import FAULT_KINDS
 
-LENGTH = 600.0  # s of a shift; each one begins with an arm that starts
+LENGTH = 600.0  # s of a shift; each one begins with an arm that starts, the last one may be longer or shorter
 QUIET = 15.0  # s at the end of a shift, in which the arm recovers from the last fault
 
 
 def shifts(seed: str, hours: float, every: float, kinds: Sequence[str]) -> list[Shift]:
     """Return the shifts of so many hours, with a random fault in each interval of ``every`` [s]."""
     seconds = 3600.0 * hours
-    number = math.ceil(seconds / LENGTH)
-    return [
-        shift(f"{seed} shift {index}", min(LENGTH, seconds - index * LENGTH), every, kinds)
-        for index in range(number)
-    ]
+    # A rest of at most QUIET would have no fault, and perhaps no operator: it belongs to the shift before.
+    number = max(1, math.ceil((seconds - QUIET) / LENGTH))
+    lengths = [LENGTH] * (number - 1) + [seconds - (number - 1) * LENGTH]
+    return [shift(f"{seed} shift {index}", length, every, kinds) for index, length in enumerate(lengths)]
 
 
 def shift(seed: str, length: float, every: float, kinds: Sequence[str]) -> Shift:

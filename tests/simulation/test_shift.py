@@ -50,6 +50,24 @@ def test_the_promises_hold_in_the_scenarios_of_the_chaos_monkey(name: str) -> No
     assert next(finding for finding in outcome.findings if finding.promise == "S1").cases
 
 
+@pytest.mark.parametrize(
+    ("seconds", "lengths"),
+    [
+        (36.0, [36.0]),
+        (600.0, [600.0]),
+        (600.12, [600.12]),
+        (614.9, [614.9]),
+        (615.1, [600.0, 15.1]),
+        (1200.0, [600.0, 600.0]),
+        (1201.0, [600.0, 601.0]),
+    ],
+)
+def test_no_shift_is_too_short_for_an_operator(seconds: float, lengths: list[float]) -> None:
+    shifts = plan.shifts("1", seconds / 3600.0, 5.0, list(FAULT_KINDS))
+    assert [each.length for each in shifts] == pytest.approx(lengths)
+    assert all(each.scenario["engines"] for each in shifts)
+
+
 def test_a_quiet_shift_has_output_from_every_program() -> None:
     outcome = play(Shift("quiet", 10.0, SCENARIO, []))
     assert not violations(outcome)
