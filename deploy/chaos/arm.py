@@ -9,6 +9,7 @@ from contextlib import suppress
 
 from deploy.chaos.babbler import BABBLER
 from deploy.chaos.clock import Clock
+from deploy.chaos.overlaps import Overlaps
 from deploy.supervision import processes
 from deploy.supervision.system import DeploymentError, System
 
@@ -22,6 +23,7 @@ class Arm:
         self.namespace = namespace
         self.system = system
         self.domain = 0  # ROS_DOMAIN_ID
+        self.overlaps = Overlaps()
         self.clock = Clock(system.run.parent / f"clock{file_suffix(namespace)}")
         self._environment: dict[str, str] = {}
         self._spent = 0.0  # s of processor time of processes for whose end no supervisord waits

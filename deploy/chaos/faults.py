@@ -66,7 +66,7 @@ def stop(arm: Arm, program: str) -> Undo:
     """Suspend a process by SIGSTOP; at the end, continue it if it is still alive."""
     pid = arm.pid(program)
     _send(arm, pid, signal.SIGSTOP)
-    return lambda: _send(arm, pid, signal.SIGCONT)
+    return arm.overlaps.begin(("stop", pid), lambda: _send(arm, pid, signal.SIGCONT))
 
 
 def hog(arm: Arm, program: str) -> None:
@@ -136,7 +136,7 @@ def crash_loop(arm: Arm, program: str) -> Undo:
             left.pop(node, None)
             arm.system.write_parameters(left)
 
-    return repair
+    return arm.overlaps.begin(("crash_loop", program), repair)
 
 
 def full_disk(arm: Arm, target: str) -> Undo:
@@ -151,7 +151,7 @@ def full_disk(arm: Arm, target: str) -> Undo:
             resource.prlimit(supervisor, resource.RLIMIT_FSIZE, (hard if size is None else size, hard))
 
     limit(1)
-    return lambda: limit(None)
+    return arm.overlaps.begin(("full_disk", supervisor), lambda: limit(None))
 
 
 def step_clock(arm: Arm, target: str) -> None:

@@ -13,6 +13,7 @@ from rclpy_simulation import Delay, Network, Process, Simulation
 from rclpy_simulation.host import BOOT, SECOND
 
 from deploy.chaos.history import SWITCH, Life
+from deploy.chaos.overlaps import Overlaps
 from deploy.simulation.calibration import Calibration, load
 from deploy.simulation.machine import simulated_services
 from deploy.simulation.supervisor import Supervisor
@@ -53,6 +54,7 @@ class Arm:
         """Packet loss and latency without faults."""
         self.skew = 0.0
         """By which the clock of the operator's host is ahead of the robot's [s]."""
+        self.overlaps = Overlaps()
         self._directory = directory
         file = directory / "scenario.yaml"
         file.write_text(yaml.safe_dump(dict(scenario)))
@@ -63,9 +65,10 @@ class Arm:
         origin = (BOOT / SECOND) + simulation.now + LEAD
         self.origin = simulation.now + LEAD
         """The beginning of the scenario [s of the simulation]."""
-        self._parameters = scenario_parameters(file, origin)
+        self.parameters = scenario_parameters(file, origin)
+        """The content of the parameter file."""
         self._programs = {each.name: each for each in PROGRAMS}
-        self.write_parameters({})
+        self.write_parameters()
         self.supervisor = Supervisor(simulation, list(NAMES), self.spawn)
 
     def process(self, program: str) -> Process | None:
@@ -93,9 +96,9 @@ class Arm:
             process.kill()
         self.supervisor = Supervisor(self.simulation, list(NAMES), self.spawn)
 
-    def write_parameters(self, more: Mapping[str, Any]) -> None:
+    def write_parameters(self) -> None:
         """Write the parameter file that services read when they start."""
-        (self._directory / "parameters.yaml").write_text(yaml.safe_dump({**self._parameters, **more}))
+        (self._directory / "parameters.yaml").write_text(yaml.safe_dump(self.parameters))
 
     def spawn(self, name: str, parent: int) -> Process:
         """Start a process of a program."""

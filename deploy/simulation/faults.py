@@ -46,7 +46,7 @@ def _stop(arm: Arm, program: str, duration: float) -> Undo | None:
     if process is None:
         return None
     process.stop()
-    return process.proceed
+    return arm.overlaps.begin(("stop", process), process.proceed)
 
 
 def _fail(error: type[BaseException]) -> Callable[[Process], None]:
@@ -77,10 +77,17 @@ def _double(arm: Arm, program: str, duration: float) -> Undo:
 
 
 def _crash_loop(arm: Arm, program: str, duration: float) -> Undo:
-    arm.write_parameters({f"/{program}": {KEY: {PARAMETERS[program]: "not a number"}}})
+    node = f"/{program}"
+    arm.parameters[node] = {KEY: {PARAMETERS[program]: "not a number"}}
+    arm.write_parameters()
     if process := arm.process(program):
         process.kill()
-    return lambda: arm.write_parameters({})
+
+    def repair() -> None:
+        del arm.parameters[node]
+        arm.write_parameters()
+
+    return arm.overlaps.begin(("crash_loop", program), repair)
 
 
 def _stranger(program: Callable[[], None]) -> Callable[[Arm, str, float], Undo]:
@@ -111,12 +118,12 @@ def _drift_clock(arm: Arm, target: str, duration: float) -> Undo:
             arm.simulation.set_drift(arm.simulation.host(name), rate)
 
     drift(rate)
-    return lambda: drift(0.0)
+    return arm.overlaps.begin("drift_clock", lambda: drift(0.0))
 
 
 def _partition(arm: Arm, target: str, duration: float) -> Undo:
     arm.simulation.cut(ROBOT, CONTROL)
-    return lambda: arm.simulation.heal(ROBOT, CONTROL)
+    return arm.overlaps.begin(PARTITION, lambda: arm.simulation.heal(ROBOT, CONTROL))
 
 
 def _bad_line(arm: Arm, target: str, duration: float) -> Undo:
@@ -126,7 +133,7 @@ def _bad_line(arm: Arm, target: str, duration: float) -> Undo:
     def heal() -> None:
         network.loss, network.latency = arm.good_line
 
-    return heal
+    return arm.overlaps.begin("bad_line", heal)
 
 
 FAULT_KINDS: dict[str, FaultKind] = {

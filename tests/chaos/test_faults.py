@@ -74,6 +74,53 @@ def test_two_crash_loops_restore_the_parameters(arm: Arm) -> None:
     assert yaml.safe_load(arm.system.parameters.read_text()) == good
 
 
+def test_overlapping_crash_loops_of_a_program_last_until_the_last_one_ends(arm: Arm) -> None:
+    good = {ALL_NODES: {KEY: {"scenario": "demo"}}}
+    arm.system.parameters.write_text(yaml.safe_dump(good))
+    first, second = (FAULT_KINDS["crash_loop"].inject(arm, "sentinel") for _ in range(2))
+    assert first is not None
+    assert second is not None
+    first()
+    assert "/arm1/sentinel" in yaml.safe_load(arm.system.parameters.read_text())
+    second()
+    assert yaml.safe_load(arm.system.parameters.read_text()) == good
+
+
+def is_stopped(pid: int) -> bool:
+    return processes.stat_of(pid)[0] == "T"
+
+
+def is_full(pid: int) -> bool:
+    return resource.prlimit(pid, resource.RLIMIT_FSIZE)[0] == 1
+
+
+@pytest.mark.parametrize(("kind", "is_wrong"), [("stop", is_stopped), ("full_disk", is_full)])
+def test_a_fault_lasts_although_an_overlapping_one_ends(
+    kind: str, is_wrong: Callable[[int], bool], arm: Arm, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def await_wrong(pid: int, wrong: bool) -> None:
+        """Wait for the kernel: it stops a process a moment after the signal."""
+        deadline = time.monotonic() + 10.0
+        while is_wrong(pid) != wrong:
+            assert time.monotonic() < deadline
+
+    with subprocess.Popen(["sleep", "60"], env=arm.environment()) as process:
+        try:
+            await_members(arm.system, 1)
+            monkeypatch.setattr(arm, "pid", lambda program: process.pid)
+            monkeypatch.setattr(System, "supervisor", lambda system: process.pid)
+            first, second = (FAULT_KINDS[kind].inject(arm, "velocity") for _ in range(2))
+            assert first is not None
+            assert second is not None
+            await_wrong(process.pid, True)
+            first()
+            assert is_wrong(process.pid)
+            second()
+            await_wrong(process.pid, False)
+        finally:
+            process.kill()
+
+
 def test_crash_loops_break_a_number_of_a_program() -> None:
     assert PARAMETERS["config_l1"] == "value"
     assert PARAMETERS["dead_mans_switch"] == "rate"

@@ -5,13 +5,15 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import pytest
+import yaml
+from rclpy_simulation.host import BOOT, SECOND
 
 from deploy.chaos import schedule
-from deploy.chaos.history import ALL, NO_TARGET
+from deploy.chaos.history import ALL, NO_TARGET, OPERATOR
 from deploy.chaos.schedule import DAY, PlannedFault
 from deploy.chaos.schedule_file import Shift
 from deploy.chaos.testbed import SCENARIO, sources
@@ -127,13 +129,74 @@ def test_a_bug_of_a_service_violates_a_promise(monkeypatch: pytest.MonkeyPatch) 
     assert "S1" in violations(play(Shift("bug", ASLEEP + 12.0, BRIEF, kills)))
 
 
-def test_a_line_is_good_again_after_overlapping_faults(tmp_path: Path) -> None:
+def is_stopped(simulated: arm.Arm) -> bool:
+    process = simulated.process("velocity")
+    assert process is not None
+    return process.is_stopped
+
+
+def is_cut(simulated: arm.Arm) -> bool:
+    hosts = [simulated.simulation.host(name) for name in (arm.ROBOT, arm.CONTROL)]
+    return simulated.simulation.network.is_cut(*hosts)
+
+
+def is_bad(simulated: arm.Arm) -> bool:
+    network = simulated.simulation.network
+    return (network.loss, network.latency) == BAD_LINE
+
+
+def drifts(simulated: arm.Arm) -> bool:
+    host, boot = simulated.simulation.host(arm.ROBOT), BOOT
+    return host.time_of_day(boot + SECOND) - host.time_of_day(boot) != SECOND
+
+
+@pytest.mark.parametrize(
+    ("kind", "target", "is_wrong"),
+    [
+        ("stop", "velocity", is_stopped),
+        ("partition", OPERATOR, is_cut),
+        ("bad_line", ALL, is_bad),
+        ("drift_clock", NO_TARGET, drifts),
+    ],
+)
+def test_a_fault_lasts_although_an_overlapping_one_ends(
+    kind: str, target: str, is_wrong: Callable[[arm.Arm], bool], tmp_path: Path
+) -> None:
     with arm.simulated_arm("1", tmp_path, SCENARIO) as simulated:
-        network = simulated.simulation.network
-        good = network.loss, network.latency
-        undone = [FAULT_KINDS["bad_line"].inject(simulated, ALL, 1.0) for _ in range(2)]
-        assert (network.loss, network.latency) == BAD_LINE
-        for undo in undone:
+        simulated.simulation.run(3.0)
+        assert not is_wrong(simulated)
+        first, second = (FAULT_KINDS[kind].inject(simulated, target, 1.0) for _ in range(2))
+        assert first is not None
+        assert second is not None
+        first()
+        assert is_wrong(simulated)
+        second()
+        assert not is_wrong(simulated)
+
+
+def test_crash_loops_end_one_by_one(tmp_path: Path) -> None:
+    def bad() -> set[str]:
+        return {name for name in yaml.safe_load((tmp_path / "parameters.yaml").read_text()) if name != "/**"}
+
+    with arm.simulated_arm("1", tmp_path, SCENARIO) as simulated:
+        targets = "config_l1", "config_l2", "config_l2"
+        undone = [FAULT_KINDS["crash_loop"].inject(simulated, each, 1.0) for each in targets]
+        for left in ({"/config_l1", "/config_l2"}, {"/config_l2"}, {"/config_l2"}):
+            assert bad() == left
+            undo = undone.pop(0)
             assert undo is not None
             undo()
-        assert (network.loss, network.latency) == good
+        assert bad() == set()
+
+
+def test_a_stop_of_a_new_process_ends_although_that_of_the_old_one_lasts(tmp_path: Path) -> None:
+    with arm.simulated_arm("1", tmp_path, SCENARIO) as simulated:
+        simulated.simulation.run(3.0)
+        FAULT_KINDS["stop"].inject(simulated, "velocity", 9.0)
+        FAULT_KINDS["kill"].inject(simulated, "velocity", 0.0)
+        simulated.simulation.run(6.0)
+        undo = FAULT_KINDS["stop"].inject(simulated, "velocity", 1.0)
+        assert undo is not None
+        assert is_stopped(simulated)
+        undo()
+        assert not is_stopped(simulated)

@@ -1,0 +1,29 @@
+"""Faults that overlap: one lasts until the last one of its kind in its target has ended."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Hashable
+
+
+class Overlaps:
+    """Counts the faults that are under way."""
+
+    def __init__(self) -> None:
+        self._under_way: Counter[Hashable] = Counter()
+
+    def begin(self, what: Hashable, undo: Callable[[], object]) -> Callable[[], None]:
+        """
+        Count a fault; return how to end it, once.
+
+        :param what: its kind and its target.
+        :param undo: runs at the end, unless another fault of the same kind and target is still under way.
+        """
+        self._under_way[what] += 1
+
+        def end() -> None:
+            self._under_way[what] -= 1
+            if not self._under_way[what]:
+                undo()
+
+        return end
