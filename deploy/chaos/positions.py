@@ -11,6 +11,7 @@ from deploy.chaos.history import SOURCES, History, Sample
 from interfaces import topics
 
 ROUNDING = 1e-8  # m
+PRECISION = 4e-15  # of the lengths, 18 times the precision of float64: the rounding of links beyond 1000 km
 LONGEST_PAUSE = 20.0  # s for which a process may be suspended, and its values become old
 ORDER = 0.1  # s by which the observer may receive a value later than a position that follows from it
 DISCOVERY = 1.0  # s from the first message that the observer received until every reader knows the publisher
@@ -20,7 +21,11 @@ class PublishedValues:
     """The values of the configuration, and the positions that follow from them."""
 
     def __init__(self, history: History) -> None:
-        self._streams = [history.stream(topic) for topic in topics.CONFIGURATION.values()]
+        # A service drops a value with a problem, and keeps the one before it.
+        self._streams = [
+            [s for s in history.stream(topic) if not topic.problem(topic.type(data=s.value))]
+            for topic in topics.CONFIGURATION.values()
+        ]
 
     def explain(self, position: Sample, within: float) -> bool:
         """Return whether a position follows from values that were the latest within ``within`` [s] before."""
@@ -70,10 +75,14 @@ def _any_fits(candidates: list[list[float]], x: float, y: float) -> bool:
         # The rest has to fit the second link in length before angles are tried.
         rest_x, rest_y = x - l1 * math.cos(theta1), y - l1 * math.sin(theta1)
         length = math.hypot(rest_x, rest_y)
-        for l2 in l2s[bisect_left(l2s, length - ROUNDING) : bisect_right(l2s, length + ROUNDING)]:
-            for theta2 in theta2s:
-                heading = theta1 + theta2
+        if not math.isfinite(length):
+            continue
+        rounding = max(ROUNDING, PRECISION * l1 + PRECISION * length)
+        for l2 in l2s[bisect_left(l2s, length - rounding) : bisect_right(l2s, length + rounding)]:
+            for heading in (theta1 + theta2 for theta2 in theta2s):
+                if math.isinf(heading):  # kinematics has no position for it
+                    continue
                 error_x, error_y = rest_x - l2 * math.cos(heading), rest_y - l2 * math.sin(heading)
-                if abs(error_x) < ROUNDING and abs(error_y) < ROUNDING:
+                if abs(error_x) < rounding and abs(error_y) < rounding:
                     return True
     return False

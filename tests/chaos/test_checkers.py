@@ -22,7 +22,9 @@ from deploy.chaos.history import (
 )
 from deploy.chaos.promises import CHECKERS, meaning
 from deploy.chaos.report import text
+from interfaces import topics
 from interfaces.topics import OFF, ON, TURN_OFF
+from services.kinematics import forward_kinematics
 
 from .histories import END, added, change, faulty, good, killed, silent, value_at, with_value
 
@@ -253,6 +255,52 @@ def test_s4_position_of_older_values_is_valid() -> None:
     history = good()
     old = next(s for s in history.streams["effector/position"] if s.sent > 20.0)
     assert verdict("S4", added(history, "effector/position", (24.0, old.value))) == HOLDS
+
+
+@pytest.mark.parametrize(
+    ("topic", "value"),
+    [("theta1", math.inf), ("theta2", math.nan), ("l1", math.inf), ("l2", -1.0), ("theta2", 1.7e308)],
+)
+def test_s4_ignores_a_value_that_gives_no_position(topic: str, value: float) -> None:
+    assert verdict("S4", added(good(), topic, (30.0, value), (30.01, value))) == HOLDS
+
+
+def test_s4_angles_of_an_infinite_sum_give_no_position() -> None:
+    history = good()
+    l1, l2, _, theta2 = (
+        max(s for s in history.streams[name] if s.sent <= 30.0).value for name in topics.CONFIGURATION
+    )
+    history = added(history, "theta1", (30.001, 1.7e308))
+    history = added(history, "effector/position", (30.002, forward_kinematics(l1, l2, 1.7e308, theta2)))
+    assert verdict("S4", added(history, "theta2", (30.003, 1.7e308))) == HOLDS
+
+
+def test_s4_dropped_value_leaves_the_one_before_it_the_latest() -> None:
+    history = good()
+    for name in topics.CONFIGURATION:
+        history = silent(history, name, 2.0, END)
+    position = forward_kinematics(*(history.streams[name][-1].value for name in topics.CONFIGURATION))
+    history = added(history, "l1", (2.5, -1.0))
+    positions = {"effector/position": [Sample(50.0, 50.001, position)]}
+    assert verdict("S4", replace(history, streams=history.streams | positions)) == HOLDS
+
+
+@pytest.mark.parametrize("length", [1e-3, 1e3, 1e6, 1e8, 1e12, 1e20, 1e300])
+def test_s4_position_of_long_links_is_right_up_to_its_rounding(length: float) -> None:
+    def published(number: int, wrong_by: float) -> History:
+        """Return a history of values, each with a position that is wrong by a share of the length."""
+        streams: dict[str, list[Sample]] = {name: [] for name in (*topics.CONFIGURATION, "effector/position")}
+        for step in range(number):
+            at = 1.0 + step / 10.0
+            values = length * (1.0 + step), length * (3.3 - step / 61.0), 0.3 + step, 0.4 + 2.7 * step
+            for name, value in zip(topics.CONFIGURATION, values, strict=True):
+                streams[name].append(Sample(at, at + 0.001, value))
+            x, y = forward_kinematics(*values)
+            streams["effector/position"].append(Sample(at + 0.01, at + 0.011, (x + wrong_by * length, y)))
+        return History(END, streams)
+
+    assert verdict("S4", published(200, wrong_by=0.0)) == HOLDS
+    assert verdict("S4", published(9, wrong_by=max(1e-12, 2e-8 / length))) == VIOLATED
 
 
 def test_s4_is_unknown_if_a_value_may_have_been_missed() -> None:
