@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from rclpy.serialization import deserialize_message
+
 from deploy.chaos.babbler import is_babble
 from deploy.replay.record import Message, Record, text
+from interfaces.robot_model import BASE, frame_id
 from interfaces.topics import (
     CONFIGURATION,
     CONTRACT,
@@ -13,6 +16,7 @@ from interfaces.topics import (
     OPERATOR_ACTIVITY,
     OPERATOR_HEARTBEAT,
     OPERATOR_PRESENCE,
+    TF,
     TURN_OFF,
     Topic,
 )
@@ -60,9 +64,20 @@ def inputs(record: Record, namespace: str, chain: Chain) -> list[tuple[Topic, li
 
 
 def recorded(record: Record, namespace: str, topic: Topic) -> list[Message]:
-    """Return what the services have published on a topic, without what the chaos monkey has."""
+    """Return what the services of an arm have published on a topic, without what the chaos monkey has."""
     sent = commands(record, namespace)[1] if topic is ENGINES else record.of(topic, namespace)
+    if topic is TF:  # all arms share it
+        sent = [message for message in sent if _is_of_arm(message, namespace)]
     return [message for message in sent if not is_babble(topic, message.data)]
+
+
+def _is_of_arm(message: Message, namespace: str) -> bool:
+    """Return whether transforms are of the frames of the arm in a namespace."""
+    try:
+        found = deserialize_message(message.data, TF.type).transforms
+    except Exception:  # of any type, by the runtime
+        return False
+    return any(each.header.frame_id == frame_id(BASE, namespace) for each in found)
 
 
 def commands(record: Record, namespace: str) -> tuple[list[Message], list[Message]]:

@@ -16,8 +16,10 @@ from pathlib import Path
 
 import pytest
 from builtin_interfaces.msg import Time
+from geometry_msgs.msg import TransformStamped
 from rclpy.serialization import deserialize_message, serialize_message
 from std_msgs.msg import Float64, Header, String
+from tf2_msgs.msg import TFMessage
 
 from deploy.chaos.clock import STEP
 from deploy.chaos.history import NO_TARGET, InjectedFault
@@ -28,6 +30,7 @@ from deploy.replay.comparison import compare
 from deploy.replay.record import Message, Record, load
 from deploy.supervision.system import DeploymentError
 from interfaces import topics
+from interfaces.robot_model import BASE, LINK1, frame_id
 
 ROOT = Path(__file__).parents[2]
 PLAY = Path(__file__).parent / "play.mcap"
@@ -188,6 +191,23 @@ def test_turn_off_belongs_to_the_watchdog_while_it_misses_the_operator() -> None
     people, watchdog = chains.commands(record, "/")
     assert [message.sent / SECOND for message in people] == [2.0, 6.0, 9.0]
     assert [message.sent / SECOND for message in watchdog] == [5.001, 7.0]
+
+
+def transforms(at: float, *arms: str) -> Message:
+    """Return a message of the transforms of the first frames of arms."""
+    frames = [(frame_id(BASE, arm), frame_id(LINK1, arm)) for arm in arms]
+    stamped = [
+        TransformStamped(header=Header(frame_id=parent), child_frame_id=child) for parent, child in frames
+    ]
+    return Message(round(at * SECOND), serialize_message(TFMessage(transforms=stamped)))
+
+
+def test_transforms_belong_to_the_arm_of_their_frames() -> None:
+    sent = [transforms(1.0, "/arm1"), transforms(2.0, "/arm2"), transforms(3.0, "/"), transforms(4.0)]
+    record = Record(0, 10 * SECOND, 0, {"/tf": [*sent, Message(5 * SECOND, b"unreadable")]})
+    for namespace, at in (("/arm1", 1.0), ("/arm2", 2.0), ("/", 3.0), ("/arm3", None)):
+        messages = chains.recorded(record, namespace, topics.TF)
+        assert [message.sent / SECOND for message in messages] == ([] if at is None else [at])
 
 
 def test_state_that_changes_later_than_its_bound_differs() -> None:
