@@ -13,7 +13,7 @@ from deploy.chaos.babbler import BABBLER
 from deploy.chaos.history import Life
 from deploy.supervision import processes
 
-STALL = 0.1  # s; a scan that takes longer shows that the machine is overloaded
+STALL = 0.1  # s; a round that takes longer shows that the machine is overloaded
 SCAN_PERIOD = 0.02  # s
 NAMING_TIMEOUT = 0.5  # s within which a new process shows its program
 FORK_TIME = 0.2  # s for which a child of supervisord may look like supervisord
@@ -43,14 +43,14 @@ class ProcessMonitor:
 
     def run(self, ended: threading.Event) -> None:
         """Monitor until an event is set."""
+        before = time.monotonic()
         while not ended.is_set():
-            before = time.monotonic()
             self.scan()
-            ready = self._poll.poll(SCAN_PERIOD * 1000)
+            for handle, _ in self._poll.poll(SCAN_PERIOD * 1000):
+                self._end(handle, time.monotonic())
             if (now := time.monotonic()) - before > STALL:
                 self._overload(before, now)
-            for handle, _ in ready:
-                self._end(handle, time.monotonic())
+            before = now
         for handle in list(self._alive):
             os.close(handle)
 
@@ -75,8 +75,8 @@ class ProcessMonitor:
         if not program and (age < FORK_TIME or self._is_child_of_supervisord(pid)):
             return False
         try:
-            handle = os.pidfd_open(pid)
             began = _start_time(pid)
+            handle = os.pidfd_open(pid)
         except (OSError, ValueError, IndexError):
             return True
         life = Life(program, pid, began, None)

@@ -11,6 +11,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 import yaml
@@ -187,6 +188,61 @@ def test_babbler_ends_without_a_traceback(
     assert end is not None
     assert end.si_status == signal.SIGTERM
     assert "Traceback" not in capfd.readouterr().err  # the reader of this test may report the babble
+
+
+def run_until_end(arm: Arm, program: subprocess.Popen[bytes], report: Callable[[Life], None]) -> list[float]:
+    """Monitor a process until its end; return how long each overload lasted."""
+    overloads: list[float] = []
+    ended = threading.Event()
+
+    def note(_: str, life: Life) -> None:
+        if life.ended is None:
+            program.kill()
+        else:
+            report(life)
+            ended.set()
+
+    monitor = ProcessMonitor({arm.system.run: "/"}, note, lambda begin, end: overloads.append(end - begin))
+    monitor.run(ended)
+    return overloads
+
+
+def test_a_stall_while_an_end_is_reported_is_an_overload(
+    arm: Arm, velocity: subprocess.Popen[bytes], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ahead = 0.0
+
+    def stall(life: Life) -> None:
+        nonlocal ahead
+        ahead += 60.0
+
+    monotonic = time.monotonic
+    monkeypatch.setattr(process_monitor, "time", SimpleNamespace(**vars(time)))
+    monkeypatch.setattr(process_monitor.time, "monotonic", lambda: monotonic() + ahead)
+    assert max(run_until_end(arm, velocity, stall), default=0.0) >= 60.0
+
+
+def test_a_process_that_is_reaped_while_it_is_found_leaves_no_handle(
+    arm: Arm, velocity: subprocess.Popen[bytes], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def handles() -> int:
+        return len(os.listdir("/proc/self/fd"))
+
+    def open_late(pid: int) -> int:
+        handle = pidfd_open(pid)
+        velocity.kill()
+        velocity.wait()
+        return handle
+
+    pidfd_open, before = os.pidfd_open, handles()
+    monkeypatch.setattr(os, "pidfd_open", open_late)
+    monitor = monitor_of(arm, [])
+    monitor.scan()
+    assert velocity.returncode is not None
+    ended = threading.Event()
+    ended.set()
+    monitor.run(ended)  # closes its handles
+    assert handles() == before
 
 
 def monitor_of(arm: Arm, seen: list[Life]) -> ProcessMonitor:
