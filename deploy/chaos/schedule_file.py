@@ -11,7 +11,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -50,10 +52,34 @@ def load(path: Path) -> Shift:
     """Read a shift from a file. Raises DeploymentError: one line with the file and the reason."""
     try:
         document: Any = yaml.safe_load(path.read_text(encoding="utf-8"))
-        faults = [PlannedFault(**each) for each in document["faults"]]
-        return Shift(str(document["seed"]), float(document["length"]), document["scenario"], faults)
+        scenario = _checked(document, "scenario", dict, "mapping")
+        faults = [_fault(each) for each in _checked(document, "faults", list, "list")]
+        return Shift(str(document["seed"]), _seconds("length", document["length"]), scenario, faults)
     except OSError as error:
         raise DeploymentError(f"{path}: {error.strerror}") from None
     except (yaml.YAMLError, UnicodeDecodeError, KeyError, TypeError, ValueError) as error:
         reason = " ".join(str(error).split())
         raise DeploymentError(f"{path} is no schedule: {reason}") from None
+
+
+def _fault(content: Any) -> PlannedFault:
+    fault = PlannedFault(**content)
+    for key in ("kind", "target"):
+        _checked(content, key, str, "name")
+    return fault._replace(at=_seconds("at", fault.at), duration=_seconds("duration", fault.duration))
+
+
+def _checked(content: Any, key: str, kind: type, name: str) -> Any:
+    """Return a value of a type. Raises ValueError."""
+    value = content[key]
+    if not isinstance(value, kind):
+        raise ValueError(f"{key}: {value!r} is no {name}")
+    return value
+
+
+def _seconds(key: str, value: Any) -> float:
+    """Return a time [s]. Raises ValueError unless it is finite and not negative."""
+    with suppress(TypeError, ValueError, OverflowError):
+        if 0.0 <= (seconds := float(value)) < math.inf:
+            return seconds
+    raise ValueError(f"{key}: {value!r} is no time in s")

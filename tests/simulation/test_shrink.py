@@ -50,12 +50,29 @@ def test_a_schedule_is_shrunk_to_the_faults_that_violate_the_promise(
     assert again.digest == small.digest
 
 
+FAULT = "{{seed: 1, length: 5, scenario: {{}}, faults: [{{{}}}]}}"
+
+
 @pytest.mark.parametrize(
     ("content", "reason"),
     [
         ("", "no schedule"),
         ("faults: 3", "no schedule"),
-        ("seed: 1\nlength: x\nscenario: {}\nfaults: []", "could not convert"),
+        ("seed: 1\nlength: x\nscenario: {}\nfaults: []", "length: 'x' is no time in s"),
+        ("seed: 1\nlength: .inf\nscenario: {}\nfaults: []", "length: inf is no time in s"),
+        ("seed: 1\nlength: -1.0\nscenario: {}\nfaults: []", "length: -1.0 is no time in s"),
+        (f"seed: 1\nlength: 1{'0' * 400}\nscenario: {{}}\nfaults: []", "length: 10+ is no time in s"),
+        ("seed: 1\nlength: 5\nscenario: much\nfaults: []", "scenario: 'much' is no mapping"),
+        ("seed: 1\nlength: 5\nfaults: []", "scenario"),
+        ("seed: 1\nlength: 5\nscenario: {}", "faults"),
+        (FAULT.format("at: abc, kind: kill, target: all"), "at: 'abc' is no time in s"),
+        (FAULT.format("at: .nan, kind: kill, target: all"), "at: nan is no time in s"),
+        (FAULT.format("at: -1, kind: kill, target: all"), "at: -1 is no time in s"),
+        (FAULT.format("at: 1, kind: kill, target: all, duration: .inf"), "duration: inf is no time in s"),
+        (FAULT.format("at: 1, kind: [], target: all"), r"kind: \[\] is no name"),
+        (FAULT.format("at: 1, kind: kill, target: 7"), "target: 7 is no name"),
+        (FAULT.format("at: 1, kind: kill, target: all, why: x"), "why"),
+        ("[1]", "no schedule"),
         ("seed: 1\nlength: 5\nscenario: {}\nfaults: [{at: 1, kind: kill}]", "target"),
         ("{", "no schedule"),
     ],
