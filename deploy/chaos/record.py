@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import struct
 from collections.abc import Collection, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -133,5 +133,6 @@ def values(topic: topics.Topic, data: bytes, prefix: str) -> list[Any]:
         # The sentinel reports on other processes as `sentinel: NAME`; its report on itself counts as its own.
         reporter, _, subject = status.name.removeprefix(prefix).partition(": ")
         if status.name.startswith(prefix) and "/" not in reporter and subject in ("", reporter):
-            found += [(reporter, int(pair.value)) for pair in status.values if pair.key == "pid"]
+            with suppress(ValueError):  # a foreign node may use the key for something else
+                found += [(reporter, int(pair.value)) for pair in status.values if pair.key == "pid"]
     return found

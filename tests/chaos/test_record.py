@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.serialization import serialize_message
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
@@ -16,7 +17,7 @@ from std_msgs.msg import Float64
 
 from deploy.chaos.clock import STEP
 from deploy.chaos.history import NO_TARGET, InjectedFault, Life
-from deploy.chaos.record import FAULTS, PROCESSES, load
+from deploy.chaos.record import FAULTS, PROCESSES, load, values
 from deploy.recording.recorder import Recorder, qos_profiles
 from deploy.supervision import processes
 from interfaces import topics
@@ -42,6 +43,14 @@ def replay(record: Path) -> subprocess.CompletedProcess[str]:
     """Judge a record in a subprocess, because it handles signals."""
     command = [sys.executable, "-m", "deploy.chaos", "--replay", str(record)]
     return subprocess.run(command, cwd=processes.ROOT, capture_output=True, text=True, timeout=60)
+
+
+@pytest.mark.parametrize("pid", ["none", "", "1" * 5000])
+def test_health_without_a_pid_says_nothing_about_processes(pid: str) -> None:
+    foreign = DiagnosticStatus(name="/camera", values=[KeyValue(key="pid", value=pid)])
+    own = DiagnosticStatus(name="/velocity", values=[KeyValue(key="pid", value="7")])
+    data = serialize_message(DiagnosticArray(status=[foreign, own]))
+    assert values(topics.DIAGNOSTICS, data, "/") == [("velocity", 7)]
 
 
 @pytest.mark.parametrize(
