@@ -21,6 +21,7 @@ from deploy.supervision.system import DeploymentError
 from interfaces import topics
 
 PROCESSES, FAULTS = "/chaos/processes", "/chaos/faults"  # topics
+EARLY = 0.001  # s by which a message may seem to be sent after its reception: clocks are read one by one
 
 
 @contextmanager
@@ -86,18 +87,19 @@ def clock_offsets(faults: Iterable[bytes]) -> set[float]:
     return {0.0, *(_event(data).get("ahead", 0.0) for data in faults)}
 
 
-def time_sent(received: float, stamp: float, offsets: Collection[float]) -> float:
+def time_sent(received: float, stamp: float, offsets: Collection[float], second: int = 1) -> float:
     """
     Return when a message was sent, on the clock of its reception.
 
     :param stamp: its source time, on the arm's time of day.
     :param offsets: by which that has been ahead of the time of day of the receiver.
+    :param second: in the unit of all these times.
     """
     if not any(offsets):
         return stamp
-    # Among the possible latencies, the shortest that is not negative.
+    # Among the possible latencies, the shortest that is not negative, up to the error of the clocks.
     latencies = (received - stamp + offset for offset in offsets)
-    return received - min(latencies, key=lambda latency: (latency < 0.0, abs(latency)))
+    return received - min(latencies, key=lambda latency: (latency < -EARLY * second, abs(latency)))
 
 
 def read_event(topic: str, data: bytes, namespace: str) -> Life | InjectedFault | None:

@@ -199,7 +199,7 @@ def _value(topic: Topic, sent: int, data: bytes, offsets: Collection[int]) -> Va
         return f"unreadable: {type(error).__name__}"
     if topic is topics.OPERATOR_PRESENCE:
         stamp = message.stamp.sec * SECOND + message.stamp.nanosec
-        return ((sent - time_sent(sent, stamp, offsets)) / SECOND,)
+        return ((sent - time_sent(sent, stamp, offsets, SECOND)) / SECOND,)
     return _READ.get(topic.name, lambda it: str(it.data))(message)
 
 

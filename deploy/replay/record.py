@@ -10,6 +10,7 @@ from typing import IO, Any, NamedTuple
 from mcap.reader import make_reader
 from mcap.records import Channel
 from rclpy.serialization import deserialize_message
+from rclpy_simulation.host import SECOND
 
 from deploy.chaos.record import FAULTS, PROCESSES, clock_offsets, read_event, time_sent
 from deploy.recording.recorder import METADATA
@@ -107,7 +108,10 @@ def _read(file: IO[bytes]) -> Record | None:
     offsets = [round(each * 1e9) for each in clock_offsets(data for *_, data in read[FAULTS])]
     messages = {
         topic: sorted(
-            (Message(int(time_sent(received, stamp, offsets)), data) for received, stamp, data in each),
+            (
+                Message(int(time_sent(received, stamp, offsets, SECOND)), data)
+                for received, stamp, data in each
+            ),
             key=lambda message: message.sent,
         )
         for topic, each in read.items()

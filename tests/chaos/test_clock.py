@@ -43,6 +43,13 @@ def test_no_message_is_received_before_it_is_sent() -> None:
     assert time_sent(100.0, 100.1, [0.0, 0.3]) == pytest.approx(99.8)
 
 
+@pytest.mark.parametrize("early", [1e-6, 1e-4])
+def test_message_that_seems_a_little_early_is_not_of_another_time_of_day(early: float) -> None:
+    assert time_sent(100.0, 100.0 + early, [0.0, 1800.0]) == pytest.approx(100.0 + early)
+    sent = time_sent(100 * 10**9, 100 * 10**9 + round(early * 1e9), [0, 1800 * 10**9], second=10**9)
+    assert sent == 100 * 10**9 + round(early * 1e9)
+
+
 @pytest.mark.parametrize("stamp", [99.9, 100.1])
 def test_source_time_without_a_step_stays_as_it_is(stamp: float) -> None:
     assert time_sent(100.0, stamp, [0.0]) == stamp
