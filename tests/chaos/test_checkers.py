@@ -275,6 +275,13 @@ def test_s4_angles_of_an_infinite_sum_give_no_position() -> None:
     assert verdict("S4", added(history, "theta2", (30.003, 1.7e308))) == HOLDS
 
 
+def test_s4_detects_a_wrong_position_beyond_the_largest_length() -> None:
+    values = {"l1": 1e308, "l2": 1.0, "theta1": 1.25 * math.pi, "theta2": 0.0}
+    streams = {name: [Sample(1.0, 1.001, value)] for name, value in values.items()}
+    streams["effector/position"] = [Sample(2.0, 2.001, (0.8e308, 0.8e308))]
+    assert verdict("S4", History(END, streams)) == VIOLATED
+
+
 def test_s4_dropped_value_leaves_the_one_before_it_the_latest() -> None:
     history = good()
     for name in topics.CONFIGURATION:
