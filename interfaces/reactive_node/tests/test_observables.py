@@ -306,17 +306,6 @@ def test_timestamped_items_carry_source_time(
     assert before - timedelta(microseconds=1) <= received[0].timestamp <= after
 
 
-def test_observable_of_ended_node_completes_at_once(node: ReactiveNode) -> None:
-    observable = node.create_observable(String, "topic")
-    node.destroy_node()
-    node.destroy_node()
-    completed: list[bool] = []
-
-    observable.subscribe(on_completed=lambda: completed.append(True))
-
-    assert completed == [True]
-
-
 def test_invalid_message_type_is_error_of_observable(node: ReactiveNode) -> None:
     errors: list[Exception] = []
 

@@ -22,9 +22,10 @@ from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 from reactivex import Observable, abc
 from reactivex.disposable import CompositeDisposable, Disposable, SingleAssignmentDisposable
-from reactivex.subject import AsyncSubject, BehaviorSubject
+from reactivex.subject import BehaviorSubject
 
 from reactive_node import calls
+from reactive_node.end import End
 from reactive_node.sampled_reader import BUFFER, newest, sampled_messages
 from reactive_node.scheduler import NodeScheduler
 from reactive_node.services import Requests
@@ -40,7 +41,7 @@ class ReactiveNode(Node):
     def __init__(self, node_name: str, **options: Any) -> None:
         """Create a node; the options are those of :class:`rclpy.node.Node`."""
         super().__init__(node_name, **options)
-        self._end: AsyncSubject[None] = AsyncSubject()
+        self._end = End()
         self._sinks = CompositeDisposable()
         self._transforms: Transforms | None = None
         self.scheduler = NodeScheduler(self)
@@ -116,7 +117,7 @@ class ReactiveNode(Node):
             return self.create_subscription(msg_type, topic, lambda _: None, qos, **given)
 
         messages = sampled_messages(self, create_reader, ticks, timestamped=timestamped, most=qos.depth)
-        return messages.take_until(self._end).share()
+        return self._end.limit(messages.share())
 
     def create_parameter_observable(self, name: str) -> Observable[Any]:
         """
@@ -154,7 +155,7 @@ class ReactiveNode(Node):
                     raise
             return end
 
-        return Observable(subscribe).take_until(self._end)
+        return self._end.limit(Observable(subscribe))
 
     def create_event_observable(
         self, msg_type: Any, topic: str, qos_profile: QoSProfile | int, event: str
@@ -191,7 +192,7 @@ class ReactiveNode(Node):
             from reactive_node.transforms import Transforms  # here: tf2 is optional
 
             self._transforms = Transforms(self.create_observable, self.get_clock())
-        return self._transforms.between(target_frame, source_frame)
+        return self._end.limit(self._transforms.between(target_frame, source_frame))
 
     def create_call(
         self, srv_type: Any, srv_name: str, *, timeout: float | None = None, **options: Any
@@ -211,7 +212,7 @@ class ReactiveNode(Node):
 
         def call(request: Any) -> Observable[Any]:
             response = calls.response(client, request, self.scheduler)
-            result = ready.take(1).flat_map(lambda _: response).take_until(self._end)
+            result = self._end.limit(ready.take(1).flat_map(lambda _: response))
             return result if timeout is None else result.timeout(timeout, late, self.scheduler)
 
         return call
@@ -244,7 +245,7 @@ class ReactiveNode(Node):
 
         def act(goal: Any) -> Observable[Any]:
             execution = actions.execution(client, action_name, goal, self.scheduler)
-            return ready.take(1).flat_map(lambda _: execution).take_until(self._end)
+            return self._end.limit(ready.take(1).flat_map(lambda _: execution))
 
         return act
 

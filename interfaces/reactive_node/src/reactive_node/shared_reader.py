@@ -12,8 +12,8 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile
 from rclpy.subscription import Subscription
 from reactivex import abc
 from reactivex.disposable import Disposable
-from reactivex.subject import AsyncSubject
 
+from reactive_node.end import End
 from reactive_node.stamps import Timestamp
 
 
@@ -31,7 +31,7 @@ class SharedReader:
         create: Callable[[Callable[..., None]], Subscription],
         *,
         scheduler: abc.SchedulerBase,
-        end: AsyncSubject[None],
+        end: End,
         retained: deque[Any] | None = None,
         timestamped: bool = False,
     ) -> None:
