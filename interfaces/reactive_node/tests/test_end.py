@@ -1,4 +1,4 @@
-"""The end of a node as its observables know it."""
+"""The end of a node: its observables complete, and everything is disposed."""
 
 from __future__ import annotations
 
@@ -6,7 +6,9 @@ from collections.abc import Callable
 
 import pytest
 from example_interfaces.action import Fibonacci
+from rclpy.node import Node
 from reactivex import Observable
+from reactivex.subject import Subject
 from std_msgs.msg import String
 from std_srvs.srv import SetBool
 
@@ -27,12 +29,48 @@ OBSERVABLES: dict[str, Create] = {
 each_kind = pytest.mark.parametrize("create", OBSERVABLES.values(), ids=OBSERVABLES)
 
 
+class Watch:
+    """Keeps how an observable ends, and may raise then."""
+
+    def __init__(self, observable: Observable[object], error: str = "") -> None:
+        self.ended: list[object] = []
+        self._error = error
+        observable.subscribe(self.ended.append, self.ended.append, self._complete)
+
+    def _complete(self) -> None:
+        self.ended.append("completed")
+        if self._error:
+            raise ValueError(self._error)
+
+
+@each_kind
+def test_observer_that_raises_keeps_no_other_from_its_end(node: ReactiveNode, create: Create) -> None:
+    observable, other = create(node), node.create_observable(String, "other")
+    watches = [Watch(observable, "first"), Watch(observable, "second"), Watch(observable), Watch(other)]
+
+    with pytest.raises(ValueError, match="first"):
+        node.destroy_node()
+
+    assert [watch.ended for watch in watches] == [["completed"]] * 4
+
+
+def test_node_ends_although_an_observer_raises(node: ReactiveNode, peer: Node) -> None:
+    numbers: Subject[String] = Subject()
+    node.publish_observable(numbers, String, "numbers")
+    Watch(node.create_observable(String, "topic"), "planted")
+
+    with pytest.raises(ValueError, match="planted"):
+        node.destroy_node()
+    node.destroy_node()
+
+    assert not numbers.observers
+    assert not list(node.subscriptions)
+    assert not list(node.timers)
+
+
 @each_kind
 def test_observable_of_ended_node_completes_at_once(node: ReactiveNode, create: Create) -> None:
     observable = create(node)
     node.destroy_node()
-    ended: list[object] = []
 
-    observable.subscribe(ended.append, ended.append, lambda: ended.append("completed"))
-
-    assert ended == ["completed"]
+    assert Watch(observable).ended == ["completed"]

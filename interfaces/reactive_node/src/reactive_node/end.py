@@ -17,3 +17,19 @@ class End(AsyncSubject[None]):
     def limit(self, source: Observable[_T]) -> Observable[_T]:
         """Complete ``source`` with the node; after that, complete without a subscription to ``source``."""
         return rx.defer(lambda _: rx.never() if self.is_stopped else source).take_until(self)
+
+    def come(self) -> None:
+        """Tell all observers, also if some of them raise; the first of their errors is raised afterwards."""
+        with self.lock:
+            observers, self.observers = self.observers, []
+            self.on_next(None)
+            self.on_completed()
+        errors: list[Exception] = []
+        for observer in observers:
+            try:
+                observer.on_next(None)
+                observer.on_completed()
+            except Exception as error:
+                errors.append(error)
+        if errors:
+            raise errors[0]

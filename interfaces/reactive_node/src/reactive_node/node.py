@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
+from contextlib import ExitStack
 from typing import TYPE_CHECKING, Any
 
 import reactivex as rx
@@ -359,10 +360,14 @@ class ReactiveNode(Node):
         self.scheduler.schedule(throw)
 
     def destroy_node(self) -> None:
-        """End the node; its observables complete first."""
-        if not self._end.is_stopped:
-            self._end.on_next(None)
-            self._end.on_completed()
-            self._sinks.dispose()
-            self.scheduler.dispose()
-        super().destroy_node()
+        """
+        End the node; its observables complete first.
+
+        If observers raise, the first of their errors is raised afterwards.
+        """
+        with ExitStack() as stack:
+            stack.callback(super().destroy_node)
+            if not self._end.is_stopped:
+                stack.callback(self.scheduler.dispose)
+                stack.callback(self._sinks.dispose)
+                self._end.come()

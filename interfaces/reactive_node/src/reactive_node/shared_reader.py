@@ -11,7 +11,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile
 from rclpy.subscription import Subscription
 from reactivex import abc
-from reactivex.disposable import Disposable
+from reactivex.disposable import CompositeDisposable, Disposable
 
 from reactive_node.end import End
 from reactive_node.stamps import Timestamp
@@ -21,7 +21,6 @@ class SharedReader:
     """Creates a DDS reader for the first observer and destroys it after the last one."""
 
     # While there is a reader:
-    _at_end: abc.DisposableBase
     _listening: tuple[abc.ObserverBase[Any], ...]
     """Members that have got the retained samples. Replaced, never changed: _receive takes no lock."""
 
@@ -70,12 +69,12 @@ class SharedReader:
                 except Exception:
                     self._members = []
                     raise
-                self._at_end = self._end.subscribe(on_completed=self._complete)
             elif self._retained is None:
                 self._listening += (observer,)
             else:  # on the callback's thread: no message slips between the retained ones and the next
                 self._scheduler.schedule(lambda *_: self._join(observer))
-        return Disposable(lambda: self._leave(observer))
+        at_end = self._end.subscribe(on_completed=observer.on_completed)
+        return CompositeDisposable(at_end, Disposable(lambda: self._leave(observer)))
 
     def _join(self, observer: abc.ObserverBase[Any]) -> None:
         with self._lock:
@@ -111,12 +110,7 @@ class SharedReader:
             subscription, self._subscription = self._subscription, None
             if self._retained is not None:
                 self._retained.clear()
-            self._at_end.dispose()
             self._node.destroy_subscription(subscription)
-
-    def _complete(self) -> None:
-        for observer in list(self._members):
-            observer.on_completed()
 
 
 def retention(qos_profile: QoSProfile | int) -> deque[Any] | None:
