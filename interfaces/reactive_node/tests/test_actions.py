@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import gc
 import subprocess
 import sys
+import weakref
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -249,6 +251,19 @@ def test_goal_disposed_before_its_acceptance_is_cancelled(
     spin_until(lambda: server.cancelled == [7])
 
     assert watch.items == []
+
+
+def test_goal_disposed_before_its_acceptance_is_forgotten(
+    node: ReactiveNode, server: Server, spin_until: SpinUntil
+) -> None:
+    watches: list[Watch] = []
+    server.on_goal = lambda: watches[0].subscription.dispose()
+    watches.append(Watch(node.create_action_call(Fibonacci, "fibonacci")(goal(7)), node))
+    spin_until(lambda: server.cancelled == [7])
+
+    kept = weakref.ref(watches.pop())
+
+    spin_until(lambda: gc.collect() >= 0 and kept() is None)
 
 
 def test_goal_disposed_while_it_waits_for_server_is_not_sent(

@@ -96,8 +96,8 @@ class _Execution:
                 self._accepted = handle
         if cancelled:
             handle.cancel_goal_async()
-        else:
-            self._then(handle.get_result_async(), self._ended)
+        # Of a cancelled goal, too: only with its result, rclpy forgets the feedback's callback.
+        self._then(handle.get_result_async(), self._ended)
 
     def _ended(self, response: Any) -> None:
         with self._lock:
