@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import copy
+import pickle
+from collections.abc import Callable
 from datetime import UTC, datetime, timedelta
+from typing import Any
 
+import pytest
 from builtin_interfaces.msg import Time
 from hypothesis import given
 from hypothesis import strategies as st
 
-from reactive_node import stamps
+from reactive_node import Timestamp, stamps
 
 
 @given(st.integers(-(2**31), 2**31 - 1), st.integers(0, 10**9 - 1))
@@ -38,3 +43,18 @@ def test_message_of_a_time_has_its_seconds_and_nanoseconds() -> None:
 
     assert stamps.to_message(time) == Time(sec=65, nanosec=7000)
     assert stamps.from_message(Time(sec=65, nanosec=7999)) == time
+
+
+def pickled(item: Any) -> Any:
+    return pickle.loads(pickle.dumps(item))
+
+
+@pytest.mark.parametrize("duplicate", [copy.copy, copy.deepcopy, pickled])
+def test_timestamp_can_be_copied_and_pickled(duplicate: Callable[[Any], Any]) -> None:
+    item = Timestamp(["value"], stamps.now())._replace(nanoseconds=1_000_000_001)
+
+    twin = duplicate(item)
+
+    assert type(twin) is Timestamp
+    assert (twin.value, twin.nanoseconds) == (["value"], 1_000_000_001)
+    assert (twin.value is item.value) == (duplicate is copy.copy)

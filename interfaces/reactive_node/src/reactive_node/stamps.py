@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import time
 from datetime import UTC, datetime, timedelta
-from typing import Generic, NamedTuple, TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar
 
 from builtin_interfaces.msg import Time
 
@@ -42,6 +42,10 @@ class Timestamp(_Stamped[_T]):
 
     def __new__(cls, value: _T, timestamp: datetime) -> Timestamp[_T]:
         return tuple.__new__(cls, (value, to_nanoseconds(timestamp)))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Return what makes a copy, to the nanosecond, which the constructor cannot."""
+        return tuple.__new__, (type(self), tuple(self))
 
     @property
     def timestamp(self) -> datetime:
