@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import threading
 import weakref
 from typing import Any
@@ -9,6 +10,7 @@ from typing import Any
 import pytest
 import reactivex as rx
 from rclpy.node import Node
+from reactivex.notification import OnError
 from reactivex.scheduler import ImmediateScheduler, ThreadPoolScheduler
 from reactivex.subject import Subject
 from reactivex.testing import ReactiveTest
@@ -95,6 +97,22 @@ def test_error_of_work_ends_observable_and_work(scheduler: VirtualTime, work: Wo
     assert recording.messages == [on_error(3, ValueError("planted"))]
     assert work.items == ["bad"]
     assert items.subscriptions == [subscribe(0, 3)]
+
+
+@pytest.mark.parametrize("kind", [asyncio.CancelledError, SystemExit, KeyboardInterrupt])
+def test_exit_of_work_is_error_of_observable(scheduler: VirtualTime, kind: type[BaseException]) -> None:
+    planted = kind("planted")
+
+    def work(_: str) -> str:
+        raise planted
+
+    recording = scheduler.record(scheduler.hot((1, "a")).pipe(latest(work, scheduler.worker(WORK))), until=10)
+
+    (message,) = recording.messages
+    assert message.time == 3
+    assert isinstance(message.value, OnError)
+    assert isinstance(message.value.exception, RuntimeError)
+    assert message.value.exception.__cause__ is planted
 
 
 def test_error_of_source_is_immediate_and_ends_work(scheduler: VirtualTime, work: Work) -> None:

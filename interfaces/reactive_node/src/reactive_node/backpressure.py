@@ -25,9 +25,10 @@ def latest(
     that is passed at ``subscribe`` (``node.scheduler``); a subscription without one is an error. The next run
     begins when the last result has been emitted, so results do not pile up either.
 
-    An error of the work, or of the source, is an error of the observable. When the source completes, the
-    items in work and in waiting are finished first. Disposing drops both: no run begins any more, and the
-    result of a run that has begun is lost.
+    An error of the work, or of the source, is an error of the observable; it is a RuntimeError if the work
+    raises CancelledError, SystemExit or the like. When the source completes, the items in work and in
+    waiting are finished first. Disposing drops both: no run begins any more, and the result of a run that
+    has begun is lost.
 
     :param work: called with an item on ``workers``; returns the result.
     :param workers: the scheduler that runs the work, such as RxPY's ``ThreadPoolScheduler(1)``; in a test,
@@ -101,12 +102,18 @@ class _Worker(Generic[_T, _R]):
             try:
                 result = self._work(item)
             except Exception as error:
-                failure = error  # `error` does not outlive this block
-                self._scheduler.schedule(lambda *_: self._observer.on_error(failure))
+                self._fail(error)
+            except BaseException as error:  # Rx passes only an Exception on
+                failure = RuntimeError(f"the work raised {error!r}")
+                failure.__cause__ = error
+                self._fail(failure)
             else:
                 self._scheduler.schedule(lambda *_: self._deliver(result))
 
         self._workers.schedule(run)
+
+    def _fail(self, error: Exception) -> None:
+        self._scheduler.schedule(lambda *_: self._observer.on_error(error))
 
     def _deliver(self, result: _R) -> None:
         self._observer.on_next(result)
