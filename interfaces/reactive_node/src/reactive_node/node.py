@@ -63,11 +63,14 @@ class ReactiveNode(Node):
         Return the messages of a topic as an observable, cold and shared (thesis 4.3).
 
         No DDS reader exists before the first observer subscribes. All observers share one reader. The
-        disposal of the last observer destroys it; a new subscription creates a new one. A late observer of
-        a transient-local topic first gets the retained samples, as with a reader of its own (not with
-        BEST_AVAILABLE durability: a reader does not report which durability that has become).
-        The observable completes when the node ends. Subscribing and disposing are safe on any thread and
-        inside a callback.
+        disposal of the last observer destroys it; a new subscription creates a new one. The observable
+        completes when the node ends. Subscribing and disposing are safe on any thread and inside a callback.
+
+        A late observer of a transient-local topic first gets what the shared reader has received, as many
+        messages as its history keeps, while the topic has a publisher. A reader of its own might get fewer:
+        none whose lifespan has passed, none of a publisher that has gone, and no more than each publisher
+        keeps. With BEST_AVAILABLE durability a late observer gets none: a reader does not report which
+        durability that has become.
 
         :param timestamped: whether items are :class:`Timestamp` s of a message and its DDS source time,
             instead of messages.
