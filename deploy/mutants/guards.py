@@ -52,12 +52,15 @@ GUARDS: dict[str, tuple[str, ...]] = {
             "services",
             "transforms",
             "actions",
+            "end",
         )
     ),
+    f"{REACTIVE_NODE}/end.py": (f"{_NODE_TESTS}/test_end.py",),
     f"{REACTIVE_NODE}/sampled_reader.py": (f"{_NODE_TESTS}/test_sampled.py",),
     f"{REACTIVE_NODE}/shared_reader.py": (
         f"{_NODE_TESTS}/test_observables.py",
         f"{_NODE_TESTS}/test_events.py",
+        f"{_NODE_TESTS}/test_end.py",
     ),
     "deploy/supervision/policy.py": (
         "tests/supervision/test_policy.py",
