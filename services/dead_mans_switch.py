@@ -1,7 +1,8 @@
 """The dead man's switch, held by a virtual operator (thesis 5.2.3).
 
 User story (ours): as a developer, I am able to press and release the switch by hand
-(``ros2 param set /dead_mans_switch pressed true``) or by a scenario, which may also command the engines.
+(``ros2 param set /dead_mans_switch pressed true``) or by a scenario, which may also command the engines until
+a person takes the switch.
 """
 
 from __future__ import annotations
@@ -62,11 +63,13 @@ def wire(node: ServiceNode) -> None:
     beats = heartbeats(
         source.follow("pressed", source.scenario.pressed),
         source.follow("rate"),
-        source.play(source.scenario.heartbeats, until_set="pressed"),
+        source.until_set("pressed", source.play(source.scenario.heartbeats)),
     )
     node.publish(OPERATOR_HEARTBEAT, beats, lambda beat: Bool(data=beat))
     states = node.observe(ENGINES_STATE).map(lambda state: state.data)
     commands = engine_commands(source.play(source.scenario.commands), states)
+    # A person who takes the switch replaces the virtual operator, also for the commands.
+    commands = source.until_set("pressed", commands)
     node.publish(ENGINES, commands, lambda command: String(data=command))
 
 

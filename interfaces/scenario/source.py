@@ -77,21 +77,20 @@ class VirtualSource:
         follows = self._node.create_parameter_observable(given_back).distinct_until_changed()
         return follows.switch_map(lambda follows: (played or rx.just(first)) if follows else values)
 
-    def play(self, timeline: Events[T] | None, *, until_set: str = "") -> Observable[T]:
-        """
-        Return the single events of a timeline; a restarted process does not repeat them.
-
-        :param until_set: a parameter that ends the events when it is set by hand.
-        """
-        if timeline is None or until_set in self._settings.read():
+    def play(self, timeline: Events[T] | None) -> Observable[T]:
+        """Return the single events of a timeline; a restarted process does not repeat them."""
+        if timeline is None:
             return rx.never()
         played = rx.defer(
             lambda _: playback.events(timeline, self._origin.elapsed(), resume=self._origin.is_past)
         )
-        items = self._origin.delay_subscription(played)
-        if not until_set:
-            return items
-        return items.take_until(self._set_by_hand.filter(lambda name: name == until_set))
+        return self._origin.delay_subscription(played)
+
+    def until_set(self, name: str, items: Observable[T]) -> Observable[T]:
+        """Return items until a parameter is set by hand; none if a process before this one kept it."""
+        if name in self._settings.read():
+            return rx.never()
+        return items.take_until(self._set_by_hand.filter(lambda it: it == name))
 
     def _declare_again(self, name: str, value: Any) -> None:
         """Replace the value of a parameter, without the event of a parameter that is set by hand."""

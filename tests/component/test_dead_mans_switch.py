@@ -1,11 +1,18 @@
-"""The recipes of the virtual operator."""
+"""The recipes of the virtual operator, and the person who replaces it."""
 
 from __future__ import annotations
 
+import time
+from pathlib import Path
+
+import pytest
+from rclpy.parameter import Parameter
 from reactivex.testing import ReactiveTest, TestScheduler
 
-from interfaces.topics import OFF, ON, TURN_OFF, TURN_ON
-from services.dead_mans_switch import engine_commands, heartbeats
+from interfaces.topics import ENGINES, ENGINES_STATE, OFF, ON, OPERATOR_HEARTBEAT, TURN_OFF, TURN_ON
+from reactive_node.testing import MakeNode, SpinFor, SpinUntil
+from services.dead_mans_switch import engine_commands, heartbeats, wire
+from tests.component.wiring import Wired
 
 on_next, subscribe = ReactiveTest.on_next, ReactiveTest.subscribe
 
@@ -46,3 +53,28 @@ def test_command_is_repeated_a_limited_number_of_times(scheduler: TestScheduler)
     results = scheduler.start(lambda: engine_commands(commands, states, period=10, times=3))
 
     assert results.messages == [on_next(time, TURN_ON) for time in (210, 220, 230)]
+
+
+@pytest.mark.parametrize("pressed", [True, False])
+def test_person_who_takes_the_switch_ends_the_commands_of_the_scenario(
+    make_node: MakeNode, spin_until: SpinUntil, spin_for: SpinFor, tmp_path: Path, pressed: bool
+) -> None:
+    scenario = tmp_path / "scenario.yaml"
+    scenario.write_text("engines: [{at: 0.0, command: turn_off}, {at: 0.5, command: turn_on}]\n")
+    switch = Wired(
+        make_node,
+        spin_until,
+        wire,
+        inputs=[ENGINES_STATE],
+        outputs=[ENGINES, OPERATOR_HEARTBEAT],
+        scenario=str(scenario),
+        scenario_epoch=-1.0,
+    )
+    commands = switch.heard[ENGINES.name]
+    switch.service.set_parameters([Parameter("scenario_epoch", value=time.monotonic())])
+    spin_until(lambda: [command.data for command in commands] == [TURN_OFF])
+
+    switch.service.set_parameters([Parameter("pressed", value=pressed)])
+    spin_for(1.5)  # in which the first would have been repeated and the second one due
+
+    assert [command.data for command in commands] == [TURN_OFF]

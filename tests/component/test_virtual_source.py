@@ -128,7 +128,7 @@ def test_source_emits_nothing_before_its_origin_is_set(
     source = VirtualSource(node)
     values = emitted(node, source.follow("value", timeline))
     pressed = emitted(node, source.follow("pressed", Events(((0.0, True),))))
-    heartbeats = emitted(node, source.play(Events(((0.0, True),)), until_set="pressed"))
+    heartbeats = emitted(node, source.until_set("pressed", source.play(Events(((0.0, True),)))))
 
     spin_for(SHORT)
     assert (values, pressed, heartbeats) == ([], [], [])
@@ -310,7 +310,8 @@ def test_setting_ends_single_heartbeats_for_good(
         node = make_source(settings=str(tmp_path / "settings"))
         source = VirtualSource(node)
         emitted(node, source.follow("pressed"))
-        return node, emitted(node, source.play(Events(((0.0, 1), (SHORT, 2))), until_set="pressed"))
+        played = source.play(Events(((0.0, 1), (SHORT, 2))))
+        return node, emitted(node, source.until_set("pressed", played))
 
     node, heartbeats = source()
     spin_until(lambda: heartbeats == [1])
