@@ -1,7 +1,7 @@
 """
 `make chaos`: inject faults into an arm, and judge the record.
 
-Exit code 1 if a promise is violated, or if the record shows of none that it holds.
+Exit code 1 if the record violates a promise, or if it confirms none.
 """
 
 from __future__ import annotations
