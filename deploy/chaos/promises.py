@@ -1,4 +1,4 @@
-"""The promises of the design (§7), each with its checker."""
+"""The promises of an arm (the table in deploy/SAFETY.md), each with its checker."""
 
 from __future__ import annotations
 

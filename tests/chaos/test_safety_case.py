@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from deploy.chaos.promises import CHECKERS
+
 ROOT = Path(__file__).resolve().parents[2]
 CASE = (ROOT / "deploy" / "SAFETY.md").read_text(encoding="utf-8")
 CITED = sorted(set(re.findall(r"([\w/]*tests/\S+\.py)::(\w+)", CASE)))
@@ -15,6 +17,10 @@ CITED = sorted(set(re.findall(r"([\w/]*tests/\S+\.py)::(\w+)", CASE)))
 @pytest.mark.parametrize(("file", "test"), CITED)
 def test_cited_test_exists(file: str, test: str) -> None:
     assert f"\ndef {test}(" in (ROOT / file).read_text(encoding="utf-8")
+
+
+def test_table_names_every_promise() -> None:
+    assert re.findall(r"^\| ([SL]\d) \|", CASE, re.MULTILINE) == list(CHECKERS)
 
 
 def test_every_claim_has_evidence() -> None:
