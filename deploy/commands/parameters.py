@@ -26,6 +26,7 @@ from interfaces.scenario import scenario_file
 from interfaces.service import UserError, instance
 
 SCENARIOS = ROOT / "deploy" / "scenarios"
+DISCOVERY_RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"  # environment variable
 WEB = "WEB"  # environment variable: the port of the page, or off
 
 
@@ -80,6 +81,9 @@ def check_environment(system: System) -> None:
     except InvalidNamespaceException as error:
         reason = str(error).splitlines()[0].rstrip(":")
         raise DeploymentError(f"{NAMESPACE}={namespace} is no namespace such as /arm1: {reason}") from None
+    reach = os.environ.get(DISCOVERY_RANGE, "")
+    if reach.strip().upper() == "OFF":
+        raise DeploymentError(f"{DISCOVERY_RANGE}={reach} keeps the services apart: set LOCALHOST or SUBNET")
     if not system.members():  # the start reports a running system, and replaces orphans
         for program in manifest.programs():
             _check_claim(f"{namespace.rstrip('/')}/{program.name}", int(domain), namespace)

@@ -55,6 +55,15 @@ def test_an_impossible_domain_is_reported(site: Site) -> None:
     assert site.do("run", STEADY) == (1, "ROS_DOMAIN_ID=233 is not a number from 0 to 232")
 
 
+def test_a_discovery_range_without_other_processes_is_refused(
+    site: Site, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "OFF")
+    complaint = "ROS_AUTOMATIC_DISCOVERY_RANGE=OFF keeps the services apart: set LOCALHOST or SUBNET"
+    assert site.do("start", STEADY) == (1, complaint)
+    assert not site.run.exists()
+
+
 def test_an_impossible_namespace_is_reported(site: Site) -> None:
     site.namespace = "arm 1"
     code, printed = site.do("run", STEADY)
