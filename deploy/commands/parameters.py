@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ from rclpy.exceptions import InvalidNamespaceException
 from rclpy.validate_namespace import validate_namespace
 
 from deploy.commands import parameter_file
+from deploy.console.page.address import tls
 from deploy.supervision import manifest, processes
 from deploy.supervision.processes import ROOT
 from deploy.supervision.system import (
@@ -45,12 +47,25 @@ def of_system(scenario_name: str, user_file: str) -> dict[str, Any]:
     except UserError as error:
         raise DeploymentError(str(error)) from error
     shared = given.pop(ALL, {}).get(KEY, {})
+    page = f"{namespace_of(os.environ).rstrip('/')}/{manifest.PAGE}"
+    if user_file:
+        _check_page(user_file, shared | given.get(page, {}).get(KEY, {}))
     parameters: dict[str, Any] = scenario_parameters(path, NOT_YET)
     parameters[ALL][KEY] |= shared
     if (port := _port(os.environ.get(WEB, ""))) is not None:
-        page = f"{namespace_of(os.environ).rstrip('/')}/{manifest.PAGE}"
         given.setdefault(page, {KEY: {}})[KEY]["port"] = port
     return parameters | given
+
+
+def _check_page(user_file: str, given: Mapping[str, Any]) -> None:
+    """Raise DeploymentError if the page cannot have the address and the certificate that a file gives."""
+    declared = parameter_file.declared()[manifest.PAGE]
+    host, *files = (given.get(name, declared[name].default) for name in ("address", "certificate", "key"))
+    try:
+        # The page runs in the run directory.
+        tls(host, *(str(processes.run_directory() / file) if file else "" for file in files))
+    except UserError as error:
+        raise DeploymentError(f"{user_file}: {manifest.PAGE}: {error}") from None
 
 
 def _port(web: str) -> int | None:

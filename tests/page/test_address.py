@@ -76,8 +76,10 @@ def test_address_is_numeric(host: str) -> None:
 def test_bad_certificate_is_reported(tmp_path: Path) -> None:
     (tmp_path / "bad.pem").write_text("nonsense")
     for certificate in (tmp_path / "missing.pem", tmp_path / "bad.pem"):
-        with pytest.raises(UserError, match="certificate or key"):
+        with pytest.raises(UserError, match=f"^certificate '{certificate}' or key '{certificate}': "):
             tls("0.0.0.0", str(certificate), str(certificate))
+        with pytest.raises(UserError, match=f"^certificate '{certificate}': "):
+            tls("0.0.0.0", str(certificate), "")
 
 
 def test_host_names_are_exact() -> None:

@@ -50,6 +50,25 @@ def test_an_error_in_a_parameter_file_is_reported_before_the_start(site: Site, t
     assert not site.run.exists()
 
 
+@pytest.mark.parametrize(
+    ("page", "complaint"),
+    [
+        ("{address: abc}", "address: 'abc' is not an IPv4 address"),
+        ("{address: 0.0.0.0}", "address: 0.0.0.0 is not loopback and needs TLS: set certificate and key"),
+        ("{certificate: it.pem}", "certificate '{run}/it.pem': No such file or directory"),
+        ("{certificate: /it.pem, key: /k}", "certificate '/it.pem' or key '/k': No such file or directory"),
+    ],
+)
+def test_a_page_that_cannot_be_served_is_reported_before_the_start(
+    site: Site, tmp_path: Path, page: str, complaint: str
+) -> None:
+    file = tmp_path / "mine.yaml"
+    file.write_text(f"operator_console: {{ros__parameters: {page}}}")
+    expected = f"{file}: operator_console: {complaint.format(run=site.run)}"
+    assert site.do("start", STEADY, str(file)) == (1, expected)
+    assert not site.run.exists()
+
+
 def test_an_impossible_domain_is_reported(site: Site) -> None:
     site.domain = 233
     assert site.do("run", STEADY) == (1, "ROS_DOMAIN_ID=233 is not a number from 0 to 232")

@@ -55,9 +55,10 @@ def tls(address: str, certificate: str, key: str) -> ssl.SSLContext | None:
         raise UserError(f"address: {address} is not loopback and needs TLS: set certificate and key")
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
     try:
-        context.load_cert_chain(certificate, key or None)
-    except OSError as error:  # an SSLError, too
-        raise UserError(f"certificate or key: {error.strerror or error}") from None
+        context.load_cert_chain(certificate, key or None, password="")  # instead of asking for one
+    except OSError as error:  # an SSLError, too; it names no file
+        files = f"certificate {certificate!r}" + (f" or key {key!r}" if key else "")
+        raise UserError(f"{files}: {error.strerror or error}") from None
     return context
 
 
