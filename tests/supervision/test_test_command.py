@@ -42,3 +42,22 @@ def test_workers_share_compiled_modules(monkeypatch: pytest.MonkeyPatch) -> None
     monkeypatch.setattr(subprocess, "call", lambda command, env: environments.append(env) or 0)
     command.main(["tests/system"])
     assert not any("PYTHONDONTWRITEBYTECODE" in environment for environment in environments)
+
+
+@pytest.mark.parametrize(
+    ("words", "missing"),
+    [
+        ("tests interfaces/reactive_node --ignore=tests/page", ""),
+        ("tests/supervision/test_test_command.py::test_workers -k word -x", ""),
+        ("nix", "nix"),
+        ("tests --ignore=tests/page nix/test_it.py::test tests/nix", "nix/test_it.py::test, tests/nix"),
+    ],
+)
+def test_a_missing_path_is_named_and_nothing_runs(
+    words: str, missing: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    commands: list[list[str]] = []
+    monkeypatch.setattr(subprocess, "call", lambda command, env: commands.append(command) or 0)
+    assert command.main(words.split()) == (4 if missing else 0)
+    assert bool(commands) != bool(missing)
+    assert capsys.readouterr().err == (f"TESTS: {missing}: no such file or directory\n" if missing else "")
