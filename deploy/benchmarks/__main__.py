@@ -105,6 +105,8 @@ def main(arguments: Sequence[str]) -> int:
     parser.add_argument("kind", nargs="?", choices=kinds, default=COMPARISON, metavar="KIND", help=shown)
     parser.add_argument("--rounds", type=int, default=3, help="how many times to compare (3)")
     options = parser.parse_args(arguments)
+    if options.rounds < 1:
+        parser.error("--rounds must be at least 1")
     interruption.install()
     results: dict[str, Any] = {}
     code = 0

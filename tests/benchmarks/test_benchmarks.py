@@ -48,6 +48,14 @@ def test_table_has_a_row_for_each_alternative_and_a_dash_without_figures() -> No
     ]
 
 
+@pytest.mark.parametrize("rounds", ["0", "-1"])
+def test_a_comparison_without_a_round_is_refused(rounds: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as end:
+        command.main([f"--rounds={rounds}"])
+    assert end.value.code == 2
+    assert capsys.readouterr().err.splitlines()[-1] == "make bench: error: --rounds must be at least 1"
+
+
 def test_absent_alternatives_are_named_with_the_reason(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
