@@ -95,7 +95,8 @@ def versions() -> str:
 
 def main(arguments: Sequence[str]) -> int:
     """Run the command line; return the exit code."""
-    parser = argparse.ArgumentParser(prog="make bench", description=__doc__)
+    usage = 'make bench [BENCH="[KIND] [OPTION ...]"]'
+    parser = argparse.ArgumentParser(prog="make bench", usage=usage, description=__doc__)
     kinds = {
         COMPARISON: "this system and its alternatives (the default)",
         CHAIN: "the arm's own services and the same in plain callbacks",

@@ -42,6 +42,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     """Parse the command line; exits with code 2 if it has an error."""
     parser = argparse.ArgumentParser(
         prog="make chaos",
+        usage='make chaos [MINUTES=N] [SEED=WORD] [CHAOS="OPTION ..."]',
         description="Inject faults into an arm, record it from outside, and check the promises.",
     )
     add = parser.add_argument
@@ -49,9 +50,9 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     add("--seed", type=int, help="the same seed gives the same random faults")
     add("--every", type=number(0.01, 3600), default=5.0, help="seconds between two random faults, default 5")
     kinds = tuple(dict.fromkeys((*FAULT_KINDS, clock.STEP)))
-    of_kinds = f"of {', '.join(kinds)}; {clock.STEP} needs {clock.PACKAGE}"
+    of_kinds = f"separated by commas, of {', '.join(kinds)}; {clock.STEP} needs {clock.PACKAGE}"
     add("--faults", type=names(kinds), default=tuple(FAULT_KINDS), help=of_kinds)
-    add("--targets", type=names(PROGRAMS), default=(), help=f"of {', '.join(PROGRAMS)}")
+    add("--targets", type=names(PROGRAMS), default=(), help=f"separated by commas, of {', '.join(PROGRAMS)}")
     scenarios = f"instead of random faults: {', '.join(NAMED)}"
     add("--scenario", choices=(RANDOM, *NAMED), default=RANDOM, metavar="NAME", help=scenarios)
     add("--arms", type=int, default=1, help="they share the random faults; each gets a whole scenario")

@@ -44,7 +44,8 @@ class Score:
 
 def main(arguments: Sequence[str]) -> int:
     """Run the command line; return the exit code."""
-    parser = argparse.ArgumentParser(prog="make mutants", description=__doc__)
+    usage = 'make mutants [MODULES="MODULE ..."]'
+    parser = argparse.ArgumentParser(prog="make mutants", usage=usage, description=__doc__)
     parser.add_argument("modules", nargs="*", help="paths of modules; all if there are none")
     modules = parser.parse_args(arguments).modules or list(GUARDS)
     if unknown := [module for module in modules if module not in GUARDS]:

@@ -55,10 +55,16 @@ def main(arguments: Sequence[str]) -> int:
 def _parse(arguments: Sequence[str]) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         prog="make replay",
+        usage='make replay RECORD=FILE [REPLAY="OPTION ..."]',
         description="Feed a record through today's services in virtual time, and show what differs.",
     )
     add = parser.add_argument
-    add("record", type=Path, help="an MCAP of `make record`, `make chaos` or `ros2 bag record -s mcap`")
+    add(
+        "record",
+        type=Path,
+        metavar="RECORD=FILE",
+        help="an MCAP of `make record`, `make chaos` or `ros2 bag record -s mcap`",
+    )
     add("--namespace", help="of the arm; by default, all arms of the record")
     add("--parameters", default="", metavar="FILE", help="a ROS parameter file for the services")
     add("--output", type=Path, metavar="FILE", help="for the replayed messages, default RECORD.replayed.mcap")

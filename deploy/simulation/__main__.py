@@ -46,13 +46,16 @@ def main(arguments: Sequence[str]) -> int:
 
 def _parse(arguments: Sequence[str]) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
-        prog="make simulate", description="Simulate an arm under faults, and check its promises."
+        prog="make simulate",
+        usage='make simulate [HOURS=N] [SEED=WORD] [SCHEDULE=FILE] [SIMULATE="OPTION ..."]',
+        description="Simulate an arm under faults, and check its promises.",
     )
     add = parser.add_argument
     add("--hours", type=number(0.01, 100_000), default=1.0, help="of the arm, default 1")
     add("--seed", help="the same seed gives the same record, byte for byte; default: a new one")
     add("--every", type=number(0.1, 3600), default=5.0, help="seconds between two faults, default 5")
-    add("--faults", type=names(FAULT_KINDS), default=tuple(FAULT_KINDS), help=f"of {', '.join(FAULT_KINDS)}")
+    of_kinds = f"separated by commas, of {', '.join(FAULT_KINDS)}"
+    add("--faults", type=names(FAULT_KINDS), default=tuple(FAULT_KINDS), help=of_kinds)
     add("--schedule", type=Path, metavar="FILE", help="play this schedule instead")
     minutes = "for so many minutes, inject faults at every message and timer of an operator's day instead"
     add("--systematic", type=number(0.01, 100_000), metavar="MINUTES", help=minutes)
