@@ -28,9 +28,9 @@ export PYTHON SCENARIO PARAMETERS WEB
 help:
 	@echo "make run      start the system, show it in this terminal, stop it with Ctrl-C"
 	@echo "make start    start it in the background          (run, start: SCENARIO=demo, listing_5_9 or a file)"
-	@echo "                                                  (WEB=off for no page, or its port)"
+	@echo "                                                  (PARAMETERS=file; WEB=off for no page, or its port)"
 	@echo "make console  attach this terminal to it"
-	@echo "make status   its services: state, pid, uptime, restarts, last output"
+	@echo "make status   its services: state, pid, uptime, restarts, last output, health"
 	@echo "make logs     follow their logs"
 	@echo "make record   record its messages until Ctrl-C     (MCAP for Foxglove and ros2 bag, in .run/records)"
 	@echo "make stop     stop it"
