@@ -47,7 +47,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     )
     add = parser.add_argument
     add("--minutes", type=number(0.01, 10_000), default=5.0, help="length of the random faults, default 5")
-    add("--seed", type=int, help="the same seed gives the same random faults")
+    add("--seed", help="the same seed gives the same random faults")
     add("--every", type=number(0.01, 3600), default=5.0, help="seconds between two random faults, default 5")
     kinds = tuple(dict.fromkeys((*FAULT_KINDS, clock.STEP)))
     of_kinds = f"separated by commas, of {', '.join(kinds)}; {clock.STEP} needs {clock.PACKAGE}"
@@ -93,7 +93,7 @@ def plan(options: argparse.Namespace) -> Plan:
         title = f"Scenario {options.scenario}, {length:.0f} s{several}"
         return Plan(title, [planned] * options.arms, length, testbed)
     _require_clock(options.faults)
-    seed = random.randrange(10**6) if options.seed is None else options.seed
+    seed = options.seed or str(random.randrange(10**6))
     length = 60 * options.minutes
     planned = schedule.random_faults(
         seed, length, every=options.every, kinds=options.faults, targets=options.targets

@@ -34,6 +34,12 @@ def test_a_fault_that_only_a_simulation_has_is_refused(tmp_path: Path) -> None:
         plan.plan(plan.parse(["--schedule", path]))
 
 
+def test_a_seed_may_be_a_word() -> None:
+    plans = [plan.plan(plan.parse(["--minutes", "1", "--seed", seed])) for seed in ("abc", "abc", "abd")]
+    assert "seed abc," in plans[0].title
+    assert plans[0].schedules == plans[1].schedules != plans[2].schedules
+
+
 @pytest.fixture
 def without_library(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(clock, "LIBRARY", tmp_path / "libfaketime")
