@@ -9,7 +9,7 @@ if find_spec("rclpy._dds") is None:
         f"rclpy_simulation needs the rclpy of reactive-arm-runtime, not that of {rclpy.__path__[0]}"
     )
 if find_spec("greenlet") is None:
-    raise ImportError("rclpy_simulation needs greenlet: pip install 'reactive-arm-runtime[simulation]'")
+    raise ImportError("rclpy_simulation needs greenlet: pip install 'greenlet>=3.1,<4'")
 
 from rclpy_simulation.host import Host
 from rclpy_simulation.network import Delay, Network

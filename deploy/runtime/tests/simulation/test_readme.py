@@ -40,7 +40,7 @@ def _error_without(module: str, tmp_path: Path) -> str:
 
 def test_a_missing_greenlet_is_a_clear_error(tmp_path: Path) -> None:
     assert _error_without("greenlet", tmp_path) == (
-        "ImportError: rclpy_simulation needs greenlet: pip install 'reactive-arm-runtime[simulation]'"
+        "ImportError: rclpy_simulation needs greenlet: pip install 'greenlet>=3.1,<4'"
     )
 
 
