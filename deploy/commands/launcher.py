@@ -107,7 +107,7 @@ def logs(system: System) -> None:
             while tail.poll() is None:
                 interruption.check()
                 if system.supervisor_has_ended():
-                    print("The system has ended.")
+                    print(system.how_it_ended())
                     break
                 with suppress(subprocess.TimeoutExpired):
                     tail.wait(0.1)
@@ -119,11 +119,13 @@ def record(system: System) -> None:
     """Record the messages of a running system until Ctrl-C or its end."""
     if not _adopt_environment(system):
         raise DeploymentError("Nothing runs: make start")
+    if system.supervisor_has_ended():
+        raise DeploymentError(system.unattended())
     from deploy.commands import record
     from deploy.commands.member import Member
 
     with Member() as member:
-        record.write(system.run / RECORDS, member, system.supervisor_has_ended)
+        record.write(system.run / RECORDS, member, system)
 
 
 @contextmanager
@@ -201,7 +203,7 @@ def _show(system: System, member: Member, *, owner: bool = False) -> None:
                 return
             if system.supervisor_has_ended():
                 if not owner or not system.start_again():
-                    say(system.unattended() if system.is_wanted else "The system has ended.")
+                    say(system.how_it_ended())
                     return
                 say("supervisord was killed: everything has been started anew.")
 

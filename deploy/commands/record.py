@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
 
 from deploy.commands.member import Member
 from deploy.recording.recorder import Recorder, record
 from deploy.supervision import interruption
+from deploy.supervision.system import System
 
 
-def write(directory: Path, member: Member, has_ended: Callable[[], bool]) -> None:
-    """Record until Ctrl-C or until the system has ended; print the path, duration and size of the file."""
+def write(directory: Path, member: Member, system: System) -> None:
+    """Record until Ctrl-C or until supervisord has ended; print the path, duration and size of the file."""
     directory.mkdir(exist_ok=True)
     path = directory / time.strftime("%Y%m%d-%H%M%S.mcap")
     began = time.monotonic()
@@ -21,9 +21,9 @@ def write(directory: Path, member: Member, has_ended: Callable[[], bool]) -> Non
         record(member.node, recorder)
         print(f"Recording to {path} until Ctrl-C ...", flush=True)
         try:
-            while not has_ended():
+            while not system.supervisor_has_ended():
                 member.spin_once()
-            print("The system has ended.")
+            print(system.how_it_ended())
         except interruption.Interrupted:
             interruption.ignore()
     seconds, size = time.monotonic() - began, path.stat().st_size / 1e6

@@ -92,6 +92,10 @@ class System:
             "make start replaces them, make stop ends them."
         )
 
+    def how_it_ended(self) -> str:
+        """The message about the end of supervisord, by a stop or by an accident."""
+        return self.unattended() if self.is_wanted else "The system has ended."
+
     def members(self) -> list[processes.Process]:
         """The live processes of the system, also those that a dead supervisord left behind."""
         return processes.of_system(self.run)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import signal
 import time
@@ -74,6 +75,20 @@ def test_record_is_complete_when_the_system_ends(small_site: Site) -> None:
     path = Path(command.await_line(SUMMARY)[1])
     with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_JAZZY)) as reader:
         assert reader.message_count == int(command.await_line(SUMMARY)[3])
+
+
+def test_record_tells_that_supervisord_has_died(small_site: Site) -> None:
+    assert small_site.do("start", "demo")[0] == 0
+    command = record(small_site)
+    os.kill(small_site.members[""], signal.SIGKILL)
+    assert command.wait() == 0
+    died = f"supervisord has died; {len(small_site.programs)} services go on without it in {small_site.run}."
+    assert died in command.output
+    command.await_line(SUMMARY)
+
+    code, printed = small_site.do("record")
+    assert (code, printed.splitlines()[0]) == (1, died)
+    assert len(list((small_site.run / "records").iterdir())) == 1
 
 
 def test_record_of_nothing_is_refused(site: Site) -> None:
