@@ -25,7 +25,7 @@ from deploy.chaos.pictures import framed, timeline
 from deploy.chaos.promises import CHECKERS
 from deploy.chaos.report import text
 from deploy.supervision import interruption, processes
-from deploy.supervision.system import DeploymentError, System, set_middleware
+from deploy.supervision.system import DeploymentError, System, make_directory, set_middleware
 
 KEPT = 10  # records
 
@@ -108,7 +108,7 @@ def _holds(path: Path, title: str, namespace: str, name: str) -> bool:
 def _directory() -> Iterator[Path]:
     """Create the directory of a record, and keep the last ten. Only one chaos monkey runs at a time."""
     base = processes.run_directory() / "chaos"
-    base.mkdir(parents=True, exist_ok=True)
+    make_directory(base)
     descriptor = os.open(base, os.O_RDONLY)
     try:
         try:

@@ -29,11 +29,13 @@ def _reader(path: Path) -> Iterator[McapReader]:
     """
     Open a record.
 
-    :raises DeploymentError: if the file is incomplete or not a record.
+    :raises DeploymentError: if the file cannot be read, is incomplete or not a record.
     """
     try:
         with path.open("rb") as file:
             yield make_reader(file)
+    except OSError as error:
+        raise DeploymentError(f"Record {path}: {error.strerror}") from None
     except (McapError, struct.error) as error:  # struct.error: the file ends within a number
         raise DeploymentError(f"{path} is not a complete record: {error}") from None
 

@@ -44,7 +44,6 @@ def save(shift: Shift, path: Path) -> None:
         "scenario": dict(shift.scenario),
         "faults": [each._asdict() for each in shift.faults],
     }
-    path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(yaml.safe_dump(document, sort_keys=False, default_flow_style=None), encoding="utf-8")
 
 

@@ -26,7 +26,7 @@ from deploy.simulation.shrink import shrink
 from deploy.simulation.summary import Summary
 from deploy.simulation.workers import summaries
 from deploy.supervision import interruption, processes
-from deploy.supervision.system import DeploymentError
+from deploy.supervision.system import DeploymentError, make_directory
 
 BAR = 40  # characters
 
@@ -140,6 +140,7 @@ def _conclude(outcome: Outcome, title: str) -> int:
     directory = processes.run_directory() / "simulation"
     name = "".join(each if each.isalnum() else "-" for each in outcome.shift.seed)
     schedule, report = directory / f"{name}.yaml", directory / f"{name}.html"
+    make_directory(directory)
     schedule_file.save(outcome.shift, schedule)
     remarks = [f"{title} · {count(len(outcome.shift.faults), 'fault')} in {outcome.shift.length:.0f} s"]
     report.write_text(page(title, remarks, outcome.findings, outcome.history), encoding="utf-8")

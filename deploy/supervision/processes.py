@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 MARK = "REACTIVE_ARM_SYSTEM"
+RUN_DIRECTORY = "REACTIVE_ARM_RUN_DIR"  # environment variable
 ROOT = Path(__file__).resolve().parents[2]
 
 
@@ -31,7 +32,7 @@ class Process(NamedTuple):
 
 def run_directory() -> Path:
     """The directory of a system's runtime files: REACTIVE_ARM_RUN_DIR, or .run in this checkout."""
-    return Path(os.environ.get("REACTIVE_ARM_RUN_DIR") or ROOT / ".run").resolve()
+    return Path(os.environ.get(RUN_DIRECTORY) or ROOT / ".run").resolve()
 
 
 def environment_of(pid: int) -> dict[str, str]:

@@ -294,7 +294,7 @@ class System:
     @contextmanager
     def _alone(self) -> Iterator[None]:
         """Hold the run directory: only one start or stop at a time."""
-        self.run.mkdir(mode=0o700, parents=True, exist_ok=True)
+        make_directory(self.run, 0o700)
         directory = os.open(self.run, os.O_RDONLY)
         try:
             try:
@@ -307,6 +307,17 @@ class System:
             yield
         finally:
             os.close(directory)
+
+
+def make_directory(path: Path, mode: int = 0o777) -> None:
+    """Make the run directory or one in it, unless it exists. Raises DeploymentError."""
+    try:
+        path.mkdir(mode, parents=True, exist_ok=True)
+    except OSError as error:
+        raise DeploymentError(
+            f"The run directory {path} cannot be made: {error.strerror}."
+            f" Set {processes.RUN_DIRECTORY} to another one."
+        ) from None
 
 
 def scenario_parameters(scenario: Path, origin: float) -> dict[str, object]:

@@ -172,3 +172,9 @@ def test_other_file_is_refused_in_one_line(tmp_path: Path) -> None:
     assert done.returncode == 1
     assert done.stderr.startswith(f"{record} is not a complete record: ")
     assert done.stderr.count("\n") == 1
+
+
+def test_missing_file_is_refused_in_one_line(tmp_path: Path) -> None:
+    done = replay(tmp_path / "nix")
+    expected = f"Record {tmp_path / 'nix'}: No such file or directory\n"
+    assert (done.returncode, done.stderr) == (1, expected)

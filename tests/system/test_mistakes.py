@@ -106,7 +106,9 @@ def test_an_impossible_dds_configuration_is_reported(site: Site, monkeypatch: py
 def test_a_run_directory_that_cannot_be_made_is_reported(site: Site, tmp_path: Path) -> None:
     site.run = tmp_path / "file" / "run"
     site.run.parent.touch()
-    assert site.do("start", STEADY) == (1, f"[Errno 20] Not a directory: '{site.run}'")
+    reason = f"The run directory {site.run} cannot be made: Not a directory."
+    expected = 1, f"{reason} Set REACTIVE_ARM_RUN_DIR to another one."
+    assert site.do("start", STEADY) == expected
     site.run.parent.unlink()
 
 
