@@ -100,7 +100,7 @@ def kill_supervisor(arm: Arm, target: str) -> Undo:
         arm.remember_processor_time(orphans)
         arm.system.start_again()
 
-    return start_again
+    return arm.overlaps.begin("kill_supervisor", start_again)
 
 
 def double(arm: Arm, program: str) -> Undo:

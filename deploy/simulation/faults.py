@@ -69,7 +69,7 @@ def _kill_all(arm: Arm, target: str, duration: float) -> None:
 
 def _kill_supervisor(arm: Arm, target: str, duration: float) -> Undo:
     arm.supervisor.die()
-    return arm.start_again
+    return arm.overlaps.begin("kill_supervisor", arm.start_again)
 
 
 def _double(arm: Arm, program: str, duration: float) -> Undo:

@@ -87,6 +87,20 @@ def test_overlapping_crash_loops_of_a_program_last_until_the_last_one_ends(arm: 
     assert yaml.safe_load(arm.system.parameters.read_text()) == good
 
 
+def test_supervisord_stays_dead_although_an_overlapping_fault_ends(
+    arm: Arm, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    starts: list[System] = []
+    monkeypatch.setattr(System, "start_again", lambda system: starts.append(system))
+    first, second = (FAULT_KINDS["kill_supervisor"].inject(arm, ALL) for _ in range(2))
+    assert first is not None
+    assert second is not None
+    first()
+    assert starts == []
+    second()
+    assert starts == [arm.system]
+
+
 def is_stopped(pid: int) -> bool:
     return processes.stat_of(pid)[0] == "T"
 

@@ -174,6 +174,19 @@ def test_a_fault_lasts_although_an_overlapping_one_ends(
         assert not is_wrong(simulated)
 
 
+def test_supervisord_stays_dead_although_an_overlapping_fault_ends(tmp_path: Path) -> None:
+    with arm.simulated_arm("1", tmp_path, SCENARIO) as simulated:
+        first, second = (FAULT_KINDS["kill_supervisor"].inject(simulated, ALL, 1.0) for _ in range(2))
+        assert first is not None
+        assert second is not None
+        first()
+        simulated.simulation.run(3.0)
+        assert not simulated.supervisor.is_alive
+        second()
+        simulated.simulation.run(6.0)
+        assert simulated.supervisor.is_alive
+
+
 def test_crash_loops_end_one_by_one(tmp_path: Path) -> None:
     def bad() -> set[str]:
         return {name for name in yaml.safe_load((tmp_path / "parameters.yaml").read_text()) if name != "/**"}
