@@ -61,7 +61,11 @@ def unleash(options: argparse.Namespace) -> int:
     with _directory() as directory:
         with new_testbed(directory, say=say, loss=options.loss, steps_clock=planned.steps_clock) as testbed:
             before = Cost.now(testbed.arms)
-            testbed.inject(schedules, length)
+            try:
+                testbed.inject(schedules, length)
+            except interruption.Interrupted:  # the testbed completes the record
+                say(f'To judge the record so far: make chaos CHAOS="--replay {testbed.record}"')
+                raise
             cost = Cost.now(testbed.arms).since(before)
         print(f"\n{cost}")
         return judge(testbed.record, f"{title}, {cost}")
