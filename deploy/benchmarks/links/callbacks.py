@@ -1,7 +1,8 @@
-"""rclpy with plain callbacks."""
+"""rclpy with plain callbacks. As in the C program, a source has one message, and the middle passes it on."""
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Callable
 from typing import Any
 
@@ -26,10 +27,20 @@ class Connection(Link):
 
     def publisher(self, topic: str) -> Callable[[Item], object]:
         publisher = self.node.create_publisher(UInt8MultiArray, topic, self.qos)
-        return lambda item: publisher.publish(UInt8MultiArray(data=item))
+        message = UInt8MultiArray(data=array("B", bytes(self.job.size)))
+
+        def send(item: Item) -> None:
+            message.data[:8] = item[:8]
+            publisher.publish(message)
+
+        return send
 
     def subscribe(self, topic: str, on_item: Callable[[Any], object]) -> None:
         self.node.create_subscription(UInt8MultiArray, topic, lambda message: on_item(message.data), self.qos)
+
+    def forward(self, source: str, target: str) -> None:
+        publisher = self.node.create_publisher(UInt8MultiArray, target, self.qos)
+        self.node.create_subscription(UInt8MultiArray, source, publisher.publish, self.qos)
 
     def wait(self, seconds: float) -> None:
         rclpy.spin_once(self.node, timeout_sec=seconds)

@@ -26,5 +26,5 @@ class Connection(callbacks.Connection):
 
     def forward(self, source: str, target: str) -> None:
         items = self.node.create_observable(UInt8MultiArray, source, self.qos)
-        copies = items.map(lambda message: UInt8MultiArray(data=message.data))
-        self.node.publish_observable(copies, UInt8MultiArray, target, self.qos)
+        mapped = items.map(lambda message: message)  # a recipe has at least one operator
+        self.node.publish_observable(mapped, UInt8MultiArray, target, self.qos)

@@ -12,10 +12,6 @@ from std_msgs.msg import UInt8MultiArray
 from deploy.benchmarks.links import callbacks
 
 
-def _copy(message: Any) -> Any:
-    return UInt8MultiArray(data=message.data)
-
-
 class Connection(callbacks.Connection):
     """A node whose subscriptions feed subjects, and whose publisher observes."""
 
@@ -27,7 +23,7 @@ class Connection(callbacks.Connection):
 
     def forward(self, source: str, target: str) -> None:
         publisher = self.node.create_publisher(UInt8MultiArray, target, self.qos)
-        self._from_topic(source).pipe(operators.map(_copy)).subscribe(publisher.publish)
+        self._from_topic(source).pipe(operators.map(lambda message: message)).subscribe(publisher.publish)
 
     def _from_topic(self, topic: str) -> Subject[Any]:
         items: Subject[Any] = Subject()
