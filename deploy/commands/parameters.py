@@ -48,7 +48,7 @@ def of_system(scenario_name: str, user_file: str) -> dict[str, Any]:
         raise DeploymentError(str(error)) from error
     shared = given.pop(ALL, {}).get(KEY, {})
     page = f"{namespace_of(os.environ).rstrip('/')}/{manifest.PAGE}"
-    if user_file:
+    if user_file and manifest.PAGE in parameter_file.declared():
         _check_page(user_file, shared | given.get(page, {}).get(KEY, {}))
     parameters: dict[str, Any] = scenario_parameters(path, NOT_YET)
     parameters[ALL][KEY] |= shared
