@@ -48,7 +48,7 @@ def of_system(scenario_name: str, user_file: str) -> dict[str, Any]:
         raise DeploymentError(str(error)) from error
     shared = given.pop(ALL, {}).get(KEY, {})
     page = f"{namespace_of(os.environ).rstrip('/')}/{manifest.PAGE}"
-    if user_file and manifest.PAGE in parameter_file.declared():
+    if user_file:
         _check_page(user_file, shared | given.get(page, {}).get(KEY, {}))
     parameters: dict[str, Any] = scenario_parameters(path, NOT_YET)
     parameters[ALL][KEY] |= shared
@@ -59,7 +59,9 @@ def of_system(scenario_name: str, user_file: str) -> dict[str, Any]:
 
 def _check_page(user_file: str, given: Mapping[str, Any]) -> None:
     """Raise DeploymentError if the page cannot have the address and the certificate that a file gives."""
-    declared = parameter_file.declared()[manifest.PAGE]
+    declared = parameter_file.declared().get(manifest.PAGE)
+    if declared is None:  # a system without the page
+        return
     host, *files = (given.get(name, declared[name].default) for name in ("address", "certificate", "key"))
     try:
         # The page runs in the run directory.
