@@ -1,10 +1,13 @@
-"""Best-effort console output that never blocks."""
+"""Best-effort console output that never blocks for long."""
 
 from __future__ import annotations
 
 import select
 import sys
 from typing import TextIO
+
+PATIENCE = 0.1  # s: a terminal takes nothing for a moment while another thread writes to it
+_patience = PATIENCE  # none while the reader is stuck
 
 
 def say(line: str) -> None:
@@ -16,6 +19,12 @@ def say(line: str) -> None:
 
     :raises BrokenPipeError: if the pipe has no reader any more.
     """
+    global _patience
     output: TextIO | None = sys.stdout
-    if output and select.select([], [output], [], 0)[1]:
+    if not output:
+        return
+    if select.select([], [output], [], _patience)[1]:
+        _patience = PATIENCE
         print(line, flush=True)
+    else:
+        _patience = 0.0

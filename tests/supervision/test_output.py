@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import os
+import select
 import subprocess
 import sys
+import threading
+from contextlib import suppress
+from typing import Any
 
 import pytest
 
+from deploy.console import output
 from deploy.console.output import say
 from deploy.supervision.processes import ROOT
 
@@ -29,6 +35,34 @@ def test_reader_that_does_not_read_blocks_nothing() -> None:
         lines = process.stdout.read().splitlines()
     assert 0 < len(lines) < LINES
     assert set(lines) == {b"#" * 99}
+
+
+def test_reader_that_is_late_for_a_moment_gets_the_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    reading, writing = os.pipe()
+    os.set_blocking(writing, False)
+    with open(reading, "rb") as reader, open(writing, "w") as pipe:
+        with suppress(BlockingIOError):
+            while True:
+                os.write(writing, b"#" * 4096)
+        waits, wait = threading.Event(), select.select
+
+        def noted(*arguments: Any) -> Any:
+            waits.set()
+            return wait(*arguments)
+
+        def read() -> None:
+            waits.wait()
+            while b"late" not in reader.read1():
+                pass
+
+        monkeypatch.setattr(output, "_patience", 60.0)
+        monkeypatch.setattr(select, "select", noted)
+        monkeypatch.setattr(sys, "stdout", pipe)
+        late = threading.Thread(target=read, daemon=True)
+        late.start()
+        say("late")
+        late.join(60.0)
+        assert not late.is_alive(), "the line was dropped"
 
 
 def test_closed_standard_output_gets_nothing() -> None:
