@@ -32,6 +32,7 @@ from services import engine_controller, operator_watchdog
 
 LINGER = 5.0  # s after the last page has left until its topics are given up: a reload is faster
 LINES_PERIOD = 0.5  # s
+UNSEEN_PERIOD = 0.3  # s at which the engines' state is read while no page shows it; it lives for 0.4 s
 PUBLISHED_WITHIN = timedelta(milliseconds=50)
 
 
@@ -86,10 +87,17 @@ def wire(node: ServiceNode) -> None:
     def seen(topic: topics.Topic) -> Observable[Any]:
         return observed[topic.name]
 
+    # Ten times a second is often for what nobody sees: it would be half of the work of this process.
+    sampled = node.observe(topics.ENGINES_STATE, timestamped=True, sampled=UNSEEN_PERIOD)
+    engines = is_open.start_with(False).switch_map(lambda it: seen(topics.ENGINES_STATE) if it else sampled)
+
+    def always_seen(topic: topics.Topic) -> Observable[Any]:
+        return engines if topic is topics.ENGINES_STATE else seen(topic)
+
     lines = line_batches(seen, turn_offs.map(just_now), rx.interval(LINES_PERIOD), node.get_namespace())
     session = state.while_open(seen, lines, node.get_namespace(), clock)
     changes = rx.merge(
-        state.always(seen, new_watchdogs(node, origin), clock),
+        state.always(always_seen, new_watchdogs(node, origin), controllers(node), clock),
         is_open.switch_map(lambda it: session if it else rx.never()),
         switch.holds.map(state.held),
         switch.pressed.map(state.held_by_terminal),
@@ -128,6 +136,12 @@ def new_watchdogs(node: ServiceNode, origin: Origin) -> Observable[bool]:
     matches = node.create_event_observable(topic.type, topic.name, topic.qos, "matched")
     appeared = matches.filter(lambda it: it.current_count_change > 0)
     return appeared.map_indexed(lambda _, index: index > 0 or not origin.is_past)
+
+
+def controllers(node: ServiceNode) -> Callable[[], frozenset[tuple[int, ...]]]:
+    """Return what returns the identifiers of the publishers of the engines' state."""
+    name = node.resolve_topic_name(topics.ENGINES_STATE.name)
+    return lambda: frozenset(tuple(each.endpoint_gid) for each in node.get_publishers_info_by_topic(name))
 
 
 def just_now(_: Any) -> Span:

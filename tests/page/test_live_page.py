@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 
+from deploy.console.page.state import RESTARTED
 from deploy.supervision.manifest import PAGE
 from deploy.supervision.system import System
 from interfaces import topics
@@ -128,6 +129,18 @@ def test_engines_go_off_in_time_when_the_hand_is_gone(hand: Hand, observer: Obse
     assert off - released <= S1
     observer.until(lambda: "incapacitated" in hand.shown["engines"]["why"])
     assert hand.shown["operator"]["strikes_left"] == 0
+
+
+def test_killed_controller_is_the_reason_that_the_engines_are_off(
+    hand: Hand, observer: Observer, module_site: Site
+) -> None:
+    hold(hand, observer)
+    observer.watch(1.0)
+    hand.say("engines", command="turn_on")
+    observer.until(lambda: hand.shown["engines"]["state"] == ON)
+    os.kill(module_site.members["engine_controller"], signal.SIGKILL)
+    observer.until(lambda: hand.shown["engines"]["state"] == OFF)
+    assert hand.shown["engines"]["why"] == RESTARTED
 
 
 def test_closed_page_is_released(address: str, observer: Observer) -> None:

@@ -37,6 +37,7 @@ class Play:
         self.changes: list[Any] = []
         self.watchdogs: list[Any] = []
         self.lines: list[Any] = []
+        self.controllers = [(0.0, frozenset({"first"}))]  # since when they are on the graph
 
     def now(self) -> float:
         return float(self._scheduler.clock)
@@ -51,6 +52,9 @@ class Play:
     def note(self, time: float, change: state.Change) -> None:
         self.changes.append(on_next(time, [change]))  # a callable would be a predicate
 
+    def present_controllers(self) -> frozenset[str]:
+        return [present for since, present in self.controllers if since <= self.now()][-1]
+
     def run(self, until: float, initial: PageState | None = None, *, opened: float = 200.5) -> PageState:
         """The state at a time."""
 
@@ -59,7 +63,7 @@ class Play:
 
         def create() -> rx.Observable[PageState]:
             hot = self._scheduler.create_hot_observable
-            always = state.always(seen, hot(*self.watchdogs), self.clock)
+            always = state.always(seen, hot(*self.watchdogs), self.present_controllers, self.clock)
             session = state.while_open(seen, hot(*self.lines), "/arm", self.clock)
             changes = rx.merge(
                 always,
@@ -303,10 +307,24 @@ def test_controller_turned_them_off_without_a_command(play: Play) -> None:
     assert view(play.run(210), "page", 209.2)["engines"]["why"] == state.BY_CONTROLLER
 
 
-def test_controller_was_killed(play: Play) -> None:
+def test_controller_was_stopped(play: Play) -> None:
     engines(play, (209, ON), (211, OFF))
 
     assert view(play.run(212), "page", 211.1)["engines"]["why"] == state.RESTARTED
+
+
+def test_controller_was_killed_and_is_back_at_once(play: Play) -> None:
+    play.controllers += [(210.1, frozenset({"first", "second"}))]  # DDS notices later that the first is gone
+    engines(play, (209, ON), (210, ON), (210.2, OFF))
+
+    assert view(play.run(211), "page", 210.3)["engines"]["why"] == state.RESTARTED
+
+
+def test_controller_that_was_killed_before_turns_them_off_itself(play: Play) -> None:
+    play.controllers += [(210.1, frozenset({"first", "second"})), (210.7, frozenset({"second"}))]
+    engines(play, (209, ON), (210, ON), (210.2, OFF), (210.5, ON), (210.9, OFF))
+
+    assert view(play.run(211), "page", 211.0)["engines"]["why"] == state.BY_CONTROLLER
 
 
 def test_old_reason_is_forgotten_when_they_are_on_again(play: Play) -> None:

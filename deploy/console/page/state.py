@@ -92,6 +92,8 @@ class PageState(NamedTuple):
     engines: str | None = None
     reported: float = -math.inf
     """When the engines' state was published."""
+    controllers: frozenset[Any] = frozenset()
+    """The publishers of the engines' state when they went on."""
     off_since: float = -math.inf
     since_when: str = NOT_YET
     """Why the engines are off, if no command explains it."""
@@ -121,17 +123,20 @@ def page_states(changes: Observable[Change], initial: PageState) -> Observable[P
     return changes.scan(lambda state, change: change(state), initial)
 
 
-def always(seen: Seen, watchdogs: Observable[bool], clock: Clock) -> Observable[Change]:
+def always(
+    seen: Seen, watchdogs: Observable[bool], controllers: Callable[[], frozenset[Any]], clock: Clock
+) -> Observable[Change]:
     """
     The changes that count even while no page is open: a page that opens later shows strikes and reasons.
 
     :param watchdogs: emits for each operator watchdog that appears, whether its strikes are known to begin.
+    :param controllers: returns the present publishers of the engines' state.
     """
     return rx.merge(
         watchdogs.map(lambda begins: lambda state: _new_watchdog(state, begins)),
         _changes(seen(topics.OPERATOR_ACTIVITY), _activity, clock),
         _changes(seen(topics.ENGINES), _command, clock),
-        _changes(seen(topics.ENGINES_STATE), _engines, clock),
+        _changes(seen(topics.ENGINES_STATE), _engines(controllers), clock),
     )
 
 
@@ -256,16 +261,21 @@ def _explain(state: PageState, cause: str, now: float) -> PageState:
     return state._replace(cause=cause, caused=now) if (goes_off or is_older) and is_first else state
 
 
-def _engines(state: PageState, message: Timestamp[Any], clock: Clock) -> PageState:
-    engines, now = message.value.data, clock.now()
-    if engines == ON:
-        # A repeated `on` may come after the command that ends it.
-        cause = state.cause if state.engines == ON and now - state.caused < TOGETHER else ""
-        return state._replace(engines=ON, reported=now, cause=cause, refused=None)
-    if state.engines == ON:
-        fallback = BY_CONTROLLER if now - state.reported < RENEWED else RESTARTED
-        return state._replace(engines=OFF, reported=now, off_since=now, since_when=fallback)
-    return state._replace(engines=OFF, reported=now)
+def _engines(controllers: Callable[[], frozenset[Any]]) -> Callable[[PageState, Any, Clock], PageState]:
+    def change(state: PageState, message: Timestamp[Any], clock: Clock) -> PageState:
+        engines, now = message.value.data, clock.now()
+        if engines == ON:
+            # A repeated `on` may come after the command that ends it.
+            cause = state.cause if state.engines == ON and now - state.caused < TOGETHER else ""
+            known = state.controllers if state.engines == ON else controllers()
+            return state._replace(engines=ON, reported=now, controllers=known, cause=cause, refused=None)
+        if state.engines == ON:
+            is_new = not controllers() <= state.controllers
+            fallback = RESTARTED if is_new or now - state.reported >= RENEWED else BY_CONTROLLER
+            return state._replace(engines=OFF, reported=now, off_since=now, since_when=fallback)
+        return state._replace(engines=OFF, reported=now)
+
+    return change
 
 
 # The processes
