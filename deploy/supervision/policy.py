@@ -43,7 +43,7 @@ class Action(NamedTuple):
 class Timeouts:
     """The times of the policy [s]."""
 
-    period: float = 0.25
+    period: float = 0.5
     """between two observations"""
     health: float = 2.7
     """without health of a service, which reports once a second"""
@@ -100,7 +100,7 @@ class Policy:
         A paused or overloaded machine delays the services' reports as well: they are not silent.
         """
         if self._last_time is not None:
-            self._paused += max(0.0, observation.time - self._last_time - 2 * self._timeouts.period)
+            self._paused += max(0.0, observation.time - self._last_time - self._timeouts.period)
         self._last_time = observation.time
         before, self._last_health = self._last_health, {}
         for process, when in observation.last_health.items():

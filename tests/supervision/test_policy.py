@@ -188,10 +188,10 @@ def test_pauses_of_the_sentinel_count_for_no_silence() -> None:
         run.hear("ab")
         assert run.decide() == []
     run.now += 30.0
-    assert run.decide() == []  # own time has advanced by two periods
+    assert run.decide() == []  # own time has advanced by one period
     resumed = run.now
 
-    assert run.first(200.0, healthy="b") == (resumed + 2.0, [silence_of(2.5, "a")])
+    assert run.first(200.0, healthy="b") == (resumed + 2.25, [silence_of(2.5, "a")])
 
 
 def test_restarts_within_a_minute_are_recent() -> None:
