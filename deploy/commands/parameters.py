@@ -48,8 +48,8 @@ def of_system(scenario_name: str, user_file: str) -> dict[str, Any]:
         raise DeploymentError(str(error)) from error
     shared = given.pop(ALL, {}).get(KEY, {})
     page = f"{namespace_of(os.environ).rstrip('/')}/{manifest.PAGE}"
-    if user_file:
-        _check_page(user_file, shared | given.get(page, {}).get(KEY, {}))
+    if user_file and (files := _page_files(user_file, shared | given.get(page, {}).get(KEY, {}))):
+        given.setdefault(page, {KEY: {}})[KEY].update(files)
     parameters: dict[str, Any] = scenario_parameters(path, NOT_YET)
     parameters[ALL][KEY] |= shared
     if (port := _port(os.environ.get(WEB, ""))) is not None:
@@ -57,17 +57,23 @@ def of_system(scenario_name: str, user_file: str) -> dict[str, Any]:
     return parameters | given
 
 
-def _check_page(user_file: str, given: Mapping[str, Any]) -> None:
-    """Raise DeploymentError if the page cannot have the address and the certificate that a file gives."""
+def _page_files(user_file: str, given: Mapping[str, Any]) -> dict[str, str]:
+    """
+    Return the files that the page is given: a relative path counts from the folder of the parameter file.
+
+    :raises DeploymentError: if the page cannot have the address and the certificate that it is given.
+    """
     declared = parameter_file.declared().get(manifest.PAGE)
     if declared is None:  # a system without the page
-        return
-    host, *files = (given.get(name, declared[name].default) for name in ("address", "certificate", "key"))
+        return {}
+    folder = Path(user_file).resolve().parent
+    files = {name: str(folder / given[name]) for name in ("certificate", "key") if given.get(name)}
+    host = given.get("address", declared["address"].default)
     try:
-        # The page runs in the run directory.
-        tls(host, *(str(processes.run_directory() / file) if file else "" for file in files))
+        tls(host, files.get("certificate", ""), files.get("key", ""))
     except UserError as error:
         raise DeploymentError(f"{user_file}: {manifest.PAGE}: {error}") from None
+    return files
 
 
 def _port(web: str) -> int | None:

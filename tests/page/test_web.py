@@ -1,4 +1,4 @@
-"""WEB: the environment variable that moves the page, or switches it off."""
+"""What the page is started with: WEB moves it or switches it off, a parameter file sets the rest."""
 
 from __future__ import annotations
 
@@ -40,3 +40,17 @@ def test_web_wins_over_the_parameter_file(tmp_path: Path) -> None:
 
     assert port_of("", user_file=str(file)) == {"port": 9000, "names": "arm.example"}
     assert port_of("8000", user_file=str(file)) == {"port": 8000, "names": "arm.example"}
+
+
+def test_files_of_the_page_are_beside_the_parameter_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    loaded: list[tuple[str, ...]] = []
+    monkeypatch.setattr(parameters, "tls", lambda *given: loaded.append(given))
+    file = tmp_path / "parameters.yaml"
+    file.write_text("operator_console: {ros__parameters: {certificate: arm.pem, key: /etc/arm.key}}")
+
+    started_with = port_of("", user_file=str(file))
+
+    assert started_with == {"certificate": str(tmp_path / "arm.pem"), "key": "/etc/arm.key"}
+    assert loaded == [("127.0.0.1", str(tmp_path / "arm.pem"), "/etc/arm.key")]

@@ -55,7 +55,7 @@ def test_an_error_in_a_parameter_file_is_reported_before_the_start(site: Site, t
     [
         ("{address: abc}", "address: 'abc' is not an IPv4 address"),
         ("{address: 0.0.0.0}", "address: 0.0.0.0 is not loopback and needs TLS: set certificate and key"),
-        ("{certificate: it.pem}", "certificate '{run}/it.pem': No such file or directory"),
+        ("{certificate: it.pem}", "certificate '{folder}/it.pem': No such file or directory"),
         ("{certificate: /it.pem, key: /k}", "certificate '/it.pem' or key '/k': No such file or directory"),
     ],
 )
@@ -64,7 +64,7 @@ def test_a_page_that_cannot_be_served_is_reported_before_the_start(
 ) -> None:
     file = tmp_path / "mine.yaml"
     file.write_text(f"operator_console: {{ros__parameters: {page}}}")
-    expected = f"{file}: operator_console: {complaint.format(run=site.run)}"
+    expected = f"{file}: operator_console: {complaint.format(folder=tmp_path)}"
     assert site.do("start", STEADY, str(file)) == (1, expected)
     assert not site.run.exists()
 
