@@ -132,14 +132,21 @@ def _record(
     offered = qos_profiles(topic)
     # The loss is reported before or after the next message is: the one before both is among the last two.
     last_two: deque[int] = deque(maxlen=2)
+    is_numbered = len(topic.publishers) == 1  # and not by Cyclone DDS
+    last_number: int | None = None
 
     def write(data: bytes, info: Any) -> None:
+        nonlocal last_number
         if not last_two:
             first(name)
         now = time.monotonic_ns()
         last_two.append(now)
         age = time.time_ns() - info["source_timestamp"]
         recorder.message(name, topic.type_name, offered, data, now, now - age)
+        number = info["publication_sequence_number"] if is_numbered else None
+        if last_number is not None and number is not None and number > last_number + 1:
+            report_loss(info)  # Fast DDS does not report each one
+        last_number = number
 
     def report_loss(info: Any) -> None:
         now = time.monotonic_ns()

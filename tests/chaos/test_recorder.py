@@ -58,9 +58,16 @@ def node(tmp_path: Path, reports: list[tuple[float, float]]) -> Iterator[Subscri
     file.close()
 
 
-def receive(node: Subscriptions, clock: Clock, at: float) -> None:
+def receive(
+    node: Subscriptions,
+    clock: Clock,
+    at: float,
+    topic: topics.Topic = topics.L2,
+    number: int | None = None,
+) -> None:
     clock.now = at
-    node.write[topics.L2.name](b"", {"source_timestamp": time.time_ns()})
+    info = {"source_timestamp": time.time_ns(), "publication_sequence_number": number}
+    node.write[topic.name](b"", info)
 
 
 def lose(node: Subscriptions, clock: Clock, at: float, topic: topics.Topic = topics.L2) -> None:
@@ -88,6 +95,30 @@ def test_a_loss_is_reported_from_the_last_message_before_it(
     assert covered(reports, 4.0)
     assert not covered(reports, 0.9)
     assert not covered(reports, 4.1)
+
+
+def test_a_missing_number_is_a_loss(
+    node: Subscriptions, clock: Clock, reports: list[tuple[float, float]]
+) -> None:
+    for at, number in ((1.0, 7), (2.0, 8), (3.0, 10), (4.0, 11)):
+        receive(node, clock, at, number=number)
+    assert reports == [(2.0, 3.0)]
+
+
+def test_numbers_of_a_new_publisher_begin_anew(
+    node: Subscriptions, clock: Clock, reports: list[tuple[float, float]]
+) -> None:
+    for at, number in ((1.0, 7), (2.0, 1), (3.0, 2)):
+        receive(node, clock, at, number=number)
+    assert not reports
+
+
+def test_numbers_of_several_publishers_mean_nothing(
+    node: Subscriptions, clock: Clock, reports: list[tuple[float, float]]
+) -> None:
+    for at, number in ((1.0, 7), (2.0, 90), (3.0, 8), (4.0, 91)):
+        receive(node, clock, at, topics.ENGINES, number)
+    assert not reports
 
 
 def test_a_loss_before_the_first_message_is_a_moment(
