@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import ssl
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import timedelta
 from typing import Any
 
 import reactivex as rx
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 from reactivex import Observable
 from reactivex.subject import BehaviorSubject, Subject
 from std_msgs.msg import Bool, String
@@ -32,7 +33,11 @@ from services import engine_controller, operator_watchdog
 
 LINGER = 5.0  # s after the last page has left until its topics are given up: a reload is faster
 LINES_PERIOD = 0.5  # s
-UNSEEN_PERIOD = 0.3  # s at which the engines' state is read while no page shows it; it lives for 0.4 s
+BEST_EFFORT = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+UNSEEN = replace(topics.ENGINES_STATE, qos=BEST_EFFORT)
+"""The engines' state while no page shows it. To read and acknowledge it ten times a second would cost more
+than the rest of this process."""
+UNSEEN_PERIOD = 0.3  # s
 PUBLISHED_WITHIN = timedelta(milliseconds=50)
 
 
@@ -87,9 +92,8 @@ def wire(node: ServiceNode) -> None:
     def seen(topic: topics.Topic) -> Observable[Any]:
         return observed[topic.name]
 
-    # Ten times a second is often for what nobody sees: it would be half of the work of this process.
-    sampled = node.observe(topics.ENGINES_STATE, timestamped=True, sampled=UNSEEN_PERIOD)
-    engines = is_open.start_with(False).switch_map(lambda it: seen(topics.ENGINES_STATE) if it else sampled)
+    unseen = node.observe(UNSEEN, timestamped=True, sampled=UNSEEN_PERIOD)
+    engines = is_open.start_with(False).switch_map(lambda it: seen(topics.ENGINES_STATE) if it else unseen)
 
     def always_seen(topic: topics.Topic) -> Observable[Any]:
         return engines if topic is topics.ENGINES_STATE else seen(topic)

@@ -84,8 +84,8 @@ class ServiceNode(ReactiveNode):
         Return the good messages of a topic; the others are dropped and reported.
 
         :param timestamped: see :meth:`ReactiveNode.create_observable`.
-        :param sampled: the same; of a latched topic only what publishers send that latch it.
-        :param buffered: likewise.
+        :param sampled: the same; not for a latched topic.
+        :param buffered: the same.
         :param max_age: a message that is older [s], or this much ahead of the local clock, is not good.
         """
         self._observed[self.resolve_topic_name(topic.name)] = topic
@@ -94,10 +94,8 @@ class ServiceNode(ReactiveNode):
             # Raw, because rclpy on Cyclone DDS would deliver a truncated message as one of zeros.
             return self.create_observable(topic.type, topic.name, qos, timestamped=True, raw=True, **options)
 
-        is_timed = sampled is not None or buffered is not None
-        shared = None
-        if is_timed or not is_latched(topic.qos):
-            shared = create(topic.qos, sampled=sampled, buffered=buffered)
+        read_by = {"sampled": sampled, "buffered": buffered}
+        shared = None if is_latched(topic.qos) else create(topic.qos, **read_by)
 
         def subscribe(
             observer: abc.ObserverBase[Any], _: abc.SchedulerBase | None = None

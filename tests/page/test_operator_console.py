@@ -18,6 +18,7 @@ from websockets.sync.client import ClientConnection, connect
 
 from deploy.console import operator_console
 from deploy.console.page import remote
+from deploy.console.page.state import RESTARTED
 from deploy.supervision.system import PAGE_FILE
 from interfaces import topics
 from interfaces.service import ServiceNode
@@ -334,6 +335,25 @@ def test_topics_are_observed_only_while_a_page_is_open(world: World, monkeypatch
     with world.page():
         world.until(lambda: observed() > always | {"/effector/position", "/diagnostics", "/parameter_events"})
     world.until(lambda: observed() == always)
+
+
+def test_page_tells_why_the_engines_went_off_while_none_was_open(
+    world: World, make_node: Callable[..., Any]
+) -> None:
+    def controller(name: str, engines: str) -> Any:
+        node = make_node(name)
+        publisher = node.create_publisher(String, "engines/state", topics.ENGINES_STATE.qos)
+        node.create_timer(0.1, lambda: publisher.publish(String(data=engines)))
+        return node
+
+    killed = controller("killed", topics.ON)
+    world.for_seconds(1.0)
+    killed.destroy_node()
+    controller("successor", topics.OFF)
+    world.for_seconds(1.0)
+
+    with world.page() as page:
+        assert page.shown["engines"]["why"] == RESTARTED
 
 
 def test_taken_port_disables_the_page_and_nothing_else(
