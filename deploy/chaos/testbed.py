@@ -106,6 +106,7 @@ class Testbed:
         self._stack = ExitStack()
         self._epoch = 0.0  # origin of the scenario
         self._origin = 0.0  # of the record
+        self._seen: set[str] = set()  # topics with a message
 
     def __enter__(self) -> Testbed:
         with ExitStack() as stack:
@@ -126,7 +127,8 @@ class Testbed:
                     self.start(arm, parameters)
                 arm.environment()
                 # One arm after the other: starting together would take each of them too long.
-                self._await_output(arm, lines)
+                self._await_messages([arm], [topics.ENGINES_STATE], lines)
+            self._await_messages(self.arms, [*OUTPUTS.values()], lines)
             self._stack = stack.pop_all()
         return self
 
@@ -224,13 +226,15 @@ class Testbed:
         self._origin = float(origin.removeprefix("observing "))
         return lines
 
-    def _await_output(self, arm: Arm, lines: queue.Queue[str]) -> None:
-        """Wait until the observer has seen the output of every program."""
-        missing = {f"{arm.namespace.rstrip('/')}/{topic.name}" for topic in OUTPUTS.values()}
-        deadline = time.monotonic() + START_TIMEOUT
-        while missing:
+    def _await_messages(
+        self, arms: Sequence[Arm], awaited: Sequence[topics.Topic], lines: queue.Queue[str]
+    ) -> None:
+        """Wait until the observer has seen a message on each topic of each arm; most follow the scenario."""
+        names = {topic.full_name(arm.namespace) for arm in arms for topic in awaited}
+        deadline = max(time.monotonic(), self._epoch) + START_TIMEOUT
+        while missing := names - self._seen:
             line = self._next(lines, deadline, f"No message on {', '.join(sorted(missing))}")
-            missing.discard(line.removeprefix("seen "))
+            self._seen.add(line.removeprefix("seen "))
 
     def _next(self, lines: queue.Queue[str], deadline: float, error: str) -> str:
         while time.monotonic() < deadline:
