@@ -28,7 +28,8 @@ def draw(results: Mapping[str, Results], file: Path) -> None:
         for color, (kind, rows) in enumerate(results.items()):
             points = [(int(count), figures[name][0]) for count, figures in rows.items() if name in figures]
             if points:
-                axes.plot(*zip(*points, strict=True), marker="o", label=kind, color=f"C{color}")
+                line = axes.plot(*zip(*points, strict=True), marker="o", label=kind, color=f"C{color}")
+                line[0].set_clip_on(False)  # a marker may be on the edge
         axes.set_title(title, loc="left", fontsize=10)
         axes.set_xlabel(number)
         axes.set_xlim(left=0)
