@@ -107,7 +107,8 @@ def read_points_numpy(
     """Return fields of one type as a plain array with a row for each point; see :func:`read_points`."""
     points = read_points(cloud, field_names, skip_nans, uvs, reshape_organized_cloud)
     assert len(_types(points.dtype)) <= 1, "the fields have several types: use read_points()"
-    return structured_to_unstructured(points)
+    plain: NDArray[Any] = structured_to_unstructured(points)
+    return plain
 
 
 def read_points_list(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,7 +51,8 @@ def average_velocity(
     to_reference = lookup(reference_frame, tracking_frame, time)
     origin = to_reference[:3, 3]
     angular = to_reference[:3, :3] @ angular
-    linear = to_reference[:3, :3] @ linear + np.cross(origin, angular)
+    swept: NDArray[Any] = np.cross(origin, angular)
+    linear = to_reference[:3, :3] @ linear + swept
 
     # of the reference point
     point = lookup(reference_frame, reference_point_frame, time) @ (*reference_point, 1.0)
