@@ -298,7 +298,8 @@ class Executor(AbstractContextManager["Executor"]):
 
     def _next(self, deadline: int | None, condition: Callable[[], bool] | None) -> tuple[Any, Any]:
         """Wait for work: return an entity and the data taken from it, or a task and ``None``."""
-        self._check(condition)
+        if condition is not None or self._is_shutdown or not self._context._valid:  # saves the call
+            self._check(condition)
         waited = False
         while True:
             if self._entities_changed:
@@ -353,7 +354,8 @@ class Executor(AbstractContextManager["Executor"]):
 
         :return: whether :meth:`wake` was called.
         """
-        timeout = INFINITY if deadline is None else _remaining(deadline)
+        now = time.monotonic_ns()
+        timeout = INFINITY if deadline is None else max(0, deadline - now)
         if self._tasks:
             self._tasks_were_first = not self._tasks_were_first
             if self._tasks_were_first:  # as in rclpy; the next time, they come after the data
@@ -368,7 +370,7 @@ class Executor(AbstractContextManager["Executor"]):
         for timer in self._timers:
             if timer._canceled:  # most timers of schedulers are: saves the call
                 continue
-            remaining = timer._remaining()
+            remaining = timer._next_call - now if timer._is_steady else timer._remaining()
             if remaining <= 0:
                 if self.can_execute(timer):
                     next_timer, timeout = None, 0

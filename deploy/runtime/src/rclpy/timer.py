@@ -59,6 +59,7 @@ class Timer:
         self._context = get_default_context() if context is None else context
         self._clock = clock
         self._source = clock.handle
+        self._is_steady = clock.clock_type == ClockType.STEADY_TIME
         self._period = int(timer_period_ns)
         self._last_call = self._source.nanoseconds()
         self._next_call = self._last_call + self._period
@@ -138,7 +139,7 @@ class Timer:
 
     def destroy(self) -> None:
         """Destroy it. :meth:`rclpy.node.Node.destroy_timer` also removes it from the node."""
-        self._destroyed = True
+        self._destroyed = self._canceled = True
         if self._jump_handle is not None:
             self._jump_handle.unregister()
 
@@ -146,7 +147,7 @@ class Timer:
 
     def _remaining(self) -> int:
         """Return the time to wait [ns]: infinite if canceled, or not yet due in simulated time."""
-        if self._canceled or self._destroyed:
+        if self._canceled:
             return INFINITY
         override = self._source._override
         if override is None:
@@ -155,7 +156,7 @@ class Timer:
         return INFINITY if self._next_call > override else 0
 
     def _take(self) -> tuple[()] | None:
-        if self._destroyed or self._canceled:
+        if self._canceled:
             return None
         override = self._source._override
         now = self._source._read() if override is None else override

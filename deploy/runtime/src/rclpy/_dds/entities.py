@@ -375,7 +375,9 @@ class WaitSet:
         count = blocking.dds_waitset_wait(*arguments)
         if not count or self.closed:
             return []
-        return tokens[: min(checked(count, "cannot wait"), len(tokens))]
+        if count < 0:  # here: most waits save the call
+            checked(count, "cannot wait")
+        return tokens[: min(count, len(tokens))]
 
     def close(self) -> None:
         """Close the wait set and end its waits; attached conditions and entities stay open."""
