@@ -68,6 +68,25 @@ def test_node_ends_although_an_observer_raises(node: ReactiveNode, peer: Node) -
     assert not list(node.timers)
 
 
+def test_recipe_that_fails_at_its_end_keeps_no_other_from_its_end(node: ReactiveNode) -> None:
+    ended: list[str] = []
+
+    def end(name: str) -> Callable[[], None]:
+        def fail() -> None:
+            ended.append(name)
+            raise ValueError(name)
+
+        return fail
+
+    for name in ("first", "second"):
+        node.publish_observable(Subject[String]().finally_action(end(name)), String, name)
+
+    with pytest.raises(ValueError, match="second"):
+        node.destroy_node()
+
+    assert ended == ["first", "second"]
+
+
 @each_kind
 def test_observable_of_ended_node_completes_at_once(node: ReactiveNode, create: Create) -> None:
     observable = create(node)

@@ -366,11 +366,13 @@ class ReactiveNode(Node):
         """
         End the node; its observables complete first.
 
-        If observers raise, the first of their errors is raised afterwards.
+        If observers or disposals of recipes raise, one of their errors is raised afterwards.
         """
         with ExitStack() as stack:
             stack.callback(super().destroy_node)
             if not self._end.is_stopped:
                 stack.callback(self.scheduler.dispose)
                 stack.callback(self._sinks.dispose)
+                for sink in reversed(self._sinks.to_list()):  # each, also if another one raises
+                    stack.callback(sink.dispose)
                 self._end.come()
