@@ -233,7 +233,7 @@ class Testbed:
         names = {topic.full_name(arm.namespace) for arm in arms for topic in awaited}
         deadline = max(time.monotonic(), self._epoch) + START_TIMEOUT
         while missing := names - self._seen:
-            line = self._next(lines, deadline, f"No message on {', '.join(sorted(missing))}")
+            line = self._next(lines, deadline, _no_message(sorted(missing), len(arms)))
             self._seen.add(line.removeprefix("seen "))
 
     def _next(self, lines: queue.Queue[str], deadline: float, error: str) -> str:
@@ -242,6 +242,13 @@ class Testbed:
             with suppress(queue.Empty):
                 return lines.get(timeout=0.1)
         raise DeploymentError(error)
+
+
+def _no_message(topic_names: Sequence[str], arms: int) -> str:
+    shown, more = ", ".join(topic_names[:3]), len(topic_names) - 3
+    others = f" and {more} more topics" if more > 0 else ""
+    advice = ": try fewer --arms" if arms > 1 else ""
+    return f"No message on {shown}{others} within {START_TIMEOUT:.0f} s{advice}"
 
 
 def _packet_loss(percent: float) -> dict[str, str]:
