@@ -8,6 +8,7 @@ a person takes the switch.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from operator import attrgetter
 
 import reactivex as rx
 from reactivex import Observable
@@ -66,7 +67,7 @@ def wire(node: ServiceNode) -> None:
         source.until_set("pressed", source.play(source.scenario.heartbeats)),
     )
     node.publish(OPERATOR_HEARTBEAT, beats, lambda beat: Bool(data=beat))
-    states = node.observe(ENGINES_STATE).map(lambda state: state.data)
+    states = node.observe(ENGINES_STATE, attrgetter("data"))
     commands = engine_commands(source.play(source.scenario.commands), states)
     # A person who takes the switch replaces the virtual operator, also for the commands.
     commands = source.until_set("pressed", commands)

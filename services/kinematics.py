@@ -7,6 +7,7 @@ effector, a pair of its x and y coordinates.
 from __future__ import annotations
 
 import math
+from operator import attrgetter
 
 import reactivex as rx
 from geometry_msgs.msg import Point, PointStamped
@@ -44,16 +45,14 @@ def effector_position(
 def wire(node: ServiceNode) -> None:
     """Connect the recipe with its topics."""
 
-    frame = frame_id(BASE, node.get_namespace())
+    frame, clock = frame_id(BASE, node.get_namespace()), node.get_clock()
 
     def message(position: tuple[float, float]) -> PointStamped:
         x, y = position
-        header = Header(stamp=node.get_clock().now().to_msg(), frame_id=frame)
+        header = Header(stamp=clock.now().to_msg(), frame_id=frame)
         return PointStamped(header=header, point=Point(x=x, y=y))
 
-    l1, l2, theta1, theta2 = (
-        node.observe(topic).map(lambda message: message.data) for topic in (L1, L2, THETA1, THETA2)
-    )
+    l1, l2, theta1, theta2 = (node.observe(topic, attrgetter("data")) for topic in (L1, L2, THETA1, THETA2))
     node.publish(EFFECTOR_POSITION, effector_position(l1, l2, theta1, theta2), message)
 
 

@@ -7,6 +7,7 @@ set-up.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import NamedTuple
 
 import reactivex as rx
@@ -85,9 +86,7 @@ def wire(node: ServiceNode) -> None:
     def description(l1: float, l2: float) -> String:
         return String(data=urdf(l1, l2, namespace))
 
-    l1, l2, theta1, theta2 = (
-        node.observe(topic).map(lambda message: message.data) for topic in (L1, L2, THETA1, THETA2)
-    )
+    l1, l2, theta1, theta2 = (node.observe(topic, attrgetter("data")) for topic in (L1, L2, THETA1, THETA2))
     states = configurations(l1, l2, theta1, theta2, node.declare(Parameters).rate)
     stamped = states.map(lambda it: (node.get_clock().now().to_msg(), it)).share()
     # Most of the time nobody looks.

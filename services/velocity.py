@@ -52,7 +52,7 @@ def _position(message: PointStamped) -> Position:
 
 def wire(node: ServiceNode) -> None:
     """Connect the recipe with its topics."""
-    speeds = effector_speed(node.observe(EFFECTOR_POSITION).map(_position))
+    speeds = effector_speed(node.observe(EFFECTOR_POSITION, _position))
     node.publish(EFFECTOR_SPEED, speeds, lambda speed: Float64(data=speed))
 
 

@@ -30,6 +30,7 @@ class Input:
         drop: Callable[[str, str], None],
         staleness: Callable[[datetime], str] | None,
         timestamped: bool,
+        item: Callable[[Any], Any] | None,
     ) -> None:
         """
         Make an input without readers.
@@ -37,12 +38,14 @@ class Input:
         :param drop: called with the topic's name and the reason for each message that is not good.
         :param staleness: returns why a source time is not fresh, empty if it is; None if all are.
         :param timestamped: whether items are :class:`Timestamp` s instead of messages.
+        :param item: makes an item of such an item; None if the observer gets them as they are.
         """
         self._topic = topic
         self._observer = observer
         self._drop = drop
         self._staleness = staleness
         self._timestamped = timestamped
+        self._item = item
         self._recent: deque[int] | None = None  # source times, while two readers may get the same message
 
     def read(self, samples: Observable[Timestamp[bytes]]) -> abc.DisposableBase:
@@ -87,7 +90,12 @@ class Input:
             problem = self._staleness(sample.timestamp)
         if problem:
             self._drop(topic.name, problem)
-        elif self._timestamped:
-            self._observer.on_next(sample._replace(value=message))
-        else:
-            self._observer.on_next(message)
+            return
+        item: Any = sample._replace(value=message) if self._timestamped else message
+        if self._item is not None:
+            try:
+                item = self._item(item)
+            except Exception as error:
+                self._observer.on_error(error)
+                return
+        self._observer.on_next(item)

@@ -74,6 +74,7 @@ class ServiceNode(ReactiveNode):
     def observe(
         self,
         topic: Topic,
+        item: Callable[[Any], Any] | None = None,
         *,
         timestamped: bool = False,
         sampled: float | None = None,
@@ -83,6 +84,7 @@ class ServiceNode(ReactiveNode):
         """
         Return the good messages of a topic; the others are dropped and reported.
 
+        :param item: makes an item of a message, like the operator ``map``, which costs more for each message.
         :param timestamped: see :meth:`ReactiveNode.create_observable`.
         :param sampled: the same; not for a latched topic.
         :param buffered: the same.
@@ -106,6 +108,7 @@ class ServiceNode(ReactiveNode):
                 drop=self.health.drop,
                 staleness=None if max_age is None else partial(self._staleness, max_age),
                 timestamped=timestamped,
+                item=item,
             )
             return messages.read_every_publisher(create) if shared is None else messages.read(shared)
 
@@ -126,29 +129,19 @@ class ServiceNode(ReactiveNode):
         :param on_demand: see :meth:`ReactiveNode.publish_observable`.
         """
 
-        def subscribe(
-            observer: abc.ObserverBase[Any], scheduler: abc.SchedulerBase | None = None
-        ) -> abc.DisposableBase:
-            def make(item: Any) -> None:
-                if isinstance(item, Rejected):
-                    self.health.drop(item.topic.name, item.reason)
-                    return
-                try:
-                    result = message(item)
-                except Exception as error:
-                    observer.on_error(error)
-                    return
-                problem = topic.problem(result)
-                if problem:
-                    self.health.drop(topic.name, problem)
-                    return
-                self.health.count_output()
-                observer.on_next(result)
+        def make(item: Any) -> Any:
+            if isinstance(item, Rejected):
+                self.health.drop(item.topic.name, item.reason)
+                return None
+            result = message(item)
+            problem = topic.problem(result)
+            if problem:
+                self.health.drop(topic.name, problem)
+                return None
+            self.health.count_output()
+            return result
 
-            return items.subscribe(make, observer.on_error, scheduler=scheduler)
-
-        messages = Observable(subscribe)
-        self.publish_observable(messages, topic.type, topic.name, topic.qos, on_demand=on_demand)
+        self.publish_observable(items, topic.type, topic.name, topic.qos, message=make, on_demand=on_demand)
 
     def age(self, stamp: datetime) -> float:
         """

@@ -330,6 +330,40 @@ def readers(service: ServiceNode, monkeypatch: pytest.MonkeyPatch) -> Readers:
     return readers
 
 
+@pytest.mark.parametrize("topic", [topics.EFFECTOR_SPEED, topics.L1], ids=lambda topic: topic.name)
+def test_items_are_made_of_good_messages(service: ServiceNode, readers: Readers, topic: topics.Topic) -> None:
+    received: list[Any] = []
+    service.observe(topic, lambda message: 2 * message.data).subscribe(received.append)
+    service.observe(topic, lambda it: (it.value.data, it.timestamp), timestamped=True).subscribe(
+        received.append
+    )
+    for data in (1.5, math.nan, 2.0):
+        readers.receive(number(data), 7.0)
+    assert received == [3.0, (1.5, at_time(7.0)), 4.0, (2.0, at_time(7.0))]
+
+
+def test_error_while_an_item_is_made_is_an_error_of_the_observable(
+    service: ServiceNode, readers: Readers
+) -> None:
+    errors: list[Exception] = []
+    service.observe(topics.L1, lambda message: 1 / message.data).subscribe(on_error=errors.append)
+    readers.receive(number(0.0), 1.0)
+    readers.receive(number(0.0), 2.0)
+    assert [type(error) for error in errors] == [ZeroDivisionError]
+    assert not readers.samples.observers
+
+
+def test_error_of_an_observer_is_no_error_of_the_observable(service: ServiceNode, readers: Readers) -> None:
+    def fail(_: float) -> None:
+        raise ValueError("planted")
+
+    errors: list[Exception] = []
+    service.observe(topics.L1, lambda message: message.data).subscribe(fail, errors.append)
+    with pytest.raises(ValueError, match="planted"):
+        readers.receive(number(0.0), 1.0)
+    assert not errors
+
+
 def test_copies_of_latched_messages_are_dropped(service: ServiceNode, readers: Readers) -> None:
     received: list[Any] = []
     service.observe(topics.L1, timestamped=True).subscribe(received.append)

@@ -31,6 +31,35 @@ def test_observable_is_published(node: ReactiveNode, peer: Node, spin_until: Spi
     spin_until(lambda: received == [1.5])
 
 
+def test_message_is_made_of_each_item_unless_there_is_none(
+    node: ReactiveNode, peer: Node, spin_until: SpinUntil
+) -> None:
+    numbers: Subject[float] = Subject()
+    received: list[float] = []
+    peer.create_subscription(Float64, "numbers", lambda message: received.append(message.data), 10)
+
+    def message(number: float) -> Float64 | None:
+        return Float64(data=1 / number) if number else None
+
+    node.publish_observable(numbers, Float64, "numbers", message=message)
+    spin_until(lambda: any(p.get_subscription_count() for p in node.publishers if p.topic_name == "/numbers"))
+    for number in (2.0, 0.0, 4.0):
+        numbers.on_next(number)
+    spin_until(lambda: received == [0.5, 0.25])
+
+
+def test_error_while_a_message_is_made_is_raised_once_by_spin(
+    node: ReactiveNode, spin_until: SpinUntil, spin_for: SpinFor
+) -> None:
+    numbers: Subject[int] = Subject()
+    node.publish_observable(numbers, Float64, "numbers", message=lambda number: Float64(data=1 / number))
+    numbers.on_next(0)
+    assert not numbers.observers
+    with pytest.raises(ZeroDivisionError):
+        spin_until(lambda: False)
+    spin_for(0.05)
+
+
 def test_publisher_lives_from_wiring_until_disposal(
     node: ReactiveNode, peer: Node, spin_until: SpinUntil
 ) -> None:
@@ -140,8 +169,11 @@ def test_error_in_recipe_is_raised_by_spin(
         spin_until(lambda: False)
 
 
-def test_message_of_wrong_type_is_raised_by_spin(node: ReactiveNode, spin_until: SpinUntil) -> None:
-    node.publish_observable(rx.timer(0.01).map(lambda _: String(data="no number")), Float64, "numbers")
+@pytest.mark.parametrize("message", [String(data="no number"), None], ids=["string", "none"])
+def test_message_of_wrong_type_is_raised_by_spin(
+    node: ReactiveNode, spin_until: SpinUntil, message: Any
+) -> None:
+    node.publish_observable(rx.timer(0.01).map(lambda _: message), Float64, "numbers")
 
     with pytest.raises(TypeError):
         spin_until(lambda: False)

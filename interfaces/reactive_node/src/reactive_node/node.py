@@ -260,16 +260,19 @@ class ReactiveNode(Node):
         topic: str,
         qos_profile: QoSProfile | int = 10,
         *,
+        message: Callable[[Any], Any] | None = None,
         on_demand: bool = False,
         **options: Any,
     ) -> abc.DisposableBase:
         """
-        Publish every message of an observable until the returned disposable is disposed or the node ends.
+        Publish every item of an observable until the returned disposable is disposed or the node ends.
 
         The publisher exists from now on: peers need time to discover it, and a publisher that is created
         with the first message loses it. An error of the observable, or a message of another type, is raised
         once out of the spinning of this node.
 
+        :param message: makes a message of an item; where it returns ``None``, nothing is published. By
+            default, the items are messages.
         :param on_demand: whether the observable is observed only while the topic has subscribers, each time
             anew. Without them it costs nothing, down to its own topics.
         :param options: further arguments of :meth:`rclpy.node.Node.create_publisher`; with ``on_demand``
@@ -288,9 +291,13 @@ class ReactiveNode(Node):
         publisher = self.create_publisher(msg_type, topic, qos_profile, **options)
         subscription = SingleAssignmentDisposable()
 
-        def publish(message: Any) -> None:
+        def publish(item: Any) -> None:
             try:
-                publisher.publish(message)
+                if message is not None:
+                    item = message(item)
+                    if item is None:
+                        return
+                publisher.publish(item)
             except Exception as error:
                 if not subscription.is_disposed:  # by an earlier error, while the observable emits at once
                     subscription.dispose()
