@@ -32,6 +32,8 @@ def deserialize_message(serialized_message: bytes, message_type: type[_Message])
     :raises RMWError: if the bytes are not a message of this type.
     """
     type_: Any = message_type
+    if serialized_message.__class__ is not bytes:  # memory that the caller may change
+        serialized_message = bytes(serialized_message)
     try:
         message: _Message = type_._deserialize(serialized_message)
     except ValueError as error:

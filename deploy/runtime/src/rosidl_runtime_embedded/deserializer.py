@@ -1,6 +1,7 @@
 """Generates the functions that read messages from little-endian XCDR1, one for each type.
 
-The counterpart of :mod:`.serializer`. A message keeps none of the bytes, which may be lent. Samples are
+The counterpart of :mod:`.serializer`. A memoryview is memory that DDS lends: a long sequence of numbers,
+such as an image, stays there until it is first read (:func:`.fields.numeric_field`). Samples are
 untrusted: a count allocates and repeats nothing if the sample is too short for it, and every malformed
 sample raises ValueError. Only the bounds of strings are not checked, as in ROS 2, where C++ sends longer
 strings. With ROS_PYTHON_CHECK_FIELDS=1 the assignment to the field checks them; its AssertionError becomes a
@@ -27,6 +28,7 @@ from .layout import (
     run_format,
     smallest_size,
 )
+from .pieces import LARGE
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -171,10 +173,12 @@ class _DeserializerGenerator(Generator):
         self._emit(f"q = p + {count} * {size}")
         self._emit("if q > end: raise ValueError('it is too short')")
         if code:
-            # through a view, because a copy of an image costs more than everything else
+            self._emit(f"if {count} >= {LARGE // size} and type(data) is memoryview:")
+            self._emit(f" {target} = data[p:q].cast('{code}')")
+            self._emit("else:")
             numbers = self._variable()
-            self._emit(f"{target} = {numbers} = array('{code}')")
-            self._emit(f"{numbers}.frombytes(memoryview(data)[p:q])")
+            self._emit(f" {target} = {numbers} = array('{code}')")
+            self._emit(f" {numbers}.frombytes(memoryview(data)[p:q])")
         else:
             self._emit(f"{target} = {type_.base}s(data[p:q])")
         self._emit("p = q")

@@ -2,15 +2,16 @@
 
 As in rclpy, a sequence of numbers is an ``array.array``, an array of numbers is a ``numpy.ndarray``, every
 other array or sequence is a list, and an octet is ``bytes`` of length 1. NumPy takes as long to import as
-the rest of a node, so an array stays an ``array.array`` until its first read.
+the rest of a node, so an array stays an ``array.array`` until its first read. And a long sequence of a
+received message stays in the memory of DDS, as a memoryview, until its first read: a relay need not copy it.
 """
 
 from __future__ import annotations
 
 from array import array
 from math import isinf
-from operator import attrgetter
 from reprlib import Repr
+from threading import RLock
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -116,6 +117,10 @@ def numeric_field(type_name: str, field: Field) -> property:
     """Property of an array or sequence of numbers, which converts or refuses assigned values."""
     slot, code, convert = slot_of(field), ARRAY_CODES[field.type.base], converter(type_name, field)
 
+    def get_sequence(self: object) -> Any:
+        value = getattr(self, slot)
+        return _own_numbers(self, slot, code) if value.__class__ is memoryview else value
+
     def get_array(self: object) -> Any:
         value = getattr(self, slot)
         if isinstance(value, array):
@@ -128,7 +133,21 @@ def numeric_field(type_name: str, field: Field) -> property:
     def set_numbers(self: object, value: Any) -> None:
         setattr(self, slot, convert(value))
 
-    return property(get_array if field.type.array_size else attrgetter(slot), set_numbers)
+    return property(get_array if field.type.array_size else get_sequence, set_numbers)
+
+
+_FIRST_READ = RLock()  # a signal handler may read a message while another one is copied
+
+
+def _own_numbers(message: object, slot: str, code: str) -> Any:
+    """Copy a sequence from the memory of DDS; threads that read it at the same time get one array."""
+    with _FIRST_READ:
+        numbers = getattr(message, slot)
+        if isinstance(numbers, memoryview):
+            lent, numbers = numbers, array(code)
+            numbers.frombytes(lent.cast("B"))
+            setattr(message, slot, numbers)
+    return numbers
 
 
 def _to_array(code: str, value: Any) -> array[Any]:

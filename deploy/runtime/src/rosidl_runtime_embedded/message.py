@@ -166,7 +166,10 @@ class Message:
 
         @classmethod
         def _deserialize(cls, data: bytes | memoryview) -> Self:
-            """Message from little-endian XCDR1 with its header. Raises ValueError for other bytes."""
+            """Message from little-endian XCDR1 with its header. Raises ValueError for other bytes.
+
+            The message may keep a memoryview, which must not change.
+            """
     else:
 
         def __init__(self, /, *args, **fields):

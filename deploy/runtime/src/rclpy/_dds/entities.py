@@ -42,7 +42,8 @@ class Sample(NamedTuple):
     """
     A received message: CDR with encapsulation header, source time [ns since 1970], and its writer.
 
-    The CDR is bytes, or a read-only memoryview if it is lent.
+    The CDR is bytes, or a memoryview if it is lent. Nothing may write to that: other readers of this process
+    have the same memory.
     """
 
     data: Any
@@ -152,7 +153,7 @@ def _loan(serdata: Pointer, size: int) -> memoryview:
     lent = quick.ddsi_serdata_to_ser_ref(serdata, 0, size, vector)
     octets = (ct.c_ubyte * size).from_address(vector[0])
     weakref.finalize(octets, quick.ddsi_serdata_to_ser_unref, lent, vector).atexit = False
-    return memoryview(octets).cast("B").toreadonly()
+    return memoryview(octets).cast("B")
 
 
 def _vectors(data: Pieces) -> tuple[int, Any]:
