@@ -14,6 +14,8 @@ from typing import Any
 
 import pytest
 
+from tests.system.sites import LIMIT
+
 from . import chromium
 from .arm import GONE, LINK, Arm, hold_with_engines_on
 from .chromium import HandOnPage
@@ -138,3 +140,24 @@ def test_page_is_told_that_its_beats_came_too_late(arm: Arm, browser: Any, link:
         assert hand.stalled, hand.why
         hand.up()
         hand.hold()
+
+
+@pytest.mark.parametrize("part", ["dom.js", "main.js", "base.css"])
+def test_page_loads_again_until_each_part_has_arrived(arm: Arm, browser: Any, part: str) -> None:
+    refused: list[str] = []
+
+    def refuse_twice(route: Any) -> None:
+        if len(refused) == 2:
+            route.continue_()
+        else:
+            refused.append(route.request.url)
+            route.abort("internetdisconnected")
+
+    with closing(browser.new_context()) as context:
+        context.route(f"**/static/{part}", refuse_twice)
+        hand = HandOnPage(context, arm.url)
+        deadline = time.monotonic() + LIMIT
+        while len(refused) < 2:  # a page without a style is live at once
+            assert time.monotonic() < deadline
+            hand.page.wait_for_timeout(50)
+        hand.await_live()
