@@ -81,6 +81,8 @@ def namespaces() -> Iterator[Callable[[str], str]]:
             pair = ("link", "add", "eth0", "type", "veth", "peer", "name", name, "netns", full(BRIDGE))
             _ip("-n", full(name), *pair)
             _ip("-n", full(name), "address", "add", f"{NETWORK}.{number}/24", "dev", "eth0")
+            # No IPv6: it gets its address a second later, and a browser drops its connections at that change.
+            _ip("-n", full(name), "link", "set", "eth0", "addrgenmode", "none")
             for device in ("lo", "eth0"):
                 _ip("-n", full(name), "link", "set", device, "up")
             _ip("-n", full(BRIDGE), "link", "set", name, "master", "bridge")
