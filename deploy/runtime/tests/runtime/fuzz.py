@@ -47,6 +47,7 @@ NAMES = [*MAIN_TYPES, DISCOVERY, SCALAR]
 
 BATCH = 50_000  # inputs
 MEMORY = 64 << 20  # bytes that a process may allocate beside what it has when the first batch begins
+ADDRESSES = resource.getrlimit(resource.RLIMIT_AS)  # made now: without memory, nothing can be made
 
 
 class Decoder(NamedTuple):
@@ -165,12 +166,14 @@ def feed(name: str, inputs: int, seed: str) -> tuple[int, int]:
         except ValueError:
             continue
         except Exception as error:
+            resource.setrlimit(resource.RLIMIT_AS, ADDRESSES)  # the report needs memory
             raise AssertionError(f"{name}: {error!r} for {data.hex()}") from error
         accepted += 1
         if accepted % 10 == 0:
             try:
                 check(value)
             except Exception as error:
+                resource.setrlimit(resource.RLIMIT_AS, ADDRESSES)
                 raise AssertionError(f"{name}: {error!r} after reading {data.hex()}") from error
     return accepted, inputs - accepted
 
@@ -181,7 +184,7 @@ def limit_memory() -> None:
         feed(name, 100, "")  # imports and caches
     pages = int(Path("/proc/self/statm").read_text().split()[0])
     limit = pages * resource.getpagesize() + MEMORY
-    resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
+    resource.setrlimit(resource.RLIMIT_AS, (limit, ADDRESSES[1]))
 
 
 def main() -> None:
