@@ -30,10 +30,11 @@ def deserialize_message(serialized_message: bytes, message_type: type[_Message])
     :raises AttributeError: if `message_type` is not a message or service type.
     :raises RuntimeError: if it is a service type.
     :raises RMWError: if the bytes are not a message of this type.
+    :raises TypeError: if `serialized_message` is not bytes-like.
     """
     type_: Any = message_type
     if serialized_message.__class__ is not bytes:  # memory that the caller may change
-        serialized_message = bytes(serialized_message)
+        serialized_message = bytes(memoryview(serialized_message))
     try:
         message: _Message = type_._deserialize(serialized_message)
     except ValueError as error:

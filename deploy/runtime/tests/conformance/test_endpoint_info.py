@@ -87,6 +87,12 @@ def test_a_message_survives_serialization() -> None:
         deserialize_message(data[:5], Float64)
 
 
+@pytest.mark.parametrize("data", [5, "text", None])
+def test_only_bytes_can_be_deserialized(data: Any) -> None:
+    with pytest.raises(TypeError):
+        deserialize_message(data, Float64)
+
+
 def test_only_messages_can_be_serialized() -> None:
     with pytest.raises(AttributeError):
         serialize_message("hello")
