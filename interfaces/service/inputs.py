@@ -38,7 +38,8 @@ class Input:
         :param drop: called with the topic's name and the reason for each message that is not good.
         :param staleness: returns why a source time is not fresh, empty if it is; None if all are.
         :param timestamped: whether items are :class:`Timestamp` s instead of messages.
-        :param item: makes an item of such an item; None if the observer gets them as they are.
+        :param item: turns each message or Timestamp into the item that the observer gets; None if it gets
+            them unchanged.
         """
         self._topic = topic
         self._observer = observer

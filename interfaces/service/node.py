@@ -84,7 +84,8 @@ class ServiceNode(ReactiveNode):
         """
         Return the good messages of a topic; the others are dropped and reported.
 
-        :param item: makes an item of a message, like the operator ``map``, which costs more for each message.
+        :param item: turns each message into an item, as the operator ``map`` does at a higher cost. With
+            ``timestamped``, it gets the :class:`Timestamp`.
         :param timestamped: see :meth:`ReactiveNode.create_observable`.
         :param sampled: the same; not for a latched topic.
         :param buffered: the same.

@@ -1,8 +1,8 @@
-/** Loads the page again if a part of it did not arrive, as after a change of the network: without it, nothing would. */
+/** Loads the page again if a part of it did not arrive, for example because the network changed meanwhile. */
 
 const RETRY = 1000; // ms
 
-/** Wait until the server answers: the browser would show an error instead of a page that it cannot load. */
+/** Reload as soon as the server answers: before that, the browser would replace the page with an error of its own. */
 async function reload() {
   try {
     await fetch(location.pathname);
@@ -12,5 +12,5 @@ async function reload() {
   }
 }
 
-// A failed part raises an error without a bubble, also for what it imports itself.
+// These errors do not bubble. A script also has one if something that it imports does not arrive.
 addEventListener("error", ({ target }) => target instanceof Element && setTimeout(reload, RETRY), { capture: true });

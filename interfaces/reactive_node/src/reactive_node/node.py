@@ -271,8 +271,8 @@ class ReactiveNode(Node):
         with the first message loses it. An error of the observable, or a message of another type, is raised
         once out of the spinning of this node.
 
-        :param message: makes a message of an item; where it returns ``None``, nothing is published. By
-            default, the items are messages.
+        :param message: turns each item into a message; if it returns ``None``, nothing is published. By
+            default, the items are the messages.
         :param on_demand: whether the observable is observed only while the topic has subscribers, each time
             anew. Without them it costs nothing, down to its own topics.
         :param options: further arguments of :meth:`rclpy.node.Node.create_publisher`; with ``on_demand``
