@@ -29,7 +29,7 @@ from rclpy.signals import SignalHandlerOptions
 from deploy.chaos.history import LOSS, NO_TARGET, OVERLOAD, InjectedFault, Life
 from deploy.chaos.process_monitor import ProcessMonitor
 from deploy.chaos.record import FAULTS, PROCESSES
-from deploy.recording.recorder import Recorder, record
+from deploy.recording.recorder import Recorder, clocks, record
 
 
 @contextmanager
@@ -76,8 +76,8 @@ def _report_first(name: str) -> None:
 def main(arguments: list[str]) -> int:
     """Observe until standard input ends; the first line of output is the origin of the record's times."""
     path, arms = Path(arguments[0]), [text.split("=", 2) for text in arguments[1:]]
-    origin = time.monotonic()
-    recorder = Recorder(path, round(origin * 1e9), time.time_ns())
+    begin, epoch = clocks()
+    recorder, origin = Recorder(path, begin, epoch), begin / 1e9
 
     def write(topic: str, event: dict[str, Any], *times: str) -> None:
         relative = {key: event[key] - origin for key in times if event[key] is not None}

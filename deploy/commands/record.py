@@ -7,7 +7,7 @@ from contextlib import closing
 from pathlib import Path
 
 from deploy.commands.member import Member
-from deploy.recording.recorder import Recorder, record
+from deploy.recording.recorder import Recorder, clocks, record
 from deploy.supervision import interruption
 from deploy.supervision.system import System
 
@@ -17,7 +17,7 @@ def write(directory: Path, member: Member, system: System) -> None:
     directory.mkdir(exist_ok=True)
     path = directory / time.strftime("%Y%m%d-%H%M%S.mcap")
     began = time.monotonic()
-    with closing(Recorder(path, time.monotonic_ns(), time.time_ns())) as recorder:
+    with closing(Recorder(path, *clocks())) as recorder:
         record(member.node, recorder)
         print(f"Recording to {path} until Ctrl-C ...", flush=True)
         try:

@@ -27,6 +27,15 @@ from interfaces import topics
 METADATA = "reactive-arm"
 DEPTH = 200  # messages that may wait while the recorder is not scheduled
 HEARTBEAT_DEPTH = 10  # a flood of heartbeats need not be recorded in full
+_ONE_MOMENT = 100_000  # ns within which both clocks are read
+
+
+def clocks() -> tuple[int, int]:
+    """Return one moment on the monotonic clock and since 1970 [ns]."""
+    while True:
+        before, epoch, after = time.monotonic_ns(), time.time_ns(), time.monotonic_ns()
+        if after - before < _ONE_MOMENT:  # otherwise, the thread has paused in between
+            return before, epoch
 
 
 class Recorder:
@@ -139,9 +148,9 @@ def _record(
         nonlocal last_number
         if not last_two:
             first(name)
-        now = time.monotonic_ns()
+        now, epoch = clocks()
         last_two.append(now)
-        age = time.time_ns() - info["source_timestamp"]
+        age = epoch - info["source_timestamp"]
         recorder.message(name, topic.type_name, offered, data, now, now - age)
         number = info["publication_sequence_number"] if is_numbered else None
         if last_number is not None and number is not None and number > last_number + 1:

@@ -105,6 +105,24 @@ def test_a_missing_number_is_a_loss(
     assert reports == [(2.0, 3.0)]
 
 
+def test_pause_between_two_clocks_changes_no_time(
+    node: Subscriptions, clock: Clock, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    epoch, pauses = 10**18, iter([0.01, 0.02])  # s
+    recorded: list[tuple[int, int]] = []
+
+    def time_of_day() -> int:
+        clock.now += next(pauses, 0.0)
+        return epoch + time.monotonic_ns()
+
+    monkeypatch.setattr(time, "time_ns", time_of_day)
+    monkeypatch.setattr(recorder.Recorder, "message", lambda *message: recorded.append(message[-2:]))
+    clock.now = 2.0
+    info = {"source_timestamp": epoch + 1_500_000_000, "publication_sequence_number": None}
+    node.write[topics.L2.name](b"", info)
+    assert recorded == [(2_030_000_000, 1_500_000_000)]
+
+
 def test_numbers_of_a_new_publisher_begin_anew(
     node: Subscriptions, clock: Clock, reports: list[tuple[float, float]]
 ) -> None:
