@@ -26,7 +26,6 @@ GUARDS: dict[str, tuple[str, ...]] = {
         "tests/component/test_health.py",
         "tests/component/test_service_node.py",
     ),
-    "interfaces/service/inputs.py": ("tests/component/test_service_node.py",),
     "interfaces/service/instance.py": ("tests/component/test_instance.py",),
     "interfaces/service/node.py": ("tests/component/test_service_node.py",),
     "interfaces/service/parameters.py": (
@@ -57,6 +56,10 @@ GUARDS: dict[str, tuple[str, ...]] = {
     ),
     f"{REACTIVE_NODE}/end.py": (f"{_NODE_TESTS}/test_end.py",),
     f"{REACTIVE_NODE}/sampled_reader.py": (f"{_NODE_TESTS}/test_sampled.py",),
+    f"{REACTIVE_NODE}/message_reader.py": (
+        f"{_NODE_TESTS}/test_message_reader.py",
+        f"{_NODE_TESTS}/test_observables.py",
+    ),
     f"{REACTIVE_NODE}/shared_reader.py": (
         f"{_NODE_TESTS}/test_observables.py",
         f"{_NODE_TESTS}/test_events.py",

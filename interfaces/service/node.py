@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import datetime
-from functools import partial
 from typing import Any, TypeVar
 
 from rcl_interfaces.msg import (
@@ -16,15 +15,13 @@ from rcl_interfaces.msg import (
     SetParametersResult,
 )
 from rclpy.parameter import Parameter
-from rclpy.qos import QoSProfile
-from reactivex import Observable, abc
+from rclpy.serialization import deserialize_message
+from reactivex import Observable
 
 from interfaces.service.health import HealthReporter
-from interfaces.service.inputs import Input
 from interfaces.service.parameters import Declaration, declarations
-from interfaces.topics import Topic, is_latched
+from interfaces.topics import Topic
 from reactive_node import ReactiveNode, stamps
-from reactive_node.stamps import Timestamp
 
 T = TypeVar("T")
 
@@ -93,27 +90,37 @@ class ServiceNode(ReactiveNode):
         """
         self._observed[self.resolve_topic_name(topic.name)] = topic
 
-        def create(qos: QoSProfile, **options: Any) -> Observable[Timestamp[bytes]]:
-            # Raw, because rclpy on Cyclone DDS would deliver a truncated message as one of zeros.
-            return self.create_observable(topic.type, topic.name, qos, timestamped=True, raw=True, **options)
+        type_, problem_of = topic.type, topic.problem
+        with_time = timestamped or max_age is not None
 
-        read_by = {"sampled": sampled, "buffered": buffered}
-        shared = None if is_latched(topic.qos) else create(topic.qos, **read_by)
+        def good(received: Any) -> Any:
+            """Return the item of a message. All in one step: every message takes this path."""
+            data = received.value if with_time else received
+            try:
+                message = deserialize_message(data, type_)
+            except RuntimeError:  # RMWError, which the rclpy of ROS 2 does not export
+                self.health.drop(topic.name, f"{len(data)} octets are no {topic.type_name}")
+                return None
+            problem = problem_of(message)
+            if not problem and max_age is not None:
+                problem = self._staleness(max_age, received.timestamp)
+            if problem:
+                self.health.drop(topic.name, problem)
+                return None
+            result = received._replace(value=message) if timestamped else message
+            return result if item is None else item(result)
 
-        def subscribe(
-            observer: abc.ObserverBase[Any], _: abc.SchedulerBase | None = None
-        ) -> abc.DisposableBase:
-            messages = Input(
-                topic,
-                observer,
-                drop=self.health.drop,
-                staleness=None if max_age is None else partial(self._staleness, max_age),
-                timestamped=timestamped,
-                item=item,
-            )
-            return messages.read_every_publisher(create) if shared is None else messages.read(shared)
-
-        return Observable(subscribe)
+        return self.create_observable(
+            topic.type,
+            topic.name,
+            topic.qos,
+            timestamped=with_time,
+            sampled=sampled,
+            buffered=buffered,
+            item=good,
+            every_publisher=True,
+            raw=True,  # rclpy on Cyclone DDS would deliver a truncated message as one of zeros
+        )
 
     def publish(
         self,

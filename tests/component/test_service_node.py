@@ -16,11 +16,10 @@ import reactivex as rx
 from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import Point, PointStamped
 from rclpy.context import Context
-from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.qos import QoSProfile
 from rclpy.serialization import serialize_message
 from rclpy.time import Time
 from reactivex.subject import Subject
@@ -303,15 +302,10 @@ class Readers:
 
     def __init__(self) -> None:
         self.samples: Subject[Timestamp[bytes]] = Subject()
-        self.qos: list[QoSProfile] = []
-        self.events: list[SubscriptionEventCallbacks] = []
 
-    def create(
-        self, _: Any, __: Any, qos: QoSProfile, *, event_callbacks: Any = None, **___: Any
-    ) -> Subject[Timestamp[bytes]]:
-        self.qos.append(qos)
-        self.events.append(event_callbacks)
-        return self.samples
+    def create(self, *_: Any, item: Callable[[Any], Any], timestamped: bool, **__: Any) -> rx.Observable[Any]:
+        received = self.samples if timestamped else self.samples.map(lambda sample: sample.value)
+        return received.map(item).filter(lambda made: made is not None)
 
     def receive(self, message: Any, *seconds: float) -> None:
         """Receive a message once for each source time."""
@@ -362,39 +356,6 @@ def test_error_of_an_observer_is_no_error_of_the_observable(service: ServiceNode
     with pytest.raises(ValueError, match="planted"):
         readers.receive(number(0.0), 1.0)
     assert not errors
-
-
-def test_copies_of_latched_messages_are_dropped(service: ServiceNode, readers: Readers) -> None:
-    received: list[Any] = []
-    service.observe(topics.L1, timestamped=True).subscribe(received.append)
-    readers.events[0].incompatible_qos(None)  # from now on, a second reader listens
-    readers.samples.observers.pop()  # the test delivers the copies
-    readers.receive(number(1.5), *range(17), *range(1, 17))
-    assert received == [Timestamp(number(1.5), at_time(at)) for at in range(17)]
-    readers.receive(number(1.5), 0.0)  # forgotten: only the last sixteen are known
-    assert len(received) == 18
-
-
-def test_one_reader_delivers_no_copies(service: ServiceNode, readers: Readers) -> None:
-    received: list[Any] = []
-    service.observe(topics.L1).subscribe(received.append)
-    readers.receive(number(1.5), 1.0, 1.0)
-    assert received == [number(1.5)] * 2
-
-
-def test_events_of_one_time_are_no_copies(service: ServiceNode, readers: Readers) -> None:
-    received: list[Any] = []
-    service.observe(topics.ENGINES).subscribe(received.append)
-    readers.receive(String(data="turn_off"), 1.0, 1.0)
-    assert received == [String(data="turn_off")] * 2
-
-
-def test_volatile_publishers_get_one_reader(service: ServiceNode, readers: Readers) -> None:
-    service.observe(topics.L1).subscribe()
-    assert readers.qos == [topics.L1.qos]
-    for _ in range(2):
-        readers.events[0].incompatible_qos(None)
-    assert [(qos.depth, qos.durability) for qos in readers.qos[1:]] == [(1, DurabilityPolicy.VOLATILE)]
 
 
 @pytest.mark.parametrize("topic", [topics.L1, topics.ENGINES], ids=lambda topic: topic.name)
@@ -571,3 +532,30 @@ def test_sampled_topic_is_read_at_its_ticks_only(
     publisher.publish(Bool(data=True))
     spin_until(lambda: each)
     assert sampled == []
+
+
+def test_buffered_topic_is_read_at_its_ticks_in_full(
+    service: ServiceNode, peer: Node, spin_until: SpinUntil, spin_for: SpinFor
+) -> None:
+    ticks: Subject[None] = Subject()
+    received: list[str] = []
+    service.observe(topics.ENGINES, lambda message: message.data, buffered=ticks).subscribe(received.append)
+    publisher = peer.create_publisher(String, "engines", topics.ENGINES.qos)
+    spin_until(lambda: publisher.get_subscription_count() == 1)
+    for command in ("turn_on", "turn_off"):
+        publisher.publish(String(data=command))
+    spin_for(0.05)
+    assert received == []
+    ticks.on_next(None)
+    assert received == ["turn_on", "turn_off"]
+
+
+def test_topic_on_demand_is_observed_while_it_has_subscribers(
+    service: ServiceNode, peer: Node, spin_until: SpinUntil, spin_for: SpinFor
+) -> None:
+    speeds: Subject[float] = Subject()
+    service.publish(topics.EFFECTOR_SPEED, speeds, number, on_demand=True)
+    spin_for(0.05)
+    assert not speeds.observers
+    peer.create_subscription(Float64, "effector/speed", lambda _: None, topics.EFFECTOR_SPEED.qos)
+    spin_until(lambda: bool(speeds.observers))

@@ -27,10 +27,11 @@ from reactivex.subject import BehaviorSubject
 
 from reactive_node import calls
 from reactive_node.end import End
+from reactive_node.message_reader import MessageReader
 from reactive_node.sampled_reader import BUFFER, newest, sampled_messages
 from reactive_node.scheduler import NodeScheduler
 from reactive_node.services import Requests
-from reactive_node.shared_reader import SharedReader, retention
+from reactive_node.shared_reader import SharedReader
 
 if TYPE_CHECKING:
     from reactive_node.transforms import Transforms
@@ -57,6 +58,8 @@ class ReactiveNode(Node):
         timestamped: bool = False,
         sampled: float | Observable[Any] | None = None,
         buffered: float | Observable[Any] | None = None,
+        item: Callable[[Any], Any] | None = None,
+        every_publisher: bool = False,
         **options: Any,
     ) -> Observable[Any]:
         """
@@ -80,26 +83,34 @@ class ReactiveNode(Node):
             get no retained samples, and QoS events are not warned of.
         :param buffered: the same for topics of which each message counts: at each tick, all messages become
             items that have come since the tick before, one after the other. The reader keeps 1000.
+        :param item: turns each message, with ``timestamped`` each Timestamp, into the item, once for all
+            observers and at less cost than the operator ``map``; if it returns ``None``, there is none.
+        :param every_publisher: whether a transient-local topic also delivers the messages of volatile
+            publishers, such as those of ``ros2 topic pub``: from the first one on, a second reader listens to
+            them. Without effect on other topics, and with ``sampled`` or ``buffered``.
         :param options: further arguments of :meth:`rclpy.node.Node.create_subscription`; with ``sampled`` or
-            ``buffered`` without ``callback_group`` and ``event_callbacks``.
+            ``buffered`` without ``callback_group`` and ``event_callbacks``, with ``every_publisher`` without
+            ``event_callbacks``.
         """
         if sampled is not None:
             qos = newest(qos_profile, 1)
-            return self._create_sampled(msg_type, topic, qos, timestamped, sampled, options)
+            return self._create_sampled(msg_type, topic, qos, timestamped, item, sampled, options)
         if buffered is not None:
             qos = newest(qos_profile, BUFFER)
-            return self._create_sampled(msg_type, topic, qos, timestamped, buffered, options)
+            return self._create_sampled(msg_type, topic, qos, timestamped, item, buffered, options)
 
-        def create_reader(callback: Callable[..., None]) -> Subscription:
-            return self.create_subscription(msg_type, topic, callback, qos_profile, **options)
+        def create_reader(callback: Callable[..., None], qos: QoSProfile | int, **given: Any) -> Subscription:
+            return self.create_subscription(msg_type, topic, callback, qos, **given, **options)
 
-        reader = SharedReader(
+        reader = MessageReader(
             self,
             create_reader,
+            qos_profile,
             scheduler=self.scheduler,
             end=self._end,
-            retained=retention(qos_profile),
             timestamped=timestamped,
+            item=item,
+            every_publisher=every_publisher,
         )
         return Observable(reader.subscribe)
 
@@ -109,6 +120,7 @@ class ReactiveNode(Node):
         topic: str,
         qos: QoSProfile,
         timestamped: bool,
+        item: Callable[[Any], Any] | None,
         period: float | Observable[Any],
         options: dict[str, Any],
     ) -> Observable[Any]:
@@ -120,8 +132,10 @@ class ReactiveNode(Node):
             given = {"callback_group": group, "event_callbacks": events, **options}
             return self.create_subscription(msg_type, topic, lambda _: None, qos, **given)
 
-        messages = sampled_messages(self, create_reader, ticks, timestamped=timestamped, most=qos.depth)
-        return self._end.limit(messages.share())
+        items = sampled_messages(self, create_reader, ticks, timestamped=timestamped, most=qos.depth)
+        if item is not None:
+            items = items.map(item).filter(lambda made: made is not None)
+        return self._end.limit(items.share())
 
     def create_parameter_observable(self, name: str) -> Observable[Any]:
         """

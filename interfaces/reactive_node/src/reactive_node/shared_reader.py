@@ -1,4 +1,4 @@
-"""The one DDS reader that all observers of an observable share."""
+"""The DDS reader that all observers of an observable share."""
 
 from __future__ import annotations
 
@@ -8,13 +8,11 @@ from collections.abc import Callable
 from typing import Any
 
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile
 from rclpy.subscription import Subscription
 from reactivex import abc
 from reactivex.disposable import CompositeDisposable, Disposable
 
 from reactive_node.end import End
-from reactive_node.stamps import Timestamp
 
 
 class SharedReader:
@@ -22,35 +20,32 @@ class SharedReader:
 
     # While there is a reader:
     _listening: tuple[abc.ObserverBase[Any], ...]
-    """Members that have got the retained samples. Replaced, never changed: _receive takes no lock."""
+    """Members that have got the retained items. Replaced, never changed: the callback takes no lock."""
 
     def __init__(
         self,
         node: Node,
-        create: Callable[[Callable[..., None]], Subscription],
+        create: Callable[..., Subscription],
         *,
         scheduler: abc.SchedulerBase,
         end: End,
         retained: deque[Any] | None = None,
-        timestamped: bool = False,
     ) -> None:
         """
         Share a reader among observers; none exists yet.
 
-        :param create: creates the reader of ``node`` with a callback.
+        :param create: creates the reader of ``node``, with a callback that gets the items.
         :param scheduler: runs actions on the thread that runs the callback.
         :param end: completes when the node ends; the observers complete with it.
-        :param retained: holds the samples for late observers; None if late observers get none.
-        :param timestamped: whether items are :class:`Timestamp` s instead of messages.
+        :param retained: holds the items for late observers; None if late observers get none.
         """
         self._node = node
         self._create = create
         self._scheduler = scheduler
         self._end = end
         self._retained = retained
-        self._callback = self._receive_with_info if timestamped else self._receive
         self._lock = threading.RLock()
-        self._subscription: Subscription | None = None
+        self._subscriptions: list[Subscription] = []
         self._members: list[abc.ObserverBase[Any]] = []
 
     def subscribe(
@@ -62,10 +57,10 @@ class SharedReader:
                 observer.on_completed()
                 return Disposable()
             self._members.append(observer)
-            if self._subscription is None:
+            if not self._subscriptions:
                 self._listening = (observer,)
                 try:
-                    self._subscription = self._create(self._callback)
+                    self._subscriptions.append(self._create_first())
                 except Exception:
                     self._members = []
                     raise
@@ -76,28 +71,21 @@ class SharedReader:
         at_end = self._end.subscribe(on_completed=observer.on_completed)
         return CompositeDisposable(at_end, Disposable(lambda: self._leave(observer)))
 
+    def _create_first(self) -> Subscription:
+        return self._create(self._emit)
+
     def _join(self, observer: abc.ObserverBase[Any]) -> None:
         with self._lock:
-            if self._subscription is None or observer not in self._members:
+            if observer not in self._members:
                 return
             self._listening += (observer,)
             # DDS drops the retained samples of a publisher that has gone.
-            alive = self._subscription.get_publisher_count() > 0
+            alive = any(each.get_publisher_count() > 0 for each in self._subscriptions)
             retained = tuple(self._retained) if self._retained and alive else ()
         for item in retained:
             observer.on_next(item)
 
-    def _receive(self, item: Any) -> None:
-        if self._retained is not None:
-            self._retained.append(item)
-        for observer in self._listening:
-            observer.on_next(item)
-
-    def _receive_with_info(self, message: Any, info: Any) -> None:
-        # Without Timestamp() and _receive(): where messages are rare, each call costs most.
-        item: Timestamp[Any] = tuple.__new__(Timestamp, (message, info["source_timestamp"]))
-        if self._retained is not None:
-            self._retained.append(item)
+    def _emit(self, item: Any) -> None:
         for observer in self._listening:
             observer.on_next(item)
 
@@ -105,16 +93,10 @@ class SharedReader:
         with self._lock:
             self._members = [member for member in self._members if member is not observer]
             self._listening = tuple(member for member in self._listening if member is not observer)
-            if self._members or self._subscription is None:
+            if self._members:
                 return
-            subscription, self._subscription = self._subscription, None
+            subscriptions, self._subscriptions = self._subscriptions, []
             if self._retained is not None:
                 self._retained.clear()
-            self._node.destroy_subscription(subscription)
-
-
-def retention(qos_profile: QoSProfile | int) -> deque[Any] | None:
-    """Return an empty store for the samples that late observers get; None if they get none."""
-    if isinstance(qos_profile, int) or qos_profile.durability != DurabilityPolicy.TRANSIENT_LOCAL:
-        return None
-    return deque(maxlen=None if qos_profile.history == HistoryPolicy.KEEP_ALL else qos_profile.depth)
+            for subscription in subscriptions:
+                self._node.destroy_subscription(subscription)

@@ -1,0 +1,98 @@
+"""The DDS reader of a topic that all observers of its messages share."""
+
+from __future__ import annotations
+
+import copy
+from collections import deque
+from collections.abc import Callable
+from typing import Any
+
+from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile
+from rclpy.subscription import Subscription
+from reactivex import abc
+
+from reactive_node.end import End
+from reactive_node.shared_reader import SharedReader
+from reactive_node.stamps import Timestamp
+
+_RECENT = 16  # messages of which a second reader may deliver a copy
+
+
+class MessageReader(SharedReader):
+    """Turns messages into items for all observers."""
+
+    def __init__(
+        self,
+        node: Node,
+        create: Callable[..., Subscription],
+        qos_profile: QoSProfile | int,
+        *,
+        scheduler: abc.SchedulerBase,
+        end: End,
+        timestamped: bool,
+        item: Callable[[Any], Any] | None,
+        every_publisher: bool,
+    ) -> None:
+        """
+        Share a reader among observers; none exists yet.
+
+        :param create: creates a reader of ``node`` with a callback, a QoS and further arguments of
+            :meth:`rclpy.node.Node.create_subscription`.
+        :param scheduler, end: see :class:`SharedReader`.
+        :param timestamped, item, every_publisher: see :meth:`ReactiveNode.create_observable`.
+        """
+        super().__init__(node, create, scheduler=scheduler, end=end, retained=_retention(qos_profile))
+        self._qos = qos_profile
+        self._timestamped = timestamped
+        self._item = item
+        self._reads_every_publisher = every_publisher and self._retained is not None
+        self._recent: deque[int] | None = None  # source times, while there are two readers
+
+    def _create_first(self) -> Subscription:
+        self._recent = None
+        if not self._reads_every_publisher:
+            return self._create(self._receive, self._qos)
+        events = SubscriptionEventCallbacks(incompatible_qos=self._add_volatile)
+        return self._create(self._receive, self._qos, event_callbacks=events)
+
+    def _add_volatile(self, _: Any) -> None:
+        """Read by a second reader as well: the first one receives nothing from a volatile publisher."""
+        with self._lock:
+            if len(self._subscriptions) == 1:
+                self._recent = deque(maxlen=_RECENT)
+                qos = copy.copy(self._qos)
+                assert isinstance(qos, QoSProfile)
+                qos.durability = DurabilityPolicy.VOLATILE
+                self._subscriptions.append(self._create(self._receive, qos))
+
+    def _receive(self, message: Any, info: Any) -> None:
+        """Hand on a message. All in one step: every message takes this path."""
+        if self._recent is not None:
+            if info["source_timestamp"] in self._recent:
+                return
+            self._recent.append(info["source_timestamp"])
+        item = message
+        if self._timestamped:  # without Timestamp(): where messages are rare, each call costs most
+            item = tuple.__new__(Timestamp, (message, info["source_timestamp"]))
+        if self._item is not None:
+            try:
+                item = self._item(item)
+            except Exception as error:
+                for observer in self._listening:
+                    observer.on_error(error)
+                return
+            if item is None:
+                return
+        if self._retained is not None:
+            self._retained.append(item)
+        for observer in self._listening:
+            observer.on_next(item)
+
+
+def _retention(qos_profile: QoSProfile | int) -> deque[Any] | None:
+    """Return an empty store for the items that late observers get; None if they get none."""
+    if isinstance(qos_profile, int) or qos_profile.durability != DurabilityPolicy.TRANSIENT_LOCAL:
+        return None
+    return deque(maxlen=None if qos_profile.history == HistoryPolicy.KEEP_ALL else qos_profile.depth)

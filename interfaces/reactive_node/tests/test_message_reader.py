@@ -1,0 +1,251 @@
+"""Items of messages, and messages of every publisher."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+import reactivex as rx
+from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from reactivex.scheduler import ImmediateScheduler
+from reactivex.subject import Subject
+from std_msgs.msg import Float64
+
+from reactive_node import ReactiveNode
+from reactive_node.end import End
+from reactive_node.message_reader import MessageReader
+from reactive_node.testing import SpinFor, SpinUntil
+
+LATCHED = QoSProfile(depth=3, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+VOLATILE = DurabilityPolicy.VOLATILE
+
+
+class Readers:
+    """Stands in for a node and the readers that it creates."""
+
+    def __init__(self) -> None:
+        self.callbacks: list[Callable[[Any, Any], None]] = []
+        self.qos: list[Any] = []
+        self.events: list[SubscriptionEventCallbacks | None] = []
+        self.destroyed: list[Any] = []
+
+    def create(self, callback: Any, qos: Any, event_callbacks: Any = None) -> int:
+        self.callbacks.append(callback)
+        self.qos.append(qos)
+        self.events.append(event_callbacks)
+        return len(self.callbacks)
+
+    def destroy_subscription(self, reader: int) -> None:
+        self.destroyed.append(reader)
+
+    def find_volatile_publisher(self) -> None:
+        """Report to the first reader that there is a publisher that it does not match."""
+        events = self.events[0]
+        assert events is not None
+        assert events.incompatible_qos is not None
+        events.incompatible_qos(None)  # type: ignore[arg-type]
+
+    def receive(self, reader: int, message: str, time: int) -> None:
+        self.callbacks[reader](message, {"source_timestamp": time})
+
+    def observable(self, qos: Any, **options: Any) -> rx.Observable[Any]:
+        here: Any = self
+        options = {"timestamped": False, "item": None, "every_publisher": False} | options
+        reader = MessageReader(here, here.create, qos, scheduler=ImmediateScheduler(), end=End(), **options)
+        return rx.Observable(reader.subscribe)
+
+
+@pytest.fixture
+def readers() -> Readers:
+    return Readers()
+
+
+@pytest.fixture
+def publisher(peer: Node) -> Publisher:
+    return peer.create_publisher(Float64, "topic", LATCHED)
+
+
+def half(message: Float64) -> float | None:
+    """Return half of a positive number."""
+    return message.data / 2 if message.data > 0 else None
+
+
+# Items
+
+
+def test_item_is_made_once_for_all_observers(
+    node: ReactiveNode, publisher: Publisher, spin_until: SpinUntil
+) -> None:
+    made: list[float] = []
+    received: list[tuple[str, float | None]] = []
+
+    def item(message: Float64) -> float | None:
+        made.append(message.data)
+        return half(message)
+
+    observable = node.create_observable(Float64, "topic", LATCHED, item=item)
+    for name in ("one", "two"):
+        observable.subscribe(lambda value, name=name: received.append((name, value)))
+    spin_until(lambda: publisher.get_subscription_count() == 1)
+    for data in (1.0, -1.0, 3.0):
+        publisher.publish(Float64(data=data))
+    spin_until(lambda: len(received) == 4)
+
+    assert received == [("one", 0.5), ("two", 0.5), ("one", 1.5), ("two", 1.5)]
+    assert made == [1.0, -1.0, 3.0]
+
+
+def test_late_observer_gets_retained_items(
+    node: ReactiveNode, publisher: Publisher, spin_until: SpinUntil
+) -> None:
+    first: list[float] = []
+    late: list[float] = []
+    observable = node.create_observable(Float64, "topic", LATCHED, item=half)
+    observable.subscribe(first.append)
+    spin_until(lambda: publisher.get_subscription_count() == 1)
+    for data in (1.0, 2.0, 3.0, 4.0, -1.0):
+        publisher.publish(Float64(data=data))
+        spin_until(lambda data=data: data < 0 or first[-1:] == [data / 2])
+
+    observable.subscribe(late.append)
+    spin_until(lambda: late == [1.0, 1.5, 2.0])
+
+
+def test_item_may_be_made_of_a_timestamp(readers: Readers) -> None:
+    received: list[Any] = []
+    observable = readers.observable(10, timestamped=True, item=lambda it: (it.value, it.nanoseconds))
+    observable.subscribe(received.append)
+    readers.receive(0, "a", 7)
+    assert received == [("a", 7)]
+
+
+@pytest.mark.parametrize("reading", ["sampled", "buffered"])
+def test_tick_makes_items(
+    node: ReactiveNode, peer: Node, spin_until: SpinUntil, spin_for: SpinFor, reading: str
+) -> None:
+    ticks: Subject[None] = Subject()
+    received: list[Any] = []
+    options = {reading: ticks}
+    node.create_observable(
+        Float64, "topic", timestamped=True, item=lambda it: half(it.value), **options
+    ).subscribe(received.append)
+    publisher = peer.create_publisher(Float64, "topic", 10)
+    spin_until(lambda: publisher.get_subscription_count() == 1)
+    for data in (-1.0, 4.0):
+        publisher.publish(Float64(data=data))
+        spin_for(0.05)
+        ticks.on_next(None)
+    assert received == [2.0]
+
+
+def test_error_while_an_item_is_made_is_an_error_for_all_observers(readers: Readers) -> None:
+    errors: list[tuple[str, type[Exception]]] = []
+    observable = readers.observable(10, item=lambda message: message / 0)
+    for name in ("one", "two"):
+        observable.subscribe(on_error=lambda error, name=name: errors.append((name, type(error))))
+    readers.receive(0, "a", 1)
+    assert errors == [("one", TypeError), ("two", TypeError)]
+    assert readers.destroyed == [1]
+
+
+def test_error_of_an_observer_is_no_error_of_the_observable(readers: Readers) -> None:
+    def fail(_: Any) -> None:
+        raise ValueError("planted")
+
+    errors: list[Exception] = []
+    readers.observable(10, item=str.upper).subscribe(fail, errors.append)
+    with pytest.raises(ValueError, match="planted"):
+        readers.receive(0, "a", 1)
+    assert not errors
+
+
+# Every publisher
+
+
+def test_volatile_publisher_of_latched_topic_is_heard_if_wanted(
+    node: ReactiveNode, peer: Node, publisher: Publisher, spin_until: SpinUntil, spin_for: SpinFor
+) -> None:
+    received: list[float] = []
+    deaf: list[float] = []
+    node.create_observable(Float64, "topic", LATCHED, every_publisher=True).subscribe(
+        lambda message: received.append(message.data)
+    )
+    node.create_observable(Float64, "topic", LATCHED).subscribe(lambda message: deaf.append(message.data))
+    publisher.publish(Float64(data=1.0))
+    spin_until(lambda: received == deaf == [1.0])
+
+    by_hand = peer.create_publisher(Float64, "topic", 10)
+    spin_until(lambda: by_hand.get_subscription_count() == 1)
+    by_hand.publish(Float64(data=2.0))
+    spin_until(lambda: received == [1.0, 2.0])
+    spin_until(lambda: publisher.get_subscription_count() == 3)
+    publisher.publish(Float64(data=3.0))
+    spin_until(lambda: len(received) == 3 and len(deaf) == 2)
+    spin_for(0.05)
+
+    assert received == [1.0, 2.0, 3.0]
+    assert deaf == [1.0, 3.0]
+
+
+def test_what_two_readers_deliver_comes_once(readers: Readers) -> None:
+    received: list[Any] = []
+    readers.observable(LATCHED, every_publisher=True, timestamped=True).subscribe(
+        lambda item: received.append(item.nanoseconds)
+    )
+    readers.receive(0, "a", 1)
+    readers.find_volatile_publisher()
+    for time in range(2, 19):
+        readers.receive(0, "a", time)
+    for time in range(3, 19):
+        readers.receive(1, "a", time)
+    assert received == [*range(1, 19)]
+    readers.receive(1, "a", 2)  # forgotten: only the last sixteen are known
+    assert received == [*range(1, 19), 2]
+
+
+def test_one_reader_delivers_no_copies(readers: Readers) -> None:
+    received: list[Any] = []
+    readers.observable(LATCHED, every_publisher=True).subscribe(received.append)
+    readers.receive(0, "a", 1)
+    readers.receive(0, "a", 1)
+    assert received == ["a", "a"]
+
+
+def test_second_reader_is_volatile_and_the_only_one(readers: Readers) -> None:
+    readers.observable(LATCHED, every_publisher=True).subscribe()
+    assert readers.qos == [LATCHED]
+    for _ in range(2):
+        readers.find_volatile_publisher()
+    assert [(qos.depth, qos.durability) for qos in readers.qos[1:]] == [(3, VOLATILE)]
+    assert LATCHED.durability == DurabilityPolicy.TRANSIENT_LOCAL
+
+
+def test_last_observer_ends_both_readers(readers: Readers) -> None:
+    subscription = readers.observable(LATCHED, every_publisher=True).subscribe()
+    readers.find_volatile_publisher()
+    subscription.dispose()
+    assert readers.destroyed == [1, 2]
+    readers.find_volatile_publisher()  # an event that comes too late
+    assert len(readers.callbacks) == 2
+
+
+def test_next_observer_begins_with_one_reader(readers: Readers) -> None:
+    received: list[Any] = []
+    observable = readers.observable(LATCHED, every_publisher=True)
+    subscription = observable.subscribe()
+    readers.find_volatile_publisher()
+    readers.receive(0, "a", 1)
+    subscription.dispose()
+    observable.subscribe(received.append)
+    readers.receive(2, "a", 1)
+    assert received == ["a"]
+
+
+@pytest.mark.parametrize("qos", [10, QoSProfile(depth=1)])
+def test_volatile_topic_needs_no_second_reader(readers: Readers, qos: Any) -> None:
+    readers.observable(qos, every_publisher=True).subscribe()
+    assert readers.events == [None]
