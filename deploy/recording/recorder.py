@@ -141,7 +141,8 @@ def _record(
     offered = qos_profiles(topic)
     # The loss is reported before or after the next message is: the one before both is among the last two.
     last_two: deque[int] = deque(maxlen=2)
-    is_numbered = len(topic.publishers) == 1  # and not by Cyclone DDS
+    # Each publisher has numbers of its own; Cyclone DDS has none.
+    is_numbered = len(topic.publishers) == 1 and topic is not topics.DIAGNOSTICS
     last_number: int | None = None
 
     def write(data: bytes, info: Any) -> None:

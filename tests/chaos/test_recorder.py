@@ -131,11 +131,12 @@ def test_numbers_of_a_new_publisher_begin_anew(
     assert not reports
 
 
+@pytest.mark.parametrize("topic", [topics.ENGINES, topics.DIAGNOSTICS], ids=lambda topic: topic.name)
 def test_numbers_of_several_publishers_mean_nothing(
-    node: Subscriptions, clock: Clock, reports: list[tuple[float, float]]
+    node: Subscriptions, clock: Clock, reports: list[tuple[float, float]], topic: topics.Topic
 ) -> None:
     for at, number in ((1.0, 7), (2.0, 90), (3.0, 8), (4.0, 91)):
-        receive(node, clock, at, topics.ENGINES, number)
+        receive(node, clock, at, topic, number)
     assert not reports
 
 
