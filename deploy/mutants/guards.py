@@ -44,6 +44,7 @@ GUARDS: dict[str, tuple[str, ...]] = {
         for name in (
             "publishing",
             "observables",
+            "message_reader",
             "sampled",
             "parameters",
             "events",

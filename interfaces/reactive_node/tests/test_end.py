@@ -93,3 +93,16 @@ def test_observable_of_ended_node_completes_at_once(node: ReactiveNode, create: 
     node.destroy_node()
 
     assert Watch(observable).ended == ["completed"]
+
+
+def test_recipe_that_begins_at_the_end_of_the_node_ends_too(node: ReactiveNode) -> None:
+    numbers: Subject[String] = Subject()
+    early: Subject[String] = Subject()
+
+    def begin() -> None:
+        node.publish_observable(numbers, String, "numbers")
+
+    node.publish_observable(early.finally_action(begin), String, "early")
+    node.destroy_node()
+
+    assert not numbers.observers
