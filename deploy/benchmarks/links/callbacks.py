@@ -7,8 +7,10 @@ from collections.abc import Callable
 from typing import Any
 
 import rclpy
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
+from rclpy.task import Future
 from std_msgs.msg import UInt8MultiArray
 
 from deploy.benchmarks.link import Item, Job, Link
@@ -23,6 +25,8 @@ class Connection(Link):
         super().__init__(job)
         rclpy.init(args=[])
         self.node = type(self).make_node(job.role)
+        self.executor = SingleThreadedExecutor()
+        self.executor.add_node(self.node)
         self.qos = QoSProfile(depth=job.depth)
 
     def publisher(self, topic: str) -> Callable[[Item], object]:
@@ -43,7 +47,7 @@ class Connection(Link):
         self.node.create_subscription(UInt8MultiArray, source, publisher.publish, self.qos)
 
     def wait(self, seconds: float) -> None:
-        rclpy.spin_once(self.node, timeout_sec=seconds)
+        self.executor.spin_until_future_complete(Future(), seconds)
 
     def close(self) -> None:
         self.node.destroy_node()

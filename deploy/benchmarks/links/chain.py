@@ -13,8 +13,6 @@ from pathlib import Path
 from typing import Any
 
 from geometry_msgs.msg import PointStamped
-from rclpy.executors import SingleThreadedExecutor
-from rclpy.task import Future
 from std_msgs.msg import Bool, Float64, Header
 
 from deploy.benchmarks.link import KINEMATICS, VELOCITY, Item, Job
@@ -37,8 +35,6 @@ class Connection(callbacks.Connection):
 
     def __init__(self, job: Job) -> None:
         super().__init__(job)
-        self.executor = SingleThreadedExecutor()
-        self.executor.add_node(self.node)
         file = os.open(Path(job.directory, "sent"), os.O_RDWR | os.O_CREAT, 0o600)
         os.ftruncate(file, 16)
         self.memory = mmap.mmap(file, 16)  # the time of the latest item, and how many there were
@@ -136,6 +132,3 @@ class Connection(callbacks.Connection):
 
     def _listen(self, topic: Topic, callback: Callable[[Any], object]) -> None:
         self.node.create_subscription(topic.type, topic.name, callback, topic.qos)
-
-    def wait(self, seconds: float) -> None:
-        self.executor.spin_until_future_complete(Future(), seconds)
