@@ -59,12 +59,16 @@ def present(alternatives: Iterable[Alternative], refused: dict[str, str]) -> lis
 def compare(
     alternatives: Sequence[Alternative], scenarios: Sequence[Scenario], rounds: int
 ) -> Iterator[tuple[str, dict[str, float]]]:
-    """Yield the figures of each measurement with the alternative's title; a round measures all of them."""
+    """
+    Yield the figures of each measurement with the alternative's title; a round measures all of them.
+
+    Every second round goes backwards: a machine that becomes slower or faster favours none.
+    """
     began = time.monotonic()
     for number in range(1, rounds + 1):
         for scenario in scenarios:
             print(f"round {number} of {rounds}, {scenario.key}, {time.monotonic() - began:.0f} s", flush=True)
-            for each in alternatives:
+            for each in alternatives if number % 2 else reversed(alternatives):
                 try:
                     yield each.title, measure(each, scenario)
                 except MeasurementFailed as error:

@@ -81,9 +81,8 @@ class ServiceNode(ReactiveNode):
         """
         Return the good messages of a topic; the others are dropped and reported.
 
-        :param item: turns each message into an item, as the operator ``map`` does at a higher cost. With
-            ``timestamped``, it gets the :class:`Timestamp`.
-        :param timestamped: see :meth:`ReactiveNode.create_observable`.
+        :param item: turns each good message into an item: see :meth:`ReactiveNode.create_observable`.
+        :param timestamped: the same.
         :param sampled: the same; not for a latched topic.
         :param buffered: the same.
         :param max_age: a message that is older [s], or this much ahead of the local clock, is not good.

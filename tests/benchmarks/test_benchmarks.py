@@ -95,6 +95,15 @@ def test_failed_measurement_leaves_the_others_their_figures(
     assert "no figures: silent, start.8: no word\n" in capsys.readouterr().out
 
 
+def test_every_second_round_goes_backwards(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(command, "measure", lambda alternative, scenario: {})
+    order = [Alternative(title, "callbacks") for title in ("one", "two")]
+
+    rounds = command.compare(order, [Scenario("start", 8, 0.0)], 3)
+
+    assert [title for title, _ in rounds] == ["one", "two", "two", "one", "one", "two"]
+
+
 def test_dora_dataflow_joins_source_and_sink(tmp_path: Path) -> None:
     jobs = [Job("dora_nodes", role, LAST, 8, 0.0, 0.0, 1.0, str(tmp_path)) for role in (SINK, SOURCE)]
 
