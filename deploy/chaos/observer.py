@@ -77,7 +77,8 @@ def main(arguments: list[str]) -> int:
     """Observe until standard input ends; the first line of output is the origin of the record's times."""
     path, arms = Path(arguments[0]), [text.split("=", 2) for text in arguments[1:]]
     begin, epoch = clocks()
-    recorder, origin = Recorder(path, begin, epoch), begin / 1e9
+    recorder = Recorder(path, begin, epoch)
+    origin = begin / 1e9
 
     def write(topic: str, event: dict[str, Any], *times: str) -> None:
         relative = {key: event[key] - origin for key in times if event[key] is not None}

@@ -16,10 +16,11 @@ import reactivex as rx
 from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import Point, PointStamped
 from rclpy.context import Context
+from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from rclpy.qos import QoSProfile
+from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.serialization import serialize_message
 from rclpy.time import Time
 from reactivex.subject import Subject
@@ -27,7 +28,7 @@ from std_msgs.msg import Bool, Float64, Header, String
 
 from interfaces import topics
 from interfaces.service import Rejected, ServiceNode, parameter
-from reactive_node.stamps import Timestamp
+from reactive_node.stamps import Timestamp, to_nanoseconds
 
 Make = Callable[..., Any]
 SpinUntil = Callable[..., None]
@@ -298,19 +299,30 @@ def test_errors_of_published_items_are_raised_by_spin(
 
 
 class Readers:
-    """Stands in for the readers of a service: all receive the same samples."""
+    """Stands in for the DDS readers of a service: all receive the same samples."""
 
-    def __init__(self) -> None:
-        self.samples: Subject[Timestamp[bytes]] = Subject()
+    def __init__(self, node: ServiceNode, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.callbacks: dict[object, Callable[[bytes, Any], None]] = {}
+        self.qos: list[QoSProfile] = []
+        self.events: list[SubscriptionEventCallbacks] = []
+        monkeypatch.setattr(node, "create_subscription", self._create)
+        monkeypatch.setattr(node, "destroy_subscription", lambda reader: self.callbacks.pop(reader, None))
 
-    def create(self, *_: Any, item: Callable[[Any], Any], timestamped: bool, **__: Any) -> rx.Observable[Any]:
-        received = self.samples if timestamped else self.samples.map(lambda sample: sample.value)
-        return received.map(item).filter(lambda made: made is not None)
+    def _create(
+        self, _: Any, __: Any, callback: Any, qos: QoSProfile, *, event_callbacks: Any = None, **___: Any
+    ) -> object:
+        reader = object()
+        self.callbacks[reader] = callback
+        self.qos.append(qos)
+        self.events.append(event_callbacks)
+        return reader
 
     def receive(self, message: Any, *seconds: float) -> None:
         """Receive a message once for each source time."""
         for at in seconds:
-            self.samples.on_next(Timestamp(bytes(serialize_message(message)), at_time(at)))
+            info = {"source_timestamp": to_nanoseconds(at_time(at))}
+            for callback in list(self.callbacks.values()):
+                callback(bytes(serialize_message(message)), info)
 
 
 def at_time(seconds: float) -> datetime:
@@ -319,9 +331,7 @@ def at_time(seconds: float) -> datetime:
 
 @pytest.fixture
 def readers(service: ServiceNode, monkeypatch: pytest.MonkeyPatch) -> Readers:
-    readers = Readers()
-    monkeypatch.setattr(service, "create_observable", readers.create)
-    return readers
+    return Readers(service, monkeypatch)
 
 
 @pytest.mark.parametrize("topic", [topics.EFFECTOR_SPEED, topics.L1], ids=lambda topic: topic.name)
@@ -344,7 +354,7 @@ def test_error_while_an_item_is_made_is_an_error_of_the_observable(
     readers.receive(number(0.0), 1.0)
     readers.receive(number(0.0), 2.0)
     assert [type(error) for error in errors] == [ZeroDivisionError]
-    assert not readers.samples.observers
+    assert not readers.callbacks
 
 
 def test_error_of_an_observer_is_no_error_of_the_observable(service: ServiceNode, readers: Readers) -> None:
@@ -358,16 +368,52 @@ def test_error_of_an_observer_is_no_error_of_the_observable(service: ServiceNode
     assert not errors
 
 
-@pytest.mark.parametrize("topic", [topics.L1, topics.ENGINES], ids=lambda topic: topic.name)
+def test_copies_of_latched_messages_are_dropped(service: ServiceNode, readers: Readers) -> None:
+    received: list[Any] = []
+    service.observe(topics.L1, timestamped=True).subscribe(received.append)
+    readers.events[0].incompatible_qos(None)  # from now on, a second reader listens
+    readers.callbacks.popitem()  # the test delivers the copies
+    readers.receive(number(1.5), *range(17), *range(1, 17))
+    assert received == [Timestamp(number(1.5), at_time(at)) for at in range(17)]
+    readers.receive(number(1.5), 0.0)  # forgotten: only the last sixteen are known
+    assert len(received) == 18
+
+
+def test_one_reader_delivers_no_copies(service: ServiceNode, readers: Readers) -> None:
+    received: list[Any] = []
+    service.observe(topics.L1).subscribe(received.append)
+    readers.receive(number(1.5), 1.0, 1.0)
+    assert received == [number(1.5)] * 2
+
+
+def test_events_of_one_time_are_no_copies(service: ServiceNode, readers: Readers) -> None:
+    received: list[Any] = []
+    service.observe(topics.ENGINES).subscribe(received.append)
+    readers.receive(String(data="turn_off"), 1.0, 1.0)
+    assert received == [String(data="turn_off")] * 2
+
+
+def test_volatile_publishers_get_one_reader(service: ServiceNode, readers: Readers) -> None:
+    service.observe(topics.L1).subscribe()
+    assert readers.qos == [topics.L1.qos]
+    for _ in range(2):
+        readers.events[0].incompatible_qos(None)
+    assert [(qos.depth, qos.durability) for qos in readers.qos[1:]] == [(1, DurabilityPolicy.VOLATILE)]
+
+
+@pytest.mark.parametrize("topic", [topics.L1, topics.EFFECTOR_SPEED], ids=lambda topic: topic.name)
 def test_end_of_a_reader_is_passed_on(service: ServiceNode, readers: Readers, topic: topics.Topic) -> None:
     ends: list[Any] = []
-    service.observe(topic).subscribe(on_completed=lambda: ends.append("completed"))
-    service.observe(topic).subscribe(on_error=ends.append)
     error = LookupError()
-    completed, failed = readers.samples.observers
-    completed.on_completed()
-    failed.on_error(error)
-    assert ends == ["completed", error]
+
+    def fail(_: Any) -> None:
+        raise error
+
+    service.observe(topic).subscribe(on_completed=lambda: ends.append("completed"))
+    service.observe(topic, fail).subscribe(on_error=ends.append)
+    readers.receive(number(1.5), 1.0)
+    service.destroy_node()
+    assert ends == [error, "completed"]
 
 
 @pytest.mark.parametrize(
