@@ -163,6 +163,14 @@ def test_error_of_an_observer_is_no_error_of_the_observable(readers: Readers) ->
     assert not errors
 
 
+def test_plain_message_needs_no_info(readers: Readers) -> None:
+    received: list[Any] = []
+    readers.observable(10).subscribe(received.append)
+    (callback,) = readers.callbacks
+    callback("a")  # type: ignore[call-arg]
+    assert received == ["a"]
+
+
 # Every publisher
 
 

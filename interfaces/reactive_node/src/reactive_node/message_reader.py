@@ -49,13 +49,16 @@ class MessageReader(SharedReader):
         self._item = item
         self._reads_every_publisher = every_publisher and self._retained is not None
         self._recent: deque[int] | None = None  # source times, while there are two readers
+        is_plain = not timestamped and item is None and self._retained is None
+        # Without the info of a message, which rclpy collects only for a callback that takes it.
+        self._callback: Callable[..., None] = self._emit if is_plain else self._receive
 
     def _create_first(self) -> Subscription:
         self._recent = None
         if not self._reads_every_publisher:
-            return self._create(self._receive, self._qos)
+            return self._create(self._callback, self._qos)
         events = SubscriptionEventCallbacks(incompatible_qos=self._add_volatile)
-        return self._create(self._receive, self._qos, event_callbacks=events)
+        return self._create(self._callback, self._qos, event_callbacks=events)
 
     def _add_volatile(self, _: Any) -> None:
         """Read by a second reader as well: the first one receives nothing from a volatile publisher."""
@@ -65,7 +68,7 @@ class MessageReader(SharedReader):
                 qos = copy.copy(self._qos)
                 assert isinstance(qos, QoSProfile)
                 qos.durability = DurabilityPolicy.VOLATILE
-                self._subscriptions.append(self._create(self._receive, qos))
+                self._subscriptions.append(self._create(self._callback, qos))
 
     def _receive(self, message: Any, info: Any) -> None:
         """Hand on a message. All in one step: every message takes this path."""
