@@ -32,8 +32,6 @@ from deploy.chaos.cost import proportional_set_size
 from deploy.supervision import interruption
 from reactive_node.domains import reserved_domain
 
-WARM_UP = 0.5  # s; connections and caches have settled by then
-SECONDS = 1.5
 _SILENCE = 20.0  # s without a report that an alternative may take
 _GRACE = 3.0  # s to end
 _LOOK = 0.2  # s between two looks for an interruption
@@ -53,6 +51,10 @@ class Scenario:
     """Of an item [octets]."""
     rate: float
     """Of the source [Hz]; 0 is as fast as it can."""
+    warm_up: float = 0.5
+    """From the first item until the measurement [s]; connections and caches have settled by then."""
+    seconds: float = 1.5
+    """Of the measurement."""
 
     @property
     def key(self) -> str:
@@ -77,30 +79,30 @@ SCENARIOS = (
     Scenario("flood", 10_000_000, 0.0),
     Scenario("start", 8, 1000.0),
 )
-CHAIN_SCENARIOS = tuple(Scenario(CHAIN, 8, rate) for rate in (100.0, 500.0, 1000.0, 4000.0))
-WATCHDOG_SCENARIOS = tuple(Scenario(WATCHDOG, 1, rate) for rate in (20.0, 10_000.0))
+# A service reports its health once a second, and reads the whole discovery for its first report. That belongs
+# to its start, so the warm-up of the chain is longer.
+CHAIN_SCENARIOS = tuple(
+    Scenario(CHAIN, 8, rate, warm_up=2.0, seconds=2.0) for rate in (100.0, 500.0, 1000.0, 4000.0)
+)
+WATCHDOG_SCENARIOS = tuple(Scenario(WATCHDOG, 1, rate, warm_up=2.0, seconds=3.0) for rate in (20.0, 10_000.0))
 
 
-def measure(
-    alternative: Alternative, scenario: Scenario, *, warm_up: float = WARM_UP, seconds: float = SECONDS
-) -> dict[str, float]:
+def measure(alternative: Alternative, scenario: Scenario) -> dict[str, float]:
     """
     Return the figures of a scenario, named with its key.
 
-    :param warm_up: from the first item until the measurement [s].
-    :param seconds: of the measurement.
     :raises MeasurementFailed: if the processes end early or stay silent.
     """
     if scenario.name == WATCHDOG:
-        return _measure_watchdog(alternative, scenario, warm_up, seconds)
+        return _measure_watchdog(alternative, scenario)
     roles = (SINK, *scenario.middle, SOURCE)
-    with _run(alternative, roles, scenario, warm_up, seconds) as run:
+    with _run(alternative, roles, scenario) as run:
         began = run.start()
         first = run.report(SINK, "first")
         if scenario.name == "start":
             return {f"{scenario.key}.seconds": first["time"] - began}
         pids = [run.pids[role] for role in scenario.middle or (SINK,)]
-        end, cpu = _cost(run, pids, seconds)
+        end, cpu = _cost(run, pids, scenario.seconds)
         megabytes = sum(map(proportional_set_size, pids))
         threads = sum(len(os.listdir(f"/proc/{pid}/task")) for pid in pids)
     figures = {"cpu_us": sum(cpu), "megabytes": megabytes, "threads": threads}
@@ -113,31 +115,25 @@ def measure(
     return {f"{scenario.key}.{name}": value for name, value in figures.items()}
 
 
-def _measure_watchdog(
-    alternative: Alternative, scenario: Scenario, warm_up: float, seconds: float
-) -> dict[str, float]:
-    with _run(alternative, (WATCHDOG, SOURCE), scenario, warm_up, seconds) as run:
+def _measure_watchdog(alternative: Alternative, scenario: Scenario) -> dict[str, float]:
+    with _run(alternative, (WATCHDOG, SOURCE), scenario) as run:
         run.start()
-        time.sleep(2 * warm_up)  # until it hears the heartbeats
+        time.sleep(scenario.warm_up)  # until it hears the heartbeats
         began, before = time.monotonic(), cpu_seconds(run.pids[WATCHDOG])
-        time.sleep(2 * seconds)
+        time.sleep(scenario.seconds)
         busy = cpu_seconds(run.pids[WATCHDOG]) - before
         return {f"{scenario.key}.cpu_percent": 100 * busy / (time.monotonic() - began)}
 
 
-def measure_subscribers(
-    alternative: Alternative, count: int, rate: float, *, warm_up: float = WARM_UP, seconds: float = SECONDS
-) -> dict[str, float]:
+def measure_subscribers(alternative: Alternative, scenario: Scenario, count: int) -> dict[str, float]:
     """
-    Return the processor time that an item of 8 B costs its publisher and each of ``count`` subscribers [µs].
+    Return the processor time that an item costs its publisher and each of ``count`` subscribers [µs].
 
-    :param rate: of the publisher [Hz].
     :raises MeasurementFailed: if the processes end early or stay silent.
     """
-    roles = (*[SINK] * count, SOURCE)
-    with _run(alternative, roles, Scenario("subscribers", 8, rate), warm_up, seconds) as run:
+    with _run(alternative, (*[SINK] * count, SOURCE), scenario) as run:
         run.start()
-        _, (publisher, subscriber) = _cost(run, [run.pids[SOURCE], run.pids[SINK]], seconds)
+        _, (publisher, subscriber) = _cost(run, [run.pids[SOURCE], run.pids[SINK]], scenario.seconds)
     return {"publisher_us": publisher, "subscriber_us": subscriber}
 
 
@@ -162,14 +158,12 @@ def cpu_seconds(pid: int) -> float:
 
 
 @contextmanager
-def _run(
-    alternative: Alternative, roles: Sequence[str], scenario: Scenario, warm_up: float, seconds: float
-) -> Iterator[_Run]:
+def _run(alternative: Alternative, roles: Sequence[str], scenario: Scenario) -> Iterator[_Run]:
     """Prepare a process for each role, in a ROS domain and a directory of their own."""
     temporary = tempfile.TemporaryDirectory(prefix="bench-", ignore_cleanup_errors=True)
     with reserved_domain() as domain_id, temporary as directory:
         topic = HEARTBEATS if WATCHDOG in roles else FIRST if MIDDLE in roles else LAST
-        fields = (topic, scenario.size, scenario.rate, warm_up, seconds, directory)
+        fields = (topic, scenario.size, scenario.rate, scenario.warm_up, scenario.seconds, directory)
         jobs = [Job(alternative.link, role, *fields) for role in roles]
         with _Run(alternative, jobs, domain_id) as run:
             yield run

@@ -16,7 +16,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from deploy.benchmarks.alternatives import Alternative
-from deploy.benchmarks.measurement import MeasurementFailed, measure_subscribers
+from deploy.benchmarks.measurement import MeasurementFailed, Scenario, measure_subscribers
 from deploy.benchmarks.table import Results, table
 from deploy.chaos.arm import Arm
 from deploy.chaos.cost import Cost
@@ -155,7 +155,7 @@ def subscribers(sizes: Sequence[int] = SIZES) -> Rows:
     """Yield what one item costs its publisher and one of its subscribers [µs]."""
     here = Alternative("ReactiveNode", "reactive", ros=bool(system_rclpy()))
     for size in sizes:
-        yield str(size), measure_subscribers(here, size, RATE)
+        yield str(size), measure_subscribers(here, Scenario("subscribers", 8, RATE), size)
 
 
 def _packets() -> int:

@@ -126,7 +126,7 @@ def test_processor_time_of_a_process_is_that_of_all_its_threads() -> None:
 def test_short_pipeline_of_this_system_has_figures() -> None:
     here = Alternative("ReactiveNode", "reactive", ros=bool(system_rclpy()))
 
-    figures = measurement.measure(here, Scenario("pipeline", 8, 200.0), warm_up=0.1, seconds=0.2)
+    figures = measurement.measure(here, Scenario("pipeline", 8, 200.0, warm_up=0.1, seconds=0.2))
 
     assert set(figures) == {
         f"pipeline.8.{name}" for name in ("p50_ms", "p99_ms", "cpu_us", "megabytes", "threads", "delivered")
@@ -149,7 +149,7 @@ EMBEDDED_ONLY = pytest.mark.skipif(bool(system_rclpy()), reason="platform: the e
 def test_short_chain_has_figures(link: str) -> None:
     here = Alternative("here", link, ros=bool(system_rclpy()))
 
-    figures = measurement.measure(here, Scenario("chain", 8, 100.0), warm_up=0.1, seconds=0.3)
+    figures = measurement.measure(here, Scenario("chain", 8, 100.0, warm_up=0.1, seconds=0.3))
 
     names = ("p50_ms", "p99_ms", "cpu_us", "megabytes", "threads", "delivered")
     assert set(figures) == {f"chain.100.{name}" for name in names}
@@ -172,29 +172,27 @@ def in_c() -> Callable[[str], Alternative]:
 @pytest.mark.parametrize(
     ("program", "scenario"),
     [
-        (c_program.PIPELINE, Scenario("pipeline", 1_000_000, 50.0)),
-        (c_program.SERVICES, Scenario("chain", 8, 100.0)),
-        (c_program.SERVICES, Scenario("watchdog", 1, 1000.0)),
+        (c_program.PIPELINE, Scenario("pipeline", 1_000_000, 50.0, warm_up=0.1, seconds=0.2)),
+        (c_program.SERVICES, Scenario("chain", 8, 100.0, warm_up=0.1, seconds=0.2)),
+        (c_program.SERVICES, Scenario("watchdog", 1, 1000.0, warm_up=0.2, seconds=0.4)),
     ],
     ids=lambda value: value if isinstance(value, str) else value.name,
 )
 def test_short_measurement_of_the_c_program_has_figures(
     in_c: Callable[[str], Alternative], program: str, scenario: Scenario
 ) -> None:
-    figures = measurement.measure(in_c(program), scenario, warm_up=0.1, seconds=0.2)
+    figures = measurement.measure(in_c(program), scenario)
     assert all(value > 0 for value in figures.values())
 
 
 @pytest.mark.usefixtures("in_c")  # the source of the heartbeats
 def test_watchdog_that_hears_each_heartbeat_costs_more_than_the_service() -> None:
     ros = bool(system_rclpy())
-    scenario = Scenario("watchdog", 1, 2000.0)
+    scenario = Scenario("watchdog", 1, 2000.0, warm_up=2.0, seconds=1.0)
     service, callbacks = (
         measurement.measure(
             Alternative(link, link, ros=ros, commands=alternatives.services),
             scenario,
-            warm_up=1.0,
-            seconds=0.5,
         )["watchdog.2000.cpu_percent"]
         for link in ("chain_services", "chain")
     )
@@ -211,7 +209,7 @@ def test_processor_time_is_measured_although_all_reports_have_waited(monkeypatch
 
     monkeypatch.setattr(measurement._Run, "report", late)
     here = Alternative("callbacks", "callbacks", ros=bool(system_rclpy()))
-    figures = measurement.measure(here, Scenario("pipeline", 8, 200.0), warm_up=0.1, seconds=0.2)
+    figures = measurement.measure(here, Scenario("pipeline", 8, 200.0, warm_up=0.1, seconds=0.2))
     assert figures["pipeline.8.cpu_us"] > 10.0
 
 

@@ -81,7 +81,8 @@ def test_fleet_grows_until_the_machine_is_full(monkeypatch: pytest.MonkeyPatch) 
 def test_item_costs_its_publisher_and_its_subscribers(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(alternatives, "BENCH_PYTHON", alternatives.SYSTEM_PYTHON)
     here = Alternative("ReactiveNode", "reactive", ros=bool(system_rclpy()))
-    figures = measurement.measure_subscribers(here, 3, 200.0, warm_up=0.2, seconds=0.3)
+    scenario = measurement.Scenario("subscribers", 8, 200.0, warm_up=0.2, seconds=0.3)
+    figures = measurement.measure_subscribers(here, scenario, 3)
     assert figures.keys() == scale.HEADINGS[scale.SUBSCRIBERS].keys()
     assert all(value > 0 for value in figures.values())
 
