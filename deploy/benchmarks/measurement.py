@@ -46,7 +46,7 @@ class Scenario:
     """One kind of work."""
 
     name: str
-    """`pipeline`, `flood`, `start`, `chain` (from an angle to a speed) or `watchdog` (heartbeats)."""
+    """`pipeline`, `flood`, `start`, `subscribers`, `chain` (an angle to a speed) or `watchdog` (heartbeats)."""
     size: int
     """Of an item [octets]."""
     rate: float
@@ -80,7 +80,7 @@ SCENARIOS = (
     Scenario("start", 8, 1000.0),
 )
 # A service reports its health once a second, and reads the whole discovery for its first report. That belongs
-# to its start, so the warm-up of the chain is longer.
+# to its start, so services warm up longer.
 CHAIN_SCENARIOS = tuple(
     Scenario(CHAIN, 8, rate, warm_up=2.0, seconds=2.0) for rate in (100.0, 500.0, 1000.0, 4000.0)
 )
