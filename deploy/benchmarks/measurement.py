@@ -46,7 +46,7 @@ class Scenario:
     """One kind of work."""
 
     name: str
-    """`pipeline`, `flood`, `start`, `subscribers`, `chain` (an angle to a speed) or `watchdog` (heartbeats)."""
+    """`pipeline`, `flood`, `start`, `subscribers`, `chain` (angle to speed) or `watchdog` (heartbeats)."""
     size: int
     """Of an item [octets]."""
     rate: float
