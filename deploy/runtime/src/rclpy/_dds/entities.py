@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import ctypes as ct
 import time
-import weakref
-from functools import cache
+from array import array
+from functools import cache, lru_cache
+from sys import is_finalizing
 from typing import Any, NamedTuple
 
 from rclpy._handle import Handle
@@ -146,22 +147,45 @@ def _keep_memory() -> None:
     bytes(30_000_000)
 
 
+class _Loan:
+    """Returns memory to DDS when nothing refers to it any more: for less than a finalizer costs."""
+
+    __slots__ = ("_lent", "_vector")
+
+    def __init__(self, lent: int, vector: Any) -> None:
+        self._lent, self._vector = lent, vector
+
+    def __del__(self, dds: Any = quick, is_ending: Any = is_finalizing) -> None:
+        if not is_ending():  # DDS may have gone by then
+            dds.ddsi_serdata_to_ser_unref(self._lent, self._vector)
+
+
+_Vector = ct.c_size_t * 2  # struct iovec
+
+
+@lru_cache(maxsize=16)
+def _octets(size: int) -> Any:
+    return ct.c_ubyte * size
+
+
 def _loan(serdata: Pointer, size: int) -> memoryview:
     """Return the octets of a sample in DDS's own memory, which is freed when nothing refers to them."""
     _keep_memory()
-    vector = (ct.c_size_t * 2)()  # struct iovec
+    vector = _Vector()
     lent = quick.ddsi_serdata_to_ser_ref(serdata, 0, size, vector)
-    octets = (ct.c_ubyte * size).from_address(vector[0])
-    weakref.finalize(octets, quick.ddsi_serdata_to_ser_unref, lent, vector).atexit = False
+    octets = _octets(size).from_address(vector[0])
+    octets.loan = _Loan(lent, vector)
     return memoryview(octets).cast("B")
 
 
 def _vectors(data: Pieces) -> tuple[int, Any]:
-    """Return the number of the pieces, and an array of where they are; they must not be freed before it."""
+    """Return the number of the pieces, and where they are; they must not be freed before it."""
     _keep_memory()
-    pieces = [piece for piece in data.pieces if piece]
-    vectors = (IoVector(ct.addressof(ct.c_char.from_buffer(piece)), len(piece)) for piece in pieces)
-    return len(pieces), (IoVector * len(pieces))(*vectors)
+    numbers = array("L")
+    for piece in data.pieces:
+        if piece:
+            numbers.extend((ct.addressof(ct.c_char.from_buffer(piece)), len(piece)))
+    return len(numbers) // 2, IoVector.from_buffer(numbers)
 
 
 class _Endpoint(Handle):
