@@ -2,9 +2,10 @@
 
 A source publishes items, a middle process maps and publishes them again, a sink receives them. Then a source
 floods a sink, and a source starts while a sink waits. `chain` compares the arm's kinematics and velocity, and
-its operator watchdog, with the same in plain callbacks. Each round measures all alternatives, so a busy
-machine affects all alike. CPU time is that of whole processes. What cannot be measured here is named with the
-reason.
+its operator watchdog, with the same in plain callbacks. `images` sends images from one process to another.
+
+Each round measures all alternatives, so a busy machine affects all alike. CPU time is that of whole
+processes. What cannot be measured here is named with the reason.
 """
 
 from __future__ import annotations
@@ -22,22 +23,34 @@ from pathlib import Path
 from typing import Any
 
 from deploy.benchmarks import environment, scale
-from deploy.benchmarks.alternatives import ALTERNATIVES, BENCH_PYTHON, CHAINS, Alternative
+from deploy.benchmarks.alternatives import ALTERNATIVES, BENCH_PYTHON, CHAINS, IMAGES, Alternative
 from deploy.benchmarks.measurement import (
     CHAIN_SCENARIOS,
+    IMAGE_SCENARIOS,
     SCENARIOS,
     WATCHDOG_SCENARIOS,
     MeasurementFailed,
     Scenario,
     measure,
 )
-from deploy.benchmarks.table import chain_tables, tables
+from deploy.benchmarks.table import chain_tables, image_tables, tables
 from deploy.commands.setup import system_rclpy
 from deploy.supervision import interruption
 from deploy.supervision.processes import ROOT, run_directory
 
-COMPARISON, CHAIN, SCALE = "comparison", "chain", "scale"
-TABLES: dict[str, Callable[[Any], str]] = {COMPARISON: tables, CHAIN: chain_tables, SCALE: scale.tables}
+COMPARISON, CHAIN, IMAGE, SCALE = "comparison", "chain", "images", "scale"
+TABLES: dict[str, Callable[[Any], str]] = {
+    COMPARISON: tables,
+    CHAIN: chain_tables,
+    IMAGE: image_tables,
+    SCALE: scale.tables,
+}
+WORK: dict[str, tuple[Sequence[Alternative], Sequence[Scenario]]] = {
+    COMPARISON: (ALTERNATIVES, SCENARIOS),
+    CHAIN: (CHAINS, CHAIN_SCENARIOS),
+    IMAGE: (IMAGES, IMAGE_SCENARIOS),
+}
+CHARTS = (COMPARISON, SCALE)
 
 
 def present(alternatives: Iterable[Alternative], refused: dict[str, str]) -> list[Alternative]:
@@ -104,6 +117,7 @@ def main(arguments: Sequence[str]) -> int:
     kinds = {
         COMPARISON: "this system and its alternatives (the default)",
         CHAIN: "the arm's own services and the same in plain callbacks",
+        IMAGE: "images from one process to another",
         SCALE: "many arms, many subscribers",
     }
     shown = "; ".join(f"{name}: {meaning}" for name, meaning in kinds.items())
@@ -135,11 +149,11 @@ def main(arguments: Sequence[str]) -> int:
 
 def _compare(results: dict[str, Any], kind: str, rounds: int) -> None:
     """Collect the rounds of each figure, by alternative."""
-    alternatives, scenarios = (CHAINS, CHAIN_SCENARIOS) if kind == CHAIN else (ALTERNATIVES, SCENARIOS)
+    alternatives, scenarios = WORK[kind]
     needed = {each.requirements for each in alternatives if each.requirements} | {environment.CHART}
     found = present(alternatives, environment.prepare(sorted(needed)))
     if kind == CHAIN and any(each.build for each in found):  # the source of the heartbeats is in C
-        scenarios += WATCHDOG_SCENARIOS
+        scenarios = (*scenarios, *WATCHDOG_SCENARIOS)
     print(f"{machine()}; {versions()}", flush=True)
     results |= {each.title: {} for each in found}
     for title, figures in compare(found, scenarios, rounds):
@@ -161,7 +175,7 @@ def _write(kind: str, results: dict[str, Any]) -> int:
     directory.mkdir(parents=True, exist_ok=True)
     file, chart = directory / f"{kind}.json", directory / f"{kind}.svg"
     file.write_text(json.dumps(results, indent=1))
-    if kind == CHAIN:
+    if kind not in CHARTS:
         print(f"Figures: {file}")
         return 0
     command = [str(BENCH_PYTHON), "-m", f"deploy.benchmarks.{kind}_chart", str(file), str(chart)]

@@ -10,6 +10,7 @@ from deploy.benchmarks.link import HEARTBEATS, Job
 from deploy.supervision.processes import run_directory
 
 PIPELINE, SERVICES = "pipeline", "services"
+LOOPBACK, LOCALHOST, DEFAULTS = "loopback.xml", "localhost.xml", "defaults.xml"
 _SOURCES = Path(__file__).with_name("c")
 _CONFIGURATIONS = Path(__file__).with_name("links")
 _PACKAGES = {"cc": "gcc libc6-dev", "idlc": "cyclonedds-tools cyclonedds-dev"}
@@ -37,10 +38,14 @@ def build() -> str:
     return ""
 
 
-def command(program: str, job: Job) -> list[str]:
-    """Return the command of a process of PIPELINE or SERVICES."""
+def command(program: str, job: Job, settings: str = "") -> list[str]:
+    """
+    Return the command of a process of PIPELINE or SERVICES.
+
+    :param settings: a file of Cyclone DDS in ``links/``; by default, those of the embedded runtime.
+    """
     numbers = (job.size, job.rate, job.warm_up, job.seconds, job.depth)
-    configuration = _CONFIGURATIONS / ("localhost.xml" if job.topic == HEARTBEATS else "loopback.xml")
+    configuration = _CONFIGURATIONS / (settings or (LOCALHOST if job.topic == HEARTBEATS else LOOPBACK))
     words = [job.role, job.topic, *map(str, numbers), job.directory, configuration.read_text()]
     return [str(_directory() / program), *words]
 

@@ -46,7 +46,7 @@ class Scenario:
     """One kind of work."""
 
     name: str
-    """`pipeline`, `flood`, `start`, `subscribers`, `chain` (angle to speed) or `watchdog` (heartbeats)."""
+    """`pipeline`, `flood`, `start`, `subscribers`, `image`, `chain` (angle to speed) or `watchdog`."""
     size: int
     """Of an item [octets]."""
     rate: float
@@ -59,6 +59,8 @@ class Scenario:
     @property
     def key(self) -> str:
         """The beginning of the names of its figures."""
+        if self.name == IMAGE:
+            return f"{self.name}.{self.size}.{self.rate:.0f}"
         return f"{self.name}.{self.rate if self.name in (CHAIN, WATCHDOG) else self.size:.0f}"
 
     @property
@@ -66,8 +68,14 @@ class Scenario:
         """The roles between sink and source, the last one first."""
         return {"pipeline": (MIDDLE,), CHAIN: (VELOCITY, KINEMATICS)}.get(self.name, ())
 
+    @property
+    def charged(self) -> tuple[str, ...]:
+        """The roles whose cost counts."""
+        return (SOURCE, SINK) if self.name == IMAGE else self.middle or (SINK,)
+
 
 CHAIN = "chain"
+IMAGE = "image"
 SCENARIOS = (
     Scenario("pipeline", 8, 200.0),
     Scenario("pipeline", 1_000, 200.0),
@@ -83,6 +91,10 @@ SCENARIOS = (
 # to its start, so services warm up longer.
 CHAIN_SCENARIOS = tuple(
     Scenario(CHAIN, 8, rate, warm_up=2.0, seconds=2.0) for rate in (100.0, 500.0, 1000.0, 4000.0)
+)
+IMAGE_SCENARIOS = (
+    *(Scenario(IMAGE, 1_000_000, rate) for rate in (20.0, 100.0, 300.0)),
+    *(Scenario(IMAGE, 10_000_000, rate, seconds=3.0) for rate in (4.0, 20.0)),
 )
 WATCHDOG_SCENARIOS = tuple(Scenario(WATCHDOG, 1, rate, warm_up=2.0, seconds=3.0) for rate in (20.0, 10_000.0))
 
@@ -101,7 +113,7 @@ def measure(alternative: Alternative, scenario: Scenario) -> dict[str, float]:
         first = run.report(SINK, "first")
         if scenario.name == "start":
             return {f"{scenario.key}.seconds": first["time"] - began}
-        pids = [run.pids[role] for role in scenario.middle or (SINK,)]
+        pids = [run.pids[role] for role in scenario.charged]
         end, cpu = _cost(run, pids, scenario.seconds)
         megabytes = sum(map(proportional_set_size, pids))
         threads = sum(len(os.listdir(f"/proc/{pid}/task")) for pid in pids)

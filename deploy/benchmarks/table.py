@@ -57,6 +57,26 @@ def chain_tables(results: Results) -> str:
     return "\n\n".join([*chain, table("operator watchdog: CPU [% of a core]", results, heartbeats)])
 
 
+def image_tables(results: Results) -> str:
+    """Return all tables of the images."""
+    work = {(1_000_000, rate): f"1 MB, {rate} Hz" for rate in (20, 100, 300)}
+    work |= {(10_000_000, rate): f"10 MB, {rate} Hz" for rate in (4, 20)}
+    titles = {
+        "p50_ms": "image: latency, p50 [ms]",
+        "p99_ms": "image: latency, p99 [ms]",
+        "cpu_us": "image: CPU of both processes [µs/image]",
+        "delivered": "image: delivered [%]",
+    }
+    return "\n\n".join(
+        table(
+            title,
+            results,
+            {f"image.{size}.{rate}.{figure}": heading for (size, rate), heading in work.items()},
+        )
+        for figure, title in titles.items()
+    )
+
+
 def tables(results: Results) -> str:
     """Return all tables of the comparison."""
 

@@ -13,7 +13,7 @@ import pytest
 from deploy.benchmarks import __main__ as command
 from deploy.benchmarks import alternatives, c_program, measurement, table
 from deploy.benchmarks.alternatives import Alternative
-from deploy.benchmarks.link import LAST, SINK, SOURCE, Job
+from deploy.benchmarks.link import LAST, MIDDLE, SINK, SOURCE, Job
 from deploy.benchmarks.measurement import MeasurementFailed, Scenario
 from deploy.commands.setup import system_rclpy
 
@@ -132,6 +132,44 @@ def test_short_pipeline_of_this_system_has_figures() -> None:
         f"pipeline.8.{name}" for name in ("p50_ms", "p99_ms", "cpu_us", "megabytes", "threads", "delivered")
     }
     assert all(value > 0 for value in figures.values())
+
+
+@pytest.mark.parametrize("link", ["image_callbacks", "image_reactive"])
+def test_short_measurement_of_images_has_figures(link: str) -> None:
+    here = Alternative("here", link, ros=bool(system_rclpy()))
+
+    figures = measurement.measure(here, Scenario("image", 1_000_000, 50.0, warm_up=0.1, seconds=0.3))
+
+    names = ("p50_ms", "p99_ms", "cpu_us", "megabytes", "threads", "delivered")
+    assert set(figures) == {f"image.1000000.50.{name}" for name in names}
+    assert all(value > 0 for value in figures.values())
+
+
+def test_image_is_charged_to_both_processes() -> None:
+    assert Scenario("image", 1_000_000, 20.0).charged == (SOURCE, SINK)
+    assert Scenario("flood", 1_000_000, 0.0).charged == (SINK,)
+    assert Scenario("pipeline", 1_000_000, 20.0).charged == (MIDDLE,)
+
+
+def test_tables_of_images_have_a_column_for_each_scenario() -> None:
+    figures = {f"{each.key}.p50_ms": [each.rate] for each in measurement.IMAGE_SCENARIOS}
+
+    headings, _, row, *_ = table.image_tables({"here": figures}).splitlines()
+
+    assert headings.endswith("| 1 MB, 20 Hz | 1 MB, 100 Hz | 1 MB, 300 Hz | 10 MB, 4 Hz | 10 MB, 20 Hz |")
+    assert row == "| here | 20.0 | 100 | 300 | 4.00 | 20.0 |"
+
+
+def test_c_program_has_the_settings_of_the_runtime_or_those_of_cyclone_dds(tmp_path: Path) -> None:
+    job = Job(c_program.PIPELINE, SINK, LAST, 8, 0.0, 0.0, 1.0, str(tmp_path))
+    here = Alternative("C", c_program.PIPELINE)
+
+    ((*_, same),) = alternatives.c_processes(here, [job])
+    ((*_, defaults),) = alternatives.c_processes_with_defaults(here, [job])
+
+    assert "FragmentSize" in same
+    assert "FragmentSize" not in defaults
+    assert 'NetworkInterface name="lo"' in defaults
 
 
 EMBEDDED_ONLY = pytest.mark.skipif(bool(system_rclpy()), reason="platform: the embedded runtime's DDS")

@@ -20,6 +20,7 @@ class Connection(Link):
     """A node with publishers and subscriptions."""
 
     make_node: Callable[[str], Node] = Node
+    message_type: Any = UInt8MultiArray
 
     def __init__(self, job: Job) -> None:
         super().__init__(job)
@@ -30,8 +31,8 @@ class Connection(Link):
         self.qos = QoSProfile(depth=job.depth)
 
     def publisher(self, topic: str) -> Callable[[Item], object]:
-        publisher = self.node.create_publisher(UInt8MultiArray, topic, self.qos)
-        message = UInt8MultiArray(data=array("B", bytes(self.job.size)))
+        publisher = self.node.create_publisher(self.message_type, topic, self.qos)
+        message = self.message_type(data=array("B", bytes(self.job.size)))
 
         def send(item: Item) -> None:
             message.data[:8] = item[:8]
@@ -40,11 +41,14 @@ class Connection(Link):
         return send
 
     def subscribe(self, topic: str, on_item: Callable[[Any], object]) -> None:
-        self.node.create_subscription(UInt8MultiArray, topic, lambda message: on_item(message.data), self.qos)
+        def receive(message: Any) -> None:
+            on_item(message.data)
+
+        self.node.create_subscription(self.message_type, topic, receive, self.qos)
 
     def forward(self, source: str, target: str) -> None:
-        publisher = self.node.create_publisher(UInt8MultiArray, target, self.qos)
-        self.node.create_subscription(UInt8MultiArray, source, publisher.publish, self.qos)
+        publisher = self.node.create_publisher(self.message_type, target, self.qos)
+        self.node.create_subscription(self.message_type, source, publisher.publish, self.qos)
 
     def wait(self, seconds: float) -> None:
         self.executor.spin_until_future_complete(Future(), seconds)
