@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable
 from typing import Any
 
@@ -24,22 +25,34 @@ LATCHED = QoSProfile(depth=3, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 VOLATILE = DurabilityPolicy.VOLATILE
 
 
+class Reader:
+    """Stands in for a reader."""
+
+    def __init__(self, callback: Callable[..., None]) -> None:
+        self.callback = callback
+
+    @property
+    def collects_info(self) -> bool:
+        """Whether rclpy collects the info of each message for the callback."""
+        return len(inspect.signature(self.callback).parameters) == 2
+
+
 class Readers:
     """Stands in for a node and the readers that it creates."""
 
     def __init__(self) -> None:
-        self.callbacks: list[Callable[[Any, Any], None]] = []
+        self.created: list[Reader] = []
         self.qos: list[Any] = []
         self.events: list[SubscriptionEventCallbacks | None] = []
-        self.destroyed: list[Any] = []
+        self.destroyed: list[Reader] = []
 
-    def create(self, callback: Any, qos: Any, event_callbacks: Any = None) -> int:
-        self.callbacks.append(callback)
+    def create(self, callback: Any, qos: Any, event_callbacks: Any = None) -> Reader:
+        self.created.append(Reader(callback))
         self.qos.append(qos)
         self.events.append(event_callbacks)
-        return len(self.callbacks)
+        return self.created[-1]
 
-    def destroy_subscription(self, reader: int) -> None:
+    def destroy_subscription(self, reader: Reader) -> None:
         self.destroyed.append(reader)
 
     def find_volatile_publisher(self) -> None:
@@ -49,8 +62,10 @@ class Readers:
         assert events.incompatible_qos is not None
         events.incompatible_qos(None)  # type: ignore[arg-type]
 
-    def receive(self, reader: int, message: str, time: int) -> None:
-        self.callbacks[reader](message, {"source_timestamp": time})
+    def receive(self, number: int, message: str, time: int) -> None:
+        reader = self.created[number]
+        arguments = (message, {"source_timestamp": time}) if reader.collects_info else (message,)
+        reader.callback(*arguments)
 
     def observable(self, qos: Any, **options: Any) -> rx.Observable[Any]:
         here: Any = self
@@ -149,7 +164,7 @@ def test_error_while_an_item_is_made_is_an_error_for_all_observers(readers: Read
         observable.subscribe(on_error=lambda error, name=name: errors.append((name, type(error))))
     readers.receive(0, "a", 1)
     assert errors == [("one", TypeError), ("two", TypeError)]
-    assert readers.destroyed == [1]
+    assert readers.destroyed == readers.created
 
 
 def test_error_of_an_observer_is_no_error_of_the_observable(readers: Readers) -> None:
@@ -163,12 +178,24 @@ def test_error_of_an_observer_is_no_error_of_the_observable(readers: Readers) ->
     assert not errors
 
 
-def test_plain_message_needs_no_info(readers: Readers) -> None:
-    received: list[Any] = []
-    readers.observable(10).subscribe(received.append)
-    (callback,) = readers.callbacks
-    callback("a")  # type: ignore[call-arg]
-    assert received == ["a"]
+@pytest.mark.parametrize("qos", [10, LATCHED])
+@pytest.mark.parametrize("item", [None, str.upper])
+@pytest.mark.parametrize("timestamped", [False, True])
+def test_info_is_collected_only_for_timestamps(
+    readers: Readers, qos: Any, item: Any, timestamped: bool
+) -> None:
+    readers.observable(qos, item=item, timestamped=timestamped, every_publisher=True).subscribe()
+    assert [reader.collects_info for reader in readers.created] == [timestamped]
+
+
+def test_info_is_collected_while_there_are_two_readers(readers: Readers) -> None:
+    observable = readers.observable(LATCHED, every_publisher=True)
+    subscription = observable.subscribe()
+    readers.find_volatile_publisher()
+    assert [reader.collects_info for reader in readers.created] == [True, True]
+    subscription.dispose()
+    observable.subscribe()
+    assert not readers.created[2].collects_info
 
 
 # Every publisher
@@ -199,19 +226,20 @@ def test_volatile_publisher_of_latched_topic_is_heard_if_wanted(
     assert deaf == [1.0, 3.0]
 
 
-def test_what_two_readers_deliver_comes_once(readers: Readers) -> None:
+@pytest.mark.parametrize("timestamped", [False, True])
+def test_what_two_readers_deliver_comes_once(readers: Readers, timestamped: bool) -> None:
     received: list[Any] = []
-    readers.observable(LATCHED, every_publisher=True, timestamped=True).subscribe(
-        lambda item: received.append(item.nanoseconds)
+    readers.observable(LATCHED, every_publisher=True, timestamped=timestamped).subscribe(
+        lambda item: received.append(int(item.value if timestamped else item))
     )
-    readers.receive(0, "a", 1)
+    readers.receive(0, "1", 1)
     readers.find_volatile_publisher()
     for time in range(2, 19):
-        readers.receive(0, "a", time)
+        readers.receive(0, str(time), time)
     for time in range(3, 19):
-        readers.receive(1, "a", time)
+        readers.receive(1, str(time), time)
     assert received == [*range(1, 19)]
-    readers.receive(1, "a", 2)  # forgotten: only the last sixteen are known
+    readers.receive(1, "2", 2)  # forgotten: only the last sixteen are known
     assert received == [*range(1, 19), 2]
 
 
@@ -236,9 +264,9 @@ def test_last_observer_ends_both_readers(readers: Readers) -> None:
     subscription = readers.observable(LATCHED, every_publisher=True).subscribe()
     readers.find_volatile_publisher()
     subscription.dispose()
-    assert readers.destroyed == [1, 2]
+    assert readers.destroyed == readers.created
     readers.find_volatile_publisher()  # an event that comes too late
-    assert len(readers.callbacks) == 2
+    assert len(readers.created) == 2
 
 
 def test_next_observer_begins_with_one_reader(readers: Readers) -> None:

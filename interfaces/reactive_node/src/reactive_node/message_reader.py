@@ -49,9 +49,8 @@ class MessageReader(SharedReader):
         self._item = item
         self._reads_every_publisher = every_publisher and self._retained is not None
         self._recent: deque[int] | None = None  # source times, while there are two readers
-        is_plain = not timestamped and item is None and self._retained is None
-        # Without the info of a message, which rclpy collects only for a callback that takes it.
-        self._callback: Callable[..., None] = self._emit if is_plain else self._receive
+        # rclpy collects the info of a message only for a callback that takes it.
+        self._callback: Callable[..., None] = self._receive_with_info if timestamped else self._receive
 
     def _create_first(self) -> Subscription:
         self._recent = None
@@ -65,20 +64,24 @@ class MessageReader(SharedReader):
         with self._lock:
             if len(self._subscriptions) == 1:
                 self._recent = deque(maxlen=_RECENT)
+                self._subscriptions[0].callback = self._receive_with_info
                 qos = copy.copy(self._qos)
                 assert isinstance(qos, QoSProfile)
                 qos.durability = DurabilityPolicy.VOLATILE
-                self._subscriptions.append(self._create(self._callback, qos))
+                self._subscriptions.append(self._create(self._receive_with_info, qos))
 
-    def _receive(self, message: Any, info: Any) -> None:
-        """Hand on a message. All in one step: every message takes this path."""
+    def _receive_with_info(self, message: Any, info: Any) -> None:
+        """Hand on a message of which the source time matters, unless the other reader has delivered it."""
         if self._recent is not None:
             if info["source_timestamp"] in self._recent:
                 return
             self._recent.append(info["source_timestamp"])
-        item = message
         if self._timestamped:  # without Timestamp(): where messages are rare, each call costs most
-            item = tuple.__new__(Timestamp, (message, info["source_timestamp"]))
+            message = tuple.__new__(Timestamp, (message, info["source_timestamp"]))
+        self._receive(message)
+
+    def _receive(self, item: Any) -> None:
+        """Hand on a message. All in one step: every message takes this path."""
         if self._item is not None:
             try:
                 item = self._item(item)

@@ -90,7 +90,7 @@ class ReactiveNode(Node):
             them. Without effect on other topics, and with ``sampled`` or ``buffered``.
         :param options: further arguments of :meth:`rclpy.node.Node.create_subscription`; with ``sampled`` or
             ``buffered`` without ``callback_group`` and ``event_callbacks``, with ``every_publisher`` without
-            ``event_callbacks``.
+            ``event_callbacks`` and, as by default, with a mutually exclusive callback group.
         """
         if sampled is not None:
             qos = newest(qos_profile, 1)
