@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes as ct
 import time
 from array import array
-from functools import cache, lru_cache
+from functools import cache
 from sys import is_finalizing
 from typing import Any, NamedTuple
 
@@ -161,11 +161,7 @@ class _Loan:
 
 
 _Vector = ct.c_size_t * 2  # struct iovec
-
-
-@lru_cache(maxsize=16)
-def _octets(size: int) -> Any:
-    return ct.c_ubyte * size
+_Octets = ct.c_ubyte * 2**32  # as many as a sample may have; a type for each size would cost more
 
 
 def _loan(serdata: Pointer, size: int) -> memoryview:
@@ -173,9 +169,9 @@ def _loan(serdata: Pointer, size: int) -> memoryview:
     _keep_memory()
     vector = _Vector()
     lent = quick.ddsi_serdata_to_ser_ref(serdata, 0, size, vector)
-    octets = _octets(size).from_address(vector[0])
+    octets: Any = _Octets.from_address(vector[0])
     octets.loan = _Loan(lent, vector)
-    return memoryview(octets).cast("B")
+    return memoryview(octets).cast("B")[:size]
 
 
 def _vectors(data: Pieces) -> tuple[int, Any]:
