@@ -59,8 +59,8 @@ def chain_tables(results: Results) -> str:
 
 def image_tables(results: Results) -> str:
     """Return all tables of the images."""
-    work = {(1_000_000, rate): f"1 MB, {rate} Hz" for rate in (20, 100, 300)}
-    work |= {(10_000_000, rate): f"10 MB, {rate} Hz" for rate in (4, 20)}
+    rates = {1_000_000: (20, 100, 300), 10_000_000: (4, 20)}
+    work = {f"{size}.{rate}": f"{SIZES[size]}, {rate} Hz" for size in rates for rate in rates[size]}
     titles = {
         "p50_ms": "image: latency, p50 [ms]",
         "p99_ms": "image: latency, p99 [ms]",
@@ -71,7 +71,7 @@ def image_tables(results: Results) -> str:
         table(
             title,
             results,
-            {f"image.{size}.{rate}.{figure}": heading for (size, rate), heading in work.items()},
+            {f"image.{key}.{figure}": heading for key, heading in work.items()},
         )
         for figure, title in titles.items()
     )

@@ -123,15 +123,19 @@ def test_processor_time_of_a_process_is_that_of_all_its_threads() -> None:
     assert measurement.cpu_seconds(0) == pytest.approx(time.process_time(), abs=0.01)
 
 
+def assert_has_figures(figures: dict[str, float], key: str) -> None:
+    """Fail unless these are the figures of a measurement with a latency, all above zero."""
+    names = ("p50_ms", "p99_ms", "cpu_us", "megabytes", "threads", "delivered")
+    assert set(figures) == {f"{key}.{name}" for name in names}
+    assert all(value > 0 for value in figures.values())
+
+
 def test_short_pipeline_of_this_system_has_figures() -> None:
     here = Alternative("ReactiveNode", "reactive", ros=bool(system_rclpy()))
 
     figures = measurement.measure(here, Scenario("pipeline", 8, 200.0, warm_up=0.1, seconds=0.2))
 
-    assert set(figures) == {
-        f"pipeline.8.{name}" for name in ("p50_ms", "p99_ms", "cpu_us", "megabytes", "threads", "delivered")
-    }
-    assert all(value > 0 for value in figures.values())
+    assert_has_figures(figures, "pipeline.8")
 
 
 @pytest.mark.parametrize("link", ["image_callbacks", "image_reactive"])
@@ -140,9 +144,7 @@ def test_short_measurement_of_images_has_figures(link: str) -> None:
 
     figures = measurement.measure(here, Scenario("image", 1_000_000, 50.0, warm_up=0.1, seconds=0.3))
 
-    names = ("p50_ms", "p99_ms", "cpu_us", "megabytes", "threads", "delivered")
-    assert set(figures) == {f"image.1000000.50.{name}" for name in names}
-    assert all(value > 0 for value in figures.values())
+    assert_has_figures(figures, "image.1000000.50")
 
 
 def test_image_is_charged_to_both_processes() -> None:
@@ -189,9 +191,7 @@ def test_short_chain_has_figures(link: str) -> None:
 
     figures = measurement.measure(here, Scenario("chain", 8, 100.0, warm_up=0.1, seconds=0.3))
 
-    names = ("p50_ms", "p99_ms", "cpu_us", "megabytes", "threads", "delivered")
-    assert set(figures) == {f"chain.100.{name}" for name in names}
-    assert all(value > 0 for value in figures.values())
+    assert_has_figures(figures, "chain.100")
     assert figures["chain.100.p50_ms"] < 1000 / 100, "the latency is that of the latest angle"
 
 

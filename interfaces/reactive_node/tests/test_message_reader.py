@@ -164,7 +164,8 @@ def test_error_while_an_item_is_made_is_an_error_for_all_observers(readers: Read
         observable.subscribe(on_error=lambda error, name=name: errors.append((name, type(error))))
     readers.receive(0, "a", 1)
     assert errors == [("one", TypeError), ("two", TypeError)]
-    assert readers.destroyed == readers.created
+    (reader,) = readers.created
+    assert readers.destroyed == [reader]
 
 
 def test_error_of_an_observer_is_no_error_of_the_observable(readers: Readers) -> None:
@@ -186,6 +187,15 @@ def test_info_is_collected_only_for_timestamps(
 ) -> None:
     readers.observable(qos, item=item, timestamped=timestamped, every_publisher=True).subscribe()
     assert [reader.collects_info for reader in readers.created] == [timestamped]
+
+
+@pytest.mark.parametrize("qos", [10, LATCHED])
+def test_message_without_info_is_an_item(readers: Readers, qos: Any) -> None:
+    received: list[Any] = []
+    readers.observable(qos, every_publisher=True).subscribe(received.append)
+    (reader,) = readers.created
+    reader.callback("a")
+    assert received == ["a"]
 
 
 def test_info_is_collected_while_there_are_two_readers(readers: Readers) -> None:
@@ -264,7 +274,8 @@ def test_last_observer_ends_both_readers(readers: Readers) -> None:
     subscription = readers.observable(LATCHED, every_publisher=True).subscribe()
     readers.find_volatile_publisher()
     subscription.dispose()
-    assert readers.destroyed == readers.created
+    first, second = readers.created
+    assert readers.destroyed == [first, second]
     readers.find_volatile_publisher()  # an event that comes too late
     assert len(readers.created) == 2
 
