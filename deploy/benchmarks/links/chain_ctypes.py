@@ -28,7 +28,7 @@ from interfaces.topics import EFFECTOR_POSITION, EFFECTOR_SPEED, L1, L2, THETA1,
 
 _HEADER = b"\0\1\0\0"  # CDR, little endian
 _NUMBER = struct.Struct("<4sd")
-_POSITION = struct.Struct("<4siII8sddd")  # stamp, length of the frame's name, the name, x, y, z
+_POSITION = struct.Struct("<4siII12sddd")  # stamp, length of the frame's name, the name and padding, x, y, z
 
 
 class Connection(chain.Connection):

@@ -323,7 +323,7 @@ class Executor(AbstractContextManager["Executor"]):
                     if group is not None:
                         group.ending_execution(entity)
                     continue
-                if is_reader:
+                if is_reader and self._burst_end:
                     self._repeatable.append((entity, True))
                 return entity, taken
             if self._repeatable:
@@ -355,7 +355,7 @@ class Executor(AbstractContextManager["Executor"]):
         :return: whether :meth:`wake` was called.
         """
         now = time.monotonic_ns()
-        timeout = INFINITY if deadline is None else max(0, deadline - now)
+        timeout = INFINITY if deadline is None else deadline - now if deadline > now else 0
         if self._tasks:
             self._tasks_were_first = not self._tasks_were_first
             if self._tasks_were_first:  # as in rclpy; the next time, they come after the data

@@ -69,6 +69,7 @@ class Subscription(Owner):
     def callback(self, value: Callable[..., Any]) -> None:
         self._callback = value
         self._callback_type = _callback_type(value)
+        self._takes_info = self._callback_type is Subscription.CallbackType.WithMessageInfo
 
     def get_publisher_count(self) -> int:
         """Return the number of matched publishers."""
@@ -84,7 +85,7 @@ class Subscription(Owner):
             except ValueError as error:
                 self._bad_input.drop(sample, error)
                 continue
-            if self._callback_type is Subscription.CallbackType.MessageOnly:
+            if not self._takes_info:
                 return (message,)
             return (message, sample.info())
         return None

@@ -35,6 +35,23 @@ def wait(reader: Reader) -> None:
     waitset.close()
 
 
+class Octets(bytes):
+    """Octets of a user's own class."""
+
+    remark: str
+
+
+@pytest.mark.parametrize("cls", [bytes, Octets])
+def test_messages_of_all_sizes_arrive_unchanged(cls: type[bytes], reader: Reader, writer: Writer) -> None:
+    for size in (1, 2, 3, 4, 5, 8, 5, 4, 63, 64, 65, 1000, 100_000):
+        message = cls(HEADER + bytes(number % 251 for number in range(1, size + 1)))
+        writer.write(message)
+        wait(reader)
+        sample = reader.take()
+        assert sample is not None
+        assert sample.data == message + bytes(-size % 4)  # RTPS pads to four octets
+
+
 def test_a_take_during_a_take_gets_the_next_message(
     reader: Reader, writer: Writer, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -18,18 +18,20 @@ from . import domain, qos, status
 from .discovery import Discovery
 from .library import (
     ANY_STATE,
+    BYTES_HEADER,
     LIBRARY_HANDLE,
     SERDATA_KIND_DATA,
     TIMEOUT,
     Duration,
     Entity,
     Guid,
-    IoVector,
     Pointer,
     SampleInfo,
+    Serdata,
     TopicDescriptor,
     blocking,
     checked,
+    pack_vector,
     quick,
 )
 
@@ -37,6 +39,15 @@ from .library import (
 # malformed sample reaches the codec, which can name its writer. And discovery announces no XTypes
 # information, as in ROS 2. The operations are DDS_OP_ADR | DDS_OP_TYPE_1BY at offset 0, then DDS_OP_RTS.
 _OPAQUE = (ct.c_uint32 * 3)(0x01010000, 0, 0)
+
+
+# Arguments of C functions that are the same for every message. ctypes would convert a number each time, for
+# more than most of these calls cost.
+_DATA = ct.c_int(SERDATA_KIND_DATA)
+_ANY = ct.c_uint32(ANY_STATE)
+_ONE_SAMPLE = ct.c_uint32(1)
+_ONE_PIECE = ct.c_size_t(1)
+_BEGINNING = ct.c_size_t(0)
 
 
 class Sample(NamedTuple):
@@ -164,7 +175,7 @@ _Vector = ct.c_size_t * 2  # struct iovec
 _Octets = ct.c_ubyte * 2**32  # as many as a sample may have; a type for each size would cost more
 
 
-def _loan(serdata: Pointer, size: int) -> memoryview:
+def _loan(serdata: Serdata, size: int) -> memoryview:
     """Return the octets of a sample in DDS's own memory, which is freed when nothing refers to them."""
     _keep_memory()
     vector = _Vector()
@@ -174,14 +185,14 @@ def _loan(serdata: Pointer, size: int) -> memoryview:
     return memoryview(octets).cast("B")[:size]
 
 
-def _vectors(data: Pieces) -> tuple[int, Any]:
+def _vectors(data: Pieces) -> tuple[int, bytes]:
     """Return the number of the pieces, and where they are; they must not be freed before it."""
     _keep_memory()
     numbers = array("L")
     for piece in data.pieces:
         if piece:
             numbers.extend((ct.addressof(ct.c_char.from_buffer(piece)), len(piece)))
-    return len(numbers) // 2, IoVector.from_buffer(numbers)
+    return len(numbers) // 2, numbers.tobytes()
 
 
 class _Endpoint(Handle):
@@ -189,6 +200,7 @@ class _Endpoint(Handle):
 
     def __init__(self, handle: int) -> None:
         self.handle = handle
+        self._entity = Entity(handle)
         self.logger_name = ""  # of the node that it belongs to
         self.gid = _guid(handle)
 
@@ -212,10 +224,11 @@ class Writer(_Endpoint):
         super().__init__(handle)
         sertype = Pointer()
         checked(quick.dds_get_entity_sertype(handle, ct.byref(sertype)), "cannot read a writer's type")
-        self._sertype = sertype.value  # None once closed: DDS frees it with the writer
+        self._sertype: Pointer | None = sertype  # None once closed: DDS frees it with the writer
         instance = ct.c_uint64()
         checked(quick.dds_get_instance_handle(handle, ct.byref(instance)), "cannot read a writer's handle")
         self.instance_handle = instance.value
+        self._size = 0, ct.c_size_t(0)  # of the latest message: most messages of a topic have the same
 
     def write(self, data: bytes | Pieces) -> None:
         """
@@ -225,19 +238,24 @@ class Writer(_Endpoint):
         """
         if len(data) & 3:  # RTPS pads to four octets; Cyclone would pad with uninitialized memory
             data += bytes(-len(data) & 3)  # type: ignore[operator]
-        size = len(data)
-        if isinstance(data, Pieces):
-            count, vectors = _vectors(data)
+        octets = len(data)
+        known, size = self._size
+        if known != octets:
+            size = ct.c_size_t(octets)
+            self._size = octets, size
+        if data.__class__ is Pieces:
+            number, vectors = _vectors(data)
+            count = ct.c_size_t(number)
         else:
-            count, vectors = 1, IoVector(data, size)
+            count, vectors = _ONE_PIECE, pack_vector(id(data) + BYTES_HEADER, octets)
         sertype = self._sertype  # until the end of the next call, no other thread runs Python code
         if sertype is None:
             raise InvalidHandle("cannot use a writer that was destroyed")
-        serdata = quick.ddsi_serdata_from_ser_iov(sertype, SERDATA_KIND_DATA, count, vectors, size)
+        serdata = quick.ddsi_serdata_from_ser_iov(sertype, _DATA, count, vectors, size)
         del data  # other threads may change the message from here on
         if not serdata:
-            raise ValueError(f"invalid CDR of {size} octets: it needs an encapsulation header and data")
-        result = blocking.dds_writecdr(self.handle, serdata)
+            raise ValueError(f"invalid CDR of {octets} octets: it needs an encapsulation header and data")
+        result = blocking.dds_writecdr(self._entity, serdata)
         if result:
             if self._sertype is None:
                 raise InvalidHandle("cannot use a writer that was destroyed")
@@ -275,7 +293,8 @@ class Reader(_Endpoint):
         super().__init__(handle)
         self.condition = checked(blocking.dds_create_readcondition(handle, ANY_STATE), "read condition")
         # DDS returns a sample in a buffer. Each taking thread uses one; they are reused, as creation is slow.
-        self._buffers: list[tuple[Pointer, int, SampleInfo, int]] = []
+        self._buffers: list[tuple[Serdata, SampleInfo, tuple[Any, ...]]] = []
+        self._size = 0, ct.c_size_t(0)  # of the latest message: most messages of a topic have the same
 
     def take(self, lend: bool = False) -> Sample | None:
         """
@@ -286,19 +305,25 @@ class Reader(_Endpoint):
         try:
             buffer = self._buffers.pop()
         except IndexError:
-            serdata, info = Pointer(), SampleInfo()
-            buffer = serdata, ct.addressof(serdata), info, ct.addressof(info)
-        serdata, serdata_address, info, info_address = buffer
+            serdata, info = Serdata(), SampleInfo()
+            addresses = Pointer(ct.addressof(serdata)), Pointer(ct.addressof(info))
+            buffer = serdata, info, (self._entity, addresses[0], _ONE_SAMPLE, addresses[1], _ANY)
+        serdata, info, arguments = buffer
         sample = None
-        while quick.dds_takecdr(self.handle, serdata_address, 1, info_address, ANY_STATE) > 0:
+        while quick.dds_takecdr(*arguments) > 0:
             if info.valid_data:
-                size = quick.ddsi_serdata_size(serdata)
-                if lend and size >= LARGE:
-                    data: Any = _loan(serdata, size)
+                octets = quick.ddsi_serdata_size(serdata)
+                if lend and octets >= LARGE:
+                    data: Any = _loan(serdata, octets)
                 else:
-                    data = bytes(size)  # no other reference exists yet, so it may be written to
-                    quick.ddsi_serdata_to_ser(serdata, 0, size, data)
-                sample = Sample(data, info.source_timestamp, info.publication_handle)
+                    known, size = self._size
+                    if known != octets:
+                        size = ct.c_size_t(octets)
+                        self._size = octets, size
+                    data = bytes(octets)  # no other reference exists yet, so it may be written to
+                    quick.ddsi_serdata_to_ser(serdata, _BEGINNING, size, data)
+                # Without Sample(): where messages are rare, each call costs most.
+                sample = tuple.__new__(Sample, (data, info.source_timestamp, info.publication_handle))
             quick.ddsi_serdata_unref(serdata)
             if sample is not None:  # else the sample is a change of state without a message
                 break
@@ -398,7 +423,7 @@ class WaitSet:
             return []
         if count < 0:  # here: most waits save the call
             checked(count, "cannot wait")
-        return tokens[: min(count, len(tokens))]
+        return [tokens[0]] if count == 1 else tokens[: min(count, len(tokens))]  # one is what most waits find
 
     def close(self) -> None:
         """Close the wait set and end its waits; attached conditions and entities stay open."""

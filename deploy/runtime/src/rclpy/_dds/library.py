@@ -14,7 +14,8 @@ from __future__ import annotations
 import ctypes as ct
 import importlib.util
 from pathlib import Path
-from types import SimpleNamespace
+from struct import Struct
+from types import ModuleType
 from typing import Any
 
 Entity = ct.c_int32
@@ -41,6 +42,10 @@ class DDSError(RuntimeError):
         reason = quick.dds_strretcode(code)
         super().__init__(f"{what}: {reason.decode() if reason else 'unknown error'} (DDS return code {code})")
         self.code = code
+
+
+class Serdata(ct.c_void_p):
+    """struct ddsi_serdata *: a sample in DDS's memory. As a result, it is not converted to a number."""
 
 
 class TopicDescriptor(ct.Structure):
@@ -83,10 +88,8 @@ class SampleInfo(ct.Structure):
     ]
 
 
-class IoVector(ct.Structure):
-    """struct iovec."""
-
-    _fields_ = [("base", ct.c_char_p), ("length", ct.c_size_t)]
+pack_vector = Struct("PN").pack  # struct iovec of address and size, for less than a ctypes structure costs
+BYTES_HEADER = bytes.__basicsize__ - 1  # where the octets of a bytes object begin; they end with a NUL
 
 
 class Guid(ct.Structure):
@@ -155,7 +158,7 @@ _BLOCKING: dict[str, tuple[Any, list[Any]]] = {
     "dds_waitset_wait": (ct.c_int32, [Entity, Pointer, ct.c_size_t, Duration]),
     "dds_set_guardcondition": (ct.c_int32, [Entity, ct.c_bool]),
     "dds_take_guardcondition": (ct.c_int32, [Entity, ct.POINTER(ct.c_bool)]),
-    "dds_writecdr": (ct.c_int32, [Entity, Pointer]),
+    "dds_writecdr": (ct.c_int32, [Entity, Serdata]),
     "dds_wait_for_acks": (ct.c_int32, [Entity, Duration]),
     "dds_assert_liveliness": (ct.c_int32, [Entity]),
     "dds_get_status_mask": (ct.c_int32, [Entity, ct.POINTER(ct.c_uint32)]),
@@ -170,14 +173,14 @@ _BLOCKING: dict[str, tuple[Any, list[Any]]] = {
 _QUICK: dict[str, tuple[Any, list[Any]]] = {
     "dds_strretcode": (ct.c_char_p, [ct.c_int32]),
     "dds_takecdr": (ct.c_int32, [Entity, Pointer, ct.c_uint32, Pointer, ct.c_uint32]),
-    "ddsi_serdata_size": (ct.c_uint32, [Pointer]),
-    "ddsi_serdata_to_ser": (None, [Pointer, ct.c_size_t, ct.c_size_t, Pointer]),
-    "ddsi_serdata_to_ser_ref": (Pointer, [Pointer, ct.c_size_t, ct.c_size_t, Pointer]),
+    "ddsi_serdata_size": (ct.c_uint32, [Serdata]),
+    "ddsi_serdata_to_ser": (None, [Serdata, ct.c_size_t, ct.c_size_t, Pointer]),
+    "ddsi_serdata_to_ser_ref": (Pointer, [Serdata, ct.c_size_t, ct.c_size_t, Pointer]),
     "ddsi_serdata_to_ser_unref": (None, [Pointer, Pointer]),
-    "ddsi_serdata_unref": (None, [Pointer]),
+    "ddsi_serdata_unref": (None, [Serdata]),
     "ddsi_serdata_from_ser_iov": (
-        Pointer,
-        [Pointer, ct.c_int, ct.c_size_t, ct.POINTER(IoVector), ct.c_size_t],
+        Serdata,
+        [Pointer, ct.c_int, ct.c_size_t, Pointer, ct.c_size_t],
     ),
     "dds_get_entity_sertype": (ct.c_int32, [Entity, ct.POINTER(Pointer)]),
     "dds_get_guid": (ct.c_int32, [Entity, ct.POINTER(Guid)]),
@@ -213,12 +216,12 @@ _QUICK: dict[str, tuple[Any, list[Any]]] = {
 }
 
 
-def functions(library: ct.CDLL, signatures: dict[str, tuple[Any, list[Any]]]) -> SimpleNamespace:
+def functions(library: ct.CDLL, signatures: dict[str, tuple[Any, list[Any]]]) -> Any:
     """Return a namespace of C functions, with declared results and arguments.
 
-    Its plain attributes are faster than those of a ctypes library, which uses ``__getattr__``.
+    It is a module: the interpreter finds an attribute of one without a look-up.
     """
-    declared = SimpleNamespace()
+    declared = ModuleType("functions of C")
     for name, (result, arguments) in signatures.items():
         function = getattr(library, name)
         function.restype, function.argtypes = result, arguments
