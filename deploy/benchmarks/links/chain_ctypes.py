@@ -14,11 +14,12 @@ from collections.abc import Callable
 from rclpy._dds import WaitSet
 from rclpy._dds.library import (
     ANY_STATE,
+    BYTES_HEADER,
     SERDATA_KIND_DATA,
-    IoVector,
-    Pointer,
     SampleInfo,
+    Serdata,
     blocking,
+    pack_vector,
     quick,
 )
 
@@ -38,7 +39,7 @@ class Connection(chain.Connection):
         super().__init__(job)
         self._readers: list[tuple[int, Callable[[bytes], None]]] = []
         self._wait_set = WaitSet()
-        self._serdata, self._info = Pointer(), SampleInfo()
+        self._serdata, self._info = Serdata(), SampleInfo()
 
     def _kinematics(self) -> None:
         write = self._writer(EFFECTOR_POSITION)
@@ -87,7 +88,8 @@ class Connection(chain.Connection):
         handle, sertype = writer.handle, writer._sertype
 
         def write(data: bytes) -> None:
-            vector, size = IoVector(data, len(data)), len(data)
+            size = len(data)
+            vector = pack_vector(id(data) + BYTES_HEADER, size)
             serdata = quick.ddsi_serdata_from_ser_iov(sertype, SERDATA_KIND_DATA, 1, vector, size)
             blocking.dds_writecdr(handle, serdata)
 
