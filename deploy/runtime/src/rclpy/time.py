@@ -63,7 +63,7 @@ class Time:
     @classmethod
     def _of(cls, nanoseconds: int, clock_type: ClockType) -> Time:
         """Create a time from a clock's reading, without checks."""
-        time = cls.__new__(cls)
+        time: Time = object.__new__(cls)
         time._nanoseconds = nanoseconds
         time._clock_type = clock_type
         return time

@@ -60,8 +60,8 @@ def _octets(data: bytes | memoryview) -> list[bytes]:
 
 def _text(data: bytes | memoryview) -> str:
     # as in rclpy: a string ends at its first NUL, and invalid UTF-8 is replaced
-    text = data.decode("utf-8", "replace") if type(data) is bytes else str(data, "utf-8", "replace")
-    return text.partition("\0")[0]
+    text = str(data, "utf-8", "replace")
+    return text.partition("\0")[0] if "\0" in text else text
 
 
 def _wide_text(data: bytes | memoryview) -> str:
