@@ -4,8 +4,8 @@ A source publishes items, a middle process maps and publishes them again, a sink
 floods a sink, and a source starts while a sink waits. `chain` compares the arm's kinematics and velocity, and
 its operator watchdog, with the same in plain callbacks. `images` sends images from one process to another.
 
-Each round measures all alternatives, so a busy machine affects all alike. CPU time is that of whole
-processes. What cannot be measured here is named with the reason.
+Each round measures all alternatives in a random order, so a busy machine affects all alike. CPU time is that
+of whole processes. What cannot be measured here is named with the reason.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import argparse
 import json
 import os
 import platform
+import random
 import subprocess
 import sys
 import time
@@ -75,13 +76,14 @@ def compare(
     """
     Yield the figures of each measurement with the alternative's title; a round measures all of them.
 
-    Every second round goes backwards: a machine that becomes slower or faster favours none.
+    Each round and scenario has its own random order: neither a machine that becomes slower, nor what was
+    measured just before, favours one.
     """
     began = time.monotonic()
     for number in range(1, rounds + 1):
         for scenario in scenarios:
             print(f"round {number} of {rounds}, {scenario.key}, {time.monotonic() - began:.0f} s", flush=True)
-            for each in alternatives if number % 2 else reversed(alternatives):
+            for each in random.sample(alternatives, len(alternatives)):
                 try:
                     yield each.title, measure(each, scenario)
                 except MeasurementFailed as error:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import random
 import sys
 import time
 from collections.abc import Callable
@@ -56,7 +57,7 @@ def test_a_comparison_without_a_round_is_refused(rounds: str, capsys: pytest.Cap
     assert capsys.readouterr().err.splitlines()[-1] == "make bench: error: --rounds must be at least 1"
 
 
-def test_absent_alternatives_are_named_with_the_reason(
+def test_absent_comparedare_named_with_the_reason(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     on_ros = bool(system_rclpy())
@@ -95,13 +96,16 @@ def test_failed_measurement_leaves_the_others_their_figures(
     assert "no figures: silent, start.8: no word\n" in capsys.readouterr().out
 
 
-def test_every_second_round_goes_backwards(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_each_round_measures_all_in_an_order_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(command, "measure", lambda alternative, scenario: {})
-    order = [Alternative(title, "callbacks") for title in ("one", "two")]
+    monkeypatch.setattr(command, "random", random.Random(1))
+    compared = [Alternative(title, "callbacks") for title in "abcdef"]
 
-    rounds = command.compare(order, [Scenario("start", 8, 0.0)], 3)
+    titles = [title for title, _ in command.compare(compared, [Scenario("start", 8, 0.0)], 3)]
 
-    assert [title for title, _ in rounds] == ["one", "two", "two", "one", "one", "two"]
+    rounds = [titles[:6], titles[6:12], titles[12:]]
+    assert [sorted(each) for each in rounds] == [list("abcdef")] * 3
+    assert len({tuple(each) for each in rounds}) == 3
 
 
 def test_dora_dataflow_joins_source_and_sink(tmp_path: Path) -> None:
