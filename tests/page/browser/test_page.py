@@ -25,7 +25,7 @@ WAIT = 1000 * LIMIT  # ms
 TABS = 100  # more than the page has stops
 GREY = 0.5  # s
 SAMPLES = 5
-QUIET = 20  # ms by which timers of the page may be late in a sample that counts
+QUIET = 20  # ms by which timers and frames of the page may be late in a sample that counts
 
 TIMING = """
 let heard = 0, late = 0, ticked = performance.now();
@@ -35,6 +35,14 @@ setInterval(() => {
     late += Math.max(0, now - ticked - 20);
     ticked = now;
 }, 10);
+const request = window.requestAnimationFrame;
+window.requestAnimationFrame = (draw) => {
+    const asked = performance.now();
+    return request((now) => {
+        late += Math.max(0, performance.now() - asked - 20);
+        draw(now);
+    });
+};
 window.WebSocket = class extends WebSocket {
     constructor(...options) {
         super(...options);
@@ -46,7 +54,7 @@ addEventListener("DOMContentLoaded", () => new MutationObserver(() => {
     if (isLost) greyed.push([performance.now() - heard, late]);
 }).observe(document.documentElement, { attributeFilter: ["data-connection"] }));
 """
-"""Notes how long after the last message the page turned grey, and how late its timers were meanwhile [ms]."""
+"""Notes how long after the last message the page turned grey, and how late timers and frames were [ms]."""
 
 BEYOND = """
 [...document.querySelectorAll("body *")].filter((it) =>
