@@ -57,7 +57,7 @@ def test_a_comparison_without_a_round_is_refused(rounds: str, capsys: pytest.Cap
     assert capsys.readouterr().err.splitlines()[-1] == "make bench: error: --rounds must be at least 1"
 
 
-def test_absent_comparedare_named_with_the_reason(
+def test_absent_alternatives_are_named_with_the_reason(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     on_ros = bool(system_rclpy())
