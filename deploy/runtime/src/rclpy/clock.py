@@ -188,8 +188,7 @@ class _ClockSource(Handle):
         return self._read() if override is None else override
 
     def get_now(self) -> Time:
-        override = self._override
-        return Time._of(self._read() if override is None else override, self._type)
+        return Time._of(self.nanoseconds(), self._type)
 
     def get_ros_time_override_is_enabled(self) -> bool:
         return self._override is not None

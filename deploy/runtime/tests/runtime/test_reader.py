@@ -38,8 +38,6 @@ def wait(reader: Reader) -> None:
 class Octets(bytes):
     """Octets of a user's own class."""
 
-    remark: str
-
 
 @pytest.mark.parametrize("cls", [bytes, Octets])
 def test_messages_of_all_sizes_arrive_unchanged(cls: type[bytes], reader: Reader, writer: Writer) -> None:

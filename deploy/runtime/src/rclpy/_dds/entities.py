@@ -201,6 +201,7 @@ class _Endpoint(Handle):
     def __init__(self, handle: int) -> None:
         self.handle = handle
         self._entity = Entity(handle)
+        self._size = 0, ct.c_size_t(0)  # of the latest message: most messages of a topic have the same
         self.logger_name = ""  # of the node that it belongs to
         self.gid = _guid(handle)
 
@@ -228,7 +229,6 @@ class Writer(_Endpoint):
         instance = ct.c_uint64()
         checked(quick.dds_get_instance_handle(handle, ct.byref(instance)), "cannot read a writer's handle")
         self.instance_handle = instance.value
-        self._size = 0, ct.c_size_t(0)  # of the latest message: most messages of a topic have the same
 
     def write(self, data: bytes | Pieces) -> None:
         """
@@ -294,7 +294,6 @@ class Reader(_Endpoint):
         self.condition = checked(blocking.dds_create_readcondition(handle, ANY_STATE), "read condition")
         # DDS returns a sample in a buffer. Each taking thread uses one; they are reused, as creation is slow.
         self._buffers: list[tuple[Serdata, SampleInfo, tuple[Any, ...]]] = []
-        self._size = 0, ct.c_size_t(0)  # of the latest message: most messages of a topic have the same
 
     def take(self, lend: bool = False) -> Sample | None:
         """
@@ -306,8 +305,8 @@ class Reader(_Endpoint):
             buffer = self._buffers.pop()
         except IndexError:
             serdata, info = Serdata(), SampleInfo()
-            addresses = Pointer(ct.addressof(serdata)), Pointer(ct.addressof(info))
-            buffer = serdata, info, (self._entity, addresses[0], _ONE_SAMPLE, addresses[1], _ANY)
+            to_serdata, to_info = Pointer(ct.addressof(serdata)), Pointer(ct.addressof(info))
+            buffer = serdata, info, (self._entity, to_serdata, _ONE_SAMPLE, to_info, _ANY)
         serdata, info, arguments = buffer
         sample = None
         while quick.dds_takecdr(*arguments) > 0:
