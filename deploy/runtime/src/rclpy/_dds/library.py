@@ -140,6 +140,18 @@ def _path() -> str:
     raise ImportError(f"the C library of Cyclone DDS is missing: no libddsc* in {libraries}")
 
 
+# Every message takes the path through these. Their callers pass nothing but ctypes objects of these types and
+# bytes, so that ctypes need not check and convert the arguments.
+_CALLED_WITH_CONVERTED = {
+    "dds_waitset_wait",
+    "dds_takecdr",
+    "ddsi_serdata_size",
+    "ddsi_serdata_to_ser",
+    "ddsi_serdata_unref",
+    "ddsi_serdata_from_ser_iov",
+    "dds_writecdr",
+}
+
 # name: (result, arguments). These may wait, or take a lock that another thread holds for long.
 _BLOCKING: dict[str, tuple[Any, list[Any]]] = {
     "dds_create_domain": (Entity, [ct.c_uint32, ct.c_char_p]),
@@ -217,14 +229,16 @@ _QUICK: dict[str, tuple[Any, list[Any]]] = {
 
 
 def functions(library: ct.CDLL, signatures: dict[str, tuple[Any, list[Any]]]) -> Any:
-    """Return a namespace of C functions, with declared results and arguments.
+    """Return a namespace of C functions, with declared results, and arguments where ctypes must convert them.
 
     It is a module: the interpreter finds an attribute of one without a look-up.
     """
     declared = ModuleType("functions of C")
     for name, (result, arguments) in signatures.items():
         function = getattr(library, name)
-        function.restype, function.argtypes = result, arguments
+        function.restype = result
+        if name not in _CALLED_WITH_CONVERTED:
+            function.argtypes = arguments
         setattr(declared, name, function)
     return declared
 
