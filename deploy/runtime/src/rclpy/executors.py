@@ -149,8 +149,8 @@ class Executor(AbstractContextManager["Executor"]):
         self._tokens: dict[int, int] = {}  # DDS handle -> token
         self._last_token = _WAKE
         # Entities or tasks, and whether each is a reader, which may have several messages.
-        self._ready: deque[tuple[Any, bool]] = deque()
-        self._repeatable: deque[tuple[Any, bool]] = deque()  # readers that had a message in this burst
+        self._ready: deque[tuple[Any, int]] = deque()  # entity, DDS handle of a reader or 0
+        self._repeatable: deque[tuple[Any, int]] = deque()  # readers that had a message in this burst
         self._burst_end = 0
         self._tasks_were_first = False
         self._context._executors.add(self)
@@ -307,7 +307,7 @@ class Executor(AbstractContextManager["Executor"]):
             if self._groups_changed:
                 self._unblock()
             while self._ready:
-                entity, is_reader = self._ready.popleft()
+                entity, reader = self._ready.popleft()
                 if entity.__class__ is Task:
                     return entity, None
                 group = entity.callback_group
@@ -323,8 +323,8 @@ class Executor(AbstractContextManager["Executor"]):
                     if group is not None:
                         group.ending_execution(entity)
                     continue
-                if is_reader and self._burst_end:
-                    self._repeatable.append((entity, True))
+                if reader and self._burst_end:
+                    self._repeatable.append((entity, reader))
                 return entity, taken
             if self._repeatable:
                 if time.monotonic_ns() < self._burst_end:
@@ -365,7 +365,7 @@ class Executor(AbstractContextManager["Executor"]):
         for guard in self._guards:
             if guard._is_ready() and self.can_execute(guard):
                 timeout = 0
-                self._ready.append((guard, False))
+                self._ready.append((guard, 0))
         next_timer: Timer | None = None
         for timer in self._timers:
             if timer._canceled:  # most timers of schedulers are: saves the call
@@ -374,7 +374,7 @@ class Executor(AbstractContextManager["Executor"]):
             if remaining <= 0:
                 if self.can_execute(timer):
                     next_timer, timeout = None, 0
-                    self._ready.append((timer, False))
+                    self._ready.append((timer, 0))
             elif remaining < timeout:
                 next_timer, timeout = timer, remaining
         watch = self._watch
@@ -383,7 +383,7 @@ class Executor(AbstractContextManager["Executor"]):
         began = time.monotonic_ns()
         tokens = self._waitset.wait(timeout)
         if not tokens and next_timer is not None:
-            self._ready.append((next_timer, False))  # the wait lasted until the timer was due
+            self._ready.append((next_timer, 0))  # the wait lasted until the timer was due
         if tokens:
             ended = time.monotonic_ns()
             self._burst_end = ended + _BURST if ended - began < _ASLEEP else 0
@@ -394,17 +394,17 @@ class Executor(AbstractContextManager["Executor"]):
             if token == _WAKE:
                 woken = True
                 self._guard.take()
-            elif token in self._attached:
-                self._ready.append((self._attached[token][0], True))
+            elif (attached := self._attached.get(token)) is not None:
+                self._ready.append(attached)
         if watch is not None:
-            self._ready.extend((entity, False) for entity in watch.ready(tokens))
+            self._ready.extend((entity, 0) for entity in watch.ready(tokens))
         if self._tasks:
             self._collect_tasks()
         return woken
 
     def _collect_tasks(self) -> None:
         while self._tasks:
-            self._ready.append((self._tasks.popleft(), False))
+            self._ready.append((self._tasks.popleft(), 0))
 
     # The contents of the wait set
 

@@ -43,11 +43,11 @@ _OPAQUE = (ct.c_uint32 * 3)(0x01010000, 0, 0)
 
 # Arguments of C functions that are the same for every message. ctypes would convert a number each time, for
 # more than most of these calls cost.
-_DATA = ct.c_int(SERDATA_KIND_DATA)
-_ANY = ct.c_uint32(ANY_STATE)
-_ONE_SAMPLE = ct.c_uint32(1)
-_ONE_PIECE = ct.c_size_t(1)
-_BEGINNING = ct.c_size_t(0)
+_DATA = ct.c_int.from_param(SERDATA_KIND_DATA)
+_ANY = ct.c_uint32.from_param(ANY_STATE)
+_ONE_SAMPLE = ct.c_uint32.from_param(1)
+_ONE_PIECE = ct.c_size_t.from_param(1)
+_BEGINNING = ct.c_size_t.from_param(0)
 
 
 class Sample(NamedTuple):
@@ -200,8 +200,9 @@ class _Endpoint(Handle):
 
     def __init__(self, handle: int) -> None:
         self.handle = handle
-        self._entity = Entity(handle)
-        self._size = 0, ct.c_size_t(0)  # of the latest message: most messages of a topic have the same
+        self._entity = Entity.from_param(handle)
+        # Of the latest message: most messages of a topic have the same.
+        self._size = 0, ct.c_size_t.from_param(0)
         self.logger_name = ""  # of the node that it belongs to
         self.gid = _guid(handle)
 
@@ -225,7 +226,8 @@ class Writer(_Endpoint):
         super().__init__(handle)
         sertype = Pointer()
         checked(quick.dds_get_entity_sertype(handle, ct.byref(sertype)), "cannot read a writer's type")
-        self._sertype: Pointer | None = sertype  # None once closed: DDS frees it with the writer
+        # None once closed: DDS frees it with the writer.
+        self._sertype: Any = Pointer.from_param(sertype.value)
         instance = ct.c_uint64()
         checked(quick.dds_get_instance_handle(handle, ct.byref(instance)), "cannot read a writer's handle")
         self.instance_handle = instance.value
@@ -241,11 +243,11 @@ class Writer(_Endpoint):
         octets = len(data)
         known, size = self._size
         if known != octets:
-            size = ct.c_size_t(octets)
+            size = ct.c_size_t.from_param(octets)
             self._size = octets, size
         if data.__class__ is Pieces:
             number, vectors = _vectors(data)
-            count = ct.c_size_t(number)
+            count = ct.c_size_t.from_param(number)
         else:
             count, vectors = _ONE_PIECE, pack_vector(id(data) + BYTES_HEADER, octets)
         sertype = self._sertype  # until the end of the next call, no other thread runs Python code
@@ -305,7 +307,7 @@ class Reader(_Endpoint):
             buffer = self._buffers.pop()
         except IndexError:
             serdata, info = Serdata(), SampleInfo()
-            to_serdata, to_info = Pointer(ct.addressof(serdata)), Pointer(ct.addressof(info))
+            to_serdata, to_info = ct.byref(serdata), ct.byref(info)
             buffer = serdata, info, (self._entity, to_serdata, _ONE_SAMPLE, to_info, _ANY)
         serdata, info, arguments = buffer
         sample = None
@@ -317,7 +319,7 @@ class Reader(_Endpoint):
                 else:
                     known, size = self._size
                     if known != octets:
-                        size = ct.c_size_t(octets)
+                        size = ct.c_size_t.from_param(octets)
                         self._size = octets, size
                     data = bytes(octets)  # no other reference exists yet, so it may be written to
                     quick.ddsi_serdata_to_ser(serdata, _BEGINNING, size, data)
@@ -395,8 +397,8 @@ class WaitSet:
         self._capacity = capacity
         tokens, timeout = (ct.c_ssize_t * capacity)(), Duration()
         # Converted once: a wait follows every callback, and the conversion costs more than the call.
-        address = Pointer(ct.addressof(tokens))
-        self._buffer = tokens, timeout, (Entity(self.handle), address, ct.c_size_t(capacity), timeout)
+        entity, size = Entity.from_param(self.handle), ct.c_size_t.from_param(capacity)
+        self._buffer = tokens, timeout, (entity, ct.byref(tokens), size, timeout)
 
     def attach(self, handle: int, token: int) -> bool:
         """Add a condition or entity, which ``wait`` reports as ``token``; False if it no longer exists."""
