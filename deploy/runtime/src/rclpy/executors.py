@@ -148,8 +148,8 @@ class Executor(AbstractContextManager["Executor"]):
         self._blocked: dict[int, tuple[_Entity, int]] = {}  # likewise, while the callback group is busy
         self._tokens: dict[int, int] = {}  # DDS handle -> token
         self._last_token = _WAKE
-        # Entities or tasks, and whether each is a reader, which may have several messages.
-        self._ready: deque[tuple[Any, int]] = deque()  # entity, DDS handle of a reader or 0
+        # Entities or tasks. A reader may have several messages: with its DDS handle, the others with 0.
+        self._ready: deque[tuple[Any, int]] = deque()
         self._repeatable: deque[tuple[Any, int]] = deque()  # readers that had a message in this burst
         self._burst_end = 0
         self._tasks_were_first = False

@@ -140,8 +140,8 @@ def _path() -> str:
     raise ImportError(f"the C library of Cyclone DDS is missing: no libddsc* in {libraries}")
 
 
-# Every message takes the path through these. Their callers pass nothing but ctypes objects of these types and
-# bytes, so that ctypes need not check and convert the arguments.
+# Every message passes through these. So that ctypes need not check and convert the arguments, callers pass
+# only bytes and ctypes objects of the types below, never an `int`: ctypes would cut it to 32 bits.
 _CALLED_WITH_CONVERTED = {
     "dds_waitset_wait",
     "dds_takecdr",
