@@ -19,6 +19,7 @@ from deploy.supervision.system import NAMESPACE, DeploymentError, Program, Syste
 
 if TYPE_CHECKING:
     from deploy.commands.member import Member
+    from interfaces.service.health import Health
 
 START_LIMIT = 60.0  # s until all services have to report their health
 BEGIN_LEAD = 0.3  # s from the choice of the scenario's origin to the origin: all services know it by then
@@ -86,14 +87,15 @@ def status(system: System) -> None:
         return
     from deploy.commands.member import Member
     from deploy.commands.status import of_services
+    from interfaces.service.health import heard_healths
 
     programs = system.programs()
     running = [program for program in programs if program.pid]
     deadline = time.monotonic() + STATUS_LIMIT
-    with Member() as member:
-        while not all(_reports(program, member) for program in running) and time.monotonic() < deadline:
+    with Member() as member, heard_healths(member.node) as health:
+        while not all(_reports(program, health) for program in running) and time.monotonic() < deadline:
             member.spin_once()
-        print(of_services(programs, member.health))
+        print(of_services(programs, health))
 
 
 def logs(system: System) -> None:
@@ -159,18 +161,21 @@ def _started(system: System, scenario: str, parameter_file: str) -> Iterator[Mem
 
 def _await_services(system: System, member: Member, log_sizes: dict[str, int]) -> None:
     """Wait until every service has reported its health."""
+    from interfaces.service.health import heard_healths
+
     deadline = time.monotonic() + START_LIMIT
-    while missing := [program for program in system.programs() if not _reports(program, member)]:
-        for program in missing:
-            if program.state in ("BACKOFF", "FATAL") or program.restarts >= START_ATTEMPTS:
-                words = _last_words(system, program, log_sizes.get(program.name, 0))
-                raise DeploymentError(f"{program.name} does not start:\n{words}")
-        if time.monotonic() > deadline:
-            names = ", ".join(program.name for program in missing)
-            raise DeploymentError(f"No sign of life from {names}; see {system.logs}")
-        look_again = time.monotonic() + 0.2
-        while time.monotonic() < look_again:
-            member.spin_once()
+    with heard_healths(member.node) as health:
+        while missing := [program for program in system.programs() if not _reports(program, health)]:
+            for program in missing:
+                if program.state in ("BACKOFF", "FATAL") or program.restarts >= START_ATTEMPTS:
+                    words = _last_words(system, program, log_sizes.get(program.name, 0))
+                    raise DeploymentError(f"{program.name} does not start:\n{words}")
+            if time.monotonic() > deadline:
+                names = ", ".join(program.name for program in missing)
+                raise DeploymentError(f"No sign of life from {names}; see {system.logs}")
+            look_again = time.monotonic() + 0.2
+            while time.monotonic() < look_again:
+                member.spin_once()
 
 
 def _last_words(system: System, program: Program, begin: int) -> str:
@@ -182,9 +187,9 @@ def _last_words(system: System, program: Program, begin: int) -> str:
     return program.error
 
 
-def _reports(program: Program, member: Member) -> bool:
+def _reports(program: Program, health: Mapping[str, Health]) -> bool:
     """Whether this very process, not one of another system in the domain, has reported its health."""
-    return program.name in member.health and member.health[program.name].pid == program.pid
+    return program.name in health and health[program.name].pid == program.pid
 
 
 def _show(system: System, member: Member, *, owner: bool = False) -> None:

@@ -1,4 +1,4 @@
-"""A node beside the services: it listens to their health and sets their parameters."""
+"""A node beside the services: it sees their topics and sets their parameters."""
 
 from __future__ import annotations
 
@@ -15,7 +15,6 @@ from rclpy.task import Future
 
 from deploy.supervision import interruption, manifest
 from deploy.supervision.system import DeploymentError, namespace_of
-from interfaces.service.health import Health, HealthMonitor
 from reactive_node import ReactiveNode
 
 SPIN_TIME = 0.01  # s
@@ -34,12 +33,6 @@ class Member:
             raise DeploymentError(f"Cannot join the ROS graph: {error}") from None
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self.node)
-        self._monitor = HealthMonitor(self.node)
-
-    @property
-    def health(self) -> dict[str, Health]:
-        """The latest health of each service, by program."""
-        return self._monitor.latest
 
     def spin_once(self) -> None:
         """Run one callback; waits at most 0.1 s for it. Raises Interrupted after a signal."""

@@ -21,7 +21,7 @@ from deploy.console.terminal import open_terminal
 from interfaces import topics
 from reactive_node import ReactiveNode, stamps
 
-PERIOD = 0.2  # s between two batches of lines
+PERIOD = 0.25  # s between two batches of lines
 BACKLOG = 50  # messages of a topic that wait for the next batch
 
 HELP = """\

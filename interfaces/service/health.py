@@ -9,8 +9,8 @@ import os
 import socket
 import time
 from collections import Counter
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from typing import Any, NamedTuple
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -115,16 +115,21 @@ class Health(NamedTuple):
     """Age of the service's last output [s]; ``None`` before the first."""
 
 
-class HealthMonitor:
-    """Listens to /diagnostics: the latest health of each service in a node's namespace, by program."""
-
-    def __init__(self, node: Node) -> None:
-        self.latest: dict[str, Health] = {}
-        self._namespace = node.get_namespace().rstrip("/")
-        node.create_subscription(DIAGNOSTICS.type, DIAGNOSTICS.name, self._on_message, DIAGNOSTICS.qos)
-
-    def _on_message(self, message: DiagnosticArray) -> None:
-        self.latest.update(healths(message, self._namespace))
+@contextmanager
+def heard_healths(node: Node) -> Iterator[dict[str, Health]]:
+    """Listen to /diagnostics: the latest health of each service in the namespace of a node, by program."""
+    latest: dict[str, Health] = {}
+    namespace = node.get_namespace().rstrip("/")
+    subscription = node.create_subscription(
+        DIAGNOSTICS.type,
+        DIAGNOSTICS.name,
+        lambda message: latest.update(healths(message, namespace)),
+        DIAGNOSTICS.qos,
+    )
+    try:
+        yield latest
+    finally:
+        node.destroy_subscription(subscription)
 
 
 def healths(message: DiagnosticArray, namespace: str) -> dict[str, Health]:

@@ -13,7 +13,7 @@ from rclpy.clock import ClockType
 from rclpy.time import Time
 
 from interfaces.service import ServiceNode
-from interfaces.service.health import HealthMonitor, healths
+from interfaces.service.health import healths, heard_healths
 from interfaces.topics import DIAGNOSTICS
 from reactive_node.testing import MakeNode, SpinUntil
 
@@ -66,17 +66,18 @@ def test_report_without_pid_is_ignored_but_not_the_others() -> None:
 
 
 @pytest.mark.parametrize("namespace", ["", "/armX"])
-def test_monitor_keeps_the_latest_report_of_each_service(
+def test_latest_report_of_each_service_is_kept(
     make_node: MakeNode, spin_until: SpinUntil, namespace: str
 ) -> None:
-    monitor = HealthMonitor(make_node("listener", namespace=namespace))
     publisher = make_node("peer").create_publisher(DIAGNOSTICS.type, DIAGNOSTICS.name, DIAGNOSTICS.qos)
-    spin_until(publisher.get_subscription_count)
-    for name, pid in (("velocity", "7"), ("kinematics", "8"), ("velocity", "9")):
-        publisher.publish(message(f"{namespace}/{name}", GOOD | {"pid": pid}))
-    spin_until(lambda: {name: health.pid for name, health in monitor.latest.items()}.get("velocity") == 9)
+    with heard_healths(make_node("listener", namespace=namespace)) as latest:
+        spin_until(publisher.get_subscription_count)
+        for name, pid in (("velocity", "7"), ("kinematics", "8"), ("velocity", "9")):
+            publisher.publish(message(f"{namespace}/{name}", GOOD | {"pid": pid}))
+        spin_until(lambda: {name: health.pid for name, health in latest.items()}.get("velocity") == 9)
 
-    assert {name: health.pid for name, health in monitor.latest.items()} == {"velocity": 9, "kinematics": 8}
+    assert {name: health.pid for name, health in latest.items()} == {"velocity": 9, "kinematics": 8}
+    spin_until(lambda: not publisher.get_subscription_count())
 
 
 # Reporting
