@@ -44,9 +44,17 @@ LIBRARIES = (
 """What the services import from outside of this checkout, also late."""
 TYPES = (
     "diagnostic_msgs.msg.DiagnosticArray",
+    "diagnostic_msgs.msg.DiagnosticStatus",
+    "diagnostic_msgs.msg.KeyValue",
     "geometry_msgs.msg.PointStamped",
+    "rcl_interfaces.msg.FloatingPointRange",
+    "rcl_interfaces.msg.IntegerRange",
     "rcl_interfaces.msg.Log",
+    "rcl_interfaces.msg.Parameter",
+    "rcl_interfaces.msg.ParameterDescriptor",
     "rcl_interfaces.msg.ParameterEvent",
+    "rcl_interfaces.msg.ParameterValue",
+    "rcl_interfaces.msg.SetParametersResult",
     "rcl_interfaces.srv.DescribeParameters",
     "rcl_interfaces.srv.GetParameters",
     "rcl_interfaces.srv.GetParameterTypes",
@@ -77,6 +85,8 @@ def import_libraries() -> None:
     for name in TYPES:
         with suppress(Exception):
             _use(pkgutil.resolve_name(name))
+    with suppress(Exception):
+        _use_names()
     gc.collect()
     gc.freeze()  # a collection in a fork would copy the memory that it shares
 
@@ -85,9 +95,20 @@ def _use(type_: Any) -> None:
     """Let a type make what it makes on its first use: its hash, and the code of a message."""
     from rclpy.serialization import deserialize_message, serialize_message
 
-    getattr(type_, "_TYPE_HASH", "")
     if hasattr(type_, "get_fields_and_field_types"):
+        getattr(type_, "_TYPE_HASH", "")
         deserialize_message(serialize_message(type_()), type_)
+    else:  # a service: an endpoint has the type of its request or response
+        for part in (type_.Request, type_.Response):
+            getattr(part, "_TYPE_HASH", "")
+
+
+def _use_names() -> None:
+    """Let rclpy compile the patterns of names."""
+    from rclpy.expand_topic_name import expand_topic_name
+    from rclpy.validate_full_topic_name import validate_full_topic_name
+
+    validate_full_topic_name(expand_topic_name("topic", "node", "/namespace"))
 
 
 def executor(execve: Callable[..., NoReturn]) -> Callable[[str, Sequence[str], Mapping[str, str]], NoReturn]:
@@ -142,9 +163,7 @@ def _run(argv: Sequence[str], environment: Mapping[str, str]) -> NoReturn:
     os.environ.clear()
     os.environ.update(environment)
     sys.orig_argv, sys.argv = list(argv), list(argv[2:])
-    for name in [*sys.modules]:
-        if name.partition(".")[0] == "deploy":  # supervisord's own part of this checkout, as old as its start
-            del sys.modules[name]
+    _forget("deploy")  # supervisord's own part of this checkout, as old as its start
     code = 1
     try:
         if "sitecustomize" in sys.modules:  # Python imports it at each start
@@ -157,6 +176,16 @@ def _run(argv: Sequence[str], environment: Mapping[str, str]) -> NoReturn:
         traceback.print_exc()
     finally:
         _end(code)
+
+
+def _forget(package: str) -> None:
+    """Forget an imported package and its modules.
+
+    Their parents know them: to go through all of ``sys.modules`` would copy the memory of every name.
+    """
+    for child in [*vars(sys.modules.pop(package))]:
+        if (module := f"{package}.{child}") in sys.modules:
+            _forget(module)
 
 
 def _exit_code(end: SystemExit) -> int:

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from deploy.supervision.processes import ROOT
+from reactive_node.domains import reserved_domain
 
 PYTHON = str(Path(sys.executable).with_name("python3"))
 WARM = """
@@ -136,3 +137,35 @@ def test_program_imports_no_library_again(tmp_path: Path) -> None:
     )
     done = run(tmp_path, f"{use}{FORKED}", more="warm.import_libraries()")
     assert (done.stdout, done.stderr) == ("[]\nTrue\n", "")
+
+
+def test_service_prepares_no_type_and_no_pattern_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """For a type, the embedded runtime generates code and a hash; Python compiles a pattern once."""
+    use = (
+        "import builtins, json, re\n"
+        "import rclpy\n"
+        "from interfaces.service import ServiceNode, parameter\n"
+        "from rclpy.logging import get_logger\n"
+        "prepared = []\n"
+        "def recording(function):\n"
+        "    def record(what, *options, **others):\n"
+        "        prepared.append(str(what)[:99])\n"
+        "        return function(what, *options, **others)\n"
+        "    return record\n"
+        "get_logger('probe').info('the format of the log is that of the environment')\n"
+        "builtins.compile, json.dumps = recording(compile), recording(json.dumps)\n"
+        "re._compiler.compile = recording(re._compiler.compile)\n"
+        "rclpy.init()\n"
+        "node = ServiceNode('probe')\n"
+        "node.declare_parameter('period', 1.0)\n"
+        "node.health.report()\n"
+        "print(prepared)\n"
+        "node.destroy_node()\n"
+        "rclpy.shutdown()\n"
+    )
+    with reserved_domain() as domain_id:
+        monkeypatch.setenv("ROS_DOMAIN_ID", str(domain_id))
+        done = run(tmp_path, f"{use}{FORKED}", more="warm.import_libraries()")
+    assert done.stdout == "[]\nTrue\n"

@@ -43,7 +43,7 @@ def _character_problem(name: str) -> tuple[str, int] | None:
     """Find characters in invalid places, and unbalanced braces."""
     opened: int | None = None
     for index, character in enumerate(name):
-        if re.match(r"[0-9A-Za-z_]", character):
+        if character == "_" or (character.isascii() and character.isalnum()):
             if opened is not None and index == opened + 1 and character in "0123456789":
                 return "substitution name must not start with a number", index
         elif character == "}":
