@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import fcntl
+import json
 import os
 import shutil
 import subprocess
@@ -51,6 +52,10 @@ class Program(NamedTuple):
     """how its last process ended, in words; '' before the first end"""
     error: str
     """supervisord's words about the last start or end"""
+
+
+def _programs(answer: str) -> list[Program]:
+    return [Program(**row) for row in json.loads(answer)]
 
 
 class System:
@@ -181,11 +186,11 @@ class System:
         pid = self.supervisor()
         if pid is None:
             raise DeploymentError(self.unattended())
-        return [Program(**row) for row in self._ask(pid, "arm.programs")]
+        return _programs(self._ask(pid, "arm.programs"))
 
     def watch(self, supervisor: int) -> list[Program]:
         """The programs for the sentinel; this call is the sentinel's sign of life."""
-        return [Program(**row) for row in self._ask(supervisor, "arm.watch", timeout=ANSWER_LIMIT)]
+        return _programs(self._ask(supervisor, "arm.watch", timeout=ANSWER_LIMIT))
 
     def revive(self, supervisor: int, program: str) -> None:
         """Start a program that supervisord has given up. Raises DeploymentError."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import threading
@@ -122,7 +123,7 @@ def test_setting_the_clock_changes_no_uptime(monkeypatch: pytest.MonkeyPatch) ->
 
     for hours in (1, -1):
         monkeypatch.setattr(time, "time", lambda hours=hours: real() + hours * 3600)
-        (state,) = arm.programs()
+        (state,) = json.loads(arm.programs())
         assert 0.0 < state["uptime"] < 60.0
 
 
