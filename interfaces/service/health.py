@@ -32,7 +32,7 @@ class HealthReporter:
         """
         Start to report.
 
-        :param before_report: called before each report; it may add remarks.
+        :param before_report: called every second before the report; it may add remarks.
         """
         self._node = node
         self._before_report = before_report
@@ -50,7 +50,7 @@ class HealthReporter:
             event_callbacks=PublisherEventCallbacks(matched=self._on_matched),
         )
         # On the steady clock: a paused simulation must not look like a hung service.
-        node.create_timer(PERIOD, self.report, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        node.create_timer(PERIOD, self._on_period, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def count_output(self) -> None:
         """Count a published message."""
@@ -69,7 +69,6 @@ class HealthReporter:
 
     def report(self) -> None:
         """Publish the health, with all remarks since the last report."""
-        self._before_report()
         remarks, self._remarks = self._remarks, {}
         counts = {
             f"{subject}: {why}": n for subject, reasons in remarks.items() for why, n in reasons.items()
@@ -97,7 +96,12 @@ class HealthReporter:
         message.header.stamp = self._node.get_clock().now().to_msg()
         self._publisher.publish(message)
 
+    def _on_period(self) -> None:
+        self._before_report()
+        self.report()
+
     def _on_matched(self, subscribers: Any) -> None:
+        # Without what comes before a report: a new process has its first output to make.
         if subscribers.current_count_change > 0:
             self.report()
 
