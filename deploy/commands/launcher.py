@@ -174,7 +174,7 @@ def _await_services(system: System, member: Member, log_sizes: dict[str, int]) -
                 names = ", ".join(program.name for program in missing)
                 raise DeploymentError(f"No sign of life from {names}; see {system.logs}")
             look_again = time.monotonic() + 0.2
-            while time.monotonic() < look_again:
+            while time.monotonic() < look_again and not all(_reports(each, health) for each in missing):
                 member.spin_once()
 
 
