@@ -25,6 +25,7 @@ START_LIMIT = 60.0  # s until all services have to report their health
 BEGIN_LEAD = 0.3  # s from the choice of the scenario's origin to the origin: all services know it by then
 BEGIN_LIMIT = 5.0  # s that the services have to confirm the origin of the scenario
 STATUS_LIMIT = 3.0  # s for the health of services: the sentinel takes one without for hung after 2.7 s
+LOOK_PERIOD = 0.2  # s between two looks at the states of programs that start
 START_ATTEMPTS = 3  # of a service that dies so slowly that supervisord does not count it as an early death
 RECORDS = "records"  # in the run directory
 LOG_LINES = 15  # of a service that does not start
@@ -91,10 +92,8 @@ def status(system: System) -> None:
 
     programs = system.programs()
     running = [program for program in programs if program.pid]
-    deadline = time.monotonic() + STATUS_LIMIT
     with Member() as member, heard_healths(member.node) as health:
-        while not all(_reports(program, health) for program in running) and time.monotonic() < deadline:
-            member.spin_once()
+        _listen(member, running, health, STATUS_LIMIT)
         print(of_services(programs, health))
 
 
@@ -173,9 +172,14 @@ def _await_services(system: System, member: Member, log_sizes: dict[str, int]) -
             if time.monotonic() > deadline:
                 names = ", ".join(program.name for program in missing)
                 raise DeploymentError(f"No sign of life from {names}; see {system.logs}")
-            look_again = time.monotonic() + 0.2
-            while time.monotonic() < look_again and not all(_reports(each, health) for each in missing):
-                member.spin_once()
+            _listen(member, missing, health, LOOK_PERIOD)
+
+
+def _listen(member: Member, programs: list[Program], health: Mapping[str, Health], limit: float) -> None:
+    """Listen until these programs have reported their health, at most `limit` [s]."""
+    deadline = time.monotonic() + limit
+    while not all(_reports(program, health) for program in programs) and time.monotonic() < deadline:
+        member.spin_once()
 
 
 def _last_words(system: System, program: Program, begin: int) -> str:
