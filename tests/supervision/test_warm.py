@@ -146,7 +146,7 @@ def test_service_prepares_no_type_and_no_pattern_again(
     use = (
         "import builtins, json, re\n"
         "import rclpy\n"
-        "from interfaces.service import ServiceNode, parameter\n"
+        "from interfaces.service import ServiceNode\n"
         "from rclpy.logging import get_logger\n"
         "prepared = []\n"
         "def recording(function):\n"
@@ -160,7 +160,7 @@ def test_service_prepares_no_type_and_no_pattern_again(
         "rclpy.init()\n"
         "node = ServiceNode('probe')\n"
         "node.declare_parameter('period', 1.0)\n"
-        "node.health.report()\n"
+        "node.health._on_period()\n"
         "print(prepared)\n"
         "node.destroy_node()\n"
         "rclpy.shutdown()\n"
