@@ -125,7 +125,7 @@ CHAINS = (
     Alternative("services", "chain_services", commands=services),
     Alternative("RxPY operators on callbacks, same rclpy", "chain_operators", commands=services),
     Alternative("callbacks, same rclpy", "chain", commands=services),
-    Alternative("RxPY operators, without rclpy", "chain_ctypes", commands=services),
+    Alternative("RxPY operators, without rclpy", "chain_dds", commands=services),
     Alternative("ROS 2, services", "chain_services", ros=True, commands=services),
     Alternative("ROS 2, callbacks", "chain", ros=True, commands=services),
     Alternative("Cyclone DDS, C program", c_program.SERVICES, commands=c_processes, build=c_program.build),

@@ -187,7 +187,7 @@ EMBEDDED_ONLY = pytest.mark.skipif(bool(system_rclpy()), reason="platform: the e
         "chain",
         "chain_services",
         "chain_operators",
-        pytest.param("chain_ctypes", marks=EMBEDDED_ONLY),
+        pytest.param("chain_dds", marks=EMBEDDED_ONLY),
     ],
 )
 def test_short_chain_has_figures(link: str) -> None:

@@ -1,29 +1,15 @@
-"""The arm's own chain with its recipes but without rclpy: DDS through ctypes, messages by `struct`.
+"""The arm's own chain with its recipes but without rclpy: bare DDS readers and writers, messages by `struct`.
 
 It checks nothing and knows no type: what a Python program with RxPY on Cyclone DDS cannot undercut by much.
 """
 
 from __future__ import annotations
 
-import ctypes as ct
 import struct
 import time
 from collections.abc import Callable
-from typing import Any
 
-from rclpy._dds import WaitSet
-from rclpy._dds.library import (
-    ANY_STATE,
-    BYTES_HEADER,
-    SERDATA_KIND_DATA,
-    Entity,
-    Pointer,
-    SampleInfo,
-    Serdata,
-    blocking,
-    pack_vector,
-    quick,
-)
+from rclpy._dds import Reader, WaitSet
 from reactivex import Observable
 from reactivex.subject import Subject
 
@@ -49,13 +35,12 @@ def _position(data: bytes) -> Position:
 
 
 class Connection(chain.Connection):
-    """Readers and writers of a node that does not spin."""
+    """The DDS readers and writers of a node that does not spin."""
 
     def __init__(self, job: Job) -> None:
         super().__init__(job)
-        self._readers: list[tuple[tuple[Any, ...], Callable[[bytes], None]]] = []
+        self._readers: list[tuple[Reader, Callable[[bytes], None]]] = []
         self._wait_set = WaitSet()
-        self._serdata, self._info = Serdata(), SampleInfo()
 
     def _kinematics(self) -> None:
         write = self._writer(EFFECTOR_POSITION)
@@ -77,23 +62,11 @@ class Connection(chain.Connection):
         data: Subject[bytes] = Subject()
         reader = self.node.create_subscription(topic.type, topic.name, lambda _: None, topic.qos).handle
         self._wait_set.attach(reader.condition, len(self._readers))
-        to_serdata, to_info = Pointer(ct.addressof(self._serdata)), Pointer(ct.addressof(self._info))
-        arguments = Entity(reader.handle), to_serdata, ct.c_uint32(1), to_info, ct.c_uint32(ANY_STATE)
-        self._readers.append((arguments, data.on_next))
+        self._readers.append((reader, data.on_next))
         return data
 
     def _writer(self, topic: Topic) -> Callable[[bytes], None]:
-        writer = self.node.create_publisher(topic.type, topic.name, topic.qos).handle
-        entity, sertype = Entity(writer.handle), writer._sertype
-        kind, count = ct.c_int(SERDATA_KIND_DATA), ct.c_size_t(1)
-
-        def write(data: bytes) -> None:
-            size = len(data)
-            vector = pack_vector(id(data) + BYTES_HEADER, size)
-            serdata = quick.ddsi_serdata_from_ser_iov(sertype, kind, count, vector, ct.c_size_t(size))
-            blocking.dds_writecdr(entity, serdata)
-
-        return write
+        return self.node.create_publisher(topic.type, topic.name, topic.qos).handle.write
 
     def wait(self, seconds: float) -> None:
         if not self._readers:  # source, sink and watchdog are those of the chain in callbacks
@@ -102,14 +75,6 @@ class Connection(chain.Connection):
         end = time.monotonic_ns() + int(seconds * 1e9)
         while (left := end - time.monotonic_ns()) > 0:
             for token in self._wait_set.wait(left):
-                self._take(*self._readers[token])
-
-    def _take(self, arguments: tuple[Any, ...], on_data: Callable[[bytes], None]) -> None:
-        serdata, info = self._serdata, self._info
-        while quick.dds_takecdr(*arguments) > 0:
-            size = quick.ddsi_serdata_size(serdata)
-            data = bytes(size)
-            quick.ddsi_serdata_to_ser(serdata, ct.c_size_t(0), ct.c_size_t(size), data)
-            quick.ddsi_serdata_unref(serdata)
-            if info.valid_data:
-                on_data(data)
+                reader, on_data = self._readers[token]
+                while (sample := reader.take()) is not None:
+                    on_data(sample.data)
