@@ -7,12 +7,14 @@ import socket
 import xmlrpc.client
 from typing import Any
 
+LIMIT = 5.0  # s that supervisord has to answer, unless the caller says otherwise
+
 
 class NoAnswer(Exception):
     """supervisord does not answer, or answers with an error."""
 
 
-def call(pid: int, method: str, *arguments: object, timeout: float = 5.0) -> Any:
+def call(pid: int, method: str, *arguments: object, timeout: float = LIMIT) -> Any:
     """
     Call a method of the supervisord with this pid.
 

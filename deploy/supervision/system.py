@@ -54,10 +54,6 @@ class Program(NamedTuple):
     """supervisord's words about the last start or end"""
 
 
-def _programs(answer: str) -> list[Program]:
-    return [Program(**row) for row in json.loads(answer)]
-
-
 class System:
     """The system whose runtime files lie in one run directory, whether it runs or not."""
 
@@ -186,11 +182,11 @@ class System:
         pid = self.supervisor()
         if pid is None:
             raise DeploymentError(self.unattended())
-        return _programs(self._ask(pid, "arm.programs"))
+        return self._programs(pid, "arm.programs")
 
     def watch(self, supervisor: int) -> list[Program]:
         """The programs for the sentinel; this call is the sentinel's sign of life."""
-        return _programs(self._ask(supervisor, "arm.watch", timeout=ANSWER_LIMIT))
+        return self._programs(supervisor, "arm.watch", timeout=ANSWER_LIMIT)
 
     def revive(self, supervisor: int, program: str) -> None:
         """Start a program that supervisord has given up. Raises DeploymentError."""
@@ -201,7 +197,16 @@ class System:
         """Stop a program until the system starts anew. Raises DeploymentError."""
         self._ask(self.supervisor() or 0, "supervisor.stopProcess", f"{manifest.GROUP}:{program}")
 
-    def _ask(self, supervisor: int, method: str, *arguments: object, timeout: float = 5.0) -> Any:
+    def _programs(self, supervisor: int, method: str, timeout: float = rpc.LIMIT) -> list[Program]:
+        answer = self._ask(supervisor, method, timeout=timeout)
+        try:
+            return [Program(**row) for row in json.loads(answer)]
+        except (TypeError, ValueError) as error:  # the user has updated the checkout of a running system
+            raise DeploymentError(
+                f"supervisord (pid {supervisor}) runs another version of this program: make stop, make start"
+            ) from error
+
+    def _ask(self, supervisor: int, method: str, *arguments: object, timeout: float = rpc.LIMIT) -> Any:
         try:
             return rpc.call(supervisor, method, *arguments, timeout=timeout)
         except rpc.NoAnswer as error:

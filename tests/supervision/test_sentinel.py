@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
 
-from deploy.supervision import processes
+from deploy.supervision import processes, rpc
 from deploy.supervision.manifest import SENTINEL
 from deploy.supervision.policy import Action, Observation, Policy, Timeouts
 from deploy.supervision.probe import Probe
@@ -244,6 +244,14 @@ def test_observes_nothing_when_supervisord_is_gone(tmp_path: Path) -> None:
         Probe(System(tmp_path), os.getpid()).observe()  # which is not whose child this process is
     with pytest.raises(DeploymentError, match="does not answer"):
         Probe(System(tmp_path), os.getppid()).observe()
+
+
+def test_a_supervisord_of_another_version_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    answers = ([{"name": "velocity"}], '[{"name": "velocity", "mood": "good"}]', "velocity RUNNING")
+    for answer in answers:
+        monkeypatch.setattr(rpc, "call", lambda *_, answer=answer, **__: answer)
+        with pytest.raises(DeploymentError, match=r"supervisord \(pid 7\) runs another version"):
+            System(tmp_path).watch(7)
 
 
 class Machine:
