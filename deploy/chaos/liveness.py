@@ -23,7 +23,7 @@ from deploy.chaos.history import (
     InjectedFault,
     between,
 )
-from deploy.chaos.positions import PublishedValues, may_have_missed_values
+from deploy.chaos.positions import PublishedValues, may_have_missed_values, may_have_reached_only_some
 from interfaces import topics
 
 MEDIAN, SLOWEST = 1.0, 2.0  # s, L1
@@ -138,7 +138,7 @@ def right_after_restart(history: History) -> Finding:
             continue
         positions = between(history.stream(topics.EFFECTOR_POSITION), begin, begin + 1.0)
         right = bool(positions) and published.explain(positions[-1], within=SETTLED)
-        if positions and not right and may_have_missed_values(history, positions[-1].sent):
+        if positions and not right and _is_undecided(history, positions[-1].sent):
             unknown += 1
             continue
         cases += bool(positions)
@@ -147,6 +147,11 @@ def right_after_restart(history: History) -> Finding:
             evidence.append(Evidence(positions[-1].sent, text))
     measured = f"right after {cases - len(evidence)} of {count(cases, 'return')}"
     return Finding("L3", cases, measured, evidence, unknown)
+
+
+def _is_undecided(history: History, time: float) -> bool:
+    """Return whether the observer and kinematics may have received different values before a time."""
+    return may_have_missed_values(history, time) or may_have_reached_only_some(history, time)
 
 
 def hung_is_replaced(history: History) -> Finding:

@@ -14,6 +14,7 @@ ROUNDING = 1e-8  # m
 PRECISION = 4e-15  # of the lengths, 18 times the precision of float64: the rounding of links beyond 1000 km
 LONGEST_PAUSE = 20.0  # s for which a process may be suspended, and its values become old
 ORDER = 0.1  # s by which the observer may receive a value later than a position that follows from it
+SENDING = 0.02  # s between the begin of a fault and a value that its process was sending
 DISCOVERY = 1.0  # s from the first message that the observer received until every reader knows the publisher
 
 
@@ -62,6 +63,20 @@ def may_have_missed_values(history: History, time: float) -> bool:
             first = bisect_right(output, life.began, key=lambda s: s.sent)
             if first == len(output) or time < output[first].sent + DISCOVERY:
                 return True
+    return False
+
+
+def may_have_reached_only_some(history: History, time: float) -> bool:
+    """
+    Return whether a value that the record has as the newest one may be missing elsewhere.
+
+    A source sends a value to one reader after the other. A fault may end or suspend it in between.
+    """
+    for program in SOURCES:
+        output = history.output(program)
+        newest = output[bisect_right(output, time, key=lambda s: s.sent) - 1].sent if output else -math.inf
+        if any(f.target == program and abs(newest - f.begin) < SENDING for f in history.faults):
+            return True
     return False
 
 

@@ -613,6 +613,27 @@ def test_l3_judges_the_last_position_of_a_second() -> None:
     )
 
 
+@pytest.mark.parametrize(
+    ("target", "begin", "newest", "unknown"),
+    [
+        ("config_l1", 4.49, 4.5, 1),
+        ("config_l1", 4.51, 4.5, 1),
+        ("config_l1", 4.475, 4.5, 0),
+        ("config_l1", 4.525, 4.5, 0),
+        ("config_l1", 4.5, 5.0, 0),  # a newer value has come since
+        ("config_l1", 4.5, 6.5, 1),  # after the position
+        ("config_l2", 4.5, 4.5, 0),
+    ],
+)
+def test_l3_value_that_a_fault_cuts_off_while_it_is_sent_is_unknown(
+    target: str, begin: float, newest: float, unknown: int
+) -> None:
+    links = {**LINKS, "l1": [(at, 1.0) for at in sorted({0.0, 4.5, newest})]}
+    faults = [*kill(KINEMATICS, 4.0), stopped(target, begin, 39.0)]
+    found = CHECKERS["L3"](history(**links, positions=positions(6.0), faults=faults))
+    assert (found.unknown, len(found.evidence)) == (unknown, 1 - unknown)
+
+
 @pytest.mark.parametrize(("at", "cases"), [(5.5, 1), (6.125, 1), (6.25, 2), (13.25, 1)])
 def test_l3_disturbed_return_is_no_case(at: float, cases: int) -> None:
     faults = [*kill(KINEMATICS, 4.0, 12.0), stopped(KINEMATICS, at, at, "double")]
