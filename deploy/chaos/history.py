@@ -177,6 +177,12 @@ def between(samples: Sequence[Sample], begin: float, end: float) -> Sequence[Sam
     ]
 
 
+def last_sent(samples: Sequence[Sample], time: float) -> Sample | None:
+    """Return the last sample sent until a time, included; ``None`` if there is none."""
+    index = bisect_right(samples, time, key=lambda s: s.sent)
+    return samples[index - 1] if index else None
+
+
 def gaps(times: Iterable[float], begin: float, end: float) -> Iterable[tuple[float, float]]:
     """Yield the intervals into which the sorted ``times`` divide the one from ``begin`` to ``end``."""
     last = begin

@@ -7,7 +7,7 @@ import math
 from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
 
-from deploy.chaos.history import SOURCES, History, Sample
+from deploy.chaos.history import SOURCES, History, Sample, last_sent
 from interfaces import topics
 
 ROUNDING = 1e-8  # m
@@ -72,12 +72,11 @@ def may_have_reached_only_some(history: History, time: float) -> bool:
 
     A source sends a value to one reader after the other. A fault may end or suspend it in between.
     """
-    for program in SOURCES:
-        output = history.output(program)
-        newest = output[bisect_right(output, time, key=lambda s: s.sent) - 1].sent if output else -math.inf
-        if any(f.target == program and abs(newest - f.begin) < SENDING for f in history.faults):
-            return True
-    return False
+    newest = {program: last_sent(history.output(program), time) for program in SOURCES}
+    return any(
+        (value := newest.get(fault.target)) is not None and abs(value.sent - fault.begin) < SENDING
+        for fault in history.faults
+    )
 
 
 def _any_fits(candidates: list[list[float]], x: float, y: float) -> bool:

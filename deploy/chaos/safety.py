@@ -24,6 +24,7 @@ from deploy.chaos.history import (
     Sample,
     between,
     gaps,
+    last_sent,
 )
 from deploy.chaos.positions import LONGEST_PAUSE, PublishedValues, may_have_missed_values
 from interfaces import topics
@@ -76,7 +77,7 @@ def engines_stay_on(history: History) -> Finding:
     heartbeats = history.signs_of_life()
     for fault in history.faults:
         if fault.kind == "kill" and fault.target != CONTROLLER:
-            before = _last(states, fault.begin)
+            before = last_sent(states, fault.begin)
             alive = between(heartbeats, fault.begin - MAX_PRESENCE_AGE, fault.begin)
             kills += bool(before and before.value == ON and alive)
     measured = f"{count(kills, 'kill')} while on; turned off {how_often(permitted)} for a permitted reason"
@@ -248,11 +249,6 @@ def _deaf(history: History) -> Iterator[tuple[float, float]]:
             yield fault.begin, fault.end + REDISCOVERY
         elif fault.kind == STEP:
             yield fault.begin, fault.begin + SPREAD
-
-
-def _last(samples: Sequence[Sample], time: float) -> Sample | None:
-    index = bisect_right(samples, time, key=lambda s: s.sent)
-    return samples[index - 1] if index else None
 
 
 def _overlapping(lives: Sequence[Life], end: float) -> Iterator[tuple[Life, Life]]:

@@ -634,6 +634,13 @@ def test_l3_value_that_a_fault_cuts_off_while_it_is_sent_is_unknown(
     assert (found.unknown, len(found.evidence)) == (unknown, 1 - unknown)
 
 
+def test_l3_value_that_is_sent_after_the_position_explains_nothing() -> None:
+    faults = [*kill(KINEMATICS, 4.0), stopped("config_l1", 6.5, 39.0)]
+    links = {**LINKS, "l1": [(6.5, 1.0)]}
+    found = CHECKERS["L3"](history(**links, positions=positions(6.0), faults=faults))
+    assert (found.unknown, len(found.evidence)) == (0, 1)
+
+
 @pytest.mark.parametrize(("at", "cases"), [(5.5, 1), (6.125, 1), (6.25, 2), (13.25, 1)])
 def test_l3_disturbed_return_is_no_case(at: float, cases: int) -> None:
     faults = [*kill(KINEMATICS, 4.0, 12.0), stopped(KINEMATICS, at, at, "double")]
