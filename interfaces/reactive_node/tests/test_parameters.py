@@ -100,18 +100,19 @@ def test_parameter_set_by_other_thread_while_subscribing_is_not_missed(
     node.declare_parameter("gain", 1.0)
     get = node.get_parameter
     setter = threading.Thread(target=lambda: node.set_parameters([Parameter("gain", value=2.0)]))
+    notifying = threading.Event()
 
     def get_too_early(name: str) -> Parameter:
+        monkeypatch.undo()  # the setter's thread gets the value too, and must not come here
         present = get(name)
+        node.add_post_set_parameters_callback(lambda _: notifying.set())  # the last added is called first
         setter.start()
-        while setter.is_alive() and get(name).value == present.value:
-            setter.join(0.001)
+        assert notifying.wait(10)
         return present
 
     gains: list[float] = []
-    with monkeypatch.context() as patch:
-        patch.setattr(node, "get_parameter", get_too_early)
-        node.create_parameter_observable("gain").subscribe(gains.append)
+    monkeypatch.setattr(node, "get_parameter", get_too_early)
+    node.create_parameter_observable("gain").subscribe(gains.append)
     setter.join(10)
 
     assert gains == [1.0, 2.0]
