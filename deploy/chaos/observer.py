@@ -23,13 +23,13 @@ from typing import Any
 import rclpy
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
-from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
 from deploy.chaos.history import LOSS, NO_TARGET, OVERLOAD, InjectedFault, Life
 from deploy.chaos.process_monitor import ProcessMonitor
 from deploy.chaos.record import FAULTS, PROCESSES
 from deploy.recording.recorder import Recorder, clocks, record
+from reactive_node import ReactiveNode
 
 
 @contextmanager
@@ -53,7 +53,7 @@ def _recording(
     context = Context()
     rclpy.init(args=[], context=context, domain_id=domain, signal_handler_options=SignalHandlerOptions.NO)
     executor = SingleThreadedExecutor(context=context)
-    node = Node(f"observer_{os.getpid()}", context=context, namespace=namespace)
+    node = ReactiveNode(f"observer_{os.getpid()}", context=context, namespace=namespace)
     executor.add_node(node)
     record(node, recorder, _report_first, lost)
 

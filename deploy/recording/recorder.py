@@ -13,20 +13,25 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+import reactivex as rx
 import yaml
 from mcap.writer import Writer
+from rclpy.callback_groups import CallbackGroup
 from rclpy.event_handler import SubscriptionEventCallbacks
-from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.serialization import serialize_message
+from rclpy.subscription import Subscription
 from rosbags.typesys import Stores, get_typestore
 from std_msgs.msg import String
 
 from interfaces import topics
+from reactive_node import ReactiveNode
+from reactive_node.sampled_reader import sampled_messages
 
 METADATA = "reactive-arm"
 DEPTH = 200  # messages that may wait while the recorder is not scheduled
-HEARTBEAT_DEPTH = 10  # a flood of heartbeats need not be recorded in full
+HEARTBEAT_PERIOD = 0.05  # s; the switch sends one heartbeat in it
+HEARTBEAT_DEPTH = 10  # of each such period, for the time in which the recorder is not scheduled
 _ONE_MOMENT = 100_000  # ns within which both clocks are read
 
 
@@ -114,7 +119,7 @@ def qos_profiles(topic: topics.Topic) -> str:
 
 
 def record(
-    node: Node,
+    node: ReactiveNode,
     recorder: Recorder,
     first: Callable[[str], None] = lambda name: None,
     lost: Callable[[float, float], None] = lambda begin, end: None,
@@ -122,48 +127,79 @@ def record(
     """
     Record all topics of the contract in the namespace of a node, for as long as the node is spun.
 
+    Of the heartbeats between two looks, 50 ms apart, the newest ten are recorded: a flood of them would
+    otherwise take the processor from the services.
+
     :param first: is called with the name of each topic at its first message.
     :param lost: is called if the middleware has lost messages, with the begin and the end of the time in
         which they were sent, on the monotonic clock [s]. Lost heartbeats do not count: a flood has too many.
     """
     for topic in topics.CONTRACT:
-        _record(node, topic, recorder, first, lost)
+        write = _writer(node, topic, recorder, first)
+        if topic is topics.OPERATOR_HEARTBEAT:
+            _record_newest(node, topic, write)
+        else:
+            _record_all(node, topic, write, lost)
 
 
-def _record(
-    node: Node,
+def _writer(
+    node: ReactiveNode, topic: topics.Topic, recorder: Recorder, first: Callable[[str], None]
+) -> Callable[[bytes, int], int]:
+    """Return what records a message and its source time, and returns when it did [ns]."""
+    name, offered = node.resolve_topic_name(topic.name), qos_profiles(topic)
+    is_first = True
+
+    def write(data: bytes, source_time: int) -> int:
+        nonlocal is_first
+        if is_first:
+            first(name)
+            is_first = False
+        now, epoch = clocks()
+        recorder.message(name, topic.type_name, offered, data, now, now - (epoch - source_time))
+        return now
+
+    return write
+
+
+def _record_newest(node: ReactiveNode, topic: topics.Topic, write: Callable[[bytes, int], int]) -> None:
+    qos = QoSProfile(
+        depth=HEARTBEAT_DEPTH, reliability=topic.qos.reliability, durability=topic.qos.durability
+    )
+
+    def create_reader(group: CallbackGroup) -> Subscription:
+        events = SubscriptionEventCallbacks(use_default_callbacks=False)
+        given: Any = {"raw": True, "callback_group": group, "event_callbacks": events}
+        return node.create_subscription(topic.type, topic.name, lambda _: None, qos, **given)
+
+    ticks = rx.timer(0.0, HEARTBEAT_PERIOD, node.scheduler)
+    heartbeats = sampled_messages(node, create_reader, ticks, timestamped=True, most=HEARTBEAT_DEPTH)
+    heartbeats.starmap(write).subscribe()
+
+
+def _record_all(
+    node: ReactiveNode,
     topic: topics.Topic,
-    recorder: Recorder,
-    first: Callable[[str], None],
+    write: Callable[[bytes, int], int],
     lost: Callable[[float, float], None],
 ) -> None:
-    name = node.resolve_topic_name(topic.name)
-    offered = qos_profiles(topic)
     # The loss is reported before or after the next message is: the one before both is among the last two.
     last_two: deque[int] = deque(maxlen=2)
     # Each publisher has numbers of its own; Cyclone DDS has none.
     is_numbered = len(topic.publishers) == 1 and topic is not topics.DIAGNOSTICS
     last_number: int | None = None
 
-    def write(data: bytes, info: Any) -> None:
+    def receive(data: bytes, info: Any) -> None:
         nonlocal last_number
-        if not last_two:
-            first(name)
-        now, epoch = clocks()
-        last_two.append(now)
-        age = epoch - info["source_timestamp"]
-        recorder.message(name, topic.type_name, offered, data, now, now - age)
+        last_two.append(write(data, info["source_timestamp"]))
         number = info["publication_sequence_number"] if is_numbered else None
         if last_number is not None and number is not None and number > last_number + 1:
             report_loss(info)  # Fast DDS does not report each one
         last_number = number
 
-    def report_loss(info: Any) -> None:
+    def report_loss(_: Any) -> None:
         now = time.monotonic_ns()
-        if topic is not topics.OPERATOR_HEARTBEAT:
-            lost(min(last_two, default=now) / 1e9, now / 1e9)
+        lost(min(last_two, default=now) / 1e9, now / 1e9)
 
-    depth = HEARTBEAT_DEPTH if topic is topics.OPERATOR_HEARTBEAT else DEPTH
-    qos = QoSProfile(depth=depth, reliability=topic.qos.reliability, durability=topic.qos.durability)
+    qos = QoSProfile(depth=DEPTH, reliability=topic.qos.reliability, durability=topic.qos.durability)
     events = SubscriptionEventCallbacks(message_lost=report_loss)
-    node.create_subscription(topic.type, name, write, qos, raw=True, event_callbacks=events)
+    node.create_subscription(topic.type, topic.name, receive, qos, raw=True, event_callbacks=events)

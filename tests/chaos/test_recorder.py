@@ -1,17 +1,40 @@
-"""The recorder reports in which time the middleware has lost messages."""
+"""The recorder reports in which time the middleware has lost messages. It records no flood in full."""
 
 from __future__ import annotations
 
+import itertools
 import time
+from collections import deque
 from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from reactivex.testing import TestScheduler
 
 from deploy.recording import recorder
 from interfaces import topics
+
+
+class Reader:
+    """In place of a subscription, and of its handle: keeps the newest messages, as many as its QoS says."""
+
+    msg_type: Any = None
+    raw = True
+
+    def __init__(self, depth: int) -> None:
+        self.kept: deque[tuple[bytes, dict[str, int]]] = deque(maxlen=depth)
+        self.handle = self
+
+    def __enter__(self) -> None:
+        pass
+
+    def __exit__(self, *_: object) -> None:
+        pass
+
+    def take_message(self, *_: object) -> tuple[bytes, dict[str, int]] | None:
+        return self.kept.popleft() if self.kept else None
 
 
 class Subscriptions:
@@ -20,15 +43,19 @@ class Subscriptions:
     def __init__(self) -> None:
         self.write: dict[str, Any] = {}
         self.lose: dict[str, Any] = {}
+        self.readers: dict[str, Reader] = {}
+        self.scheduler = TestScheduler()
 
     def resolve_topic_name(self, name: str) -> str:
         return name
 
     def create_subscription(
-        self, kind: type, name: str, write: Any, qos: Any, *, raw: bool, event_callbacks: Any
-    ) -> None:
+        self, kind: type, name: str, write: Any, qos: Any, *, event_callbacks: Any, **_: Any
+    ) -> Reader:
         self.write[name] = write
         self.lose[name] = event_callbacks.message_lost
+        self.readers[name] = Reader(qos.depth)
+        return self.readers[name]
 
 
 class Clock:
@@ -147,8 +174,45 @@ def test_a_loss_before_the_first_message_is_a_moment(
     assert reports == [(4.0, 4.0)]
 
 
-def test_lost_heartbeats_are_not_reported(
-    node: Subscriptions, clock: Clock, reports: list[tuple[float, float]]
+@pytest.fixture
+def recorded(monkeypatch: pytest.MonkeyPatch) -> list[tuple[bytes, int]]:
+    """Return the messages that the recorder writes, and their source times on the monotonic clock."""
+    messages: list[tuple[bytes, int]] = []
+    monkeypatch.setattr(
+        recorder.Recorder,
+        "message",
+        lambda self, topic, type_name, qos, data, received, sent: messages.append((data, sent)),
+    )
+    monkeypatch.setattr(time, "time_ns", lambda: time.monotonic_ns() + 10**18)
+    return messages
+
+
+def send_heartbeat(node: Subscriptions, clock: Clock, at: float) -> None:
+    """Let a heartbeat arrive a millisecond after it was sent [s]."""
+    clock.now = at + 0.001
+    node.scheduler.advance_to(clock.now)
+    info = {"source_timestamp": round(at * 1e9) + 10**18}
+    node.readers[topics.OPERATOR_HEARTBEAT.name].kept.append((b"", info))
+
+
+def test_each_heartbeat_of_a_switch_is_recorded(
+    node: Subscriptions, clock: Clock, recorded: list[tuple[bytes, int]]
 ) -> None:
-    lose(node, clock, 4.0, topics.OPERATOR_HEARTBEAT)
-    assert not reports
+    sent = [0.05 * number + 0.010_000_001 for number in range(40)]
+    for at in sent:
+        send_heartbeat(node, clock, at)
+    clock.now = 2.1
+    node.scheduler.advance_to(clock.now)
+    assert recorded == [(b"", round(at * 1e9)) for at in sent]
+
+
+def test_of_a_flood_of_heartbeats_the_newest_are_recorded(
+    node: Subscriptions, clock: Clock, recorded: list[tuple[bytes, int]]
+) -> None:
+    for number in range(10_000):
+        send_heartbeat(node, clock, 1.0 + number / 10_000)
+    clock.now = 2.1
+    node.scheduler.advance_to(clock.now)
+    assert len(recorded) <= 210
+    assert recorded[-1] == (b"", 1_999_900_000)
+    assert max(later - sent for (_, sent), (_, later) in itertools.pairwise(recorded)) < 51_000_000

@@ -14,7 +14,6 @@ from rclpy.subscription import Subscription
 from reactivex import Observable, abc
 from reactivex.disposable import CompositeDisposable, Disposable
 
-from reactive_node import stamps
 from reactive_node.stamps import Timestamp
 
 BUFFER = 1000  # messages that a reader keeps for a tick that reads all of them
@@ -86,8 +85,9 @@ def sampled_messages(
                 if taken is None:
                     return
                 message, info = taken
-                time = stamps.from_nanoseconds(info["source_timestamp"])
-                observer.on_next(Timestamp(message, time) if timestamped else message)
+                if timestamped:  # without Timestamp(), which takes a datetime: it has no nanoseconds
+                    message = tuple.__new__(Timestamp, (message, info["source_timestamp"]))
+                observer.on_next(message)
 
         def destroy() -> None:
             nonlocal is_live
