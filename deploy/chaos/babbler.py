@@ -76,8 +76,9 @@ def flood(node: Node, rate: float) -> None:
     """Send heartbeats much faster than any switch, at a rate [Hz]."""
     topic = topics.OPERATOR_HEARTBEAT
     publisher = node.create_publisher(topic.type, topic.name, topic.qos)
+    heartbeat = serialize_message(Bool(data=True))  # once: the arm needs the processor
     for _ in _ticks(rate):
-        publisher.publish(Bool(data=True))
+        publisher.publish(heartbeat)
 
 
 def babble(node: Node, rate: float) -> None:
