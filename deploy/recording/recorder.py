@@ -31,7 +31,7 @@ from reactive_node.sampled_reader import sampled_messages
 METADATA = "reactive-arm"
 DEPTH = 200  # messages that may wait while the recorder is not scheduled
 HEARTBEAT_PERIOD = 0.05  # s; the switch sends one heartbeat in it
-HEARTBEAT_DEPTH = 10  # of each such period, for the time in which the recorder is not scheduled
+HEARTBEAT_DEPTH = 10  # as many are read at once; more than one if the recorder was not scheduled
 _ONE_MOMENT = 100_000  # ns within which both clocks are read
 
 
@@ -145,7 +145,12 @@ def record(
 def _writer(
     node: ReactiveNode, topic: topics.Topic, recorder: Recorder, first: Callable[[str], None]
 ) -> Callable[[bytes, int], int]:
-    """Return what records a message and its source time, and returns when it did [ns]."""
+    """
+    Return what records a message.
+
+    It takes the message and its DDS source time [ns since 1970], and returns when it was received, on the
+    monotonic clock [ns].
+    """
     name, offered = node.resolve_topic_name(topic.name), qos_profiles(topic)
     is_first = True
 
@@ -167,6 +172,7 @@ def _record_newest(node: ReactiveNode, topic: topics.Topic, write: Callable[[byt
     )
 
     def create_reader(group: CallbackGroup) -> Subscription:
+        # No QoS events: with Fast DDS, unread messages would end each wait for them at once.
         events = SubscriptionEventCallbacks(use_default_callbacks=False)
         given: Any = {"raw": True, "callback_group": group, "event_callbacks": events}
         return node.create_subscription(topic.type, topic.name, lambda _: None, qos, **given)
