@@ -14,6 +14,7 @@ from deploy.chaos.history import (
     ALL,
     BAD_LINE,
     CONTROLLER,
+    OVERLOAD,
     PARTITION,
     REDISCOVERY,
     SUSPENDING,
@@ -145,7 +146,7 @@ def single_instances(history: History) -> Finding:
             (life for life in history.lives if life.program == program), key=lambda life: life.began
         )
         cases += len(lives) - 1
-        evidence += [_two(a, b) for a, b in _overlapping(lives, history.end)]
+        evidence += [_two(a, b) for a, b in _overlapping(history, lives)]
     return Finding("S5", cases, f"restarts and duplicates: {cases}", sorted(evidence), unknown)
 
 
@@ -251,11 +252,17 @@ def _deaf(history: History) -> Iterator[tuple[float, float]]:
             yield fault.begin, fault.begin + SPREAD
 
 
-def _overlapping(lives: Sequence[Life], end: float) -> Iterator[tuple[Life, Life]]:
-    """Yield two processes that live together for longer than one of them may need to start."""
+def _overlapping(history: History, lives: Sequence[Life]) -> Iterator[tuple[Life, Life]]:
+    """
+    Yield two processes that live together for longer than one of them may need to start.
+
+    After each overload of the machine, it may need as long again. One that reports has started anyway.
+    """
+    overloads = [fault.end for fault in history.faults if fault.kind == OVERLOAD]
     for one, two in itertools.combinations(lives, 2):
-        last = min(end if one.ended is None else one.ended, end if two.ended is None else two.ended)
-        if last - max(one.began, two.began) > STARTING:
+        last = min(history.end if life.ended is None else life.ended for life in (one, two))
+        together = gaps(overloads, max(one.began, two.began), last)
+        if any(end - begin > STARTING for begin, end in together):
             yield one, two
 
 

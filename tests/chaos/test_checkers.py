@@ -349,6 +349,18 @@ def test_s5_permits_a_duplicate_that_ends_itself() -> None:
     assert verdict("S5", history) == HOLDS
 
 
+def test_s5_permits_a_duplicate_that_starts_slowly_on_an_overloaded_machine() -> None:
+    history = good()
+    history = replace(history, lives=[*history.lives, Life("kinematics", 777, 20.0, 24.0)])
+    assert verdict("S5", history) == VIOLATED
+    overload = InjectedFault("overload", NO_TARGET, 21.8, 22.0)
+    assert verdict("S5", faulty(history, overload)) == HOLDS
+    earlier = overload._replace(begin=21.7, end=21.9)  # 2.1 s before the duplicate ends
+    assert verdict("S5", faulty(history, earlier)) == VIOLATED
+    reporting = added(faulty(history, overload), "/diagnostics", (23.0, ("kinematics", 777)))
+    assert verdict("S5", reporting) == VIOLATED
+
+
 def test_s5_detects_two_that_report_health_in_turn() -> None:
     reports = ((20.0 + n, ("kinematics", 777)) for n in range(3))
     assert verdict("S5", added(good(), "/diagnostics", *((t + 0.5, v) for t, v in reports))) == VIOLATED
