@@ -10,17 +10,16 @@ import threading
 import time
 from collections import Counter, deque
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import reactivex as rx
 import yaml
 from mcap.writer import Writer
-from rclpy.callback_groups import CallbackGroup
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.qos import QoSProfile
 from rclpy.serialization import serialize_message
-from rclpy.subscription import Subscription
 from rosbags.typesys import Stores, get_typestore
 from std_msgs.msg import String
 
@@ -166,19 +165,15 @@ def _writer(
     return write
 
 
+def _qos(topic: topics.Topic, depth: int) -> QoSProfile:
+    return QoSProfile(depth=depth, reliability=topic.qos.reliability, durability=topic.qos.durability)
+
+
 def _record_newest(node: ReactiveNode, topic: topics.Topic, write: Callable[[bytes, int], int]) -> None:
-    qos = QoSProfile(
-        depth=HEARTBEAT_DEPTH, reliability=topic.qos.reliability, durability=topic.qos.durability
-    )
-
-    def create_reader(group: CallbackGroup) -> Subscription:
-        # No QoS events: with Fast DDS, unread messages would end each wait for them at once.
-        events = SubscriptionEventCallbacks(use_default_callbacks=False)
-        given: Any = {"raw": True, "callback_group": group, "event_callbacks": events}
-        return node.create_subscription(topic.type, topic.name, lambda _: None, qos, **given)
-
+    qos = _qos(topic, HEARTBEAT_DEPTH)
+    create = partial(node.create_subscription, topic.type, topic.name, lambda _: None, qos, raw=True)
     ticks = rx.timer(0.0, HEARTBEAT_PERIOD, node.scheduler)
-    heartbeats = sampled_messages(node, create_reader, ticks, timestamped=True, most=HEARTBEAT_DEPTH)
+    heartbeats = sampled_messages(node, create, ticks, timestamped=True, most=HEARTBEAT_DEPTH)
     heartbeats.starmap(write).subscribe()
 
 
@@ -206,6 +201,6 @@ def _record_all(
         now = time.monotonic_ns()
         lost(min(last_two, default=now) / 1e9, now / 1e9)
 
-    qos = QoSProfile(depth=DEPTH, reliability=topic.qos.reliability, durability=topic.qos.durability)
+    qos = _qos(topic, DEPTH)
     events = SubscriptionEventCallbacks(message_lost=report_loss)
     node.create_subscription(topic.type, topic.name, receive, qos, raw=True, event_callbacks=events)

@@ -198,7 +198,7 @@ def test_refused_message_is_told_and_the_next_one_read(ticks: Subject[None]) -> 
     stub = mock.Mock()
     stub.get_logger.return_value.warning = warnings.append
     received: list[Any] = []
-    sampled_messages(stub, lambda group: subscription, ticks).subscribe(received.append)
+    sampled_messages(stub, lambda **_: subscription, ticks).subscribe(received.append)
     ticks.on_next(NOW)
     assert (received, warnings) == ([], ["/text: no String"])
     ticks.on_next(NOW)

@@ -15,7 +15,7 @@ from contextlib import ExitStack
 from typing import TYPE_CHECKING, Any
 
 import reactivex as rx
-from rclpy.callback_groups import CallbackGroup, ReentrantCallbackGroup
+from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -126,11 +126,8 @@ class ReactiveNode(Node):
     ) -> Observable[Any]:
         ticks = period if isinstance(period, Observable) else rx.timer(0.0, period, self.scheduler)
 
-        def create_reader(group: CallbackGroup) -> Subscription:
-            # No QoS events: with Fast DDS, unread messages would end each wait for them at once.
-            events = SubscriptionEventCallbacks(use_default_callbacks=False)
-            given = {"callback_group": group, "event_callbacks": events, **options}
-            return self.create_subscription(msg_type, topic, lambda _: None, qos, **given)
+        def create_reader(**given: Any) -> Subscription:
+            return self.create_subscription(msg_type, topic, lambda _: None, qos, **{**given, **options})
 
         items = sampled_messages(self, create_reader, ticks, timestamped=timestamped, most=qos.depth)
         if item is not None:

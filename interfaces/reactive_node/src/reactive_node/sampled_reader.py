@@ -8,6 +8,7 @@ from collections.abc import Callable
 from typing import Any
 
 from rclpy.callback_groups import CallbackGroup
+from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import HistoryPolicy, QoSProfile
 from rclpy.subscription import Subscription
@@ -44,7 +45,7 @@ def newest(qos_profile: QoSProfile | int, count: int) -> QoSProfile:
 
 def sampled_messages(
     node: Node,
-    create: Callable[[CallbackGroup], Subscription],
+    create: Callable[..., Subscription],
     ticks: Observable[Any],
     *,
     timestamped: bool = False,
@@ -53,7 +54,8 @@ def sampled_messages(
     """
     Return the messages that a reader holds at each tick, those that have come since the tick before.
 
-    :param create: creates the reader of ``node`` in a callback group.
+    :param create: creates the reader of ``node`` with the arguments ``callback_group`` and
+        ``event_callbacks``.
     :param timestamped: whether items are :class:`Timestamp` s instead of messages.
     :param most: as many messages as a tick reads.
     """
@@ -61,7 +63,9 @@ def sampled_messages(
     def subscribe(
         observer: abc.ObserverBase[Any], scheduler: abc.SchedulerBase | None = None
     ) -> abc.DisposableBase:
-        subscription = create(Unattended())
+        # No QoS events: with Fast DDS, unread messages would end each wait for them at once.
+        events = SubscriptionEventCallbacks(use_default_callbacks=False)
+        subscription = create(callback_group=Unattended(), event_callbacks=events)
         lock = threading.Lock()
         is_live = True
 
