@@ -3,7 +3,8 @@
 An executor waits in a DDS wait set, with the interpreter lock released. The wait set has a condition for each
 reader, and a guard condition for all other changes: timers, tasks, guard conditions, created and destroyed
 entities. So no executor polls, and a change from any thread takes effect at once. Only the spinning thread
-uses the wait set; other threads set a flag and trigger the guard condition.
+uses the wait set; other threads set a flag and trigger the guard condition. As every message takes the path
+between two waits, that looks at this one flag only.
 """
 
 from __future__ import annotations
@@ -36,11 +37,12 @@ if TYPE_CHECKING:
     from rclpy.timer import Timer
     from rclpy.waitable import Waitable
 
-# For this long after a wait [ns], ready readers take further messages in turn. Then timers are checked again.
+# In a flood, ready readers take further messages in turn for this long [ns]. Then timers are checked again.
 # So a flood of messages needs few waits, and a slow callback delays the others only by its own duration.
 _BURST = 200_000
-# A wait that took longer [ns] has slept: the message is the first one, and a second look would find nothing.
-_ASLEEP = 20_000
+# A wait that begins this soon [ns] after the last one or its burst belongs to a flood. After a longer break,
+# a second look at a reader would find nothing.
+_BREAK = 50_000
 _WAKE = 0  # the wait set's token of the guard condition
 
 
@@ -136,7 +138,8 @@ class Executor(AbstractContextManager["Executor"]):
         self._close_dds.atexit = False  # at exit, DDS closes everything itself
         self._spinning_thread: int | None = None
         self._callback_thread: int | None = None  # the spinning thread, while it runs a callback
-        # Only the spinning thread uses the rest, except these two flags.
+        # Only the spinning thread uses the rest, except these three flags.
+        self._changed = True  # anything but data and time: one of the others, or a reason to end
         self._entities_changed = True
         self._groups_changed = False
         self._only_nodes: list[Node] | None = None  # if given, wait for these instead of the added ones
@@ -152,6 +155,7 @@ class Executor(AbstractContextManager["Executor"]):
         self._ready: deque[tuple[Any, int]] = deque()
         self._repeatable: deque[tuple[Any, int]] = deque()  # readers that had a message in this burst
         self._burst_end = 0
+        self._flood_end = 0
         self._tasks_were_first = False
         self._context._executors.add(self)
         signals._watch(self)
@@ -220,11 +224,13 @@ class Executor(AbstractContextManager["Executor"]):
 
     def wake(self) -> None:
         """Make the spinning thread check for work again; may be called from any thread."""
+        self._changed = True
         if not self._is_shutdown:
             self._guard.trigger()
 
     def _wake_if_waiting(self) -> None:
         """Wake the spinning thread, unless it is running the caller and will check again anyway."""
+        self._changed = True
         if threading.get_ident() != self._callback_thread:
             self.wake()
 
@@ -275,11 +281,22 @@ class Executor(AbstractContextManager["Executor"]):
         """
         if nodes is not None:
             self._wait_only_for(list(nodes))
+        found: list[tuple[Any, Any]] = []
+
+        def keep(entity: Any) -> bool:
+            taken = self._begin(entity)
+            if taken is not None:
+                found.append((entity, taken))
+            return taken is not None
+
         try:
-            entity, taken = self._next(_deadline(timeout_sec), condition)
+            end = self._work(keep, _deadline(timeout_sec), condition, once=True)
         finally:
             if nodes is not None:
                 self._wait_only_for(None)
+        if end is not None:
+            raise end
+        entity, taken = found[0]
         task = Task(self._run, (entity, taken), executor=self)
         entity = getattr(entity, "waitable", entity)
         candidates = self.get_nodes() if nodes is None else nodes
@@ -296,71 +313,94 @@ class Executor(AbstractContextManager["Executor"]):
         """Return whether the callback group of ``entity`` allows it to run now."""
         return entity.callback_group is None or bool(entity.callback_group.can_execute(entity))
 
-    def _next(self, deadline: int | None, condition: Callable[[], bool] | None) -> tuple[Any, Any]:
-        """Wait for work: return an entity and the data taken from it, or a task and ``None``."""
-        if condition is not None or self._is_shutdown or not self._context._valid:  # saves the call
-            self._check(condition)
-        waited = False
-        while True:
-            if self._entities_changed:
-                self._update_entities()
-            if self._groups_changed:
-                self._unblock()
-            while self._ready:
-                entity, reader = self._ready.popleft()
-                if entity.__class__ is Task:
-                    return entity, None
-                group = entity.callback_group
-                if group is not None and not group.beginning_execution(entity):
-                    self._block(entity)
-                    continue
-                try:
-                    taken = entity._take()
-                except BaseException:
-                    self._end_execution(entity)
-                    raise
-                if taken is None:
-                    if group is not None:
-                        group.ending_execution(entity)
-                    continue
-                if reader and self._burst_end:
-                    self._repeatable.append((entity, reader))
-                return entity, taken
-            if self._repeatable:
-                if time.monotonic_ns() < self._burst_end:
-                    self._ready, self._repeatable = self._repeatable, self._ready
-                    continue
-                self._repeatable.clear()
-            if waited and deadline is not None and time.monotonic_ns() >= deadline:
-                raise TimeoutException
-            # Every new reason to end wakes the executor.
-            if self._collect(deadline) or not self._ready:
-                self._check(condition)
-            waited = True
+    def _work(
+        self,
+        handle: Callable[[Any], bool],
+        deadline: int | None,
+        condition: Callable[[], bool] | None,
+        *,
+        once: bool = False,
+    ) -> type[Exception] | None:
+        """
+        Wait for work and hand it on, until the deadline has passed or there is another reason to end.
 
-    def _check(self, condition: Callable[[], bool] | None) -> None:
-        """Raise the exception that ends the wait for work, if there is a reason to end it."""
+        :param handle: gets a ready entity or task; returns whether there was work to do.
+        :param condition: whether the caller wants the end; asked at first, and after each :meth:`wake`.
+        :param once: return after one piece of work.
+        :return: the reason to end; ``None`` after work.
+        """
+        ready, repeatable = self._ready, self._repeatable
+        self._changed = True  # whatever has happened meanwhile
+        while True:
+            if self._changed and (end := self._handle_changes(condition)) is not None:
+                return end
+            if ready:
+                entity, reader = ready.popleft()
+                if handle(entity):
+                    if reader and self._burst_end:
+                        repeatable.append((entity, reader))
+                    if once or (self._changed and not self._context._valid):
+                        return None
+                    if deadline is not None and time.monotonic_ns() >= deadline:
+                        return None
+                del entity  # the next wait may be long: keep no object alive
+            elif repeatable and time.monotonic_ns() < self._burst_end:
+                ready.extend(repeatable)
+                repeatable.clear()
+            else:
+                repeatable.clear()
+                self._collect(deadline)
+                if not ready and deadline is not None and time.monotonic_ns() >= deadline:
+                    return TimeoutException
+
+    def _handle_changes(self, condition: Callable[[], bool] | None) -> type[Exception] | None:
+        """Handle what callbacks and other threads have changed; return the reason to end the wait, if any."""
+        self._changed = False  # first: later changes are handled in the next round
+        if (end := self._reason_to_end(condition)) is not None:
+            return end
+        if self._entities_changed:
+            self._update_entities()
+        if self._groups_changed:
+            self._unblock()
+        return None
+
+    def _reason_to_end(self, condition: Callable[[], bool] | None) -> type[Exception] | None:
+        """Return the exception that tells why to end the wait for work, if there is a reason."""
         if not self._context._valid:
             in_order = self._is_global and not self._context._ended_by_signal
-            raise ShutdownException if in_order else ExternalShutdownException
+            return ShutdownException if in_order else ExternalShutdownException
         if self._is_shutdown:
-            raise ShutdownException
+            return ShutdownException
         if condition is not None and condition():
-            raise ConditionReachedException
+            return ConditionReachedException
+        return None
 
-    def _collect(self, deadline: int | None) -> bool:
-        """
-        Wait for ready entities until the deadline has passed or :meth:`wake` is called; collect them.
+    def _begin(self, entity: Any) -> Any:
+        """Take the data of a ready entity; ``None`` if its callback must not run."""
+        if entity.__class__ is Task:
+            return ()
+        group = entity.callback_group
+        if group is not None and not group.beginning_execution(entity):
+            self._block(entity)
+            return None
+        try:
+            taken = entity._take()
+        except BaseException:
+            self._end_execution(entity)
+            raise
+        if taken is None and group is not None:
+            group.ending_execution(entity)
+        return taken
 
-        :return: whether :meth:`wake` was called.
-        """
+    def _collect(self, deadline: int | None) -> None:
+        """Wait for ready entities until the deadline has passed or :meth:`wake` is called; collect them."""
         now = time.monotonic_ns()
         timeout = INFINITY if deadline is None else deadline - now if deadline > now else 0
         if self._tasks:
             self._tasks_were_first = not self._tasks_were_first
             if self._tasks_were_first:  # as in rclpy; the next time, they come after the data
                 self._collect_tasks()
-                return False
+                return
             timeout = 0
         for guard in self._guards:
             if guard._is_ready() and self.can_execute(guard):
@@ -380,27 +420,23 @@ class Executor(AbstractContextManager["Executor"]):
         watch = self._watch
         if watch is not None and (remaining := watch.prepare()) < timeout:
             next_timer, timeout = None, remaining
-        began = time.monotonic_ns()
         tokens = self._waitset.wait(timeout)
-        if not tokens and next_timer is not None:
-            self._ready.append((next_timer, 0))  # the wait lasted until the timer was due
         if tokens:
-            ended = time.monotonic_ns()
-            self._burst_end = ended + _BURST if ended - began < _ASLEEP else 0
+            self._burst_end = now + _BURST if now < self._flood_end else 0
+            self._flood_end = (self._burst_end or now) + _BREAK
             if len(tokens) > 1:
                 tokens.sort()  # subscriptions before services and clients, as in rclpy
-        woken = False
-        for token in tokens:
-            if token == _WAKE:
-                woken = True
-                self._guard.take()
-            elif (attached := self._attached.get(token)) is not None:
-                self._ready.append(attached)
+            for token in tokens:
+                if token == _WAKE:
+                    self._guard.take()
+                elif (attached := self._attached.get(token)) is not None:
+                    self._ready.append(attached)
+        elif next_timer is not None:
+            self._ready.append((next_timer, 0))  # the wait lasted until the timer was due
         if watch is not None:
             self._ready.extend((entity, 0) for entity in watch.ready(tokens))
         if self._tasks:
             self._collect_tasks()
-        return woken
 
     def _collect_tasks(self) -> None:
         while self._tasks:
@@ -444,7 +480,9 @@ class Executor(AbstractContextManager["Executor"]):
             present = {*self._timers, *self._guards, *wanted.values()}
             if self._watch is not None:
                 present.update(self._watch.entities)
-            self._ready = deque(one for one in self._ready if one[0].__class__ is Task or one[0] in present)
+            left = [one for one in self._ready if one[0].__class__ is Task or one[0] in present]
+            self._ready.clear()
+            self._ready.extend(left)
 
     def _update_waitables(self, waitables: list[Waitable]) -> None:
         """Update what the waitables of users wait for."""
@@ -466,7 +504,7 @@ class Executor(AbstractContextManager["Executor"]):
                 self._blocked[token] = (entity, handle)
         # Never set to False here: another thread may just have freed the group and set it.
         if self.can_execute(entity):
-            self._groups_changed = True
+            self._groups_changed = self._changed = True
 
     def _unblock(self) -> None:
         """Wait again for entities whose callback group is free again."""
@@ -480,7 +518,7 @@ class Executor(AbstractContextManager["Executor"]):
     # Running
 
     def _run(self, entity: Any, taken: Any) -> None:
-        """Run the result of :meth:`_next`; exceptions of the callback propagate."""
+        """Run a task, or the callback of an entity with the data; exceptions of the callback propagate."""
         if entity.__class__ is Task:
             self._run_task(entity)
             _raise_exception_of(entity)
@@ -491,18 +529,22 @@ class Executor(AbstractContextManager["Executor"]):
             self._end_execution(entity)
             raise
         if result.__class__ is CoroutineType:
-            task = Task(result, executor=self)
-            task._call_when_complete(lambda: self._end_execution(entity))
-            self._run_task(task)
-            _raise_exception_of(task)
+            self._run_coroutine(entity, result)
         else:
             self._end_execution(entity)
+
+    def _run_coroutine(self, entity: Any, coroutine: Any) -> None:
+        """Run what a callback has returned; its callback group is busy until the coroutine ends."""
+        task = Task(coroutine, executor=self)
+        task._call_when_complete(lambda: self._end_execution(entity))
+        self._run_task(task)
+        _raise_exception_of(task)
 
     def _end_execution(self, entity: _Entity) -> None:
         if entity.callback_group is not None:
             entity.callback_group.ending_execution(entity)
             if self._blocked:
-                self._groups_changed = True
+                self._groups_changed = self._changed = True
 
     def _is_idle(self) -> bool:
         """Whether no thread spins or runs a callback."""
@@ -515,7 +557,7 @@ class Executor(AbstractContextManager["Executor"]):
         :return: whether they ended within ``timeout_sec`` (``None``: no limit).
         """
         if not self._is_shutdown:
-            self._is_shutdown = True
+            self._is_shutdown = self._changed = True
             self._guard.trigger()
         # A callback or signal handler on the spinning thread cannot wait for its own end.
         if threading.get_ident() != self._spinning_thread:
@@ -596,34 +638,50 @@ class _BuiltInExecutor(Executor):
             raise ValueError("another thread already spins this executor")
         self._spinning_thread = thread  # it may already be, if a callback spins
         try:
-            while True:
-                self._callback_thread = None
-                try:
-                    entity, taken = self._next(deadline, condition)
-                except self._SPIN_ENDS:
-                    return
-                self._callback_thread = thread
-                self._dispatch(entity, taken)
-                if once or not self._context._valid:
-                    return
-                if deadline is not None and time.monotonic_ns() >= deadline:
-                    return
-                del entity, taken  # the next wait may be long: keep no object alive
+            end = self._work(self._handle, deadline, condition, once=once)
+            if end is not None and end not in self._SPIN_ENDS:
+                raise end
         finally:
             self._spinning_thread = self._callback_thread = outer
+            self._changed = True  # perhaps for an outer call
             if self._is_shutdown:  # shutdown() may be waiting for this
                 with self._idle:
                     self._idle.notify_all()
 
-    def _dispatch(self, entity: Any, taken: Any) -> None:
-        """Run the result of :meth:`_next`, on this or another thread."""
+    def _handle(self, entity: Any) -> bool:
+        """Run a task or the callback of a ready entity, here or on another thread; return whether it does."""
         raise NotImplementedError
 
 
 class SingleThreadedExecutor(_BuiltInExecutor):
     """Runs all callbacks on the thread that spins."""
 
-    _dispatch = Executor._run
+    def _handle(self, entity: Any) -> bool:
+        """Do what :meth:`_begin` and :meth:`_run` do, in one step: every message takes this path."""
+        if entity.__class__ is Task:
+            self._callback_thread = self._spinning_thread
+            self._run(entity, None)
+            self._callback_thread = None
+            return True
+        group = entity.callback_group
+        if group is not None and not group.beginning_execution(entity):
+            self._block(entity)
+            return False
+        self._callback_thread = self._spinning_thread
+        try:
+            taken = entity._take()
+            result = None if taken is None else entity._execute(taken)
+        except BaseException:
+            self._end_execution(entity)
+            raise
+        if result.__class__ is CoroutineType:
+            self._run_coroutine(entity, result)
+        elif group is not None:
+            group.ending_execution(entity)
+            if self._blocked:
+                self._groups_changed = self._changed = True
+        self._callback_thread = None
+        return taken is not None
 
 
 class MultiThreadedExecutor(_BuiltInExecutor):
@@ -660,16 +718,27 @@ class MultiThreadedExecutor(_BuiltInExecutor):
         self._wake_set.attach(self._guard.handle, _WAKE)
         self._dds.append(self._wake_set)
 
-    def _next(self, deadline: int | None, condition: Callable[[], bool] | None) -> tuple[Any, Any]:
-        """Wait for a free thread first: samples taken earlier would pile up in the pool and get old."""
-        while self._in_pool >= self._threads:
-            self._check(condition)
-            timeout = _remaining(deadline)
-            if not timeout:
-                raise TimeoutException
-            if self._wake_set.wait(timeout):
-                self._guard.take()
-        return super()._next(deadline, condition)
+    def _work(
+        self,
+        handle: Callable[[Any], bool],
+        deadline: int | None,
+        condition: Callable[[], bool] | None,
+        *,
+        once: bool = False,
+    ) -> type[Exception] | None:
+        """Wait for a free thread before any work: samples taken earlier would pile up and get old."""
+        while True:
+            while self._in_pool >= self._threads:
+                if (end := self._reason_to_end(condition)) is not None:
+                    return end
+                timeout = _remaining(deadline)
+                if not timeout:
+                    return TimeoutException
+                if self._wake_set.wait(timeout):
+                    self._guard.take()
+            end = super()._work(handle, deadline, condition, once=True)
+            if once or end is not None or not _remaining(deadline):
+                return end
 
     def _spin(
         self, deadline: int | None, condition: Callable[[], bool] | None, *, once: bool = False
@@ -680,13 +749,17 @@ class MultiThreadedExecutor(_BuiltInExecutor):
         if self._errors:
             raise self._errors.popleft()
 
-    def _dispatch(self, entity: Any, taken: Any) -> None:
+    def _handle(self, entity: Any) -> bool:
+        taken = self._begin(entity)
+        if taken is None:
+            return False
         with self._idle:
             self._in_pool += 1
         try:
             self._pool.submit(self._run_in_pool, entity, taken)
         except RuntimeError:  # a signal handler on this thread has shut the pool down
             self._run_in_pool(entity, taken)
+        return True
 
     def _run_in_pool(self, entity: Any, taken: Any) -> None:
         try:

@@ -119,8 +119,11 @@ def test_a_callback_may_await_a_future_of_another_callback(spin_until: SpinUntil
     assert results == [42]
 
 
-def test_an_awaiting_coroutine_blocks_its_callback_group(spin_until: SpinUntil, node: Node) -> None:
+def test_an_awaiting_coroutine_blocks_its_callback_group(
+    executor: SingleThreadedExecutor, spin_until: SpinUntil, node: Node
+) -> None:
     future: Future = Future()
+    received: Future = Future()
     events: list[str] = []
 
     async def wait() -> None:
@@ -128,7 +131,11 @@ def test_an_awaiting_coroutine_blocks_its_callback_group(spin_until: SpinUntil, 
         await future
         events.append("end")
 
-    node.create_subscription(Float64, "x", lambda message: events.append("message"), 10)
+    def receive(message: Float64) -> None:
+        events.append("message")
+        received.set_result(None)
+
+    node.create_subscription(Float64, "x", receive, 10)
     publisher = node.create_publisher(Float64, "x", 10)
     node.create_guard_condition(wait).trigger()
     spin_until(lambda: events == ["begin"])
@@ -138,7 +145,7 @@ def test_an_awaiting_coroutine_blocks_its_callback_group(spin_until: SpinUntil, 
     spin_until(lambda: len(ticks) >= 3)
     assert events == ["begin"]
     future.set_result(None)
-    spin_until(lambda: len(events) == 3)
+    executor.spin_until_future_complete(received, timeout_sec=20)
     assert events == ["begin", "end", "message"]
 
 
@@ -245,6 +252,20 @@ def test_an_entity_created_on_another_thread_wakes_the_executor(
     node.create_timer(0.0, called.set)
     spinning.join(10)
     assert called.is_set()
+
+
+def test_a_timer_created_in_a_callback_runs_during_the_same_spin(
+    executor: SingleThreadedExecutor, node: Node
+) -> None:
+    called: Future = Future()
+
+    def create() -> None:
+        first.cancel()
+        node.create_timer(0.001, lambda: called.set_result(None))
+
+    first = node.create_timer(0.001, create)
+    executor.spin_until_future_complete(called, timeout_sec=5)
+    assert called.done()
 
 
 def test_a_subscription_destroyed_in_its_callback_is_not_called_again(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections import Counter
 from collections.abc import Callable
 from typing import Any
@@ -11,10 +12,11 @@ import pytest
 
 import rclpy
 from rclpy import executors
-from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
 from rclpy.context import Context
 from rclpy.executors import Executor, MultiThreadedExecutor, SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.task import Future
 from std_msgs.msg import Float64
 
 MakeNode = Callable[..., Node]
@@ -190,17 +192,17 @@ def test_a_thousand_entities_under_traffic_leave_nothing_behind(
     assert threading.active_count() <= before
 
 
-@pytest.mark.parametrize(("asleep", "waits", "looks"), [(10**12, 1, 6), (-1, 5, 5)])
-def test_a_reader_is_asked_again_only_after_a_wait_without_sleep(
+@pytest.mark.parametrize(("break_", "waits", "looks"), [(10**12, 1, 6), (-1, 5, 5)])
+def test_a_reader_is_asked_again_only_in_a_flood(
     executor: SingleThreadedExecutor,
     monkeypatch: pytest.MonkeyPatch,
     node: Node,
-    asleep: int,
+    break_: int,
     waits: int,
     looks: int,
 ) -> None:
     monkeypatch.setattr(executors, "_BURST", 10**12)
-    monkeypatch.setattr(executors, "_ASLEEP", asleep)  # ns: every wait is shorter, or every wait is longer
+    monkeypatch.setattr(executors, "_BREAK", break_)  # ns: every break is shorter, or every break is longer
     received: list[float] = []
     subscription = node.create_subscription(Float64, "x", lambda message: received.append(message.data), 10)
     publisher = node.create_publisher(Float64, "x", 10)
@@ -225,6 +227,49 @@ def test_a_reader_is_asked_again_only_after_a_wait_without_sleep(
 
     assert received == [0.0, 1.0, 2.0, 3.0, 4.0]
     assert (calls["waits"], calls["looks"]) == (waits, looks)
+
+
+def test_a_callback_that_spins_leaves_the_end_of_the_outer_spinning_to_it(
+    executor: SingleThreadedExecutor, node: Node
+) -> None:
+    wanted: Future = Future()
+    other: Future = Future()
+    group = ReentrantCallbackGroup()
+
+    def spin_again() -> None:
+        first.cancel()
+        executor.spin_until_future_complete(other, timeout_sec=5)
+
+    def complete_wanted() -> None:
+        second.cancel()
+        wanted.set_result(None)
+
+    def complete_other() -> None:
+        third.cancel()
+        other.set_result(None)
+
+    first = node.create_timer(0.001, spin_again, group)
+    second = node.create_timer(0.01, complete_wanted, group)
+    third = node.create_timer(0.05, complete_other, group)
+    began = time.monotonic()
+    executor.spin_until_future_complete(wanted, timeout_sec=20)
+    assert other.done()
+    assert time.monotonic() - began < 10  # not by the timeout
+
+
+def test_after_a_shutdown_in_a_callback_no_other_callback_runs(
+    executor: SingleThreadedExecutor, node: Node
+) -> None:
+    called: list[int] = []
+
+    def call(number: int) -> None:
+        called.append(number)
+        executor.shutdown(timeout_sec=0)
+
+    for number in range(2):
+        node.create_guard_condition(lambda number=number: call(number)).trigger()
+    executor.spin()
+    assert called == [0]
 
 
 def test_spin_calls_the_spin_once_of_a_subclass(context: Context, make_node: MakeNode) -> None:
