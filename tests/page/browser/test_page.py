@@ -51,7 +51,8 @@ window.WebSocket = class extends WebSocket {
 };
 addEventListener("DOMContentLoaded", () => new MutationObserver(() => {
     const isLost = document.documentElement.dataset.connection === "lost";
-    if (isLost) greyed.push([performance.now() - heard, late]);
+    const now = performance.now(); // after a standstill, the timer above may not have run yet
+    if (isLost) greyed.push([now - heard, late + Math.max(0, now - ticked - 20)]);
 }).observe(document.documentElement, { attributeFilter: ["data-connection"] }));
 """
 """Notes how long after the last message the page turned grey, and how late timers and frames were [ms]."""
