@@ -3,8 +3,8 @@
 An executor waits in a DDS wait set, with the interpreter lock released. The wait set has a condition for each
 reader, and a guard condition for all other changes: timers, tasks, guard conditions, created and destroyed
 entities. So no executor polls, and a change from any thread takes effect at once. Only the spinning thread
-uses the wait set; other threads set a flag and trigger the guard condition. As every message takes the path
-between two waits, that looks at this one flag only.
+uses the wait set; other threads set a flag and trigger the guard condition. Every message takes the path
+between two waits, so this path looks at one flag only.
 """
 
 from __future__ import annotations
@@ -230,8 +230,9 @@ class Executor(AbstractContextManager["Executor"]):
 
     def _wake_if_waiting(self) -> None:
         """Wake the spinning thread, unless it is running the caller and will check again anyway."""
-        self._changed = True
-        if threading.get_ident() != self._callback_thread:
+        if threading.get_ident() == self._callback_thread:
+            self._changed = True
+        else:
             self.wake()
 
     def spin(self) -> None:
@@ -331,6 +332,7 @@ class Executor(AbstractContextManager["Executor"]):
         """
         ready, repeatable = self._ready, self._repeatable
         self._changed = True  # whatever has happened meanwhile
+        waited = False
         while True:
             if self._changed and (end := self._handle_changes(condition)) is not None:
                 return end
@@ -348,10 +350,11 @@ class Executor(AbstractContextManager["Executor"]):
                 ready.extend(repeatable)
                 repeatable.clear()
             else:
+                if waited and deadline is not None and time.monotonic_ns() >= deadline:
+                    return TimeoutException
                 repeatable.clear()
                 self._collect(deadline)
-                if not ready and deadline is not None and time.monotonic_ns() >= deadline:
-                    return TimeoutException
+                waited = True
 
     def _handle_changes(self, condition: Callable[[], bool] | None) -> type[Exception] | None:
         """Handle what callbacks and other threads have changed; return the reason to end the wait, if any."""

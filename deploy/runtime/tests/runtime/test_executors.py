@@ -257,6 +257,18 @@ def test_a_callback_that_spins_leaves_the_end_of_the_outer_spinning_to_it(
     assert time.monotonic() - began < 10  # not by the timeout
 
 
+@pytest.mark.timeout(20)
+def test_spin_once_ends_at_its_timeout_while_ready_data_cannot_be_taken(
+    executor: SingleThreadedExecutor, monkeypatch: pytest.MonkeyPatch, node: Node
+) -> None:
+    subscription = node.create_subscription(Float64, "x", lambda _: None, 10)
+    looks: list[None] = []
+    monkeypatch.setattr(subscription, "_take", lambda: looks.append(None))
+    node.create_publisher(Float64, "x", 10).publish(Float64())
+    executor.spin_once(timeout_sec=0.05)
+    assert looks
+
+
 def test_after_a_shutdown_in_a_callback_no_other_callback_runs(
     executor: SingleThreadedExecutor, node: Node
 ) -> None:
