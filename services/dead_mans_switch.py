@@ -33,18 +33,25 @@ def heartbeats(
 
 
 def engine_commands(
-    wanted: Observable[str], states: Observable[str], *, period: float = 1.0, times: int = 10
+    wanted: Observable[str],
+    states: Observable[str],
+    heard: Observable[str],
+    *,
+    period: float = 1.0,
+    times: int = 10,
 ) -> Observable[str]:
     """
     Emit each wanted command, and repeat it every ``period`` [s] until the engines obey, ``times`` in all.
 
-    A person also tries again when the system was not ready for a command.
+    A person also tries again when the system was not ready for a command, but not against somebody else: the
+    opposite command on the topic ends the repetition.
     """
 
     def attempts(command: str) -> Observable[str]:
         state = ON if command == TURN_ON else OFF
         obeyed = states.filter(lambda it: it == state)
-        return rx.timer(0.0, period).take(times).map(lambda _: command).take_until(obeyed)
+        opposed = heard.filter(lambda it: it != command)
+        return rx.timer(0.0, period).take(times).map(lambda _: command).take_until(rx.merge(obeyed, opposed))
 
     return wanted.switch_map(attempts)
 
@@ -67,8 +74,8 @@ def wire(node: ServiceNode) -> None:
         source.until_set("pressed", source.play(source.scenario.heartbeats)),
     )
     node.publish(OPERATOR_HEARTBEAT, beats, lambda beat: Bool(data=beat))
-    states = node.observe(ENGINES_STATE, attrgetter("data"))
-    commands = engine_commands(source.play(source.scenario.commands), states)
+    states, heard = (node.observe(topic, attrgetter("data")) for topic in (ENGINES_STATE, ENGINES))
+    commands = engine_commands(source.play(source.scenario.commands), states, heard)
     # A person who takes the switch replaces the virtual operator, also for the commands.
     commands = source.until_set("pressed", commands)
     node.publish(ENGINES, commands, lambda command: String(data=command))

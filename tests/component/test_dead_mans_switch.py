@@ -6,8 +6,10 @@ import time
 from pathlib import Path
 
 import pytest
+import reactivex as rx
 from rclpy.parameter import Parameter
 from reactivex.testing import ReactiveTest, TestScheduler
+from std_msgs.msg import String
 
 from interfaces.topics import ENGINES, ENGINES_STATE, OFF, ON, OPERATOR_HEARTBEAT, TURN_OFF, TURN_ON
 from reactive_node.testing import MakeNode, SpinFor, SpinUntil
@@ -37,7 +39,7 @@ def test_command_is_repeated_until_the_engines_obey(scheduler: TestScheduler) ->
         *(on_next(time, state) for time, state in [(215, OFF), (242, ON), (250, ON), (305, OFF)])
     )
 
-    results = scheduler.start(lambda: engine_commands(commands, states, period=10))
+    results = scheduler.start(lambda: engine_commands(commands, states, rx.never(), period=10))
 
     assert results.messages == [
         *(on_next(time, TURN_ON) for time in (210, 220, 230, 240)),
@@ -46,11 +48,23 @@ def test_command_is_repeated_until_the_engines_obey(scheduler: TestScheduler) ->
     assert states.subscriptions == [subscribe(210, 242), subscribe(300, 305)]
 
 
+def test_opposite_command_of_somebody_else_ends_the_repetition(scheduler: TestScheduler) -> None:
+    commands = scheduler.create_hot_observable(on_next(210, TURN_ON), on_next(300, TURN_ON))
+    states = scheduler.create_hot_observable(on_next(215, OFF))
+    heard = scheduler.create_hot_observable(
+        *(on_next(time, command) for time, command in [(211, TURN_ON), (221, TURN_ON), (225, TURN_OFF)])
+    )
+
+    results = scheduler.start(lambda: engine_commands(commands, states, heard, period=10, times=3))
+
+    assert results.messages == [on_next(time, TURN_ON) for time in (210, 220, 300, 310, 320)]
+
+
 def test_command_is_repeated_a_limited_number_of_times(scheduler: TestScheduler) -> None:
     commands = scheduler.create_hot_observable(on_next(210, TURN_ON))
     states = scheduler.create_hot_observable(on_next(215, OFF))
 
-    results = scheduler.start(lambda: engine_commands(commands, states, period=10, times=3))
+    results = scheduler.start(lambda: engine_commands(commands, states, rx.never(), period=10, times=3))
 
     assert results.messages == [on_next(time, TURN_ON) for time in (210, 220, 230)]
 
@@ -78,3 +92,27 @@ def test_person_who_takes_the_switch_ends_the_commands_of_the_scenario(
     spin_for(1.5)  # in which the first would have been repeated and the second one due
 
     assert [command.data for command in commands] == [TURN_OFF]
+
+
+def test_person_who_turns_the_engines_off_ends_the_repetition_of_the_scenario(
+    make_node: MakeNode, spin_until: SpinUntil, spin_for: SpinFor, tmp_path: Path
+) -> None:
+    scenario = tmp_path / "scenario.yaml"
+    scenario.write_text("engines: [{at: 0.0, command: turn_on}]\n")
+    switch = Wired(
+        make_node,
+        spin_until,
+        wire,
+        inputs=[ENGINES_STATE, ENGINES],
+        outputs=[ENGINES, OPERATOR_HEARTBEAT],
+        scenario=str(scenario),
+        scenario_epoch=-1.0,
+    )
+    commands = switch.heard[ENGINES.name]
+    switch.service.set_parameters([Parameter("scenario_epoch", value=time.monotonic())])
+    spin_until(lambda: [command.data for command in commands] == [TURN_ON])
+
+    switch.publish(ENGINES, String(data=TURN_OFF))
+    spin_for(1.5)  # in which the first would have been repeated
+
+    assert [command.data for command in commands] == [TURN_ON, TURN_OFF]

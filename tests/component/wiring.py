@@ -53,7 +53,8 @@ class Wired:
     def publish(self, topic: Topic, message: Any) -> None:
         """Publish a message to the service, once that has a reader."""
         publisher = self._publishers[topic.name]
-        self.spin_until(publisher.get_subscription_count)
+        own = topic.name in self.heard  # the peer may hear itself
+        self.spin_until(lambda: publisher.get_subscription_count() > own)
         publisher.publish(message)
 
     def reports(self) -> list[dict[str, str]]:
