@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from supervisor import events, loggers
+from supervisor.loggers import RotatingFileHandler
 from supervisor.states import ProcessStates, SupervisorStates, getProcessStateDescription
 
 from deploy.supervision import warm
@@ -35,7 +36,7 @@ SENTINEL_START_TIMEOUT = 30.0  # s until its first call, also on a machine that 
 SENTINEL_TIMEOUT = 3.0  # s between its calls
 
 
-class LossyLog(loggers.RotatingFileHandler):  # type: ignore[misc]
+class LossyLog(RotatingFileHandler):  # type: ignore[misc]
     """
     A log file that drops lines that it cannot write.
 
@@ -174,7 +175,8 @@ def make_interface(supervisord: Any, **config: str) -> ArmInterface:
     """The factory of the RPC interface (plugin.py)."""
     loggers.RotatingFileHandler = LossyLog  # for the programs: each start opens its log
     for handler in supervisord.options.logger.handlers:
-        handler.__class__ = LossyLog  # supervisord's own log is open already
+        if isinstance(handler, RotatingFileHandler):  # in the foreground, there is the terminal, too
+            handler.__class__ = LossyLog  # supervisord's own log is open already
     warm.import_libraries()
     supervisord.options.execve = warm.executor(os.execve)
     arm = ArmInterface(supervisord)

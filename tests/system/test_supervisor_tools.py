@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import signal
 from contextlib import closing
 from pathlib import Path
 
@@ -49,6 +50,16 @@ def test_a_start_by_hand_serves_the_commands_of_make(checkout: Checkout) -> None
     console.await_line("The system has ended")
     assert console.wait() == 0
     checkout.await_members(lambda left: not left)
+
+
+def test_a_start_by_hand_in_the_foreground_prints_its_log(checkout: Checkout) -> None:
+    supervisord = checkout.begin_command("supervisord", "-n", *CONF)
+    supervisord.await_line("entered RUNNING state")
+    checkout.await_members(lambda left: left.keys() >= checkout.programs)
+    supervisord.signal(signal.SIGINT)
+    assert supervisord.wait() == 0, supervisord.output
+    assert "Traceback" not in supervisord.output
+    assert checkout.members == {}
 
 
 def test_supervisorctl_ends_a_terminal_in_another_run_directory(small_site: Site) -> None:
