@@ -59,8 +59,11 @@ def problems(document: Any, namespace: str) -> Iterator[tuple[str, str]]:
     if not isinstance(document, dict):
         yield "file", f"must name services, of {names}"
         return
+    seen: dict[str, Any] = {}
     for node, content in document.items():
         program = _program_of(str(node), namespace)
+        if seen.setdefault(program, node) != node:
+            yield node, f"is the service that the file also names {seen[program]}"
         if program not in services and node != ALL:
             yield node, f"is no service; the services are {names}"
         elif not isinstance(content, dict) or [*content] != [KEY] or not isinstance(content[KEY], dict):

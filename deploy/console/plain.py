@@ -41,7 +41,7 @@ class PlainTerminal:
             self._input = None
             if self._is_terminal:  # the end of a file or a pipe means nothing
                 raise EOFError
-            return []
+            typed = b"\n" if self._typed else b""  # which the last line may lack
         *lines, self._typed = (self._typed + typed).split(b"\n")
         return [line.decode(errors="replace") for line in lines]
 

@@ -5,6 +5,7 @@ This module writes and reads the format of these reports.
 
 from __future__ import annotations
 
+import math
 import os
 import socket
 import time
@@ -149,11 +150,13 @@ def healths(message: DiagnosticArray, namespace: str) -> dict[str, Health]:
 
 
 def _health(status: DiagnosticStatus, values: dict[str, str]) -> Health:
-    since_output = values[_SINCE_OUTPUT]
+    since_output = float(values[_SINCE_OUTPUT]) if values[_SINCE_OUTPUT] else None
+    if since_output is not None and not math.isfinite(since_output):
+        raise ValueError(f"{_SINCE_OUTPUT} is {since_output}")
     return Health(
         heard=time.monotonic(),
         pid=int(values[_PID]),
         ok=status.level == DiagnosticStatus.OK,
         reason=status.message,
-        since_output=float(since_output) if since_output else None,
+        since_output=since_output,
     )

@@ -34,7 +34,8 @@ def claim(node: Node) -> socket.socket:
 
 def is_claimed(name: str, domain: int) -> bool:
     """Return whether a live process of this host holds the claim on a fully qualified node name."""
-    return f"@{_address(name, domain)}\n" in Path("/proc/net/unix").read_text()
+    # As bytes: sockets of other programs may have any name.
+    return f"@{_address(name, domain)}\n".encode() in Path("/proc/net/unix").read_bytes()
 
 
 def _address(name: str, domain: int) -> str:

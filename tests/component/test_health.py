@@ -40,6 +40,8 @@ def test_report_of_a_service_in_the_namespace_is_read() -> None:
         ("/arm1/battery", {"pid": "7"}),
         ("/arm1/battery", GOOD | {"pid": "none"}),
         ("/arm1/battery", GOOD | {"seconds_since_output": "long ago"}),
+        ("/arm1/battery", GOOD | {"seconds_since_output": "nan"}),
+        ("/arm1/battery", GOOD | {"seconds_since_output": "inf"}),
         ("", {}),
     ],
 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import socket
 from types import SimpleNamespace
 from typing import Any
 
@@ -35,6 +36,12 @@ def test_other_name_or_domain_is_another_claim() -> None:
         assert is_claimed(LONG, 7)
         assert is_claimed(LONG, 8)
         assert not is_claimed(LONG + "c", 7)
+
+
+def test_sockets_of_other_programs_may_have_any_name() -> None:
+    with socket.socket(socket.AF_UNIX) as other, claim(node(NAME)):
+        other.bind(f"\0{NAME}".encode() + b"\xff")
+        assert is_claimed(NAME, 7)
 
 
 def test_refused_claim_leaves_nothing_open() -> None:

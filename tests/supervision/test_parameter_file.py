@@ -59,6 +59,7 @@ operator_console: {ros__parameters: {address: 1}}       operator_console.address
 /**: {ros__parameters: {repeat: 0.5}}                   /**.repeat of engine_controller: must be from
 dead_mans_switch: {ros__parameters: {rate: fast}}       dead_mans_switch.rate: must be a number
 /**: {ros__parameters: {value: -1.0}}                   /**.value of config_l1: must be from 0 to 1000
+{velocity: {ros__parameters: {}}, /velocity: {ros__parameters: {}}}   /velocity: is the service that the file
 [1]                                                     file: must name services
 """
 

@@ -16,6 +16,7 @@ from contextlib import suppress
 
 import pytest
 
+from deploy.console.plain import PlainTerminal
 from deploy.supervision.processes import ROOT
 
 LIMIT = 20.0  # s for each awaited text
@@ -249,3 +250,13 @@ def test_missing_input_ends_nothing(redirection: str) -> None:
         assert [process.stdout.readline() for _ in range(5)] == [b"line %d\n" % number for number in range(5)]
         process.send_signal(signal.SIGINT)
         assert process.wait(LIMIT) == 0
+
+
+def test_last_line_of_a_pipe_needs_no_newline(monkeypatch: pytest.MonkeyPatch) -> None:
+    reading, writing = os.pipe()
+    with open(reading) as pipe:
+        os.write(writing, b"press\nturn_off")
+        os.close(writing)
+        monkeypatch.setattr(sys, "stdin", pipe)
+        terminal = PlainTerminal()
+        assert [terminal.read(0.0) for _ in range(3)] == [["press"], ["turn_off"], []]
