@@ -11,7 +11,7 @@ from rclpy.exceptions import InvalidNamespaceException
 from rclpy.validate_namespace import validate_namespace
 
 from deploy.commands import parameter_file
-from deploy.console.page.address import tls
+from deploy.console.page.address import DEFAULT_PORT, host_names, tls
 from deploy.supervision import manifest, processes
 from deploy.supervision.processes import ROOT
 from deploy.supervision.system import (
@@ -29,6 +29,8 @@ from interfaces.service import UserError, instance
 
 SCENARIOS = ROOT / "deploy" / "scenarios"
 DISCOVERY_RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"  # environment variable
+LIMITS = {"operator_watchdog": ("silence", "strikes"), "engine_controller": ("presence_timeout",)}
+"""The parameters of other services that the page shows."""
 WEB = "WEB"  # environment variable: the port of the page, or off
 
 
@@ -48,8 +50,10 @@ def of_system(scenario_name: str, user_file: str) -> dict[str, Any]:
         raise DeploymentError(str(error)) from error
     shared = given.pop(ALL, {}).get(KEY, {})
     page = f"{namespace_of(os.environ).rstrip('/')}/{manifest.PAGE}"
-    if user_file and (files := _page_files(user_file, shared | given.get(page, {}).get(KEY, {}))):
-        given.setdefault(page, {KEY: {}})[KEY].update(files)
+    if user_file:
+        files = _page_files(user_file, shared | given.get(page, {}).get(KEY, {}))
+        if known := files | _limits(given, page.removesuffix(manifest.PAGE)):
+            given.setdefault(page, {KEY: {}})[KEY].update(known)
     parameters: dict[str, Any] = scenario_parameters(path, NOT_YET)
     parameters[ALL][KEY] |= shared
     if (port := _port(os.environ.get(WEB, ""))) is not None:
@@ -71,9 +75,24 @@ def _page_files(user_file: str, given: Mapping[str, Any]) -> dict[str, str]:
     host = given.get("address", declared["address"].default)
     try:
         tls(host, files.get("certificate", ""), files.get("key", ""))
+        host_names(host, DEFAULT_PORT, given.get("names", "").split())
     except UserError as error:
         raise DeploymentError(f"{user_file}: {manifest.PAGE}: {error}") from None
     return files
+
+
+def _limits(given: Mapping[str, Any], prefix: str) -> dict[str, Any]:
+    """
+    Return the parameters of other services that the page shows, as far as they are given.
+
+    :param prefix: of the names of the nodes.
+    """
+    return {
+        name: value
+        for service, names in LIMITS.items()
+        for name, value in given.get(prefix + service, {}).get(KEY, {}).items()
+        if name in names
+    }
 
 
 def _port(web: str) -> int | None:

@@ -62,15 +62,25 @@ class Parameters:
 @dataclass(frozen=True)
 class _Parameters:
     settings: str = parameter("", None, "", "folder that keeps the address of the page, or empty")
+    silence: float = parameter(operator_watchdog.DEFAULTS.silence, None, "s", "of the operator watchdog")
+    strikes: int = parameter(operator_watchdog.DEFAULTS.strikes, None, "", "of the operator watchdog")
+    presence_timeout: float = parameter(
+        engine_controller.DEFAULTS.presence_timeout, None, "s", "of the engine controller"
+    )
 
 
 def wire(node: ServiceNode) -> None:
     """Connect the pages with topics, parameters and processes."""
-    parameters, folder = node.declare(Parameters), node.declare(_Parameters).settings
+    parameters, given = node.declare(Parameters), node.declare(_Parameters)
     tls = address.tls(parameters.address, parameters.certificate, parameters.key)
     origin = Origin(node)
     clock = state.Clock(hold.monotonic, node.age, lambda: origin.elapsed() if origin.is_known else 0.0)
-    newest = BehaviorSubject(state.PageState(since_when=state.OLDER if origin.is_past else state.NOT_YET))
+    initial = state.PageState(
+        since_when=state.OLDER if origin.is_past else state.NOT_YET,
+        strikes=given.strikes,
+        presence_timeout=given.presence_timeout,
+    )
+    newest = BehaviorSubject(initial)
 
     events: Subject[server.Event] = Subject()
     is_open = pages_are_open(events).share()
@@ -117,7 +127,7 @@ def wire(node: ServiceNode) -> None:
     def receive(event: server.Event) -> None:
         node.scheduler.schedule(lambda *_: events.on_next(event))
 
-    serve(node, parameters, folder, tls, receive, lambda: newest.value, clock)
+    serve(node, parameters, given, tls, receive, lambda: newest.value, clock)
 
 
 def only(events: Observable[Any], *kinds: type) -> Observable[Any]:
@@ -149,15 +159,15 @@ def controllers(node: ServiceNode) -> Callable[[], frozenset[tuple[int, ...]]]:
 
 
 def just_now(_: Any) -> Span:
-    """Return the time within which a command is published that a page has just sent."""
+    """Return the time within which the command of a page was published, which has just happened."""
     now = stamps.now()
-    return now, now + PUBLISHED_WITHIN
+    return now - PUBLISHED_WITHIN, now
 
 
 def serve(
     node: ServiceNode,
     parameters: Parameters,
-    folder: str,
+    given: _Parameters,
     tls: ssl.SSLContext | None,
     receive: Callable[[server.Event], None],
     newest: Callable[[], state.PageState],
@@ -166,7 +176,7 @@ def serve(
     """Serve the page until the node ends, and note its address; say so if that is not possible."""
     if not parameters.port:
         return
-    file = address.AddressFile(folder)
+    file = address.AddressFile(given.settings)
     last_port, token = file.read()
     try:
         listener = address.listen(parameters.address, parameters.port, last_port)
@@ -180,7 +190,7 @@ def serve(
     pages = server.PageServer(
         listener,
         Site(token, names, scheme),
-        welcome=welcome(),
+        welcome=welcome(given),
         receive=receive,
         newest=newest,
         clock=clock,
@@ -199,15 +209,14 @@ def note(node: ServiceNode, file: address.AddressFile, line: str) -> None:
         node.remark("page", str(error))
 
 
-def welcome() -> dict[str, Any]:
+def welcome(given: _Parameters) -> dict[str, Any]:
     """Return what each page is told first."""
-    watchdog, controller = operator_watchdog.Parameters(), engine_controller.Parameters()
     return {
         "programs": protocol.PROGRAMS,
         "limits": protocol.LIMITS,
-        "strikes": watchdog.strikes,
-        "silence": watchdog.silence,
-        "presence_timeout": controller.presence_timeout,
+        "strikes": given.strikes,
+        "silence": given.silence,
+        "presence_timeout": given.presence_timeout,
         "beat": server.UPDATE_PERIOD,
         "max_nonce_age": hold.MAX_NONCE_AGE,
     }

@@ -88,6 +88,17 @@ def test_host_names_are_exact() -> None:
     assert host_names("0.0.0.0", 443, ["arm.example"]) == ("arm.example:443", "arm.example")
 
 
+@pytest.mark.parametrize("name", ["küche.local", "arm.example:8642", "https://arm.example"])
+def test_name_that_no_browser_sends_is_refused(name: str) -> None:
+    with pytest.raises(UserError, match=f"^names: '{name}' must consist of ASCII letters"):
+        host_names("0.0.0.0", 8642, ["arm.example", name])
+
+
+def test_address_of_all_networks_needs_names() -> None:
+    with pytest.raises(UserError, match=r"^names: must be the names of this machine in browsers"):
+        host_names("0.0.0.0", 8642, [])
+
+
 def test_restarted_process_keeps_port_and_token(tmp_path: Path) -> None:
     AddressFile(str(tmp_path)).write(LINE)
 

@@ -34,6 +34,7 @@ class Page:
     """A page in a test: it beats while it is held, and knows what it was told last."""
 
     def __init__(self, connection: ClientConnection) -> None:
+        self.welcome: dict[str, Any] = {}
         self.shown: dict[str, Any] = {}
         self.refused: list[dict[str, str]] = []
         self.is_held = False
@@ -59,6 +60,8 @@ class Page:
                 message = json.loads(self._connection.recv(timeout=0.0))
                 if message["type"] == "refused":
                     self.refused.append(message)
+                elif message["type"] == "welcome":
+                    self.welcome = message
                 elif message["type"] == "update":
                     self.nonce = message["nonce"]
                     self.shown |= message
@@ -269,6 +272,21 @@ def test_engines_are_commanded(world: World) -> None:
         page.say("engines", command="turn_on")
         page.say("engines", command="turn_off")
         world.until(lambda: world.commands == ["turn_on", "turn_off"])
+
+
+def test_line_tells_that_a_page_has_turned_the_engines_off(world: World) -> None:
+    with world.page() as page:
+        page.say("engines", command="turn_off")
+        world.until(lambda: page.shown.get("lines"))
+    assert [line["text"] for line in page.shown["lines"]] == ["Turning off engines, as you asked..."]
+
+
+def test_page_shows_the_limits_of_this_arm(
+    make_node: Callable[..., Any], spin_until: SpinUntil, tmp_path: Path
+) -> None:
+    limits = {"silence": 2.0, "strikes": 5, "presence_timeout": 4.0}
+    with World(make_node, spin_until, tmp_path, **limits).page() as page:
+        assert {name: page.welcome[name] for name in limits} == limits
 
 
 def test_slider_sets_its_source(world: World) -> None:

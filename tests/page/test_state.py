@@ -25,6 +25,7 @@ from reactive_node.stamps import Timestamp
 
 on_next = ReactiveTest.on_next
 START = datetime(2026, 1, 1, tzinfo=UTC)
+BY_CONTROLLER = "turned off by the engine controller: no operator seen for 10 s"
 
 
 class Play:
@@ -175,6 +176,18 @@ def test_new_watchdog_begins_new_strikes(play: Play) -> None:
     assert play.run(220).strikes_left == 3
 
 
+def test_limits_are_those_of_this_arm(play: Play) -> None:
+    initial = PageState(since_when=state.NOT_YET, strikes=5, presence_timeout=2.5)
+    play.watchdogs = [on_next(201, True)]
+    conclude(play, (205, MISSED))
+    engines(play, (209, ON), (209.1, OFF))
+
+    found = play.run(210, initial)
+
+    assert found.strikes_left == 4
+    assert view(found, "page", 209.2)["engines"]["why"] == BY_CONTROLLER.replace("10", "2.5")
+
+
 def test_strikes_of_an_older_watchdog_are_unknown_until_it_begins_anew(play: Play) -> None:
     play.watchdogs.append(on_next(201, False))
     conclude(play, (210, MISSED))
@@ -304,7 +317,7 @@ def test_page_turned_them_off(play: Play) -> None:
 def test_controller_turned_them_off_without_a_command(play: Play) -> None:
     engines(play, (209, ON), (209.1, OFF))
 
-    assert view(play.run(210), "page", 209.2)["engines"]["why"] == state.BY_CONTROLLER
+    assert view(play.run(210), "page", 209.2)["engines"]["why"] == BY_CONTROLLER
 
 
 def test_controller_was_stopped(play: Play) -> None:
@@ -324,14 +337,14 @@ def test_controller_that_was_killed_before_turns_them_off_itself(play: Play) -> 
     play.controllers += [(210.1, frozenset({"first", "second"})), (210.7, frozenset({"second"}))]
     engines(play, (209, ON), (210, ON), (210.2, OFF), (210.5, ON), (210.9, OFF))
 
-    assert view(play.run(211), "page", 211.0)["engines"]["why"] == state.BY_CONTROLLER
+    assert view(play.run(211), "page", 211.0)["engines"]["why"] == BY_CONTROLLER
 
 
 def test_old_reason_is_forgotten_when_they_are_on_again(play: Play) -> None:
     play.say(210.0, topics.ENGINES, String(data=TURN_OFF))
     engines(play, (209, ON), (210.01, OFF), (210.5, ON), (210.6, ON), (210.7, OFF))
 
-    assert view(play.run(211), "page", 210.8)["engines"]["why"] == state.BY_CONTROLLER
+    assert view(play.run(211), "page", 210.8)["engines"]["why"] == BY_CONTROLLER
 
 
 def test_restarted_console_does_not_guess(play: Play) -> None:

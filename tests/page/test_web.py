@@ -54,3 +54,13 @@ def test_files_of_the_page_are_beside_the_parameter_file(
 
     assert started_with == {"certificate": str(tmp_path / "arm.pem"), "key": "/etc/arm.key"}
     assert loaded == [("127.0.0.1", str(tmp_path / "arm.pem"), "/etc/arm.key")]
+
+
+def test_page_knows_the_limits_of_other_services(tmp_path: Path) -> None:
+    file = tmp_path / "parameters.yaml"
+    file.write_text(
+        "operator_watchdog: {ros__parameters: {silence: 2.0, repeat: 0.2}}\n"
+        "engine_controller: {ros__parameters: {presence_timeout: 4.0}}\n"
+    )
+    for namespace in ("", "/arm1"):
+        assert port_of("", namespace, str(file)) == {"silence": 2.0, "presence_timeout": 4.0}

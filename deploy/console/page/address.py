@@ -18,6 +18,7 @@ from interfaces.service import UserError
 
 DEFAULT_PORT = 8642
 PORTS = 20  # that are tried from the default port on
+_NAME = re.compile(r"[A-Za-z0-9._-]+")
 _LINE = re.compile(r"The page: https?://\S+:(\d+)/#(\S+)\n")
 
 
@@ -63,7 +64,16 @@ def tls(address: str, certificate: str, key: str) -> ssl.SSLContext | None:
 
 
 def host_names(address: str, port: int, names: Sequence[str]) -> tuple[str, ...]:
-    """Return the ``Host`` headers that reach the page; browsers leave out the port of the scheme."""
+    """
+    Return the ``Host`` headers that reach the page; browsers leave out the port of the scheme.
+
+    :raises UserError: if no browser sends one of them.
+    """
+    if not names and ipaddress.IPv4Address(address).is_unspecified:
+        raise UserError(f"names: must be the names of this machine in browsers, as its address is {address}")
+    for name in names:
+        if not _NAME.fullmatch(name):
+            raise UserError(f"names: {name!r} must consist of ASCII letters, digits, dots and hyphens")
     known = names or (("127.0.0.1", "localhost") if address == "127.0.0.1" else (address,))
     return tuple(f"{name}:{port}" for name in known) + (tuple(known) if port in (80, 443) else ())
 

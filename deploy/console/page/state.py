@@ -18,11 +18,10 @@ from interfaces.service.health import healths
 from interfaces.topics import ALIVE, INCAPACITATED, MISSED, OFF, ON, TURN_OFF
 from reactive_node import stamps
 from reactive_node.stamps import Timestamp
-from services import operator_watchdog
+from services import engine_controller, operator_watchdog
 
 PROGRAMS = tuple(program.name for program in manifest.programs())
 ENGINE_CONTROLLER = topics.ENGINES_STATE.publishers[0]
-STRIKES = operator_watchdog.Parameters().strikes
 ECHO = 0.15  # s after a beat of a page for which a heartbeat on the topic is taken for that beat
 TOGETHER = 1.0  # s within which a command or a conclusion explains that the engines are off
 RENEWED = 0.5  # s: the drive's 0.4 s and the way of the message
@@ -33,7 +32,7 @@ MAX_SAMPLES, MAX_LINES, MAX_REFUSALS = 90, 200, 20  # that are kept for a page t
 BY_WATCHDOG = "turned off by the operator watchdog: operator incapacitated"
 BY_PAGE = "turned off on a page"
 BY_COMMAND = "turned off by a command of another node, such as the terminal"
-BY_CONTROLLER = "turned off by the engine controller: no operator seen for 10 s"
+BY_CONTROLLER = "turned off by the engine controller: no operator seen for {:g} s"
 RESTARTED = "turned off as the engine controller was killed or stopped"
 NOT_YET = "not turned on yet"
 OLDER = "off since before the page was served"
@@ -73,6 +72,10 @@ class Program(NamedTuple):
 class PageState(NamedTuple):
     """All that a page may show; times are those of :attr:`Clock.now` [s]."""
 
+    strikes: int = operator_watchdog.DEFAULTS.strikes
+    """The strike that turns the engines off."""
+    presence_timeout: float = engine_controller.DEFAULTS.presence_timeout
+    """How long the engines stay on without an operator [s]."""
     configuration: Mapping[str, float] = {}
     by_hand: frozenset[str] = frozenset()
     """The sources that were set by hand."""
@@ -222,7 +225,7 @@ def _presence(state: PageState, message: Timestamp[Any], clock: Clock) -> PageSt
 
 
 def _new_watchdog(state: PageState, begins: bool) -> PageState:
-    return state._replace(activity=None, strikes_left=STRIKES if begins else None)
+    return state._replace(activity=None, strikes_left=state.strikes if begins else None)
 
 
 def _activity(state: PageState, message: Timestamp[Any], clock: Clock) -> PageState:
@@ -232,7 +235,7 @@ def _activity(state: PageState, message: Timestamp[Any], clock: Clock) -> PageSt
     elif activity == INCAPACITATED:
         left = 0
     elif activity == ALIVE and state.activity == INCAPACITATED:
-        left = STRIKES
+        left = state.strikes
     state = state._replace(activity=activity, strikes_left=left)
     return _explain(state, BY_WATCHDOG, now) if activity == INCAPACITATED else state
 
@@ -271,7 +274,8 @@ def _engines(controllers: Callable[[], frozenset[Any]]) -> Callable[[PageState, 
             return state._replace(engines=ON, reported=now, controllers=known, cause=cause, refused=None)
         if state.engines == ON:
             is_new = not controllers() <= state.controllers
-            fallback = RESTARTED if is_new or now - state.reported >= RENEWED else BY_CONTROLLER
+            is_restarted = is_new or now - state.reported >= RENEWED
+            fallback = RESTARTED if is_restarted else BY_CONTROLLER.format(state.presence_timeout)
             return state._replace(engines=OFF, reported=now, off_since=now, since_when=fallback)
         return state._replace(engines=OFF, reported=now)
 
