@@ -8,8 +8,7 @@ from datetime import timedelta
 from types import TracebackType
 from typing import Any
 
-from rclpy.parameter import Parameter
-from rclpy.parameter_client import AsyncParameterClient
+import reactivex as rx
 from rclpy.qos import QoSProfile
 from reactivex import Observable
 from reactivex.subject import Subject
@@ -17,12 +16,15 @@ from std_msgs.msg import String
 
 from deploy.console.lines import Line, Span, line_batches
 from deploy.console.output import say
+from deploy.console.page.remote import RemoteParameters
 from deploy.console.terminal import open_terminal
 from interfaces import topics
 from reactive_node import ReactiveNode, stamps
 
 PERIOD = 0.25  # s between two batches of lines
 BACKLOG = 50  # messages of a topic that wait for the next batch
+AGAIN = 1.0  # s until `turn_off` is repeated, if the engines have not obeyed
+SWITCH = topics.OPERATOR_HEARTBEAT.publishers[0]
 
 HELP = """\
 Commands: press, release (the operator's switch), turn_on, turn_off (the engines), quit.
@@ -45,16 +47,20 @@ class Console:
         self.has_quit = False
         self._node = node
         self._engines = node.create_publisher(String, topics.ENGINES.name, topics.ENGINES.qos)
-        self._switch = AsyncParameterClient(node, "dead_mans_switch")
+        self._switch = RemoteParameters(node, SWITCH)
+        self._holds: Subject[bool] = Subject()
+        self._holds.switch_map(self._held).subscribe(scheduler=node.scheduler)
         self._commands: dict[str, Callable[[], None]] = {
-            "press": lambda: self._hold_switch(True),
-            "release": lambda: self._hold_switch(False),
+            "press": lambda: self._holds.on_next(True),
+            "release": lambda: self._holds.on_next(False),
             "turn_on": lambda: self._command_engines(topics.TURN_ON),
             "turn_off": lambda: self._command_engines(topics.TURN_OFF),
             "quit": self._quit,
         }
         self._origin = stamps.now() - timedelta(seconds=time.monotonic() - epoch)
         self._turned_off: Subject[Span] = Subject()
+        again = self._turned_off.switch_map(lambda _: rx.timer(AGAIN).take_until(self._off_or_wanted_on()))
+        again.subscribe(lambda _: self._command_engines(topics.TURN_OFF), scheduler=node.scheduler)
         self._ticks: Subject[None] = Subject()
         batches = line_batches(self._seen, self._turned_off, self._ticks, node.get_namespace())
         batches.subscribe(self._show, scheduler=node.scheduler)
@@ -96,11 +102,21 @@ class Console:
         else:
             say(f"{word}? Commands: {', '.join(self._commands)}")
 
-    def _hold_switch(self, pressed: bool) -> None:
-        if not self._switch.services_are_ready():
-            say("dead_mans_switch is not there")
-            return
-        self._switch.set_parameters([Parameter("pressed", value=pressed)])
+    def _held(self, pressed: bool) -> Observable[str]:
+        """Press or release the switch until it answers: a process that is killed loses the request."""
+        attempt = self._switch.set("pressed", pressed)
+
+        def insist(error: Exception, _: Any) -> Observable[str]:
+            say(f"{SWITCH} does not answer: trying again until it does")
+            return attempt.retry()
+
+        return attempt.catch(insist)
+
+    def _off_or_wanted_on(self) -> Observable[Any]:
+        """Emit when there is no reason any more to repeat `turn_off`."""
+        off = self._seen(topics.ENGINES_STATE).filter(lambda it: it.value.data == topics.OFF)
+        wanted_on = self._seen(topics.ENGINES).filter(lambda it: it.value.data == topics.TURN_ON)
+        return rx.merge(off, wanted_on)
 
     def _command_engines(self, command: str) -> None:
         before = stamps.now()
