@@ -17,7 +17,7 @@ from std_msgs.msg import Header, String
 
 from interfaces import service, topics
 from interfaces.scenario.origin import Origin
-from interfaces.service import ServiceNode, parameter
+from interfaces.service import ServiceNode, UserError, parameter
 from interfaces.topics import ALIVE, INCAPACITATED, MISSED, TURN_OFF
 from reactive_node import stamps
 from reactive_node.stamps import Timestamp
@@ -42,6 +42,11 @@ class Parameters:
     silence: float = parameter(3.0, (0.1, 60.0), "s", "a silence of this length is a strike")
     strikes: int = parameter(3, (1, 100), "", "the strike that turns the engines off")
     repeat: float = parameter(0.5, (0.05, 10.0), "s", "period at which `turn_off` is repeated")
+
+    def __post_init__(self) -> None:
+        """Raise UserError if each silence would be over before the operator is reported."""
+        if self.sampling >= self.silence:
+            raise UserError(f"sampling: must be less than silence, {self.silence:g} s, not {self.sampling:g}")
 
 
 DEFAULTS = Parameters()

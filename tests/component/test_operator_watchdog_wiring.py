@@ -11,7 +11,7 @@ import pytest
 from rclpy.parameter import Parameter
 from std_msgs.msg import Bool
 
-from interfaces.service import ServiceNode
+from interfaces.service import ServiceNode, UserError
 from interfaces.topics import (
     ALIVE,
     ENGINES,
@@ -109,12 +109,18 @@ def test_heartbeats_are_read_by_the_clock_before_they_are_old(
     assert call.kwargs["max_age"] == lifespan
 
 
+@pytest.mark.parametrize("sampling", [0.4, 0.5])
+def test_silence_that_is_over_before_the_first_sample_is_refused(wired: Any, sampling: float) -> None:
+    with pytest.raises(UserError, match=rf"^sampling: must be less than silence, 0.4 s, not {sampling}$"):
+        wired(silence=0.4, sampling=sampling)
+
+
 def test_silences_are_missed_then_incapacitated_then_turn_off(
     wired: Any, spin_until: SpinUntil, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     begin = time.monotonic()
     repeat = 0.05  # s
-    watchdog = wired(silence=0.4, strikes=2, repeat=repeat)
+    watchdog = wired(silence=0.4, sampling=0.1, strikes=2, repeat=repeat)
     logged: list[str] = []
     threads: set[int] = set()
     logger = watchdog.service.get_logger()
@@ -136,7 +142,7 @@ def test_silences_are_missed_then_incapacitated_then_turn_off(
     assert took >= 2 * 0.4 + 38 * repeat
 
 
-@pytest.mark.parametrize(("sampling", "first"), [(9.0, pytest.approx(0.15)), (0.02, 0.02)])
+@pytest.mark.parametrize(("sampling", "first"), [(2.0, pytest.approx(0.15)), (0.02, 0.02)])
 def test_watchdog_that_resumes_soon_reports_the_operator(
     wired: Any, monkeypatch: pytest.MonkeyPatch, sampling: float, first: float
 ) -> None:
@@ -158,7 +164,7 @@ def test_watchdog_samples_at_the_parameter_in_a_new_scenario(wired: Any, spin_fo
 def test_no_operator_is_expected_before_the_scenario(
     wired: Any, spin_for: SpinFor, spin_until: SpinUntil
 ) -> None:
-    watchdog = wired(silence=0.1, scenario_epoch=-1.0)
+    watchdog = wired(silence=0.1, sampling=0.05, scenario_epoch=-1.0)
     spin_for(0.3)
     assert data(watchdog, OPERATOR_ACTIVITY) == []
 
