@@ -15,7 +15,6 @@ from rclpy.context import Context
 from rclpy.parameter import Parameter
 from rclpy.signals import (
     SignalHandlerOptions,
-    _shut_down_by_signal,
     install_signal_handlers,
     uninstall_signal_handlers,
 )
@@ -77,7 +76,6 @@ def init(
     if signal_handler_options is None:
         signal_handler_options = SignalHandlerOptions.ALL if context is default else SignalHandlerOptions.NO
     context.init(args, domain_id=domain_id)
-    _shut_down_by_signal(context)
     install_signal_handlers(signal_handler_options)
 
 

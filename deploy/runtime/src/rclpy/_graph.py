@@ -363,6 +363,8 @@ class Graph:
                     return False
                 waitset.wait(int(remaining * 1e9))
                 guard.take()
+                if not alive():  # the domain may have been left meanwhile
+                    return False
                 self._discovered().refresh()
             return True
         finally:

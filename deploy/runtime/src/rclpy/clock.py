@@ -222,6 +222,8 @@ class _ClockSource(Handle):
         for handle in self._affected(change, delta):
             if handle.pre_callback is not None:
                 handle.pre_callback()
+        if change == ClockChange.ROS_TIME_NO_CHANGE and self._override is None:
+            return  # another thread has ended the simulated time meanwhile
         self._override = override
         jump = TimeJumpDictionary(clock_change=change, delta=delta)
         # Query again: a callback added meanwhile may have read the old time.

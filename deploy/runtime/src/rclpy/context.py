@@ -11,7 +11,7 @@ from contextlib import AbstractContextManager, suppress
 from types import TracebackType
 from typing import TYPE_CHECKING
 
-from rclpy import logging
+from rclpy import logging, signals
 from rclpy._arguments import RosArguments, parse
 from rclpy._dds import domain
 from rclpy._handle import Handle
@@ -108,6 +108,7 @@ class Context(AbstractContextManager["Context"]):
             self._domain_id = domain.domain_id_from_environment() if domain_id is None else domain_id
             domain.configuration()  # reports errors in the environment now, not with the first node
             self._initialized = self._valid = True
+            signals._shut_down_by_signal(self)
             if initialize_logging:
                 self._initialize_logging()
 

@@ -332,6 +332,8 @@ class Executor(AbstractContextManager["Executor"]):
         """
         ready, repeatable = self._ready, self._repeatable
         self._changed = True  # whatever has happened meanwhile
+        if self._blocked:  # another executor may have freed a callback group
+            self._groups_changed = True
         waited = False
         while True:
             if self._changed and (end := self._handle_changes(condition)) is not None:
@@ -369,11 +371,11 @@ class Executor(AbstractContextManager["Executor"]):
 
     def _reason_to_end(self, condition: Callable[[], bool] | None) -> type[Exception] | None:
         """Return the exception that tells why to end the wait for work, if there is a reason."""
+        if self._is_shutdown and not (self._is_global and self._context._ended_by_signal):
+            return ShutdownException
         if not self._context._valid:
             in_order = self._is_global and not self._context._ended_by_signal
             return ShutdownException if in_order else ExternalShutdownException
-        if self._is_shutdown:
-            return ShutdownException
         if condition is not None and condition():
             return ConditionReachedException
         return None
@@ -746,9 +748,13 @@ class MultiThreadedExecutor(_BuiltInExecutor):
     def _spin(
         self, deadline: int | None, condition: Callable[[], bool] | None, *, once: bool = False
     ) -> None:
-        super()._spin(
-            deadline, lambda: bool(self._errors) or (condition is not None and condition()), once=once
-        )
+        try:
+            super()._spin(
+                deadline, lambda: bool(self._errors) or (condition is not None and condition()), once=once
+            )
+        finally:
+            if self._closed:
+                self._pool.shutdown(wait=False)
         if self._errors:
             raise self._errors.popleft()
 
@@ -788,4 +794,6 @@ class MultiThreadedExecutor(_BuiltInExecutor):
 
     def _close(self) -> None:
         super()._close()
-        self._pool.shutdown(wait=False)
+        # A signal handler may have interrupted the pool, which holds its lock then: the spinning ends soon.
+        if threading.get_ident() != self._spinning_thread:
+            self._pool.shutdown(wait=False)

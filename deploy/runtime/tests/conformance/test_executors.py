@@ -690,3 +690,30 @@ def test_an_exception_on_a_pool_thread_propagates_from_spin(make_node: MakeNode,
         executor.add_node(node)
         with pytest.raises(ZeroDivisionError, match="planted"):
             executor.spin()
+
+
+def test_executor_that_was_shut_down_ends_silently_also_after_its_context(
+    executor: SingleThreadedExecutor, context: Context
+) -> None:
+    executor.shutdown()
+    context.shutdown()
+    executor.spin_once(timeout_sec=0)
+
+
+def test_group_that_another_executor_frees_lets_its_entities_run_again(
+    make_node: MakeNode, executor: SingleThreadedExecutor, node: Node, spin_until: SpinUntil
+) -> None:
+    group = MutuallyExclusiveCallbackGroup()
+    received: list[float] = []
+    node.create_subscription(Float64, "x", lambda it: received.append(it.data), 10, callback_group=group)
+    publisher = node.create_publisher(Float64, "x", 10)
+    spin_until(publisher.get_subscription_count)
+    other = object()  # an entity of another executor
+
+    assert group.beginning_execution(other)
+    publisher.publish(Float64(data=1.0))
+    executor.spin_once(timeout_sec=0.1)
+    assert received == []
+    group.ending_execution(other)
+
+    spin_until(lambda: received == [1.0])

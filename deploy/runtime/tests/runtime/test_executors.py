@@ -309,3 +309,26 @@ def test_spin_calls_the_spin_once_of_a_subclass(context: Context, make_node: Mak
         executor.spin()
 
     assert (len(guards), executor.turns) == (2, 2)
+
+
+def test_shutdown_by_a_signal_handler_may_interrupt_the_pool(
+    make_node: MakeNode, context: Context, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    node = make_node()
+    executor = MultiThreadedExecutor(2, context=context)
+    start_thread = executor._pool._adjust_thread_count
+
+    def interrupted() -> None:  # while the pool holds its lock
+        assert executor.shutdown()
+        start_thread()
+
+    monkeypatch.setattr(executor._pool, "_adjust_thread_count", interrupted)
+    called = threading.Event()
+    guard = node.create_guard_condition(called.set)
+    executor.add_node(node)
+    guard.trigger()
+
+    executor.spin_once(timeout_sec=5)
+
+    assert called.wait(10)
+    assert executor._pool._shutdown

@@ -232,3 +232,30 @@ def test_the_kernel_watches_the_clock_and_reports_nothing_without_a_step() -> No
         _clock_steps.acknowledge(watch)
     finally:
         os.close(watch)
+
+
+TWO_CONTEXTS = """
+import os, signal, threading
+import rclpy
+from rclpy.context import Context
+rclpy.init(args=[])
+other = Context()
+other.init(args=[])
+ended = threading.Event()
+other.on_shutdown(ended.set)
+os.kill(os.getpid(), signal.SIGTERM)
+print(ended.wait(10), other.ok())
+"""
+
+
+def test_a_signal_shuts_down_each_context_however_it_was_initialized(domain_id: int) -> None:
+    environment = {**os.environ, "ROS_DOMAIN_ID": str(domain_id)}
+    ended = subprocess.run(
+        [sys.executable, "-c", TWO_CONTEXTS],
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert (ended.stdout, ended.stderr) == ("True False\n", "")

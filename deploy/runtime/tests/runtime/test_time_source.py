@@ -12,11 +12,14 @@ import pytest
 from builtin_interfaces.msg import Time as TimeMsg
 from rcl_interfaces.msg import SetParametersResult
 from rclpy import time_source
+from rclpy.clock import JumpThreshold, ROSClock
 from rclpy.clock_type import ClockType
 from rclpy.context import Context
+from rclpy.duration import Duration
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from rclpy.time import Time
 from rclpy.wait_for_message import wait_for_message
 from rosgraph_msgs.msg import Clock as ClockMsg
 from std_msgs.msg import String
@@ -144,3 +147,13 @@ def test_timeout_ends_with_simulated_time(make_node: Callable[..., Node]) -> Non
 
 def test_system_time_needs_no_timeout(make_node: Callable[..., Node]) -> None:
     assert list(make_node().timers) == []
+
+
+def test_simulated_time_that_ends_during_a_jump_stays_ended(clock: ROSClock) -> None:
+    clock._set_ros_time_is_active(True)
+    threshold = JumpThreshold(min_forward=Duration(nanoseconds=1), min_backward=None, on_clock_change=False)
+    end = lambda: clock._set_ros_time_is_active(False)  # noqa: E731 (as another thread may do)
+    jumps = clock.create_jump_callback(threshold, pre_callback=end)
+    clock.set_ros_time_override(Time(seconds=10, clock_type=ClockType.ROS_TIME))
+    jumps.unregister()
+    assert not clock.ros_time_is_active
