@@ -59,7 +59,8 @@ class Console:
         }
         self._origin = stamps.now() - timedelta(seconds=time.monotonic() - epoch)
         self._turned_off: Subject[Span] = Subject()
-        again = self._turned_off.switch_map(lambda _: rx.timer(AGAIN).take_until(self._off_or_wanted_on()))
+        self._topics: dict[str, Observable[Any]] = {}
+        again = self._turned_off.switch_map(lambda span: rx.timer(AGAIN).take_until(self._settled(span)))
         again.subscribe(lambda _: self._command_engines(topics.TURN_OFF), scheduler=node.scheduler)
         self._ticks: Subject[None] = Subject()
         batches = line_batches(self._seen, self._turned_off, self._ticks, node.get_namespace())
@@ -85,9 +86,15 @@ class Console:
             self._quit()
 
     def _seen(self, topic: topics.Topic) -> Observable[Any]:
-        # A service wants the last message, the operator all of them.
-        qos = QoSProfile(depth=BACKLOG, reliability=topic.qos.reliability, durability=topic.qos.durability)
-        return self._node.create_observable(topic.type, topic.name, qos, timestamped=True)
+        if topic.name not in self._topics:
+            # A service wants the last message, the operator all of them.
+            qos = QoSProfile(
+                depth=BACKLOG, reliability=topic.qos.reliability, durability=topic.qos.durability
+            )
+            self._topics[topic.name] = self._node.create_observable(
+                topic.type, topic.name, qos, timestamped=True
+            )
+        return self._topics[topic.name]
 
     def _show(self, lines: list[Line]) -> None:
         self._terminal.show(f"[{self._milliseconds(line):.0f}] {line.text}" for line in lines)
@@ -112,11 +119,11 @@ class Console:
 
         return attempt.catch(insist)
 
-    def _off_or_wanted_on(self) -> Observable[Any]:
-        """Emit when there is no reason any more to repeat `turn_off`."""
+    def _settled(self, sent: Span) -> Observable[Any]:
+        """Emit when the engines are off after a `turn_off`, or somebody wants them on again."""
         off = self._seen(topics.ENGINES_STATE).filter(lambda it: it.value.data == topics.OFF)
         wanted_on = self._seen(topics.ENGINES).filter(lambda it: it.value.data == topics.TURN_ON)
-        return rx.merge(off, wanted_on)
+        return rx.merge(off, wanted_on).filter(lambda it: it.timestamp >= sent[0])
 
     def _command_engines(self, command: str) -> None:
         before = stamps.now()

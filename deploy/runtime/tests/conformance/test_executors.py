@@ -708,7 +708,7 @@ def test_group_that_another_executor_frees_lets_its_entities_run_again(
     node.create_subscription(Float64, "x", lambda it: received.append(it.data), 10, callback_group=group)
     publisher = node.create_publisher(Float64, "x", 10)
     spin_until(publisher.get_subscription_count)
-    other = object()  # an entity of another executor
+    other = Future()  # stands for an entity of another executor
 
     assert group.beginning_execution(other)
     publisher.publish(Float64(data=1.0))
