@@ -709,6 +709,7 @@ def test_group_that_another_executor_frees_lets_its_entities_run_again(
     publisher = node.create_publisher(Float64, "x", 10)
     spin_until(publisher.get_subscription_count)
     other = Future()  # stands for an entity of another executor
+    group.add_entity(other)
 
     assert group.beginning_execution(other)
     publisher.publish(Float64(data=1.0))
