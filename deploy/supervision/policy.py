@@ -46,7 +46,7 @@ class Timeouts:
     period: float = 0.5
     """between two observations"""
     health: float = 2.7
-    """without health of a service, which reports once a second"""
+    """without a report of health of a service, which makes one each second"""
     start: float = 10.0
     """of a new process until its first health"""
     duplicate: float = 1.0

@@ -25,7 +25,6 @@ WAIT = 1000 * LIMIT  # ms
 TABS = 100  # more than the page has stops
 GREY = 0.5  # s
 SAMPLES = 5
-QUIET = 20  # ms by which timers and frames of the page may be late in a sample that counts
 
 TIMING = """
 let heard = 0, late = 0, ticked = performance.now();
@@ -214,10 +213,7 @@ def test_page_turns_grey_within_500_ms(arm: Arm, browser: Any, link: Link) -> No
         assert hand.page.is_disabled("#set-l1")
         assert hand.state == "offline"
 
-        samples = [(took / 1000, late) for took, late in hand.page.evaluate("greyed")]
+        samples = hand.page.evaluate("greyed")
         assert len(samples) > SAMPLES
-        quiet = [took for took, late in samples if late < QUIET]
-        print(f"grey after {[round(took, 3) for took, _ in samples]} s, {len(quiet)} samples undisturbed")
-        if not quiet:
-            pytest.skip("platform: the machine stood still in each sample")
-        assert max(quiet) <= GREY
+        print(f"grey after {[tuple(map(round, it)) for it in samples]} ms, the second of a standstill")
+        assert max(took - standstills for took, standstills in samples) <= 1000 * GREY
