@@ -215,6 +215,7 @@ def _show(system: System, member: Member, *, owner: bool = False) -> None:
                     say(system.how_it_ended())
                     return
                 say("supervisord was killed: everything has been started anew.")
+        member.spin_some()  # sends what was typed just before `quit`
 
 
 def _adopt_environment(system: System) -> bool:

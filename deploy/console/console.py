@@ -49,7 +49,7 @@ class Console:
         self._engines = node.create_publisher(String, topics.ENGINES.name, topics.ENGINES.qos)
         self._switch = RemoteParameters(node, SWITCH)
         self._holds: Subject[bool] = Subject()
-        self._holds.switch_map(self._held).subscribe(scheduler=node.scheduler)
+        self._holds.switch_map(self._held).filter(bool).subscribe(say, scheduler=node.scheduler)
         self._commands: dict[str, Callable[[], None]] = {
             "press": lambda: self._holds.on_next(True),
             "release": lambda: self._holds.on_next(False),
@@ -110,7 +110,11 @@ class Console:
             say(f"{word}? Commands: {', '.join(self._commands)}")
 
     def _held(self, pressed: bool) -> Observable[str]:
-        """Press or release the switch until it answers: a process that is killed loses the request."""
+        """
+        Press or release the switch until it answers: a process that is killed loses the request.
+
+        Emits why the switch refuses, or an empty string.
+        """
         attempt = self._switch.set("pressed", pressed)
 
         def insist(error: Exception, _: Any) -> Observable[str]:

@@ -206,6 +206,17 @@ def test_the_operator_commands_switch_and_engines_from_the_console(
     assert module_site.members.keys() >= module_site.programs
 
 
+def test_what_is_typed_just_before_quit_is_obeyed(module_site: Site) -> None:
+    launcher = (sys.executable, "-m", "deploy.commands.launcher", "console")
+    console = module_site.begin_command(*launcher)
+    console.await_line("Engines are off")
+    console.insist("press\n", "Operator is alive")
+    console.type("release\nquit\n")
+    assert console.wait() == 0
+
+    module_site.begin_command(*launcher).await_line("Not received signal from operator")
+
+
 def test_another_terminal_may_have_sourced_another_rclpy(
     module_site: Site, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
