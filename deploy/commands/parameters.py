@@ -49,10 +49,11 @@ def of_system(scenario_name: str, user_file: str) -> dict[str, Any]:
     except UserError as error:
         raise DeploymentError(str(error)) from error
     shared = given.pop(ALL, {}).get(KEY, {})
-    page = f"{namespace_of(os.environ).rstrip('/')}/{manifest.PAGE}"
+    prefix = namespace_of(os.environ).rstrip("/") + "/"
+    page = prefix + manifest.PAGE
     if user_file:
         files = _page_files(user_file, shared | given.get(page, {}).get(KEY, {}))
-        if known := files | _limits(given, page.removesuffix(manifest.PAGE)):
+        if known := files | _limits(given, prefix):
             given.setdefault(page, {KEY: {}})[KEY].update(known)
     parameters: dict[str, Any] = scenario_parameters(path, NOT_YET)
     parameters[ALL][KEY] |= shared

@@ -17,6 +17,7 @@ from std_msgs.msg import String
 from deploy.console.lines import Line, Span, line_batches
 from deploy.console.output import say
 from deploy.console.page.remote import RemoteParameters
+from deploy.console.page.switch import PRESSED, VIRTUAL_SWITCH
 from deploy.console.terminal import open_terminal
 from interfaces import topics
 from reactive_node import ReactiveNode, stamps
@@ -24,7 +25,6 @@ from reactive_node import ReactiveNode, stamps
 PERIOD = 0.25  # s between two batches of lines
 BACKLOG = 50  # messages of a topic that wait for the next batch
 AGAIN = 1.0  # s until `turn_off` is repeated, if the engines have not obeyed
-SWITCH = topics.OPERATOR_HEARTBEAT.publishers[0]
 
 HELP = """\
 Commands: press, release (the operator's switch), turn_on, turn_off (the engines), quit.
@@ -47,7 +47,7 @@ class Console:
         self.has_quit = False
         self._node = node
         self._engines = node.create_publisher(String, topics.ENGINES.name, topics.ENGINES.qos)
-        self._switch = RemoteParameters(node, SWITCH)
+        self._switch = RemoteParameters(node, VIRTUAL_SWITCH)
         self._holds: Subject[bool] = Subject()
         self._holds.switch_map(self._held).filter(bool).subscribe(say, scheduler=node.scheduler)
         self._commands: dict[str, Callable[[], None]] = {
@@ -59,7 +59,7 @@ class Console:
         }
         self._origin = stamps.now() - timedelta(seconds=time.monotonic() - epoch)
         self._turned_off: Subject[Span] = Subject()
-        self._topics: dict[str, Observable[Any]] = {}
+        self._topics = {topic.name: self._observed(topic) for topic in topics.CONTRACT}
         again = self._turned_off.switch_map(lambda span: rx.timer(AGAIN).take_until(self._settled(span)))
         again.subscribe(lambda _: self._command_engines(topics.TURN_OFF), scheduler=node.scheduler)
         self._ticks: Subject[None] = Subject()
@@ -85,15 +85,12 @@ class Console:
         except EOFError:
             self._quit()
 
+    def _observed(self, topic: topics.Topic) -> Observable[Any]:
+        # A service wants the last message, the operator all of them.
+        qos = QoSProfile(depth=BACKLOG, reliability=topic.qos.reliability, durability=topic.qos.durability)
+        return self._node.create_observable(topic.type, topic.name, qos, timestamped=True)
+
     def _seen(self, topic: topics.Topic) -> Observable[Any]:
-        if topic.name not in self._topics:
-            # A service wants the last message, the operator all of them.
-            qos = QoSProfile(
-                depth=BACKLOG, reliability=topic.qos.reliability, durability=topic.qos.durability
-            )
-            self._topics[topic.name] = self._node.create_observable(
-                topic.type, topic.name, qos, timestamped=True
-            )
         return self._topics[topic.name]
 
     def _show(self, lines: list[Line]) -> None:
@@ -115,10 +112,10 @@ class Console:
 
         Emits why the switch refuses, or an empty string.
         """
-        attempt = self._switch.set("pressed", pressed)
+        attempt = self._switch.set(PRESSED, pressed)
 
         def insist(error: Exception, _: Any) -> Observable[str]:
-            say(f"{SWITCH} does not answer: trying again until it does")
+            say(f"{VIRTUAL_SWITCH} does not answer: trying again until it does")
             return attempt.retry()
 
         return attempt.catch(insist)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -69,50 +70,56 @@ def test_command_is_repeated_a_limited_number_of_times(scheduler: TestScheduler)
     assert results.messages == [on_next(time, TURN_ON) for time in (210, 220, 230)]
 
 
+Play = Callable[[str], Wired]
+
+
+@pytest.fixture
+def play(make_node: MakeNode, spin_until: SpinUntil, tmp_path: Path) -> Play:
+    """Begins a scenario with these commands of the virtual operator, the first of them at once."""
+
+    def begin(engines: str) -> Wired:
+        scenario = tmp_path / "scenario.yaml"
+        scenario.write_text(f"engines: {engines}\n")
+        switch = Wired(
+            make_node,
+            spin_until,
+            wire,
+            inputs=[ENGINES_STATE, ENGINES],
+            outputs=[ENGINES, OPERATOR_HEARTBEAT],
+            scenario=str(scenario),
+            scenario_epoch=-1.0,
+        )
+        switch.service.set_parameters([Parameter("scenario_epoch", value=time.monotonic())])
+        spin_until(lambda: switch.heard[ENGINES.name])
+        return switch
+
+    return begin
+
+
+def commands_of(switch: Wired) -> list[str]:
+    return [command.data for command in switch.heard[ENGINES.name]]
+
+
 @pytest.mark.parametrize("pressed", [True, False])
 def test_person_who_takes_the_switch_ends_the_commands_of_the_scenario(
-    make_node: MakeNode, spin_until: SpinUntil, spin_for: SpinFor, tmp_path: Path, pressed: bool
+    play: Play, spin_for: SpinFor, pressed: bool
 ) -> None:
-    scenario = tmp_path / "scenario.yaml"
-    scenario.write_text("engines: [{at: 0.0, command: turn_off}, {at: 0.5, command: turn_on}]\n")
-    switch = Wired(
-        make_node,
-        spin_until,
-        wire,
-        inputs=[ENGINES_STATE],
-        outputs=[ENGINES, OPERATOR_HEARTBEAT],
-        scenario=str(scenario),
-        scenario_epoch=-1.0,
-    )
-    commands = switch.heard[ENGINES.name]
-    switch.service.set_parameters([Parameter("scenario_epoch", value=time.monotonic())])
-    spin_until(lambda: [command.data for command in commands] == [TURN_OFF])
+    switch = play("[{at: 0.0, command: turn_off}, {at: 0.5, command: turn_on}]")
+    assert commands_of(switch) == [TURN_OFF]
 
     switch.service.set_parameters([Parameter("pressed", value=pressed)])
     spin_for(1.5)  # in which the first would have been repeated and the second one due
 
-    assert [command.data for command in commands] == [TURN_OFF]
+    assert commands_of(switch) == [TURN_OFF]
 
 
 def test_person_who_turns_the_engines_off_ends_the_repetition_of_the_scenario(
-    make_node: MakeNode, spin_until: SpinUntil, spin_for: SpinFor, tmp_path: Path
+    play: Play, spin_for: SpinFor
 ) -> None:
-    scenario = tmp_path / "scenario.yaml"
-    scenario.write_text("engines: [{at: 0.0, command: turn_on}]\n")
-    switch = Wired(
-        make_node,
-        spin_until,
-        wire,
-        inputs=[ENGINES_STATE, ENGINES],
-        outputs=[ENGINES, OPERATOR_HEARTBEAT],
-        scenario=str(scenario),
-        scenario_epoch=-1.0,
-    )
-    commands = switch.heard[ENGINES.name]
-    switch.service.set_parameters([Parameter("scenario_epoch", value=time.monotonic())])
-    spin_until(lambda: [command.data for command in commands] == [TURN_ON])
+    switch = play("[{at: 0.0, command: turn_on}]")
+    assert commands_of(switch) == [TURN_ON]
 
     switch.publish(ENGINES, String(data=TURN_OFF))
     spin_for(1.5)  # in which the first would have been repeated
 
-    assert [command.data for command in commands] == [TURN_ON, TURN_OFF]
+    assert commands_of(switch) == [TURN_ON, TURN_OFF]

@@ -73,7 +73,8 @@ def host_names(address: str, port: int, names: Sequence[str]) -> tuple[str, ...]
         raise UserError(f"names: must be the names of this machine in browsers, as its address is {address}")
     for name in names:
         if not _NAME.fullmatch(name):
-            raise UserError(f"names: {name!r} must consist of ASCII letters, digits, dots and hyphens")
+            characters = "ASCII letters, digits, dots, hyphens and underscores"
+            raise UserError(f"names: {name!r} must consist of {characters}")
     known = names or (("127.0.0.1", "localhost") if address == "127.0.0.1" else (address,))
     return tuple(f"{name}:{port}" for name in known) + (tuple(known) if port in (80, 443) else ())
 

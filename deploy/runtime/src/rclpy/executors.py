@@ -371,10 +371,8 @@ class Executor(AbstractContextManager["Executor"]):
 
     def _reason_to_end(self, condition: Callable[[], bool] | None) -> type[Exception] | None:
         """Return the exception that tells why to end the wait for work, if there is a reason."""
-        if self._is_shutdown and not (self._is_global and self._context._ended_by_signal):
-            return ShutdownException
-        if not self._context._valid:
-            in_order = self._is_global and not self._context._ended_by_signal
+        if self._is_shutdown or not self._context._valid:
+            in_order = not self._context._ended_by_signal if self._is_global else self._is_shutdown
             return ShutdownException if in_order else ExternalShutdownException
         if condition is not None and condition():
             return ConditionReachedException
@@ -766,7 +764,7 @@ class MultiThreadedExecutor(_BuiltInExecutor):
             self._in_pool += 1
         try:
             self._pool.submit(self._run_in_pool, entity, taken)
-        except RuntimeError:  # a signal handler on this thread has shut the pool down
+        except RuntimeError:  # the interpreter ends
             self._run_in_pool(entity, taken)
         return True
 

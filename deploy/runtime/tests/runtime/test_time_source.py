@@ -150,9 +150,11 @@ def test_system_time_needs_no_timeout(make_node: Callable[..., Node]) -> None:
 
 
 def test_simulated_time_that_ends_during_a_jump_stays_ended(clock: ROSClock) -> None:
+    def end() -> None:  # as another thread may do
+        clock._set_ros_time_is_active(False)
+
     clock._set_ros_time_is_active(True)
     threshold = JumpThreshold(min_forward=Duration(nanoseconds=1), min_backward=None, on_clock_change=False)
-    end = lambda: clock._set_ros_time_is_active(False)  # noqa: E731 (as another thread may do)
     jumps = clock.create_jump_callback(threshold, pre_callback=end)
     clock.set_ros_time_override(Time(seconds=10, clock_type=ClockType.ROS_TIME))
     jumps.unregister()
