@@ -81,6 +81,7 @@ check: setup
 	@PYTHONPATH=deploy/runtime/src $(PY) -m rosidl_runtime_embedded.stubs --output deploy/runtime/build/stubs
 	@$(PY) -m mypy
 	@$(PY) -m mypy --config-file deploy/runtime/pyproject.toml
-	@PYTHONPATH="interfaces/reactive_node/src:deploy/runtime/src:$$PYTHONPATH" .venv/bin/lint-imports --no-logo --no-cache
+	@$(PY) -m mypy --config-file deploy/tools/pyproject.toml
+	@PYTHONPATH="interfaces/reactive_node/src:deploy/runtime/src:deploy/tools/src:$$PYTHONPATH" .venv/bin/lint-imports --no-logo --no-cache
 	@.venv/bin/shellcheck deploy/commands/python.sh .ci/run .ci/run-on-ros
 	@$(PY) -m yamllint --strict deploy

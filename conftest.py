@@ -19,7 +19,8 @@ _NEEDS = {
     "deploy/runtime/tests/runtime": "rosidl_runtime_embedded",
     "deploy/runtime/tests/interop": "rosidl_runtime_embedded",
     "deploy/runtime/tests/simulation": "rosidl_runtime_embedded",
-    "deploy/runtime/tests/cli": "ros2cli",
+    "deploy/tools/tests/cli": "ros2cli",
+    "deploy/tools/tests/own": "rosidl_runtime_embedded",
 }
 collect_ignore = [tests for tests, needed in _NEEDS.items() if not importlib.util.find_spec(needed)]
 

@@ -33,6 +33,7 @@ REQUIREMENTS = ROOT / "deploy" / "requirements"
 PIP = [str(PYTHON), "-m", "pip", "install", "--no-deps", "--no-input", "--progress-bar=off"]
 REACTIVE_NODE = ROOT / "interfaces" / "reactive_node"
 RUNTIME = ROOT / "deploy" / "runtime"
+TOOLS = ROOT / "deploy" / "tools"
 
 
 class SetupError(Exception):
@@ -50,7 +51,7 @@ def main() -> int:
             began = time.monotonic()
             ros = system_rclpy()
             venv_missing = _update(STAMP, fingerprint(ros), partial(make, ros))
-            for distribution in (REACTIVE_NODE, *([] if ros else [RUNTIME])):
+            for distribution in (REACTIVE_NODE, *([] if ros else [RUNTIME, TOOLS])):
                 stamp = VENV / f"made-from-{distribution.name}"
                 _update(stamp, fingerprint_of(distribution), partial(install, distribution, stamp))
             if venv_missing:

@@ -250,10 +250,11 @@ class Checkout(Site):
 def make_small_arm(parent: Path, programs: Sequence[str] = SMALL) -> Path:
     """Make a checkout of a small arm, set up, in a directory whose path is as unpleasant as paths get."""
     directory = parent / 'it\'s 100 % "fine"' / ("deep" * 30)
-    ignored = shutil.ignore_patterns("runtime", "tests", "*.pyc.*")  # the last are gone in a moment
+    ignored = shutil.ignore_patterns("runtime", "tools", "tests", "*.pyc.*")  # the last are gone in a moment
     for name in ("deploy", "interfaces", "services"):
         shutil.copytree(ROOT / name, directory / name, ignore=ignored)
-    (directory / "deploy" / "runtime").symlink_to(ROOT / "deploy" / "runtime")
+    for name in ("runtime", "tools"):
+        (directory / "deploy" / name).symlink_to(ROOT / "deploy" / name)
     shutil.copyfile(ROOT / "Makefile", directory / "Makefile")
     _leave_programs(directory / "deploy" / "supervisord.conf", programs)
     _set_up(directory)

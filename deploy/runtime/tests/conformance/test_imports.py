@@ -1,4 +1,4 @@
-"""Names that can be imported from rclpy's and tf2's modules, besides those of facts/rclpy_api.json."""
+"""Names that can be imported from rclpy's modules, besides those of facts/rclpy_api.json."""
 
 from __future__ import annotations
 
@@ -32,10 +32,6 @@ NAMES = {
     "rclpy.subscription": "MsgType",
     "rclpy.time": "ClockType Duration",
     "rclpy.waitable": "NumberOfEntities Waitable",
-    "tf2_geometry_msgs": "Point PointStamped PolygonStamped Pose PoseStamped PoseWithCovarianceStamped"
-    " TransformStamped Vector3Stamped",
-    "tf2_ros": "Duration PointStamped PoseStamped PoseWithCovarianceStamped TFMessage Time TransformStamped"
-    " Vector3Stamped",
 }
 
 
@@ -46,9 +42,6 @@ def test_names_that_programs_import_are_there(module: str) -> None:
 
 
 def test_imported_name_is_the_original() -> None:
-    import tf2_geometry_msgs
-    import tf2_ros
-    from geometry_msgs.msg import TransformStamped
     from rcl_interfaces.msg import Parameter, ParameterDescriptor
     from rclpy import callback_groups, executors, guard_condition, node, parameter
 
@@ -57,7 +50,6 @@ def test_imported_name_is_the_original() -> None:
     assert node.Executor is executors.Executor
     assert parameter.ParameterMsg is Parameter
     assert executors.GuardCondition is guard_condition.GuardCondition
-    assert tf2_ros.TransformStamped is tf2_geometry_msgs.TransformStamped is TransformStamped
 
 
 def test_interface_is_importable_from_its_module_of_ros_2() -> None:
@@ -65,12 +57,10 @@ def test_interface_is_importable_from_its_module_of_ros_2() -> None:
     from std_srvs.srv._set_bool import SetBool as FromServiceModule
 
     from geometry_msgs.msg import Pose, _pose
-    from sensor_msgs_py import numpy_compat
     from std_srvs.srv import SetBool
 
     assert Pose is _pose.Pose is FromModule
     assert SetBool is FromServiceModule
-    assert callable(numpy_compat.structured_to_unstructured)
     with pytest.raises(ImportError):
         importlib.import_module("geometry_msgs.msg._nothing")
 
