@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
+from deploy.runtime.tests.conformance.middleware import announced_history
 
 from rclpy.duration import Duration, Infinite
 from rclpy.impl.implementation_singleton import rclpy_implementation
@@ -139,7 +140,7 @@ def test_only_best_available_policies_are_chosen(create: Create) -> None:
     qos = QoSProfile(depth=3, durability=DurabilityPolicy.BEST_AVAILABLE, deadline=HOUR)
     chosen = create("subscription", qos=qos)
     assert policies(chosen) == (RELIABLE, LATCHED, AUTOMATIC, HOUR, Infinite)
-    assert chosen.depth == 3
+    assert (chosen.history, chosen.depth) == announced_history(3)
 
 
 def test_services_with_best_available_qos_use_the_services_default(node: Node, spin_until: SpinUntil) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from deploy.runtime.tests.conformance.middleware import announced_history
 
 from rcl_interfaces.msg import (
     FloatingPointRange,
@@ -24,7 +25,6 @@ from rclpy.parameter_client import AsyncParameterClient
 from rclpy.parameter_event_handler import ParameterEventHandler
 from rclpy.qos import (
     DurabilityPolicy,
-    HistoryPolicy,
     LivelinessPolicy,
     QoSPolicyKind,
     QoSProfile,
@@ -328,7 +328,7 @@ def test_parameters_override_the_qos_of_the_endpoints(
     )
     for endpoints_of in (asking.get_publishers_info_by_topic, asking.get_subscriptions_info_by_topic):
         qos = effective_qos(endpoints_of, spin_until)
-        assert (qos.history, qos.depth) == (HistoryPolicy.KEEP_LAST, 7)
+        assert (qos.history, qos.depth) == announced_history(7)
         assert qos.reliability == ReliabilityPolicy.BEST_EFFORT
         assert qos.durability == DurabilityPolicy.TRANSIENT_LOCAL
 
@@ -378,7 +378,8 @@ def test_parameter_names_contain_the_entity_id_and_the_remapped_topic(
     publisher = node.create_publisher(Float64, "x", QoSProfile(depth=1), qos_overriding_options=options)
     assert publisher.topic_name == "/arm/y"
     spin_until(lambda: asking.get_publishers_info_by_topic("y"))
-    assert asking.get_publishers_info_by_topic("y")[0].qos_profile.depth == 9
+    qos = asking.get_publishers_info_by_topic("y")[0].qos_profile
+    assert (qos.history, qos.depth) == announced_history(9)
     assert node.get_parameter("qos_overrides./arm/y.publisher_left.depth").value == 9
 
 

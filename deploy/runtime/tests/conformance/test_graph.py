@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from deploy.runtime.tests.conformance.middleware import announced_history
 
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
@@ -106,7 +107,7 @@ def test_endpoints_are_described_with_node_type_qos_and_hash(node: Node) -> None
     assert info.topic_type == "std_msgs/msg/Float64"
     assert str(info.topic_type_hash) == recorded_hash("rt/arm1/l1")
     assert info.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL
-    assert info.qos_profile.depth == 1
+    assert (info.qos_profile.history, info.qos_profile.depth) == announced_history(1)
     assert len(info.endpoint_gid) == 16
     (info,) = node.get_subscriptions_info_by_topic("operator_heartbeat")
     assert info.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT
