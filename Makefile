@@ -17,11 +17,12 @@ MODULES ?=
 BENCH ?=
 SHELL := /bin/sh
 MAKEFLAGS += --no-print-directory
-PY := .venv/bin/python
+PY := deploy/commands/venv.sh
+RUNTIME ?=
 STAMP := .venv/made-from
 # A Python that is still starting answers Ctrl-C with a traceback: SIGINT waits until the command is ready for it.
 HOLD := $(shell env --block-signal=INT echo env --block-signal=INT 2>/dev/null)
-export PYTHON SCENARIO PARAMETERS WEB
+export PYTHON SCENARIO PARAMETERS WEB RUNTIME
 
 .PHONY: help setup run start stop status logs record console chaos simulate replay test mutants check bench
 
@@ -61,16 +62,16 @@ chaos: setup
 	@exec $(HOLD) $(PY) -m deploy.chaos --minutes $(MINUTES) $(if $(SEED),--seed $(SEED)) $(CHAOS)
 
 simulate: setup
-	@exec $(HOLD) $(PY) -m deploy.simulation --hours $(HOURS) $(if $(SEED),--seed $(SEED)) $(if $(SCHEDULE),--schedule "$(SCHEDULE)") $(SIMULATE)
+	@RUNTIME=embedded exec $(HOLD) $(PY) -m deploy.simulation --hours $(HOURS) $(if $(SEED),--seed $(SEED)) $(if $(SCHEDULE),--schedule "$(SCHEDULE)") $(SIMULATE)
 
 replay: setup
-	@exec $(HOLD) $(PY) -m deploy.replay $(if $(RECORD),"$(RECORD)") $(REPLAY)
+	@RUNTIME=embedded exec $(HOLD) $(PY) -m deploy.replay $(if $(RECORD),"$(RECORD)") $(REPLAY)
 
 test: setup
 	@$(PY) -m deploy.commands.test $(TESTS)
 
 mutants: setup
-	@exec $(HOLD) $(PY) -m deploy.mutants $(MODULES)
+	@RUNTIME=embedded exec $(HOLD) $(PY) -m deploy.mutants $(MODULES)
 
 bench: setup
 	@exec $(HOLD) $(PY) -m deploy.benchmarks $(BENCH)
@@ -80,8 +81,9 @@ check: setup
 	@$(PY) -m ruff format --check --quiet .
 	@PYTHONPATH=deploy/runtime/src $(PY) -m rosidl_runtime_embedded.stubs --output deploy/runtime/build/stubs
 	@$(PY) -m mypy
+	@$(PY) -m mypy --config-file deploy/mypy_ros.ini
 	@$(PY) -m mypy --config-file deploy/runtime/pyproject.toml
 	@$(PY) -m mypy --config-file deploy/tools/pyproject.toml
 	@PYTHONPATH="interfaces/reactive_node/src:deploy/runtime/src:deploy/tools/src:$$PYTHONPATH" .venv/bin/lint-imports --no-logo --no-cache
-	@.venv/bin/shellcheck deploy/commands/python.sh .ci/run .ci/run-on-ros
+	@.venv/bin/shellcheck deploy/commands/python.sh deploy/commands/venv.sh .ci/run .ci/run-on-ros
 	@$(PY) -m yamllint --strict deploy

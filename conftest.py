@@ -14,15 +14,15 @@ from pathlib import Path
 import pytest
 from hypothesis import Phase, settings
 
-# The embedded runtime is not installed beside ROS 2's rclpy, and not every ROS 2 has the command line.
-_NEEDS = {
-    "deploy/runtime/tests/runtime": "rosidl_runtime_embedded",
-    "deploy/runtime/tests/interop": "rosidl_runtime_embedded",
-    "deploy/runtime/tests/simulation": "rosidl_runtime_embedded",
-    "deploy/tools/tests/cli": "ros2cli",
-    "deploy/tools/tests/own": "rosidl_runtime_embedded",
-}
-collect_ignore = [tests for tests, needed in _NEEDS.items() if not importlib.util.find_spec(needed)]
+_EMBEDDED_ONLY = (
+    "deploy/runtime/tests/interop",
+    "deploy/runtime/tests/runtime",
+    "deploy/runtime/tests/simulation",
+    "tests/mutants",
+    "tests/simulation",
+)
+"""Folders whose tests need the embedded rclpy: `make test` runs them with RUNTIME=embedded."""
+collect_ignore = [] if importlib.util.find_spec("rosidl_runtime_embedded") else [*_EMBEDDED_ONLY]
 
 settings.register_profile("reactive-arm", deadline=None)  # a busy machine is no defect
 # For `make mutants`: whether a test fails, not the smallest example; the same examples each time.

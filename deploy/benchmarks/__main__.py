@@ -35,7 +35,7 @@ from deploy.benchmarks.measurement import (
     measure,
 )
 from deploy.benchmarks.table import chain_tables, image_tables, tables
-from deploy.commands.setup import system_rclpy
+from deploy.commands.setup import sourced_rclpy
 from deploy.supervision import interruption
 from deploy.supervision.processes import ROOT, run_directory
 
@@ -59,7 +59,7 @@ def present(alternatives: Iterable[Alternative], refused: dict[str, str]) -> lis
     found = []
     for each in alternatives:
         interruption.check()
-        if each.ros and not system_rclpy():
+        if each.ros and not sourced_rclpy():
             reason = "ROS 2 is not sourced in this shell"
         else:
             reason = refused.get(each.requirements) or each.missing()

@@ -14,7 +14,7 @@ from deploy.supervision.processes import ROOT
 
 CHART = "chart.txt"
 _REQUIREMENTS = Path(__file__).with_name("requirements")
-_RUNTIME = [ROOT / "deploy/requirements/system.txt", ROOT / "deploy/requirements/runtime.txt"]
+_RUNTIME = [ROOT / "deploy/requirements/system.txt", ROOT / "deploy/requirements/embedded.txt"]
 _VENV = BENCH_PYTHON.parents[1]
 _STAMP = _VENV / "made-from"
 

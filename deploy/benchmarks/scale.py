@@ -20,7 +20,7 @@ from deploy.benchmarks.measurement import MeasurementFailed, Scenario, measure_s
 from deploy.benchmarks.table import Results, table
 from deploy.chaos.arm import Arm
 from deploy.chaos.cost import Cost
-from deploy.commands.setup import system_rclpy
+from deploy.commands.setup import sourced_rclpy
 from deploy.supervision import interruption
 from deploy.supervision.processes import ROOT
 from deploy.supervision.system import NAMESPACE, System
@@ -153,7 +153,7 @@ def fleet(*, shared: bool, sizes: Sequence[int] = SIZES) -> Rows:
 
 def subscribers(sizes: Sequence[int] = SIZES) -> Rows:
     """Yield what one item costs its publisher and one of its subscribers [µs]."""
-    here = Alternative("ReactiveNode", "reactive", ros=bool(system_rclpy()))
+    here = Alternative("ReactiveNode", "reactive", ros=bool(sourced_rclpy()))
     for size in sizes:
         yield str(size), measure_subscribers(here, Scenario("subscribers", 8, RATE), size)
 

@@ -31,6 +31,7 @@ RECORDS = "records"  # in the run directory
 LOG_LINES = 15  # of a service that does not start
 # Variables that a command takes over from the running system.
 ADOPTED = (
+    "RUNTIME",
     "PYTHONPATH",
     "LD_LIBRARY_PATH",
     "AMENT_PREFIX_PATH",
@@ -41,6 +42,8 @@ ADOPTED = (
     "FASTDDS_",
     NAMESPACE,
 )
+LIBRARIES_ARE_KNOWN = "_ROS_WHEELS_BOOTSTRAP_COMPLETE"
+"""Environment variable: the wheels of ROS 2 leave the environment of this interpreter as it is."""
 
 # rclpy takes its time to load: each command imports it when it surely needs it.
 
@@ -225,10 +228,11 @@ def _adopt_environment(system: System) -> bool:
         return False
     kept = {name: value for name, value in os.environ.items() if not name.startswith(ADOPTED)}
     adopted = {name: value for name, value in running.items() if name.startswith(ADOPTED)}
-    if kept | adopted != os.environ:
+    wanted = kept | adopted | {LIBRARIES_ARE_KNOWN: "1"}
+    if wanted != os.environ:
         # Only a new process finds another rclpy and its libraries: this shell may have sourced another ROS.
         interruption.hand_over()
-        os.execve(sys.executable, [sys.executable, *sys.orig_argv[1:]], kept | adopted)
+        os.execve(sys.executable, [sys.executable, *sys.orig_argv[1:]], wanted)
     return True
 
 

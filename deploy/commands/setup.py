@@ -1,23 +1,28 @@
-"""Brings .venv up to date: the requirements of the system and its tests and, without ROS 2, deploy/runtime.
+"""Brings .venv up to date: what the system and its tests need and, without a sourced ROS 2, both runtimes.
 
-It runs on the bare interpreter, before anything is installed. Stamps in .venv record its sources.
-Where the right stamp is missing (older requirements, another interpreter, ROS 2 sourced since, an
-interrupted set-up) .venv is made anew: half an installation never counts as one. The distributions of this
-repository have stamps of their own, so a change in them takes only a second.
+ROS 2's own rclpy is installed from PyPI. The embedded rclpy stays in the checkout: where the environment has
+RUNTIME=embedded, Python finds it first, with all its message packages.
+
+It runs on the bare interpreter, before anything is installed. A stamp in .venv records its sources. Where the
+right stamp is missing (older requirements, another interpreter, ROS 2 sourced since, an interrupted set-up),
+.venv is made again: half an installation never counts as one.
 """
 
 from __future__ import annotations
 
 import fcntl
 import hashlib
+import importlib.machinery
 import importlib.util
 import os
+import platform
 import shlex
 import signal
 import subprocess
 import sys
+import sysconfig
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
@@ -31,9 +36,17 @@ STAMP = VENV / "made-from"
 LOG = VENV / "setup.log"
 REQUIREMENTS = ROOT / "deploy" / "requirements"
 PIP = [str(PYTHON), "-m", "pip", "install", "--no-deps", "--no-input", "--progress-bar=off"]
-REACTIVE_NODE = ROOT / "interfaces" / "reactive_node"
-RUNTIME = ROOT / "deploy" / "runtime"
-TOOLS = ROOT / "deploy" / "tools"
+SOURCES = [ROOT / "interfaces" / "reactive_node" / "src", ROOT / "deploy" / "tools" / "src"]
+"""Packages of this checkout that Python finds after those of an installed ROS 2."""
+RUNTIME = "RUNTIME"
+"""Environment variable: "embedded" for the rclpy of this checkout, "" for ROS 2's own."""
+EMBEDDED = ROOT / "deploy" / "runtime" / "src"
+SCRIPTS = {
+    "supervisord": "supervisor.supervisord",
+    "supervisorctl": "supervisor.supervisorctl",
+    "ros2": "ros2cli.cli",
+}
+"""Commands in .venv/bin and the modules of their `main`; pip's own scripts fail in a path with quotes."""
 
 
 class SetupError(Exception):
@@ -49,12 +62,11 @@ def main() -> int:
         signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})  # make blocks it until here
         with _alone():
             began = time.monotonic()
-            ros = system_rclpy()
-            venv_missing = _update(STAMP, fingerprint(ros), partial(make, ros))
-            for distribution in (REACTIVE_NODE, *([] if ros else [RUNTIME, TOOLS])):
-                stamp = VENV / f"made-from-{distribution.name}"
-                _update(stamp, fingerprint_of(distribution), partial(install, distribution, stamp))
-            if venv_missing:
+            ros = sourced_rclpy()
+            check_runtime(os.environ.get(RUNTIME, ""), ros)
+            if not STAMP.exists() or STAMP.read_text() != fingerprint(ros):
+                make(ros)
+                STAMP.write_text(fingerprint(ros))
                 print(f"Set up in {time.monotonic() - began:.0f} s.", flush=True)
     except SetupError as error:
         print(error, file=sys.stderr)
@@ -63,53 +75,51 @@ def main() -> int:
         print(f"Set-up failed: {error}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
+        print("\nSet-up interrupted; the next make starts it again.", file=sys.stderr)
         return 130
     finally:
         signal.signal(signal.SIGINT, signal.SIG_DFL)  # no traceback from an interpreter that ends
     return 0
 
 
-def system_rclpy() -> str:
-    """The file of the rclpy of a sourced ROS 2; '' without ROS 2."""
-    spec = importlib.util.find_spec("rclpy")
+def sourced_rclpy() -> str:
+    """The file of the rclpy of a sourced ROS 2, which is in PYTHONPATH; '' without one."""
+    path = [entry for entry in os.environ.get("PYTHONPATH", "").split(os.pathsep) if entry]
+    spec = importlib.machinery.PathFinder.find_spec("rclpy", path)
     origin = (spec and spec.origin) or ""
     return "" if Path(origin).is_relative_to(ROOT) else origin
 
 
+def check_runtime(runtime: str, ros: str) -> None:
+    """Raise SetupError unless the wanted runtime can be had beside `ros`, the rclpy of a sourced ROS 2."""
+    if runtime not in ("", "embedded"):
+        raise SetupError(f"RUNTIME={runtime}: it is empty for ROS 2's own rclpy, or embedded")
+    if runtime and ros:
+        raise SetupError(f"RUNTIME=embedded: ROS 2 is sourced, and its rclpy wins ({ros}); use another shell")
+    if not runtime and not ros and not has_wheels():
+        raise SetupError(
+            f"PyPI has ROS 2's rclpy for x86_64 with glibc 2.28 or newer, not for this machine"
+            f" ({platform.machine()}, {' '.join(filter(None, platform.libc_ver())) or 'no glibc'}):"
+            " source an installed ROS 2, or use RUNTIME=embedded, which needs x86_64 with glibc 2.17"
+        )
+
+
+def has_wheels() -> bool:
+    """Whether PyPI has ROS 2's rclpy for this machine."""
+    library, version = platform.libc_ver()
+    has_library = library == "glibc" and tuple(map(int, version.split("."))) >= (2, 28)
+    return platform.machine() == "x86_64" and has_library
+
+
 def fingerprint(ros: str) -> str:
     """The digest of everything that .venv is made from; `ros` is the file of ROS 2's rclpy."""
-    sources = [*sorted(REQUIREMENTS.glob("*.txt")), Path(__file__)]
-    return _digest(sources, sys.version, os.path.realpath(sys.executable), str(VENV), ros)
-
-
-def fingerprint_of(distribution: Path) -> str:
-    """The digest of the files that are installed of a distribution, without those of tools and builds."""
-    made = ("__pycache__", "egg-info")
-    sources = (path for path in (distribution / "src").rglob("*") if path.is_file())
-    kept = (path for path in sources if not any(part.endswith(made) for part in path.parts))
-    return _digest([distribution / "pyproject.toml", *distribution.glob("hatch_build.py"), *sorted(kept)])
-
-
-def _digest(files: Iterable[Path], *words: str) -> str:
+    words = (sys.version, os.path.realpath(sys.executable), str(VENV), ros)
     digest = hashlib.sha256(repr(words).encode())
-    for file in files:
+    for file in (*sorted(REQUIREMENTS.glob("*.txt")), Path(__file__)):
         content = file.read_bytes()
         digest.update(f"{file.relative_to(ROOT)} {len(content)} ".encode())
         digest.update(content)
     return digest.hexdigest()
-
-
-def _update(stamp: Path, fingerprint: str, make: Callable[[], None]) -> bool:
-    """Call `make` unless the stamp has this fingerprint; whether it was called."""
-    if stamp.exists() and stamp.read_text() == fingerprint:
-        return False
-    try:
-        make()
-    except KeyboardInterrupt:
-        print("\nSet-up interrupted; the next make starts it anew.", file=sys.stderr)
-        raise
-    stamp.write_text(fingerprint)
-    return True
 
 
 def make(ros: str) -> None:
@@ -120,7 +130,7 @@ def make(ros: str) -> None:
         package = f"python{sys.version_info[0]}.{sys.version_info[1]}-venv"
         raise SetupError(f"Python {version} ({sys.executable}) lacks ensurepip: apt-get install {package}")
     if ros:
-        messages = ("diagnostic_msgs", "geometry_msgs", "sensor_msgs", "std_msgs", "tf2_msgs")
+        messages = ("diagnostic_msgs", "geometry_msgs", "sensor_msgs", "std_msgs")
         needed = f"import rclpy, {', '.join(f'{package}.msg' for package in messages)}"
         check = subprocess.run([sys.executable, "-c", needed], capture_output=True, text=True)
         if check.returncode:
@@ -134,23 +144,33 @@ def make(ros: str) -> None:
     STAMP.unlink(missing_ok=True)  # no sooner: a refused set-up leaves the old .venv usable
     venv = [sys.executable, "-m", "venv", "--clear", *(["--system-site-packages"] if ros else []), str(VENV)]
     _step("a virtual environment", venv, log=None)
-    files = ["system.txt", "build.txt", "develop.txt", *([] if ros else ["runtime.txt"])]
-    _step(
-        "packages from PyPI", [*PIP, *(word for name in files for word in ("-r", str(REQUIREMENTS / name)))]
-    )
-    for tool in ("supervisord", "supervisorctl"):  # pip's own scripts fail in a path with quotes
-        (VENV / "bin" / tool).write_text(f'#!/bin/sh\nexec "${{0%/*}}/python" -m supervisor.{tool} "$@"\n')
+    files = ["system.txt", "build.txt", "develop.txt", *([] if ros else ["embedded.txt"])]
+    _step("packages from PyPI", [*PIP, *_requirements(*files)])
     if ros:
         print(f"  rclpy of ROS 2: {Path(ros).parent}")
+    elif has_wheels():
+        _step("ROS 2's rclpy from PyPI", [*PIP, "--require-hashes", *_requirements("ros.txt")])
+    _write_pth(embedded=not ros)
+    for name, module in SCRIPTS.items():
+        script = VENV / "bin" / name
+        program = f"import sys; from {module} import main; sys.exit(main())"
+        script.write_text(f'#!/bin/sh\nexec "${{0%/*}}/python" -c "{program}" "$@"\n')
+        script.chmod(0o755)
 
 
-def install(distribution: Path, stamp: Path) -> None:
-    """Install a distribution of this repository into .venv, or install it again."""
-    _refuse_while_running()
-    stamp.unlink(missing_ok=True)
-    command = [*PIP, "--no-build-isolation", "--force-reinstall", str(distribution)]
-    why = ", as this machine has no ROS 2" if distribution == RUNTIME else ""
-    _step(f"{distribution.relative_to(ROOT)}{why}", command)
+def _requirements(*names: str) -> list[str]:
+    return [word for name in names for word in ("-r", str(REQUIREMENTS / name))]
+
+
+def _write_pth(embedded: bool) -> None:
+    """Tell Python of .venv where the packages of this checkout are; it reads the .pth of the wheels later."""
+    chosen = f'import os, sys; os.environ.get("{RUNTIME}") == "embedded" and '
+    first = f"sys.path.insert(0, {str(EMBEDDED)!r})"
+    without_libraries = 'os.environ.update(_ROS_WHEELS_BOOTSTRAP_COMPLETE="1")'
+    with_workspace = '"AMENT_PREFIX_PATH" in os.environ and __import__("rosidl_runtime_embedded")'
+    lines = [chosen + what for what in (first, without_libraries, with_workspace)] if embedded else []
+    folder = sysconfig.get_path("purelib", "venv", {"base": str(VENV)})
+    Path(folder, "reactive_arm.pth").write_text("".join(f"{line}\n" for line in (*SOURCES, *lines)))
 
 
 def _refuse_while_running() -> None:

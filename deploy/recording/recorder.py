@@ -203,4 +203,5 @@ def _record_all(
 
     qos = _qos(topic, DEPTH)
     events = SubscriptionEventCallbacks(message_lost=report_loss)
-    node.create_subscription(topic.type, topic.name, receive, qos, raw=True, event_callbacks=events)
+    callback: Callable[..., None] = receive  # ROS 2's annotations do not know of the message's info
+    node.create_subscription(topic.type, topic.name, callback, qos, raw=True, event_callbacks=events)

@@ -34,14 +34,16 @@ from deploy.supervision import processes
 LIBRARIES = (
     "reactive_node",
     "reactivex.operators",
-    "rclpy._graph",
-    "rclpy._parameter_files",
     "rclpy.executors",
     "rclpy.serialization",
     "websockets.server",
     "yaml",
 )
 """What the services import from outside of this checkout, also late."""
+EMBEDDED_LIBRARIES = ("rclpy._graph", "rclpy._parameter_files")
+"""What the embedded rclpy imports late."""
+OPTIONAL_TYPES = ("tf2_msgs.msg.TFMessage",)
+"""Types that a robot publishes only where their packages exist."""
 TYPES = (
     "diagnostic_msgs.msg.DiagnosticArray",
     "diagnostic_msgs.msg.DiagnosticStatus",
@@ -66,7 +68,6 @@ TYPES = (
     "std_msgs.msg.Float64",
     "std_msgs.msg.Header",
     "std_msgs.msg.String",
-    "tf2_msgs.msg.TFMessage",
     "type_description_interfaces.srv.GetTypeDescription",
 )
 """The types of messages and of the services that each node has."""

@@ -16,7 +16,7 @@ from deploy.benchmarks import alternatives, c_program, measurement, table
 from deploy.benchmarks.alternatives import Alternative
 from deploy.benchmarks.link import LAST, MIDDLE, SINK, SOURCE, Job
 from deploy.benchmarks.measurement import MeasurementFailed, Scenario
-from deploy.commands.setup import system_rclpy
+from deploy.commands.setup import sourced_rclpy
 
 
 @pytest.fixture(autouse=True)
@@ -60,10 +60,10 @@ def test_a_comparison_without_a_round_is_refused(rounds: str, capsys: pytest.Cap
 def test_absent_alternatives_are_named_with_the_reason(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    on_ros = bool(system_rclpy())
+    on_ros = bool(sourced_rclpy())
     here = Alternative("here", "callbacks", ros=on_ros)
     answers = iter(["/opt/ros"] * on_ros + [""])
-    monkeypatch.setattr(command, "system_rclpy", lambda: next(answers))
+    monkeypatch.setattr(command, "sourced_rclpy", lambda: next(answers))
     others = (
         Alternative("sourced", "callbacks", ros=True),
         Alternative("refused", "zeromq", "zeromq.txt"),
@@ -135,7 +135,7 @@ def assert_has_figures(figures: dict[str, float], key: str) -> None:
 
 
 def test_short_pipeline_of_this_system_has_figures() -> None:
-    here = Alternative("ReactiveNode", "reactive", ros=bool(system_rclpy()))
+    here = Alternative("ReactiveNode", "reactive", ros=bool(sourced_rclpy()))
 
     figures = measurement.measure(here, Scenario("pipeline", 8, 200.0, warm_up=0.1, seconds=0.2))
 
@@ -144,7 +144,7 @@ def test_short_pipeline_of_this_system_has_figures() -> None:
 
 @pytest.mark.parametrize("link", ["image_callbacks", "image_reactive"])
 def test_short_measurement_of_images_has_figures(link: str) -> None:
-    here = Alternative("here", link, ros=bool(system_rclpy()))
+    here = Alternative("here", link, ros=bool(sourced_rclpy()))
 
     figures = measurement.measure(here, Scenario("image", 1_000_000, 50.0, warm_up=0.1, seconds=0.3))
 
@@ -178,7 +178,7 @@ def test_c_program_has_the_settings_of_the_runtime_or_those_of_cyclone_dds(tmp_p
     assert 'NetworkInterface name="lo"' in defaults
 
 
-EMBEDDED_ONLY = pytest.mark.skipif(bool(system_rclpy()), reason="platform: the embedded runtime's DDS")
+EMBEDDED_ONLY = pytest.mark.skipif(bool(sourced_rclpy()), reason="platform: the embedded runtime's DDS")
 
 
 @pytest.mark.parametrize(
@@ -191,7 +191,7 @@ EMBEDDED_ONLY = pytest.mark.skipif(bool(system_rclpy()), reason="platform: the e
     ],
 )
 def test_short_chain_has_figures(link: str) -> None:
-    here = Alternative("here", link, ros=bool(system_rclpy()))
+    here = Alternative("here", link, ros=bool(sourced_rclpy()))
 
     figures = measurement.measure(here, Scenario("chain", 8, 100.0, warm_up=0.1, seconds=0.3))
 
@@ -229,7 +229,7 @@ def test_short_measurement_of_the_c_program_has_figures(
 
 @pytest.mark.usefixtures("in_c")  # the source of the heartbeats
 def test_watchdog_that_hears_each_heartbeat_costs_more_than_the_service() -> None:
-    ros = bool(system_rclpy())
+    ros = bool(sourced_rclpy())
     scenario = Scenario("watchdog", 1, 2000.0, warm_up=2.0, seconds=1.0)
     service, callbacks = (
         measurement.measure(
@@ -250,7 +250,7 @@ def test_processor_time_is_measured_although_all_reports_have_waited(monkeypatch
         return report(run, role, event, count)
 
     monkeypatch.setattr(measurement._Run, "report", late)
-    here = Alternative("callbacks", "callbacks", ros=bool(system_rclpy()))
+    here = Alternative("callbacks", "callbacks", ros=bool(sourced_rclpy()))
     figures = measurement.measure(here, Scenario("pipeline", 8, 200.0, warm_up=0.1, seconds=0.2))
     assert figures["pipeline.8.cpu_us"] > 10.0
 

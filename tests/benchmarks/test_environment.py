@@ -27,7 +27,7 @@ def installed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[str]:
 
 def test_each_file_is_installed_when_a_run_first_needs_it(installed: list[str]) -> None:
     environment.prepare(["chart.txt"])
-    assert installed == ["venv", "system.txt", "runtime.txt", "chart.txt"]
+    assert installed == ["venv", "system.txt", "embedded.txt", "chart.txt"]
     installed.clear()
 
     environment.prepare(["chart.txt"])
@@ -41,7 +41,7 @@ def test_refused_file_is_tried_again(installed: list[str]) -> None:
     for _ in range(2):
         refused = environment.prepare(["refused.txt"])
         assert refused == {"refused.txt": "no matching distribution"}
-    assert installed == ["venv", "system.txt", "runtime.txt", "refused.txt", "refused.txt"]
+    assert installed == ["venv", "system.txt", "embedded.txt", "refused.txt", "refused.txt"]
 
 
 def test_other_python_makes_the_environment_anew(
@@ -53,4 +53,4 @@ def test_other_python_makes_the_environment_anew(
 
     environment.prepare([])
 
-    assert installed == ["venv", "system.txt", "runtime.txt"]
+    assert installed == ["venv", "system.txt", "embedded.txt"]

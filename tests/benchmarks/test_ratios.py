@@ -15,7 +15,7 @@ import pytest
 from deploy.benchmarks import alternatives, measurement
 from deploy.benchmarks.alternatives import Alternative
 from deploy.benchmarks.measurement import Scenario
-from deploy.commands.setup import system_rclpy
+from deploy.commands.setup import sourced_rclpy
 
 pytestmark = [pytest.mark.alone, pytest.mark.timeout(120)]
 
@@ -40,7 +40,7 @@ def test_reactive_costs_little_more_than_callbacks(
 ) -> None:
     monkeypatch.setattr(alternatives, "BENCH_PYTHON", Path(sys.executable))
     monkeypatch.setattr(alternatives, "SYSTEM_PYTHON", Path(sys.executable))
-    pair = [Alternative(link, link, ros=bool(system_rclpy())) for link in links]
+    pair = [Alternative(link, link, ros=bool(sourced_rclpy())) for link in links]
     ratios: dict[str, list[float]] = {}
     allowed: dict[str, float] = {}
     for _ in range(ROUNDS):

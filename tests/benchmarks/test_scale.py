@@ -14,7 +14,7 @@ from deploy.benchmarks.alternatives import Alternative
 from deploy.benchmarks.measurement import MeasurementFailed
 from deploy.chaos.arm import Arm
 from deploy.chaos.cost import Cost
-from deploy.commands.setup import system_rclpy
+from deploy.commands.setup import sourced_rclpy
 from deploy.supervision.system import System
 
 pytestmark = pytest.mark.timeout(120)
@@ -80,7 +80,7 @@ def test_fleet_grows_until_the_machine_is_full(monkeypatch: pytest.MonkeyPatch) 
 
 def test_item_costs_its_publisher_and_its_subscribers(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(alternatives, "BENCH_PYTHON", alternatives.SYSTEM_PYTHON)
-    here = Alternative("ReactiveNode", "reactive", ros=bool(system_rclpy()))
+    here = Alternative("ReactiveNode", "reactive", ros=bool(sourced_rclpy()))
     scenario = measurement.Scenario("subscribers", 8, 200.0, warm_up=0.2, seconds=0.3)
     figures = measurement.measure_subscribers(here, scenario, 3)
     assert figures.keys() == scale.HEADINGS[scale.SUBSCRIBERS].keys()

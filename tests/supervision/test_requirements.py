@@ -5,16 +5,24 @@ from __future__ import annotations
 import tomllib
 from pathlib import Path
 
+import pytest
 from packaging.requirements import Requirement
 
 ROOT = Path(__file__).parents[2]
 
 
+FILES = ("system", "build", "develop", "embedded", "ros")
+PROJECTS = {"deploy/runtime": ("system", "embedded"), "deploy/tools": ("system", "ros")}
+"""Distributions of this repository, and the files with what they need."""
+
+
+def lines(name: str) -> list[str]:
+    text = (ROOT / f"deploy/requirements/{name}.txt").read_text().replace("\\\n", "")
+    return [line for line in text.splitlines() if line and not line.startswith("#")]
+
+
 def pins(*names: str) -> dict[str, str]:
-    lines = [
-        line for name in names for line in (ROOT / f"deploy/requirements/{name}.txt").read_text().splitlines()
-    ]
-    pairs = [line.split("==") for line in lines if line and not line.startswith("#")]
+    pairs = [line.split()[0].split("==") for name in names for line in lines(name)]
     return {name.lower().replace("_", "-"): version for name, version in pairs}
 
 
@@ -25,18 +33,26 @@ def unmet(declared: list[str], pinned: dict[str, str]) -> list[str]:
 
 def test_the_projects_requirements_are_pinned_in_their_ranges() -> None:
     groups = tomllib.loads((ROOT / "pyproject.toml").read_text())["dependency-groups"]
-    for name in ("system", "develop"):
-        assert unmet(groups[name], pins(name)) == []
+    assert unmet(groups["system"], pins("system")) == []
+    assert unmet(groups["ros"], pins("ros")) == []
+    assert unmet(groups["develop"], pins("system", "build", "develop")) == []
 
 
-def test_the_runtimes_requirements_are_pinned_in_their_ranges() -> None:
-    runtime = tomllib.loads((ROOT / "deploy/runtime/pyproject.toml").read_text())
-    pinned = pins("system", "build", "runtime")
-    assert unmet(runtime["project"]["dependencies"], pinned) == []
-    assert unmet(runtime["build-system"]["requires"], pinned) == []
+@pytest.mark.parametrize("project", PROJECTS)
+def test_a_distributions_requirements_are_pinned_in_their_ranges(project: str) -> None:
+    distribution = tomllib.loads((ROOT / project / "pyproject.toml").read_text())
+    assert unmet(distribution["project"]["dependencies"], pins(*PROJECTS[project])) == []
+    assert unmet(distribution["build-system"]["requires"], pins("build")) == []
 
 
 def test_a_package_has_the_same_version_in_every_file() -> None:
-    everything = pins("system", "build", "runtime", "develop")
-    for name in ("system", "build", "runtime", "develop"):
+    everything = pins(*FILES)
+    for name in FILES:
         assert pins(name).items() <= everything.items()
+
+
+def test_each_wheel_of_ros_has_the_hashes_of_all_supported_pythons() -> None:
+    for line in lines("ros"):
+        hashes = [word for word in line.split() if word.startswith("--hash=sha256:")]
+        assert len(hashes) == len(set(hashes)), line
+        assert len(hashes) in (1, 3), line  # one for each Python, or one for all

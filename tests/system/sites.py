@@ -275,13 +275,13 @@ def _leave_programs(path: Path, names: Sequence[str]) -> None:
 
 
 def _set_up(directory: Path) -> None:
-    """Give a checkout our packages in a .venv of its own, with the stamps of a set-up."""
+    """Give a checkout our packages in a .venv of its own, with the stamp of a set-up."""
     venv = directory / ".venv"
     venv.mkdir()
     for entry in Path(sys.prefix).iterdir():
-        if not entry.name.startswith("made-from"):
+        if entry.name != "made-from":
             (venv / entry.name).symlink_to(entry)
-    stamp = "from deploy.commands import setup; setup.make = setup.install = lambda *_: None; setup.main()"
+    stamp = "from deploy.commands import setup; setup.make = lambda *_: None; setup.main()"
     base: str = sys._base_executable  # type: ignore[attr-defined]
     subprocess.run([base, "-c", stamp], cwd=directory, check=True, stdout=subprocess.DEVNULL)
 

@@ -130,5 +130,5 @@ class Connection(callbacks.Connection):
     def _publisher(self, topic: Topic) -> Callable[[Any], object]:
         return self.node.create_publisher(topic.type, topic.name, topic.qos).publish
 
-    def _listen(self, topic: Topic, callback: Callable[[Any], object]) -> None:
+    def _listen(self, topic: Topic, callback: Callable[..., Any]) -> None:
         self.node.create_subscription(topic.type, topic.name, callback, topic.qos)

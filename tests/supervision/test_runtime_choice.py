@@ -1,0 +1,101 @@
+"""Which rclpy a command of this checkout gets: ROS 2's own from PyPI, the embedded one, or a sourced one."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+
+from deploy.commands import setup
+
+ROOT = Path(__file__).parents[2]
+EMBEDDED = ROOT / "deploy" / "runtime" / "src"
+PACKAGES = sorted(path.name for path in EMBEDDED.iterdir() if (path / "__init__.py").exists())
+FIND = f"""
+from importlib.util import find_spec
+specs = {{name: find_spec(name) for name in {PACKAGES}}}
+print(*(name for name, spec in specs.items() if spec and spec.origin.startswith({str(EMBEDDED)!r})))
+"""
+ROS = "/opt/ros/jazzy/lib/python3.12/site-packages/rclpy/__init__.py"
+
+
+def in_venv(program: str, **environment: str) -> str:
+    """Return what a Python program prints that the commands of make run."""
+    command = [str(ROOT / "deploy" / "commands" / "venv.sh"), "-c", program]
+    return subprocess.check_output(command, env=os.environ | environment, text=True, timeout=30).strip()
+
+
+def test_each_package_of_the_embedded_runtime_comes_from_it() -> None:
+    assert in_venv(FIND, RUNTIME="embedded").split() == PACKAGES
+
+
+def test_no_package_of_the_default_runtime_is_embedded() -> None:
+    assert in_venv(FIND, RUNTIME="") == ""
+
+
+def test_interpreter_of_the_default_runtime_starts_once_with_its_libraries() -> None:
+    program = "import os; print(open('/proc/self/environ').read().split(chr(0)))"
+    environment = in_venv(program, RUNTIME="", LD_LIBRARY_PATH="/opt/mine")
+    if find_spec("rclpy._rclpy_pybind11") is None:  # a sourced ROS 2 brings its libraries itself
+        assert "'LD_LIBRARY_PATH=/opt/mine'" in environment
+    else:
+        assert f"'LD_LIBRARY_PATH={ROOT}/.venv/lib:{ROOT}/.venv/lib/python3" in environment
+        assert ".libs:/opt/mine'" in environment
+    assert "'_ROS_WHEELS_BOOTSTRAP_COMPLETE=1'" in environment  # otherwise they start the interpreter again
+
+
+def test_rclpy_in_pythonpath_is_a_sourced_ros(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "rclpy").mkdir()
+    (tmp_path / "rclpy" / "__init__.py").touch()
+    monkeypatch.setattr(sys, "path", [str(tmp_path), *sys.path])  # as if pip had installed it
+    monkeypatch.setenv("PYTHONPATH", f"{ROOT}{os.pathsep}")
+    assert setup.sourced_rclpy() == ""
+    monkeypatch.setenv("PYTHONPATH", str(EMBEDDED))
+    assert setup.sourced_rclpy() == ""
+    monkeypatch.setenv("PYTHONPATH", f"/none{os.pathsep}{tmp_path}")
+    assert setup.sourced_rclpy() == str(tmp_path / "rclpy" / "__init__.py")
+
+
+@pytest.mark.parametrize(
+    ("runtime", "ros", "machine", "reason"),
+    [
+        ("embeded", "", "x86_64", "RUNTIME=embeded: it is empty for ROS 2's own rclpy, or embedded"),
+        ("embedded", ROS, "x86_64", f"ROS 2 is sourced, and its rclpy wins ({ROS}); use another shell"),
+        ("", "", "aarch64", "source an installed ROS 2, or use RUNTIME=embedded, which needs x86_64"),
+        ("", "", "x86_64", ""),
+        ("embedded", "", "aarch64", ""),
+        ("", ROS, "aarch64", ""),
+    ],
+)
+def test_runtime_that_cannot_be_had_is_refused(
+    runtime: str, ros: str, machine: str, reason: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(setup.platform, "machine", lambda: machine)
+    try:
+        setup.check_runtime(runtime, ros)
+        refusal = ""
+    except setup.SetupError as error:
+        refusal = str(error)
+    assert reason in refusal
+    assert bool(reason) == bool(refusal)
+    assert "\n" not in refusal
+
+
+def test_machine_without_glibc_has_no_wheels(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(setup.platform, "machine", lambda: "x86_64")
+    monkeypatch.setattr(setup.platform, "libc_ver", lambda: ("glibc", "2.28"))
+    assert setup.has_wheels()
+    for library in (("glibc", "2.27"), ("", "")):
+        monkeypatch.setattr(setup.platform, "libc_ver", lambda library=library: library)
+        assert not setup.has_wheels()
+
+
+def test_workspace_messages_are_found_before_rclpy_is_imported(tmp_path: Path) -> None:
+    (tmp_path / "share" / "my_messages" / "msg").mkdir(parents=True)
+    (tmp_path / "share" / "my_messages" / "msg" / "Angle.msg").write_text("float64 value\n")
+    program = "from my_messages.msg import Angle; print(Angle(value=1.5).value)"
+    assert in_venv(program, RUNTIME="embedded", AMENT_PREFIX_PATH=str(tmp_path)) == "1.5"
