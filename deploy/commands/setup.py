@@ -193,6 +193,7 @@ def _step(title: str, command: list[str], log: Path | None = LOG) -> None:
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
+        close_fds=False,  # it inherits the lock
         start_new_session=True,  # the children of venv and pip end with it
         preexec_fn=partial(signal.pthread_sigmask, signal.SIG_SETMASK, mask),
     )
@@ -228,6 +229,7 @@ def _step(title: str, command: list[str], log: Path | None = LOG) -> None:
 def _alone() -> Iterator[None]:
     """Hold the lock of this checkout's set-up: a second make waits for the first."""
     directory = os.open(ROOT, os.O_RDONLY)
+    os.set_inheritable(directory, True)  # a step that outlives a killed set-up still writes into .venv
     try:
         try:
             fcntl.flock(directory, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
 import select
 import shutil
@@ -160,3 +161,23 @@ def test_an_interrupted_step_ends_with_all_its_children(tmp_path: Path) -> None:
             assert select.select([child], [], [], 10)[0]
         finally:
             os.close(child)
+
+
+def test_a_step_that_outlives_a_killed_set_up_keeps_the_lock(checkout: Path) -> None:
+    begun, end = checkout / "begun", checkout / "end"
+    os.mkfifo(begun)
+    os.mkfifo(end)
+    step = f"setup._step('a step', ['sh', '-c', ': > {begun}; : < {end}'], log=None)"
+    program = f"from deploy.commands import setup\nwith setup._alone(): {step}"
+    killed = subprocess.Popen([sys.executable, "-c", program], cwd=checkout, stdout=subprocess.DEVNULL)
+    begun.read_bytes()
+    killed.kill()
+    killed.wait()
+    directory = os.open(checkout, os.O_RDONLY)
+    try:
+        with pytest.raises(BlockingIOError):
+            fcntl.flock(directory, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        end.write_bytes(b"")
+        fcntl.flock(directory, fcntl.LOCK_EX)  # the next set-up waits for the end of the step
+    finally:
+        os.close(directory)
