@@ -117,7 +117,7 @@ class ServiceNode(ReactiveNode):
             sampled=sampled,
             buffered=buffered,
             item=good,
-            every_publisher=True,
+            every_publisher=sampled is None and buffered is None,
             raw=True,  # rclpy on Cyclone DDS would deliver a truncated message as one of zeros
         )
 

@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 import reactivex as rx
+from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.node import Node
 from reactivex.disposable import Disposable
 from reactivex.subject import Subject
@@ -69,6 +70,12 @@ def test_publisher_lives_from_wiring_until_disposal(
     sink.dispose()
     sink.dispose()
     spin_until(lambda: peer.count_publishers("numbers") == 0)
+
+
+def test_publisher_on_demand_takes_no_other_event_callbacks(node: ReactiveNode) -> None:
+    events = PublisherEventCallbacks()
+    with pytest.raises(TypeError, match="event_callbacks"):
+        node.publish_observable(rx.never(), Float64, "numbers", on_demand=True, event_callbacks=events)
 
 
 def test_observable_on_demand_is_observed_while_there_are_subscribers(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from datetime import UTC, datetime, timedelta
+from functools import partial
 from typing import Any
 from unittest import mock
 
@@ -178,6 +179,100 @@ def test_end_of_the_ticks_is_its_end(node: ReactiveNode, ticks: Subject[None], e
     getattr(ticks, end)(*([ValueError()] if end == "on_error" else []))
     assert ended == [end]
     assert not [each for each in node.subscriptions if each.topic_name == "/topic"]
+
+
+@pytest.mark.parametrize("end", ["on_completed", "on_error"])
+@pytest.mark.parametrize("ends_at_once", [True, False])
+def test_topic_is_read_again_after_the_end_of_the_ticks(
+    node: ReactiveNode, talker: Talker, spin_until: SpinUntil, end: str, ends_at_once: bool
+) -> None:
+    last: Subject[None] = Subject()
+    first: Subject[None] = Subject()
+    remaining = [first, last]
+    topic = node.create_observable(Float64, "topic", sampled=rx.defer(lambda _: remaining.pop(0)))
+    received: list[float] = []
+    again = topic.catch(lambda _, source: source) if end == "on_error" else topic.concat(topic)
+    give_end = partial(getattr(first, end), *([ValueError()] if end == "on_error" else []))
+    if ends_at_once:
+        give_end()
+    again.subscribe(lambda message: received.append(message.data))
+    if not ends_at_once:
+        give_end()
+    talker.await_readers(2)
+    talker.say(1.0)
+    spin_until(lambda: last.on_next(NOW) or received)
+    assert received == [1.0]
+
+
+@pytest.mark.parametrize("how", ["sampled", "buffered"])
+def test_retry_reads_on_after_an_error_of_the_item(
+    node: ReactiveNode, talker: Talker, ticks: Subject[None], spin_until: SpinUntil, how: str
+) -> None:
+    options: dict[str, Any] = {how: ticks, "item": lambda message: 1.0 / message.data}
+    received: list[float] = []
+    errors: list[Exception] = []
+    topic = node.create_observable(Float64, "topic", **options)
+    topic.do_action(on_error=errors.append).retry().subscribe(received.append)
+    talker.await_readers(2)
+    talker.say(0.0)
+    spin_until(lambda: ticks.on_next(NOW) or errors)
+    spin_until(lambda: talker.publisher.publish(Float64(data=2.0)) or ticks.on_next(NOW) or received)
+    assert received[0] == 0.5
+    assert [type(error) for error in errors] == [ZeroDivisionError]
+
+
+def test_item_of_none_is_no_item(
+    node: ReactiveNode, talker: Talker, ticks: Subject[None], spin_until: SpinUntil
+) -> None:
+    received: list[float] = []
+    topic = node.create_observable(Float64, "topic", buffered=ticks, item=lambda it: it.data or None)
+    topic.subscribe(received.append)
+    talker.await_readers(2)
+    talker.say(0.0, 1.0)
+    spin_until(lambda: ticks.on_next(NOW) or received)
+    assert received == [1.0]
+
+
+def test_reader_that_cannot_be_created_is_an_error_of_each_observer(
+    node: ReactiveNode, ticks: Subject[None]
+) -> None:
+    errors: list[Exception] = []
+    topic = node.create_observable(int, "topic", sampled=ticks)
+    topic.subscribe(on_error=errors.append)
+    topic.subscribe(on_error=errors.append)
+    assert [type(error) for error in errors] == [AttributeError, AttributeError]
+    assert errors[0] is not errors[1], "each observer tries again"
+
+
+@pytest.mark.parametrize(
+    ("options", "problem"),
+    [
+        ({"sampled": 0.1, "buffered": 0.1}, "sampled, buffered and every_publisher exclude each other"),
+        (
+            {"sampled": 0.1, "every_publisher": True},
+            "sampled, buffered and every_publisher exclude each other",
+        ),
+        ({"sampled": 0.0}, "a period of 0.0 s is no positive number"),
+        ({"buffered": -1}, "a period of -1 s is no positive number"),
+        ({"sampled": float("nan")}, "a period of nan s is no positive number"),
+        ({"buffered": float("inf")}, "a period of inf s is no positive number"),
+    ],
+)
+def test_arguments_that_would_be_ignored_are_refused(
+    node: ReactiveNode, options: dict[str, Any], problem: str
+) -> None:
+    with pytest.raises(ValueError, match=f"^topic: {problem}$"):
+        node.create_observable(Float64, "topic", **options)
+
+
+@pytest.mark.parametrize("option", ["callback_group", "event_callbacks"])
+def test_options_that_would_attend_the_reader_are_refused(
+    node: ReactiveNode, ticks: Subject[None], option: str
+) -> None:
+    errors: list[Exception] = []
+    topic = node.create_observable(Float64, "topic", sampled=ticks, **{option: mock.Mock()})
+    topic.subscribe(on_error=errors.append)
+    assert option in str(errors[0])
 
 
 def test_other_thread_may_dispose_while_it_is_read(node: ReactiveNode, talker: Talker) -> None:

@@ -43,21 +43,22 @@ class MessageReader(SharedReader):
         :param scheduler, end: see :class:`SharedReader`.
         :param timestamped, item, every_publisher: see :meth:`ReactiveNode.create_observable`.
         """
-        super().__init__(node, create, scheduler=scheduler, end=end, retained=_retention(qos_profile))
+        super().__init__(
+            node, create, scheduler=scheduler, end=end, item=item, retained=_retention(qos_profile)
+        )
         self._qos = qos_profile
         self._timestamped = timestamped
-        self._item = item
         self._reads_every_publisher = every_publisher and self._retained is not None
         self._recent: deque[int] | None = None  # source times, while there are two readers
         # rclpy collects the info of a message only for a callback that takes it.
         self._callback: Callable[..., None] = self._receive_with_info if timestamped else self._receive
 
-    def _create_first(self) -> Subscription:
+    def _begin(self, scheduler: abc.SchedulerBase | None) -> None:
         self._recent = None
-        if not self._reads_every_publisher:
-            return self._create(self._callback, self._qos)
-        events = SubscriptionEventCallbacks(incompatible_qos=self._add_volatile)
-        return self._create(self._callback, self._qos, event_callbacks=events)
+        options: dict[str, Any] = {}
+        if self._reads_every_publisher:
+            options["event_callbacks"] = SubscriptionEventCallbacks(incompatible_qos=self._add_volatile)
+        self._subscriptions.append(self._create(self._callback, self._qos, **options))
 
     def _add_volatile(self, _: Any) -> None:
         """Read by a second reader as well: the first one receives nothing from a volatile publisher."""
@@ -79,22 +80,6 @@ class MessageReader(SharedReader):
         if self._timestamped:  # without Timestamp(): where messages are rare, each call costs most
             message = tuple.__new__(Timestamp, (message, info["source_timestamp"]))
         self._receive(message)
-
-    def _receive(self, item: Any) -> None:
-        """Hand on a message. All in one step: every message takes this path."""
-        if self._item is not None:
-            try:
-                item = self._item(item)
-            except Exception as error:
-                for observer in self._listening:
-                    observer.on_error(error)
-                return
-            if item is None:
-                return
-        if self._retained is not None:
-            self._retained.append(item)
-        for observer in self._listening:
-            observer.on_next(item)
 
 
 def _retention(qos_profile: QoSProfile | int) -> deque[Any] | None:

@@ -9,6 +9,7 @@ A :class:`ReactiveNode` is a node like any other and creates observables, as in 
 
 from __future__ import annotations
 
+import math
 import threading
 from collections.abc import Callable
 from contextlib import ExitStack
@@ -28,7 +29,7 @@ from reactivex.subject import BehaviorSubject
 from reactive_node import calls
 from reactive_node.end import End
 from reactive_node.message_reader import MessageReader
-from reactive_node.sampled_reader import BUFFER, newest, sampled_messages
+from reactive_node.sampled_reader import BUFFER, SampledReader, newest
 from reactive_node.scheduler import NodeScheduler
 from reactive_node.services import Requests
 from reactive_node.shared_reader import SharedReader
@@ -87,11 +88,15 @@ class ReactiveNode(Node):
             observers and at less cost than the operator ``map``; if it returns ``None``, there is none.
         :param every_publisher: whether a transient-local topic also delivers the messages of volatile
             publishers, such as those of ``ros2 topic pub``: from the first one on, a second reader listens to
-            them. Without effect on other topics, and with ``sampled`` or ``buffered``.
+            them. Without effect on other topics.
         :param options: further arguments of :meth:`rclpy.node.Node.create_subscription`; with ``sampled`` or
             ``buffered`` without ``callback_group`` and ``event_callbacks``, with ``every_publisher`` without
             ``event_callbacks`` and, as by default, with a mutually exclusive callback group.
+        :raises ValueError: if more than one of ``sampled``, ``buffered`` and ``every_publisher`` is given, or
+            a period that is no positive number.
         """
+        if sum([sampled is not None, buffered is not None, every_publisher]) > 1:
+            raise ValueError(f"{topic}: sampled, buffered and every_publisher exclude each other")
         if sampled is not None:
             qos = newest(qos_profile, 1)
             return self._create_sampled(msg_type, topic, qos, timestamped, item, sampled, options)
@@ -124,15 +129,27 @@ class ReactiveNode(Node):
         period: float | Observable[Any],
         options: dict[str, Any],
     ) -> Observable[Any]:
-        ticks = period if isinstance(period, Observable) else rx.timer(0.0, period, self.scheduler)
+        if isinstance(period, Observable):
+            ticks = period
+        elif 0 < period < math.inf:
+            ticks = rx.timer(0.0, period, self.scheduler)
+        else:
+            raise ValueError(f"{topic}: a period of {period} s is no positive number")
 
         def create_reader(**given: Any) -> Subscription:
-            return self.create_subscription(msg_type, topic, lambda _: None, qos, **{**given, **options})
+            return self.create_subscription(msg_type, topic, lambda _: None, qos, **given, **options)
 
-        items = sampled_messages(self, create_reader, ticks, timestamped=timestamped, most=qos.depth)
-        if item is not None:
-            items = items.map(item).filter(lambda made: made is not None)
-        return self._end.limit(items.share())
+        reader = SampledReader(
+            self,
+            create_reader,
+            ticks,
+            scheduler=self.scheduler,
+            end=self._end,
+            timestamped=timestamped,
+            item=item,
+            most=qos.depth,
+        )
+        return Observable(reader.subscribe)
 
     def create_parameter_observable(self, name: str) -> Observable[Any]:
         """
@@ -290,16 +307,17 @@ class ReactiveNode(Node):
             without ``event_callbacks``. A subject makes an observable of the publisher's QoS events:
             ``event_callbacks=PublisherEventCallbacks(deadline=subject.on_next)``.
         """
+        events: dict[str, Any] = {}
         if on_demand:
             demanded: BehaviorSubject[bool] = BehaviorSubject(False)
-            options["event_callbacks"] = PublisherEventCallbacks(
+            events["event_callbacks"] = PublisherEventCallbacks(
                 matched=lambda subscribers: demanded.on_next(subscribers.current_count > 0)
             )
             offered = observable
             observable = demanded.distinct_until_changed().switch_map(
                 lambda is_demanded: offered if is_demanded else rx.never()
             )
-        publisher = self.create_publisher(msg_type, topic, qos_profile, **options)
+        publisher = self.create_publisher(msg_type, topic, qos_profile, **events, **options)
         subscription = SingleAssignmentDisposable()
 
         def publish(item: Any) -> None:

@@ -13,8 +13,10 @@ from rclpy.node import Node
 from rclpy.qos import HistoryPolicy, QoSProfile
 from rclpy.subscription import Subscription
 from reactivex import Observable, abc
-from reactivex.disposable import CompositeDisposable, Disposable
+from reactivex.disposable import CompositeDisposable, Disposable, SingleAssignmentDisposable
 
+from reactive_node.end import End
+from reactive_node.shared_reader import SharedReader
 from reactive_node.stamps import Timestamp
 
 BUFFER = 1000  # messages that a reader keeps for a tick that reads all of them
@@ -103,3 +105,51 @@ def sampled_messages(
         return CompositeDisposable(reading, Disposable(destroy))
 
     return Observable(subscribe)
+
+
+class SampledReader(SharedReader):
+    """Reads a topic at ticks for all observers."""
+
+    def __init__(
+        self,
+        node: Node,
+        create: Callable[..., Subscription],
+        ticks: Observable[Any],
+        *,
+        scheduler: abc.SchedulerBase,
+        end: End,
+        timestamped: bool,
+        item: Callable[[Any], Any] | None,
+        most: int,
+    ) -> None:
+        """
+        Share a reader among observers; none exists yet.
+
+        :param create, ticks, timestamped, most: see :func:`sampled_messages`.
+        :param scheduler, end, item: see :class:`SharedReader`.
+        """
+        super().__init__(node, create, scheduler=scheduler, end=end, item=item)
+        self._messages = sampled_messages(node, create, ticks, timestamped=timestamped, most=most)
+
+    def _begin(self, scheduler: abc.SchedulerBase | None) -> None:
+        reading = self._reading = SingleAssignmentDisposable()  # the ticks may end while it begins
+        reading.disposable = self._messages.subscribe(
+            self._receive, self._fail, self._complete, scheduler=scheduler
+        )
+
+    def _finish(self) -> None:
+        self._reading.dispose()
+
+    def _fail(self, error: Exception) -> None:
+        for observer in self._dismissed():
+            observer.on_error(error)
+
+    def _complete(self) -> None:
+        for observer in self._dismissed():
+            observer.on_completed()
+
+    def _dismissed(self) -> tuple[abc.ObserverBase[Any], ...]:
+        """Forget all observers and return them: one that subscribes again at the end begins to read."""
+        with self._lock:
+            observers, self._listening, self._members = self._listening, (), []
+        return observers

@@ -29,20 +29,24 @@ class SharedReader:
         *,
         scheduler: abc.SchedulerBase,
         end: End,
+        item: Callable[[Any], Any] | None = None,
         retained: deque[Any] | None = None,
     ) -> None:
         """
         Share a reader among observers; none exists yet.
 
-        :param create: creates the reader of ``node``, with a callback that gets the items.
+        :param create: creates the reader of ``node``, with a callback that gets what it receives.
         :param scheduler: runs actions on the thread that runs the callback.
         :param end: completes when the node ends; the observers complete with it.
+        :param item: turns what is received into an item, or into ``None`` for none. What it raises is an
+            error of the observers.
         :param retained: holds the items for late observers; None if late observers get none.
         """
         self._node = node
         self._create = create
         self._scheduler = scheduler
         self._end = end
+        self._item = item
         self._retained = retained
         self._lock = threading.RLock()
         self._subscriptions: list[Subscription] = []
@@ -57,10 +61,10 @@ class SharedReader:
                 observer.on_completed()
                 return Disposable()
             self._members.append(observer)
-            if not self._subscriptions:
+            if len(self._members) == 1:
                 self._listening = (observer,)
                 try:
-                    self._subscriptions.append(self._create_first())
+                    self._begin(scheduler)
                 except Exception:
                     self._members = []
                     raise
@@ -71,8 +75,17 @@ class SharedReader:
         at_end = self._end.subscribe(on_completed=observer.on_completed)
         return CompositeDisposable(at_end, Disposable(lambda: self._leave(observer)))
 
-    def _create_first(self) -> Subscription:
-        return self._create(self._emit)
+    def _begin(self, scheduler: abc.SchedulerBase | None) -> None:
+        """Create the reader. :param scheduler: that of the first observer."""
+        self._subscriptions.append(self._create(self._receive))
+
+    def _finish(self) -> None:
+        """Destroy the reader."""
+        subscriptions, self._subscriptions = self._subscriptions, []
+        if self._retained is not None:
+            self._retained.clear()
+        for subscription in subscriptions:
+            self._node.destroy_subscription(subscription)
 
     def _join(self, observer: abc.ObserverBase[Any]) -> None:
         with self._lock:
@@ -85,7 +98,19 @@ class SharedReader:
         for item in retained:
             observer.on_next(item)
 
-    def _emit(self, item: Any) -> None:
+    def _receive(self, item: Any) -> None:
+        """Hand on what is received. All in one step: every message takes this path."""
+        if self._item is not None:
+            try:
+                item = self._item(item)
+            except Exception as error:
+                for observer in self._listening:
+                    observer.on_error(error)
+                return
+            if item is None:
+                return
+        if self._retained is not None:
+            self._retained.append(item)
         for observer in self._listening:
             observer.on_next(item)
 
@@ -93,10 +118,5 @@ class SharedReader:
         with self._lock:
             self._members = [member for member in self._members if member is not observer]
             self._listening = tuple(member for member in self._listening if member is not observer)
-            if self._members:
-                return
-            subscriptions, self._subscriptions = self._subscriptions, []
-            if self._retained is not None:
-                self._retained.clear()
-            for subscription in subscriptions:
-                self._node.destroy_subscription(subscription)
+            if not self._members:
+                self._finish()
