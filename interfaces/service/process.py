@@ -21,7 +21,7 @@ import rclpy
 from rclpy.exceptions import NameValidationException, ParameterException
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 
-from interfaces.service import instance
+from interfaces.service import instance, overrides
 from interfaces.service.errors import UserError
 from interfaces.service.node import ServiceNode
 
@@ -77,6 +77,7 @@ def _spin(node: ServiceNode, wire: Callable[[ServiceNode], None]) -> int:
     with instance.claim(node), SingleThreadedExecutor() as executor:
         try:
             wire(node)
+            overrides.check(node, sys.argv[1:])
             executor.add_node(node)
             _spins = True
             executor.spin()

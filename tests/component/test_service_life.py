@@ -268,6 +268,14 @@ def test_killed_instance_frees_its_name_at_once(start: Start) -> None:
             ["services.dead_mans_switch", "--ros-args", "-p", "scenario:=/nowhere.yaml"],
             "dead_mans_switch: /nowhere.yaml: No such file or directory",
         ),
+        (
+            ["services.robot_state", "--ros-args", "-p", "rate:=30.0", "--param", "robot_state:raet:=30.0"],
+            "robot_state: raet: no such parameter; the parameters are .*rate",
+        ),
+        (
+            ["services.kinematics", "--rate=3"],
+            "kinematics: --rate=3: no such option; those of ROS follow after --ros-args",
+        ),
     ],
 )
 def test_user_error_is_one_line_and_exit_code_2(start: Start, arguments: list[str], reason: str) -> None:
@@ -276,6 +284,13 @@ def test_user_error_is_one_line_and_exit_code_2(start: Start, arguments: list[st
     assert code == 2
     assert errors.count("\n") == 1
     assert re.match(reason, errors)
+
+
+def test_parameter_file_may_name_parameters_of_other_services(start: Start, tmp_path: Path) -> None:
+    file = tmp_path / "parameters.yaml"
+    file.write_text("/**: {ros__parameters: {rate: 30.0}}")
+    ready = start("-c", READY, "--ros-args", "--params-file", str(file), "-p", "use_sim_time:=false")
+    assert ready.wait_for_line() == "ready"
 
 
 @pytest.mark.parametrize(
