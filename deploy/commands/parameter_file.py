@@ -27,12 +27,12 @@ def load(path: str, namespace: str) -> dict[str, Any]:
     """
     Return the content of a file, with the full name of each node: ROS applies no other in a namespace.
 
-    :raises UserError: for the first error, with file, key and reason.
+    :raises UserError: for errors: a line for each, with file, key and reason.
     """
     with interruption.blocking():  # the file may be a silent pipe
         document = yaml_file.load(path)
-    for key, problem in problems(document, namespace):
-        raise UserError(f"{path}: {key}: {problem}")
+    if found := [f"{path}: {key}: {problem}" for key, problem in problems(document, namespace)]:
+        raise UserError("\n".join(found))
     prefix = namespace.rstrip("/") + "/"
     return {
         node if node == ALL else prefix + _program_of(node, namespace): document[node] for node in document

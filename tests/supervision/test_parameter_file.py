@@ -87,6 +87,20 @@ def test_an_error_of_yaml_is_one_line_with_the_file(tmp_path: Path) -> None:
         parameter_file.load(str(file), "/")
 
 
+def test_all_errors_of_a_file_are_reported_a_line_for_each(tmp_path: Path) -> None:
+    file = tmp_path / "mine.yaml"
+    file.write_text("""
+        operator_watchdog: {ros__parameters: {silence: -1.0, strikes: 0}}
+        velocity: {ros__parameters: {rate: 1.0}}
+        pilot: {}
+    """)
+    with pytest.raises(UserError) as raised:
+        parameter_file.load(str(file), "/")
+    keys = ["operator_watchdog.silence", "operator_watchdog.strikes", "velocity.rate", "pilot"]
+    lines = str(raised.value).splitlines()
+    assert [line.split(": ")[:2] for line in lines] == [[str(file), key] for key in keys]
+
+
 def test_1e3_is_a_number(tmp_path: Path) -> None:
     file = tmp_path / "mine.yaml"
     file.write_text("dead_mans_switch: {ros__parameters: {rate: 1e3}}")
