@@ -24,6 +24,24 @@ STAMP := .venv/made-from
 HOLD := $(shell env --block-signal=INT echo env --block-signal=INT 2>/dev/null)
 export PYTHON SCENARIO PARAMETERS WEB RUNTIME
 
+# The variables of each command. Others on the command line are refused, except by `make stop`: it must not fail.
+USED_BY_run := SCENARIO PARAMETERS WEB
+USED_BY_start := $(USED_BY_run)
+USED_BY_chaos := MINUTES SEED CHAOS
+USED_BY_simulate := HOURS SEED SCHEDULE SIMULATE
+USED_BY_replay := RECORD REPLAY
+USED_BY_test := TESTS
+USED_BY_mutants := MODULES
+USED_BY_bench := BENCH
+# Those of the environment may also stand on the command line of make.
+ENVIRONMENT := ROS_% RMW_% CYCLONEDDS_% FASTRTPS_% FASTDDS_% REACTIVE_ARM_% PIP_% PYTHONPATH PATH
+GOALS := $(or $(MAKECMDGOALS),help)
+ifeq ($(MAKELEVEL)$(filter stop,$(GOALS)),0) # another make passes its own variables on
+USED := $(strip PYTHON $(foreach goal,$(GOALS),$(USED_BY_$(goal))))
+GIVEN := $(foreach name,$(.VARIABLES),$(if $(filter command,$(origin $(name))),$(name)))
+$(foreach name,$(filter-out $(USED) $(ENVIRONMENT),$(GIVEN)),$(error make $(GOALS) has no variable $(name); it has $(USED)))
+endif
+
 .PHONY: help setup run start stop status logs record console chaos simulate replay test mutants check bench
 
 help:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import fcntl
 import os
+import re
 import select
 import shutil
 import signal
@@ -120,6 +121,26 @@ def test_make_stop_works_in_a_read_only_checkout(checkout: Path) -> None:
 def test_a_quote_in_a_variable_of_make_is_no_shell_syntax(checkout: Path) -> None:
     done = subprocess.run(["make", "stop", "PYTHON=it's"], cwd=checkout, capture_output=True, text=True)
     assert done.stderr.splitlines()[-2:-1] == ["PYTHON=it's is not a Python 3.11, 3.12 or 3.13"]
+
+
+@pytest.mark.parametrize(
+    ("words", "problem"),
+    [
+        ("run SCENRIO=demo", "run has no variable SCENRIO; it has PYTHON SCENARIO PARAMETERS WEB"),
+        ("SCENARIO=demo", "help has no variable SCENARIO; it has PYTHON"),
+        ("chaos MINUTES=1 HOURS=1", "chaos has no variable HOURS; it has PYTHON MINUTES SEED CHAOS"),
+        ("help PYTHON=python3 ROS_DOMAIN_ID=1", ""),
+        ("stop SCENRIO=demo", ""),
+    ],
+)
+def test_a_variable_that_make_would_ignore_is_refused(checkout: Path, words: str, problem: str) -> None:
+    outside = {name: value for name, value in os.environ.items() if not name.startswith("MAKE")}
+    done = subprocess.run(["make", *words.split()], cwd=checkout, env=outside, capture_output=True, text=True)
+    if problem:
+        assert (done.returncode, done.stdout) == (2, "")
+        assert re.fullmatch(rf"Makefile:\d+: \*\*\* make {problem}\.  Stop\.\n", done.stderr)
+    else:
+        assert (done.returncode, done.stderr) == (0, "")
 
 
 def test_an_interrupt_waits_until_the_step_can_be_ended(monkeypatch: pytest.MonkeyPatch) -> None:
