@@ -171,7 +171,7 @@ def _await_services(system: System, member: Member, log_sizes: dict[str, int]) -
             for program in missing:
                 if program.state in ("BACKOFF", "FATAL") or program.restarts >= START_ATTEMPTS:
                     words = _last_words(system, program, log_sizes.get(program.name, 0))
-                    raise DeploymentError(f"{program.name} does not start:\n{words}")
+                    raise DeploymentError(f"{program.name} does not start:\n{words or system.silent_end()}")
             if time.monotonic() > deadline:
                 names = ", ".join(program.name for program in missing)
                 raise DeploymentError(f"No sign of life from {names}; see {system.logs}")

@@ -97,6 +97,11 @@ class System:
         """The message about the end of supervisord, by a stop or by an accident."""
         return self.unattended() if self.is_wanted else "The system has ended."
 
+    def silent_end(self) -> str:
+        """The reason of a program that gave none: it may have no place for its words."""
+        free = shutil.disk_usage(self.run).free
+        return f"It gave no reason; {free / 1000:.0f} kB are free on the disk of {self.run}"
+
     def members(self) -> list[processes.Process]:
         """The live processes of the system, also those that a dead supervisord left behind."""
         return processes.of_system(self.run)
@@ -284,7 +289,7 @@ class System:
                     return
                 time.sleep(0.02)
             reason = output.read_text(errors="replace").strip()
-            raise DeploymentError(f"supervisord does not start:\n{reason}")
+            raise DeploymentError(f"supervisord does not start:\n{reason or self.silent_end()}")
         except BaseException:
             process.kill()
             process.wait()

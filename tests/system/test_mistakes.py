@@ -132,3 +132,16 @@ def test_a_service_in_the_same_domain_is_reported(site: Site) -> None:
 def test_the_sentinel_runs_only_under_supervisord(site: Site) -> None:
     code, printed = site.do_command(sys.executable, "-m", "deploy.supervision.sentinel")
     assert (code, printed) == (2, "sentinel: runs only under supervisord: make start")
+
+
+def test_a_disk_without_space_for_a_log_is_reported(site: Site) -> None:
+    site.run.mkdir()
+    fill = 'mount -t tmpfs -o size=64k tmpfs "$0" && head -c 61440 /dev/zero >"$0/fill" && exec "$@"'
+    launcher = [sys.executable, "-m", "deploy.commands.launcher", "start", STEADY]
+    code, printed = site.do_command(
+        "unshare", "--mount", "--map-root-user", "sh", "-c", fill, str(site.run), *launcher
+    )
+    if printed.startswith(("unshare:", "mount:")):
+        pytest.skip(f"platform: {printed}")
+    space = f"It gave no reason; 0 kB are free on the disk of {site.run}"
+    assert (code, printed) == (1, f"supervisord does not start:\n{space}")
