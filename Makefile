@@ -37,7 +37,7 @@ USED_BY_bench := BENCH
 ENVIRONMENT := ROS_% RMW_% CYCLONEDDS_% FASTRTPS_% FASTDDS_% REACTIVE_ARM_% PIP_% PYTHONPATH PATH
 GOALS := $(or $(MAKECMDGOALS),help)
 ifeq ($(MAKELEVEL)$(filter stop,$(GOALS)),0) # another make passes its own variables on
-USED := $(strip PYTHON $(foreach goal,$(GOALS),$(USED_BY_$(goal))))
+USED := $(strip PYTHON RUNTIME $(foreach goal,$(GOALS),$(USED_BY_$(goal))))
 GIVEN := $(foreach name,$(.VARIABLES),$(if $(filter command,$(origin $(name))),$(name)))
 $(foreach name,$(filter-out $(USED) $(ENVIRONMENT),$(GIVEN)),$(error make $(GOALS) has no variable $(name); it has $(USED)))
 endif
@@ -62,6 +62,7 @@ help:
 	@echo "make bench    compare the costs with those of the alternatives  (BENCH=\"--rounds 5\", minutes each)"
 	@echo "make check    ruff, mypy, import rules, shellcheck, yamllint"
 	@echo "make setup    only set up .venv                   (PYTHON= chooses the interpreter, 3.11 to 3.13)"
+	@echo "All of them run on ROS 2's own rclpy from PyPI, or on a sourced ROS 2. RUNTIME=embedded takes our lighter one."
 
 setup:
 	@exec $(HOLD) deploy/commands/python.sh deploy.commands.setup "$$PYTHON"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-import importlib.util
 import os
 import signal
 import time
@@ -14,15 +13,9 @@ from pathlib import Path
 import pytest
 from hypothesis import Phase, settings
 
-_EMBEDDED_ONLY = (
-    "deploy/runtime/tests/interop",
-    "deploy/runtime/tests/runtime",
-    "deploy/runtime/tests/simulation",
-    "tests/mutants",
-    "tests/simulation",
-)
-"""Folders whose tests need the embedded rclpy: `make test` runs them with RUNTIME=embedded."""
-collect_ignore = [] if importlib.util.find_spec("rosidl_runtime_embedded") else [*_EMBEDDED_ONLY]
+from deploy.commands.test import left_out_here
+
+collect_ignore = [*left_out_here()]  # `make test` runs these with RUNTIME=embedded
 
 settings.register_profile("reactive-arm", deadline=None)  # a busy machine is no defect
 # For `make mutants`: whether a test fails, not the smallest example; the same examples each time.

@@ -1,69 +1,171 @@
-"""`make test`: most tests share the processors; those with bounds of time follow, few at a time or alone."""
+"""`make test`: each test on the rclpy that RUNTIME chooses, or on the embedded one if it needs that.
+
+Most tests share the processors; those with bounds of time follow, few at a time or alone.
+"""
 
 from __future__ import annotations
 
+import importlib.util
 import os
 import signal
 import subprocess
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from itertools import pairwise
 from pathlib import Path
+from typing import NamedTuple
 from xml.etree import ElementTree
+
+from deploy.commands.setup import RUNTIME, sourced_rclpy
 
 PASSED, FAILED, WRONG_USE, NO_TESTS = 0, 1, 4, 5  # exit codes of pytest
 PROCESSORS = os.cpu_count() or 1
 PHASES = {"not timed and not alone": 2 * PROCESSORS, "timed": PROCESSORS, "alone": 1}  # and their workers
+IGNORE = "--ignore="
+EMBEDDED_ONLY = (
+    "deploy/runtime/tests/interop",
+    "deploy/runtime/tests/runtime",
+    "deploy/runtime/tests/simulation",
+    "tests/mutants",
+    "tests/simulation",
+)
+"""Tests of the embedded rclpy, and of what runs only on it."""
+ACTIONS = (
+    "deploy/runtime/tests/conformance/test_action_classes.py",
+    "deploy/runtime/tests/conformance/test_action_graph.py",
+    "deploy/runtime/tests/conformance/test_actions.py",
+    "deploy/tools/tests/cli/test_action.py",
+    "interfaces/reactive_node/tests/test_actions.py",
+)
+"""Tests with a type of actions: ROS 2's wheels have none."""
+
+
+class Part(NamedTuple):
+    """Tests that run on one rclpy."""
+
+    rclpy: str
+    runtime: str
+    """the value of the environment variable RUNTIME"""
+    arguments: list[str]
+
+
+class Results(NamedTuple):
+    """The tests that passed, failed and were skipped."""
+
+    passed: set[str]
+    failed: set[str]
+    skipped: set[str]
+
+    def __str__(self) -> str:
+        return f"{len(self.passed)} passed, {len(self.failed)} failed, {len(self.skipped)} skipped"
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Run pytest for each phase with further arguments; print the results of all, return the exit code."""
-    if missing := missing_paths(arguments):
+    """Run pytest for each part and phase; print the results of all, return the exit code."""
+    if missing := [path for path in paths(arguments) if not os.path.exists(path.partition("::")[0])]:
+        # pytest-xdist finds no tests in them, and does not say why.
         print(f"TESTS: {', '.join(missing)}: no such file or directory", file=sys.stderr)
         return WRONG_USE
-    # All workers use what one of them has compiled.
-    environment = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
-    codes = []
-    with tempfile.TemporaryDirectory() as directory:
-        reports = Path(directory)
-        for number, (marked, workers) in enumerate(PHASES.items()):
-            options = ["--dist", "loadfile", "--no-loadscope-reorder", "-n", str(workers), "-m", marked]
-            report = f"--junit-xml={reports / str(number)}"
-            command = [sys.executable, "-m", "pytest", *options, *arguments, report]
-            codes.append(subprocess.call(command, env=environment))
-            if codes[-1] not in (PASSED, FAILED, NO_TESTS):
-                print("Not all tests have run.", flush=True)
-                break
-        print(summary(reports), flush=True)
+    total = Results(set(), set(), set())
+    codes, lines = [], []
+    for part in parts(arguments):
+        with tempfile.TemporaryDirectory() as directory:
+            codes += run(part, Path(directory))
+            results = results_in(Path(directory))
+        lines.append(f"{part.rclpy}: {results}")
+        total = Results(*(all_ | these for all_, these in zip(total, results, strict=True)))
+    if any(code not in (PASSED, FAILED, NO_TESTS) for code in codes):
+        lines.append("Not all tests have run.")
+    elif left_out := uncollected(arguments, set.union(*total)):
+        lines.append(f"No test of these files has run: {' '.join(left_out)}")
+        codes.append(FAILED)
+    print(*lines, total, sep="\n", flush=True)
     return max((code for code in codes if code != NO_TESTS), default=NO_TESTS)
 
 
-def summary(reports: Path) -> str:
-    """Return how many tests passed, failed and were skipped, from the JUnit reports in a directory."""
+def parts(arguments: Sequence[str]) -> list[Part]:
+    """Return the tests for the rclpy of this process, and those that need the embedded one."""
+    if importlib.util.find_spec("rosidl_runtime_embedded"):
+        return [Part("Embedded rclpy", "embedded", [*arguments])]
+    given = paths(arguments)
+    options = [word for word in arguments if word not in given]
+    needy = [path for path in left_out_here() if not _is_in(path, ignored(arguments))]
+    here = [path for path in given if not _is_in(path, needy)]
+    embedded = [path for path in given if _is_in(path, needy)]
+    embedded += [path for path in needy if _is_in(path, here) or not given]
+    found = [Part("ROS 2's rclpy", "", [*options, *here])] if here or not given else []
+    if embedded and not sourced_rclpy():
+        found.append(Part("Embedded rclpy", "embedded", [*options, *embedded]))
+    return found
+
+
+def left_out_here() -> tuple[str, ...]:
+    """Return the files and folders whose tests cannot run on the rclpy of this process."""
+    if importlib.util.find_spec("rosidl_runtime_embedded"):
+        return ()
+    return EMBEDDED_ONLY if importlib.util.find_spec("example_interfaces") else EMBEDDED_ONLY + ACTIONS
+
+
+def run(part: Part, reports: Path) -> list[int]:
+    """Run pytest for each phase; return its exit codes. Reports (JUnit) go to a directory."""
+    environment = os.environ | {RUNTIME: part.runtime}
+    environment.pop("PYTHONDONTWRITEBYTECODE", None)  # all workers use what one of them has compiled
+    codes: list[int] = []
+    for marked, workers in PHASES.items():
+        options = ["--dist", "loadfile", "--no-loadscope-reorder", "-n", str(workers), "-m", marked]
+        report = f"--junit-xml={reports / str(len(codes))}"
+        command = [sys.executable, "-m", "pytest", *options, *part.arguments, report]
+        codes.append(subprocess.call(command, env=environment))
+        if codes[-1] not in (PASSED, FAILED, NO_TESTS):
+            break
+    return codes
+
+
+def results_in(reports: Path) -> Results:
+    """Return the results in the reports of a directory."""
     tests, failed, skipped = set(), set(), set()
     for report in reports.iterdir():
         for case in ElementTree.parse(report).iter("testcase"):
-            test = case.get("classname"), case.get("name")  # it may fail and then its fixture: two cases
-            tests.add(test)
+            test = f"{case.get('classname')}.{case.get('name')}"
+            tests.add(test)  # once, even if it fails and then its fixture: these are two cases
             outcomes = {each.tag for each in case}
             if outcomes & {"failure", "error"}:
                 failed.add(test)
             elif "skipped" in outcomes:
                 skipped.add(test)
     skipped -= failed
-    return f"{len(tests - failed - skipped)} passed, {len(failed)} failed, {len(skipped)} skipped"
+    return Results(tests - failed - skipped, failed, skipped)
 
 
-def missing_paths(arguments: Sequence[str]) -> list[str]:
-    """Return the paths that do not exist: pytest-xdist finds no tests in them, and does not say why."""
+def uncollected(arguments: Sequence[str], tests: Iterable[str]) -> list[str]:
+    """Return the files of which no test is known, if all tests below some folders should have run."""
+    given = paths(arguments)
+    if len(given) + len(ignored(arguments)) < len(arguments) or any("::" in path for path in given):
+        return []  # an option selects tests
+    names = "\n".join(f".{test}." for test in tests)
+    files = {file for path in given for file in Path(path).rglob("test_*.py")}
+    unseen = (str(file) for file in files if f".{'.'.join(file.with_suffix('').parts)}." not in names)
+    not_here = (*left_out_here(), *ignored(arguments)) if sourced_rclpy() else ignored(arguments)
+    return sorted(file for file in unseen if not _is_in(file, not_here))
+
+
+def paths(arguments: Sequence[str]) -> list[str]:
+    """Return the words that are paths; a word after an option may be its value."""
     return [
         word
         for before, word in pairwise(["", *arguments])
-        # A word after an option may be its value.
         if not word.startswith("-") and ("=" in before or not before.startswith("-"))
-        if not os.path.exists(word.partition("::")[0])
     ]
+
+
+def ignored(arguments: Sequence[str]) -> list[str]:
+    """Return the paths that an option takes out."""
+    return [word.removeprefix(IGNORE) for word in arguments if word.startswith(IGNORE)]
+
+
+def _is_in(path: str, folders: Iterable[str]) -> bool:
+    return any(Path(path.partition("::")[0]).is_relative_to(folder) for folder in folders)
 
 
 if __name__ == "__main__":

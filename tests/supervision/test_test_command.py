@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import subprocess
 import sys
 from pathlib import Path
@@ -9,6 +10,11 @@ from pathlib import Path
 import pytest
 
 from deploy.commands import test as command
+
+HERE = command.Part("", "", ["tests/system", "-x"])
+"""Tests for one rclpy."""
+IGNORED = "--ignore=tests/mutants"
+ONE = "tests/simulation/test_shift.py::test"
 
 
 @pytest.mark.parametrize(
@@ -20,16 +26,16 @@ def test_exit_code_is_the_worst_and_an_interruption_ends_it(
 ) -> None:
     left = list(codes)
     monkeypatch.setattr(subprocess, "call", lambda command, env: left.pop(0))
-    assert command.main(["tests"]) == result
+    assert command.main(["tests/system", "-x"]) == result
     assert left == []
 
 
 def test_every_test_runs_once_and_those_with_bounds_of_time_beside_few(
-    monkeypatch: pytest.MonkeyPatch,
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     commands: list[list[str]] = []
     monkeypatch.setattr(subprocess, "call", lambda command, env: commands.append(command) or 0)
-    command.main(["tests/system", "-x"])
+    command.run(HERE, tmp_path)
     assert [each[-5:-1] for each in commands] == [
         ["-m", mark, "tests/system", "-x"] for mark in ("not timed and not alone", "timed", "alone")
     ]
@@ -38,18 +44,68 @@ def test_every_test_runs_once_and_those_with_bounds_of_time_beside_few(
     assert one == 1
 
 
-def test_workers_share_compiled_modules(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_workers_share_compiled_modules_and_the_runtime(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     environments: list[dict[str, str]] = []
     monkeypatch.setenv("PYTHONDONTWRITEBYTECODE", "1")
     monkeypatch.setattr(subprocess, "call", lambda command, env: environments.append(env) or 0)
-    command.main(["tests/system"])
+    command.run(HERE._replace(runtime="embedded"), tmp_path)
     assert not any("PYTHONDONTWRITEBYTECODE" in environment for environment in environments)
+    assert {environment["RUNTIME"] for environment in environments} == {"embedded"}
+
+
+def arguments(words: str) -> dict[str, str]:
+    """Return the arguments of each part, by the name of its rclpy."""
+    return {part.rclpy.split()[0]: " ".join(part.arguments) for part in command.parts(words.split())}
+
+
+@pytest.mark.parametrize(
+    ("words", "on_ros", "on_embedded"),
+    [
+        ("tests/system -x", "-x tests/system", None),
+        ("tests/simulation -x", None, "-x tests/simulation"),
+        ("tests -x", "-x tests", "-x tests/mutants tests/simulation"),
+        (f"tests {IGNORED}", f"{IGNORED} tests", f"{IGNORED} tests/simulation"),
+        (f"{ONE} tests/page", "tests/page", ONE),
+    ],
+)
+def test_each_test_runs_on_one_rclpy(
+    words: str, on_ros: str | None, on_embedded: str | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+    monkeypatch.setattr(command, "sourced_rclpy", lambda: "")
+    expected = {"ROS": on_ros, "Embedded": on_embedded}
+    assert arguments(words) == {name: text for name, text in expected.items() if text}
+
+
+def test_sourced_ros_runs_no_test_of_the_embedded_rclpy(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+    monkeypatch.setattr(command, "sourced_rclpy", lambda: "/opt/ros/rclpy")
+    assert arguments("tests") == {"ROS": "tests"}
+
+
+def test_embedded_rclpy_runs_every_test(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: name)
+    assert arguments("tests deploy/runtime") == {"Embedded": "tests deploy/runtime"}
+
+
+def test_file_without_a_collected_test_is_named(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name in ("tests/a/test_one.py", "tests/a/test_two.py", "tests/page/test_three.py"):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).touch()
+    seen = ["tests.a.test_one.TestIt.test_passes", ".tests.a.test_twofold"]
+    assert command.uncollected(["tests"], seen) == ["tests/a/test_two.py", "tests/page/test_three.py"]
+    assert command.uncollected(["tests", "--ignore=tests/page"], seen) == ["tests/a/test_two.py"]
+    assert command.uncollected(["tests", "-k", "word"], seen) == []
+    assert command.uncollected(["tests/a/test_two.py::test"], seen) == []
 
 
 @pytest.mark.parametrize(
     ("words", "missing"),
     [
-        ("tests interfaces/reactive_node --ignore=tests/page", ""),
+        ("tests interfaces/reactive_node --ignore=tests/page -x", ""),
         ("tests/supervision/test_test_command.py::test_workers -k word -x", ""),
         ("nix", "nix"),
         ("tests --ignore=tests/page nix/test_it.py::test tests/nix", "nix/test_it.py::test, tests/nix"),
@@ -65,6 +121,7 @@ def test_a_missing_path_is_named_and_nothing_runs(
     assert capsys.readouterr().err == (f"TESTS: {missing}: no such file or directory\n" if missing else "")
 
 
+NOTHING = command.Results(set(), set(), set())
 TESTS = """
 import pytest
 
@@ -101,4 +158,4 @@ def test_last_line_follows_a_warning_if_not_all_tests_have_run(
 ) -> None:
     monkeypatch.setattr(subprocess, "call", lambda command, env: 2)
     assert command.main(["tests/system"]) == 2
-    assert capsys.readouterr().out == "Not all tests have run.\n0 passed, 0 failed, 0 skipped\n"
+    assert capsys.readouterr().out.splitlines()[1:] == ["Not all tests have run.", str(NOTHING)]
