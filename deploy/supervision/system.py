@@ -302,6 +302,7 @@ class System:
         environment[NAMESPACE] = namespace_of(environment)
         set_middleware(environment)
         environment["PYTHONUNBUFFERED"] = "1"
+        environment["OPENBLAS_NUM_THREADS"] = "1"  # numpy starts no threads: supervisord forks
         _prepend(environment, "PATH", str(Path(sys.executable).parent))
         _prepend(environment, "PYTHONPATH", str(processes.ROOT))
         return environment

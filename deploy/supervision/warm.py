@@ -15,6 +15,7 @@ import atexit
 import ctypes
 import gc
 import importlib
+import importlib.util
 import mmap
 import os
 import pkgutil
@@ -32,6 +33,7 @@ from typing import Any, NoReturn
 from deploy.supervision import processes
 
 LIBRARIES = (
+    "json",
     "reactive_node",
     "reactivex.operators",
     "rclpy.executors",
@@ -40,10 +42,8 @@ LIBRARIES = (
     "yaml",
 )
 """What the services import from outside of this checkout, also late."""
-EMBEDDED_LIBRARIES = ("rclpy._graph", "rclpy._parameter_files")
+EMBEDDED = ("rclpy._graph", "rclpy._parameter_files")
 """What the embedded rclpy imports late."""
-OPTIONAL_TYPES = ("tf2_msgs.msg.TFMessage",)
-"""Types that a robot publishes only where their packages exist."""
 TYPES = (
     "diagnostic_msgs.msg.DiagnosticArray",
     "diagnostic_msgs.msg.DiagnosticStatus",
@@ -64,6 +64,7 @@ TYPES = (
     "rcl_interfaces.srv.SetParameters",
     "rcl_interfaces.srv.SetParametersAtomically",
     "sensor_msgs.msg.JointState",
+    "service_msgs.msg.ServiceEventInfo",
     "std_msgs.msg.Bool",
     "std_msgs.msg.Float64",
     "std_msgs.msg.Header",
@@ -71,6 +72,8 @@ TYPES = (
     "type_description_interfaces.srv.GetTypeDescription",
 )
 """The types of messages and of the services that each node has."""
+OPTIONAL = ("tf2_msgs.msg.TFMessage",)
+"""A type that ROS 2's wheels do not have."""
 
 _PR_SET_MM, _PR_SET_MM_MAP = 35, 14
 _NO_FILE = 0xFFFFFFFF
@@ -81,10 +84,10 @@ _names: mmap.mmap  # the command line and the environment of this process, for a
 def import_libraries() -> None:
     """Import what programs need; what cannot be imported is an error of the program that imports it."""
     gc.disable()  # imports leave next to no garbage, and to look for it takes a fifth of the time
-    for name in LIBRARIES:
+    for name in libraries():
         with suppress(Exception):
             importlib.import_module(name)
-    for name in TYPES:
+    for name in types():
         with suppress(Exception):
             _use(pkgutil.resolve_name(name))
     with suppress(Exception):
@@ -93,16 +96,25 @@ def import_libraries() -> None:
     gc.enable()
 
 
+def libraries() -> tuple[str, ...]:
+    """Return the modules that programs import on the rclpy at hand."""
+    return LIBRARIES + (EMBEDDED if importlib.util.find_spec("rosidl_runtime_embedded") else ())
+
+
+def types() -> tuple[str, ...]:
+    """Return the types that programs use, as far as their packages exist."""
+    return TYPES + (OPTIONAL if importlib.util.find_spec("tf2_msgs") else ())
+
+
 def _use(type_: Any) -> None:
-    """Let a type make what it makes on its first use: its hash, and the code of a message."""
+    """Let a type make what it makes on its first use: its hash and code, or load the library with both."""
     from rclpy.serialization import deserialize_message, serialize_message
 
-    if hasattr(type_, "get_fields_and_field_types"):
-        getattr(type_, "_TYPE_HASH", "")
-        deserialize_message(serialize_message(type_()), type_)
-    else:  # a service: an endpoint has the type of its request or response
-        for part in (type_.Request, type_.Response):
-            getattr(part, "_TYPE_HASH", "")
+    # A service's endpoint has the type of its request or response.
+    parts = [type_.Request, type_.Response] if hasattr(type_, "Request") else [type_]
+    for part in parts:
+        getattr(part, "_TYPE_HASH", "")
+        deserialize_message(serialize_message(part()), part)
 
 
 def _use_names() -> None:

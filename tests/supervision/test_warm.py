@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import importlib
 import os
+import pkgutil
 import shutil
 import signal
 import subprocess
@@ -11,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+from deploy.supervision import manifest, warm
 from deploy.supervision.processes import ROOT
 from reactive_node.domains import reserved_domain
 
@@ -126,17 +129,43 @@ def test_edited_module_of_the_checkout_counts_at_the_next_start(tmp_path: Path) 
     assert (done.stdout, done.stderr) == ("True\nTrue\n", "")
 
 
-def test_program_imports_no_library_again(tmp_path: Path) -> None:
-    use = (
-        "before = set(sys.modules)\n"
-        "from rclpy.serialization import deserialize_message, serialize_message\n"
-        "from reactivex import operators\n"
-        "from std_msgs.msg import Float64\n"
-        "assert deserialize_message(serialize_message(Float64(data=1.5)), Float64).data == 1.5\n"
-        "print(sorted(set(sys.modules) - before))\n"
-    )
-    done = run(tmp_path, f"{use}{FORKED}", more="warm.import_libraries()")
+@pytest.mark.parametrize("name", warm.libraries())
+def test_prepared_library_exists(name: str) -> None:
+    importlib.import_module(name)
+
+
+@pytest.mark.parametrize("name", warm.types())
+def test_prepared_type_exists(name: str) -> None:
+    assert isinstance(pkgutil.resolve_name(name), type)
+
+
+NEW = "[name for name in sys.modules if name not in before and name.partition('.')[0] not in OURS]"
+OURS = ("deploy", "interfaces", "services", "probe")
+"""Packages of the checkout: a service reads them at each start."""
+
+
+def test_programs_of_the_manifest_import_no_library_again(tmp_path: Path) -> None:
+    modules = {program.module for program in manifest.programs()}
+    use = f"OURS = {OURS}\nbefore = set(sys.modules)\nimport {', '.join(modules)}\nprint({NEW})\n"
+    done = run(tmp_path, f"{use}{FORKED}", more="import supervisor.supervisord; warm.import_libraries()")
     assert (done.stdout, done.stderr) == ("[]\nTrue\n", "")
+
+
+def test_supervisord_has_no_dds_and_no_thread_but_those_of_tracing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """ROS 2's rclpy loads LTTng, whose two threads wait for a session and hold no lock."""
+    monkeypatch.setenv("OPENBLAS_NUM_THREADS", "1")  # as supervisord has it
+    count = (
+        "from pathlib import Path\n"
+        "threads = len(os.listdir('/proc/self/task'))\n"
+        "expected = 3 if 'liblttng-ust' in Path('/proc/self/maps').read_text() else 1\n"
+        "links = [os.readlink(f'/proc/self/fd/{number}') for number in range(3, 100)\n"
+        "    if os.path.exists(f'/proc/self/fd/{number}')]\n"
+        "print(threads - expected, [link for link in links if 'socket' in link])\n"
+    )
+    done = run(tmp_path, f"{count}{FORKED}", more="warm.import_libraries()")
+    assert (done.stdout, done.stderr) == ("0 []\nTrue\n", "")
 
 
 def test_service_prepares_no_type_and_no_pattern_again(
@@ -145,6 +174,8 @@ def test_service_prepares_no_type_and_no_pattern_again(
     """For a type, the embedded runtime generates code and a hash; Python compiles a pattern once."""
     use = (
         "import builtins, json, re\n"
+        f"OURS = {OURS}\n"
+        "before = set(sys.modules)\n"
         "import rclpy\n"
         "from interfaces.service import ServiceNode\n"
         "from rclpy.logging import get_logger\n"
@@ -161,11 +192,11 @@ def test_service_prepares_no_type_and_no_pattern_again(
         "node = ServiceNode('probe')\n"
         "node.declare_parameter('period', 1.0)\n"
         "node.health._on_period()\n"
-        "print(prepared)\n"
+        f"print(prepared, {NEW})\n"
         "node.destroy_node()\n"
         "rclpy.shutdown()\n"
     )
     with reserved_domain() as domain_id:
         monkeypatch.setenv("ROS_DOMAIN_ID", str(domain_id))
         done = run(tmp_path, f"{use}{FORKED}", more="warm.import_libraries()")
-    assert done.stdout == "[]\nTrue\n"
+    assert done.stdout == "[] []\nTrue\n"
