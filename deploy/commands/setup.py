@@ -22,7 +22,7 @@ import subprocess
 import sys
 import sysconfig
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
@@ -41,6 +41,7 @@ SOURCES = [ROOT / "interfaces" / "reactive_node" / "src", ROOT / "deploy" / "too
 RUNTIME = "RUNTIME"
 """Environment variable: "embedded" for the rclpy of this checkout, "" for ROS 2's own."""
 EMBEDDED = ROOT / "deploy" / "runtime" / "src"
+FAST_DDS = "rmw_fastrtps_cpp"
 SCRIPTS = {
     "supervisord": "supervisor.supervisord",
     "supervisorctl": "supervisor.supervisorctl",
@@ -63,7 +64,7 @@ def main() -> int:
         with _alone():
             began = time.monotonic()
             ros = sourced_rclpy()
-            check_runtime(os.environ.get(RUNTIME, ""), ros)
+            check_runtime(os.environ, ros)
             if not STAMP.exists() or STAMP.read_text() != fingerprint(ros):
                 make(ros)
                 STAMP.write_text(fingerprint(ros))
@@ -90,8 +91,9 @@ def sourced_rclpy() -> str:
     return "" if Path(origin).is_relative_to(ROOT) else origin
 
 
-def check_runtime(runtime: str, ros: str) -> None:
+def check_runtime(environment: Mapping[str, str], ros: str) -> None:
     """Raise SetupError unless the wanted runtime can be had beside `ros`, the rclpy of a sourced ROS 2."""
+    runtime = environment.get(RUNTIME, "")
     if runtime not in ("", "embedded"):
         raise SetupError(f"RUNTIME={runtime}: it is empty for ROS 2's own rclpy, or embedded")
     if runtime and ros:
@@ -101,6 +103,12 @@ def check_runtime(runtime: str, ros: str) -> None:
             f"PyPI has ROS 2's rclpy for x86_64 with glibc 2.28 or newer, not for this machine"
             f" ({platform.machine()}, {' '.join(filter(None, platform.libc_ver())) or 'no glibc'}):"
             " source an installed ROS 2, or use RUNTIME=embedded, which needs x86_64 with glibc 2.17"
+        )
+    rmw = environment.get("RMW_IMPLEMENTATION") or FAST_DDS
+    if not runtime and not ros and rmw != FAST_DDS:
+        raise SetupError(
+            f"RMW_IMPLEMENTATION={rmw}: PyPI has ROS 2's rclpy with {FAST_DDS} only: unset it,"
+            " source an installed ROS 2, or use RUNTIME=embedded, which is on Cyclone DDS"
         )
 
 

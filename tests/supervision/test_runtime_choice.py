@@ -20,6 +20,7 @@ from importlib.util import find_spec
 specs = {{name: find_spec(name) for name in {PACKAGES}}}
 print(*(name for name, spec in specs.items() if spec and spec.origin.startswith({str(EMBEDDED)!r})))
 """
+CYCLONE = {"RMW_IMPLEMENTATION": "rmw_cyclonedds_cpp"}
 ROS = "/opt/ros/jazzy/lib/python3.12/site-packages/rclpy/__init__.py"
 
 
@@ -61,22 +62,38 @@ def test_rclpy_in_pythonpath_is_a_sourced_ros(tmp_path: Path, monkeypatch: pytes
 
 
 @pytest.mark.parametrize(
-    ("runtime", "ros", "machine", "reason"),
+    ("environment", "ros", "machine", "reason"),
     [
-        ("embeded", "", "x86_64", "RUNTIME=embeded: it is empty for ROS 2's own rclpy, or embedded"),
-        ("embedded", ROS, "x86_64", f"ROS 2 is sourced, and its rclpy wins ({ROS}); use another shell"),
-        ("", "", "aarch64", "source an installed ROS 2, or use RUNTIME=embedded, which needs x86_64"),
-        ("", "", "x86_64", ""),
-        ("embedded", "", "aarch64", ""),
-        ("", ROS, "aarch64", ""),
+        (
+            {"RUNTIME": "embeded"},
+            "",
+            "x86_64",
+            "RUNTIME=embeded: it is empty for ROS 2",
+        ),
+        (
+            {"RUNTIME": "embedded"},
+            ROS,
+            "x86_64",
+            f"its rclpy wins ({ROS}); use another shell",
+        ),
+        ({}, "", "aarch64", "source an installed ROS 2, or use RUNTIME=embedded, which needs x86_64"),
+        (
+            CYCLONE,
+            "",
+            "x86_64",
+            "RMW_IMPLEMENTATION=rmw_cyclonedds_cpp: PyPI has",
+        ),
+        ({"RUNTIME": "", "RMW_IMPLEMENTATION": "rmw_fastrtps_cpp"}, "", "x86_64", ""),
+        ({"RUNTIME": "embedded"} | CYCLONE, "", "aarch64", ""),
+        (CYCLONE, ROS, "aarch64", ""),
     ],
 )
 def test_runtime_that_cannot_be_had_is_refused(
-    runtime: str, ros: str, machine: str, reason: str, monkeypatch: pytest.MonkeyPatch
+    environment: dict[str, str], ros: str, machine: str, reason: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(setup.platform, "machine", lambda: machine)
     try:
-        setup.check_runtime(runtime, ros)
+        setup.check_runtime(environment, ros)
         refusal = ""
     except setup.SetupError as error:
         refusal = str(error)
