@@ -9,6 +9,7 @@ from typing import Any
 from mcap.writer import CompressionType, Writer
 
 from ros2cli import rosbag2
+from ros2cli.definition import message_type
 
 _PRESETS: dict[str, dict[str, Any]] = {
     "none": {"compression": CompressionType.NONE},
@@ -30,7 +31,7 @@ class BagWriter:
         self._metadata.ros_distro = "jazzy"
         self._file = (directory / file).open("wb")
         self._writer = Writer(self._file, **_PRESETS[preset])
-        self._writer.start(profile="ros2", library="reactive-arm-runtime")
+        self._writer.start(profile="ros2", library="ros2-python-tools")
         self._schemas: dict[str, int] = {}
 
     def add_topic(self, topic: rosbag2.Topic) -> Callable[[bytes, int, int], None]:
@@ -68,21 +69,25 @@ def definition(type_name: str) -> tuple[str, str]:
     """
     Return the encoding and the text of the definition of a message, followed by those of its fields.
 
-    Parts of services and actions have no file of their own: their encoding is ``unknown``, as in rosbag2.
+    Without a definition file, the encoding is ``unknown``, as in rosbag2; parts of services have none.
     """
-    from rosidl_runtime_embedded.definition_files import definition_source, message_definition
+    from rosidl_runtime_py import get_interface_path
 
     if "/msg/" not in type_name:
         return "unknown", ""
     seen = {type_name}
 
     def text(name: str) -> str:
-        parts = [definition_source(name)[1]]
-        used = {one.type.base for one in message_definition(name).fields if one.type.is_message}
+        parts = [Path(get_interface_path(name)).read_text(encoding="utf-8")]
+        package = name.partition("/")[0]
+        used = {type_ for line in parts[0].splitlines() if (type_ := message_type(line, package))}
         for nested in sorted(used):
             if nested not in seen:
                 seen.add(nested)
                 parts.append(f"{'=' * 80}\nMSG: {nested.replace('/msg/', '/')}\n{text(nested)}")
         return "\n".join(parts)
 
-    return "ros2msg", text(type_name)
+    try:
+        return "ros2msg", text(type_name)
+    except LookupError:  # its package came without the files
+        return "unknown", ""

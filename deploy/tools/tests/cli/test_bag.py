@@ -83,6 +83,13 @@ def test_file_has_the_profile_ros2_with_schemas_and_qos(record: Record) -> None:
     assert (written["version"], written["storage_identifier"]) == (9, "mcap")
 
 
+def test_type_without_a_definition_file_is_unknown() -> None:
+    from ros2cli.bag_writer import definition
+
+    assert definition("std_srvs/srv/SetBool_Request") == ("unknown", "")
+    assert definition("nothing/msg/Nothing") == ("unknown", "")
+
+
 def test_info_describes_a_bag_and_a_file(record: Record, ros2: Any) -> None:
     bag = record("--topics", "/arm/chatter", "/arm/point", "--storage-preset-profile", "zstd_fast")
     out = ros2("bag", "info", str(bag)).stdout

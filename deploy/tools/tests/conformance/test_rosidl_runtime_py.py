@@ -9,7 +9,6 @@ import pytest
 
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from example_interfaces.action import Fibonacci
 from geometry_msgs.msg import PointStamped, Polygon, PoseWithCovariance, TwistStamped
 from rosidl_parser.definition import NamespacedType, UnboundedSequence, UnboundedString
 from rosidl_runtime_py import (
@@ -40,6 +39,13 @@ from rosidl_runtime_py.utilities import (
 from sensor_msgs.msg import CameraInfo, CompressedImage, JointState
 from std_msgs.msg import Bool, Byte, ByteMultiArray, Float32, Float64, Header, String, UInt8MultiArray
 from std_srvs.srv import SetBool
+
+try:
+    from example_interfaces.action import Fibonacci
+except ModuleNotFoundError:  # ROS 2's wheels
+    from test_msgs.action import Fibonacci
+
+PACKAGE = Fibonacci.__module__.partition(".")[0]
 
 STATUS = DiagnosticStatus(
     level=b"\x01", name="arm", message="slow: yes", values=[KeyValue(key="a", value="1"), KeyValue()]
@@ -193,7 +199,7 @@ def test_unknown_messages_are_errors(name: str, error: type[Exception]) -> None:
 
 def test_services_actions_and_interfaces_by_name() -> None:
     assert get_service("std_srvs/SetBool") is SetBool
-    assert get_action("example_interfaces/Fibonacci") is Fibonacci
+    assert get_action(f"{PACKAGE}/Fibonacci") is Fibonacci
     assert get_interface("std_srvs/srv/SetBool") is SetBool
     with pytest.raises(ValueError, match="Expected the full name of a service, got 'std_msgs/msg/String'"):
         get_service("std_msgs/msg/String")
@@ -210,18 +216,18 @@ def test_kinds_of_interfaces_are_told_apart() -> None:
 def test_namespaced_types_of_names() -> None:
     assert get_namespaced_type("std_msgs/String") == NamespacedType(["std_msgs"], "String")
     assert get_message_namespaced_type("std_msgs/String") == NamespacedType(["std_msgs", "msg"], "String")
-    feedback = NamespacedType(["example_interfaces", "action"], "Fibonacci_FeedbackMessage")
+    feedback = NamespacedType([PACKAGE, "action"], "Fibonacci_FeedbackMessage")
     assert import_message_from_namespaced_type(feedback) is Fibonacci.Impl.FeedbackMessage
 
 
 def test_interfaces_of_packages_are_listed() -> None:
-    assert {"std_msgs", "example_interfaces"} <= get_interface_packages().keys()
+    assert {"std_msgs", PACKAGE} <= get_interface_packages().keys()
     assert "rosidl_parser" not in get_interface_packages()
     assert sorted(get_interfaces(["std_srvs"])["std_srvs"]) == ["srv/Empty", "srv/SetBool", "srv/Trigger"]
     assert "msg/String" in get_message_interfaces()["std_msgs"]
     assert "std_srvs" not in get_message_interfaces()
-    assert "srv/AddTwoInts" in get_service_interfaces(["example_interfaces"])["example_interfaces"]
-    assert get_action_interfaces(["example_interfaces"]) == {"example_interfaces": ["action/Fibonacci"]}
+    assert "srv/SetBool" in get_service_interfaces(["std_srvs"])["std_srvs"]
+    assert "action/Fibonacci" in get_action_interfaces([PACKAGE])[PACKAGE]
     with pytest.raises(LookupError, match="Unknown package 'nothing'"):
         get_interfaces(["nothing"])
 

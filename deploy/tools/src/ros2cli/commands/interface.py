@@ -7,10 +7,7 @@ import sys
 
 import click
 
-_PRIMITIVES = {
-    *("bool", "byte", "char", "float32", "float64", "string", "wstring"),
-    *(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)),
-}
+from ros2cli.definition import message_type
 
 
 @click.command("list")
@@ -69,7 +66,7 @@ def _show(name: str, *, comments: bool, nested_comments: bool, indent: str = "")
             click.echo(f"{indent}{text}")
         elif comments:
             click.echo()
-        if nested := _message_type(line, package):
+        if nested := message_type(line, package):
             _show(nested, comments=nested_comments, nested_comments=nested_comments, indent=f"{indent}\t")
 
 
@@ -77,12 +74,3 @@ def _without_comment(line: str) -> str:
     """The line without its comment; a '#' within quotes begins none."""
     match = re.match(r"""(?:[^#"']|"(?:\\.|[^"\\])*"|'(?:\\.|[^'\\])*'|["'])*""", line)
     return match.group().strip() if match else line
-
-
-def _message_type(line: str, package: str) -> str | None:
-    """The full name of the message that a line declares a field of; None for other lines."""
-    match = re.match(r"\s*([A-Za-z][A-Za-z0-9_/]*)(?:<=\d+)?(?:\[[^\]]*\])?\s+\w", line)
-    if not match or match[1] in _PRIMITIVES:
-        return None
-    scope, _, name = match[1].rpartition("/")
-    return f"{scope.partition('/')[0] or package}/msg/{name}"
