@@ -5,10 +5,11 @@ from __future__ import annotations
 import os
 import signal
 import sys
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, NoReturn, cast
 
 if TYPE_CHECKING:
     from io import TextIOWrapper
+    from types import FrameType
 
 
 def main() -> int:
@@ -19,8 +20,8 @@ def main() -> int:
         number of the signal that ended it: 2 for Ctrl-C, 15 for SIGTERM.
     """
     try:
-        signal.signal(signal.SIGTERM, lambda *_: sys.exit(signal.SIGTERM))
-        signal.signal(signal.SIGINT, signal.default_int_handler)  # a script's background jobs ignore it
+        signal.signal(signal.SIGTERM, _end)
+        signal.signal(signal.SIGINT, _end)  # a script's background jobs ignore it
         cast("TextIOWrapper", sys.stdout).reconfigure(line_buffering=True)
         return _run()
     except KeyboardInterrupt:
@@ -30,6 +31,14 @@ def main() -> int:
             os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno()
         )  # the interpreter flushes it at its end
         return 1
+
+
+def _end(number: int, frame: FrameType | None) -> NoReturn:
+    """End the command by an exception; objects that were not complete yet end without a complaint."""
+    sys.unraisablehook = lambda _: None
+    if number == signal.SIGINT:
+        raise KeyboardInterrupt
+    sys.exit(number)
 
 
 def _run() -> int:

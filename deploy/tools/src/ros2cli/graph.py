@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import concurrent.futures
 import os
 import time
 from collections.abc import Callable, Iterator
@@ -134,9 +135,26 @@ def interface_class(kind: str, name: str, problem: str) -> Any:
 
 def spin(node: Node, until: Future | None = None, timeout: float | None = None) -> None:
     """Run the callbacks of a node until a future is done, or for a time [s], or for ever."""
+    with spinning(node, until, timeout) as ending:
+        ending.result()
+
+
+@contextmanager
+def spinning(
+    node: Node, until: Future | None = None, timeout: float | None = None
+) -> Iterator[concurrent.futures.Future[None]]:
+    """
+    Run the callbacks of a node in a thread until the scope is left; arguments as of `spin`.
+
+    In the main thread, a signal would interrupt rclpy anywhere, also between two steps that belong together,
+    or it would have to wait while rclpy waits in C.
+
+    :return: the end of the thread, with the error of a callback.
+    """
     from rclpy.executors import SingleThreadedExecutor
     from rclpy.task import Future
 
-    with SingleThreadedExecutor() as executor:
+    # The executor is shut down first, which ends the thread.
+    with concurrent.futures.ThreadPoolExecutor(1) as threads, SingleThreadedExecutor() as executor:
         executor.add_node(node)
-        executor.spin_until_future_complete(until or Future(), timeout)
+        yield threads.submit(executor.spin_until_future_complete, until or Future(), timeout)

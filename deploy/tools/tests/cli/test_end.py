@@ -15,6 +15,7 @@ import pytest
     "arguments",
     [
         ["topic", "echo", "/arm/chatter"],
+        ["topic", "echo", "/arm/point"],  # nothing comes after the first message
         ["topic", "hz", "/arm/chatter"],
         ["topic", "bw", "/arm/chatter"],
         ["topic", "pub", "/arm/x", "std_msgs/msg/String"],

@@ -24,7 +24,6 @@ from ros2cli.options import (
 if TYPE_CHECKING:
     from mcap.records import Message
 
-    from rclpy.executors import Executor
     from rclpy.node import Node
     from rclpy.publisher import Publisher
     from rclpy.qos import QoSProfile
@@ -86,25 +85,23 @@ def play(
 ) -> None:
     """Play back ROS data from a bag, at the pace at which it was recorded."""
     from rclpy.duration import Duration
-    from rclpy.executors import SingleThreadedExecutor
 
     metadata = rosbag2.read(Path(bag_path))
     overrides = rosbag2.qos_overrides(options["qos_profile_overrides_path"])
     arguments = ["--ros-args", *(word for rule in remap for word in ("--remap", rule))]
     with (
         graph.node(_SPIN_TIME, name="rosbag2_player", arguments=arguments) as node,
-        SingleThreadedExecutor() as executor,
+        graph.spinning(node),
     ):
-        executor.add_node(node)
         topics = [topic for topic in metadata.topics if _is_wanted(topic.name, options, bool(clock))]
         publishers = _publishers(node, topics, overrides)
         graph.wait_for(lambda: _are_matched(node, publishers), _SPIN_TIME)
-        player = _Player(executor, metadata, publishers, options)
+        player = _Player(metadata, publishers, options)
         if clock:
             player.publish_clock(node, clock)
         try:
             while True:
-                player.wait(delay)
+                time.sleep(delay)
                 player.play()
                 if not loop:
                     break
@@ -167,12 +164,10 @@ class _Player:
 
     def __init__(
         self,
-        executor: Executor,
         metadata: rosbag2.Metadata,
         publishers: dict[str, Publisher],
         options: dict[str, Any],
     ) -> None:
-        self._executor = executor
         self._files = metadata.paths()
         self._publishers = publishers
         self._rate = options["rate"]
@@ -204,14 +199,8 @@ class _Player:
         self._began = time.monotonic()
         for topic, message in self._messages():
             due = self._began + (message.log_time - self._start) / (self._rate * 1e9)
-            self.wait(due - time.monotonic())
+            time.sleep(max(0.0, due - time.monotonic()))
             self._publishers[topic].publish(message.data)
-
-    def wait(self, duration: float) -> None:
-        """Wait [s], and run timers meanwhile."""
-        end = time.monotonic() + duration
-        while (left := end - time.monotonic()) > 0:
-            self._executor.spin_once(left)
 
     def _messages(self) -> Iterator[tuple[str, Message]]:
         from mcap.exceptions import McapError
