@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from rclpy.task import Future
 
 NODE_NAME_PREFIX = "_ros2cli"
-SPIN_TIME = 0.5
-"""How long a node looks for others at first, unless the user says otherwise [s]."""
 _PERIOD = 0.02
 """Period at which the graph is looked at [s]."""
 _CALM = 0.2
@@ -38,6 +36,7 @@ class NodeName(NamedTuple):
 def node(
     spin_time: float = 0.0,
     *,
+    until: Callable[[Node], bool] | None = None,
     name: str | None = None,
     use_sim_time: bool = False,
     arguments: list[str] | None = None,
@@ -46,6 +45,7 @@ def node(
     Create a node, by default a hidden one, and shut everything down at the end.
 
     :param spin_time: how long it looks for other nodes at first [s].
+    :param until: ends this as soon as it is true and nothing more appears.
     :param arguments: ROS arguments of the node.
     """
     import rclpy
@@ -62,7 +62,7 @@ def node(
             start_parameter_services=False,
             parameter_overrides=[Parameter("use_sim_time", value=use_sim_time)],
         )
-        discover(node, spin_time)
+        discover(node, spin_time, until)
         yield node
     except NameValidationException as error:
         raise click.ClickException(str(error)) from None
@@ -70,8 +70,20 @@ def node(
         rclpy.try_shutdown()
 
 
-def discover(node: Node, spin_time: float) -> None:
-    """Look for ``spin_time`` [s], and longer while more nodes and topics appear."""
+def default_spin_time() -> float:
+    """
+    How long a node looks for others at first, unless the user says otherwise [s].
+
+    A new participant of Fast DDS announces itself before it listens. It may miss the answer of a peer, which
+    answers only once, and hears of it with the peer's next announcement: by default within 3 s.
+    """
+    import rclpy
+
+    return 3.2 if "fastrtps" in rclpy.get_rmw_implementation_identifier() else 0.5
+
+
+def discover(node: Node, spin_time: float, until: Callable[[Node], bool] | None = None) -> None:
+    """Look for ``spin_time`` [s], and longer while more nodes and topics appear; ``until`` as in `node`."""
     began = time.monotonic()
     changed, known = began, (0, 0)
     while (now := time.monotonic()) < began + spin_time or (
@@ -81,6 +93,13 @@ def discover(node: Node, spin_time: float) -> None:
         found = len(node.get_node_names()), len(node.get_topic_names_and_types(no_demangle=True))
         if found != known:
             changed, known = time.monotonic(), found
+        elif until and until(node) and time.monotonic() >= changed + _CALM:
+            return
+
+
+def is_published(topic: str) -> Callable[[Node], bool]:
+    """Return the condition that a topic has a publisher. It raises RuntimeError if the name is invalid."""
+    return lambda node: node.count_publishers(full_topic_name(node, topic)) > 0
 
 
 def wait_for(condition: Callable[[], bool], timeout: float) -> bool:

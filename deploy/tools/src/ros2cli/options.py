@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from ros2cli.graph import SPIN_TIME
+from ros2cli.graph import default_spin_time
 
 if TYPE_CHECKING:
     from rclpy.qos import QoSProfile
@@ -26,8 +26,8 @@ def direct_options(verb: _Verb) -> _Verb:
     verb = click.option(
         "--spin-time",
         type=float,
-        default=SPIN_TIME,
-        show_default=True,
+        callback=lambda context, parameter, value: default_spin_time() if value is None else value,
+        show_default="0.5, or 3.2 with Fast DDS",
         help="Time in seconds to look for nodes. It looks longer while it still finds more.",
     )(verb)
     return click.option("-s", "--use-sim-time", is_flag=True, help="Enable ROS simulation time.")(verb)

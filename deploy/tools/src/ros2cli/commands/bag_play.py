@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     from rclpy.publisher import Publisher
     from rclpy.qos import QoSProfile
 
-_SPIN_TIME = 0.5
-"""How long it looks for subscriptions before it plays [s]."""
+_MATCHING_TIME = 0.5
+"""How long the subscriptions that it has found may take to match before it plays [s]."""
 
 
 @click.command(cls=VerbWithManyValues)
@@ -90,12 +90,12 @@ def play(
     overrides = rosbag2.qos_overrides(options["qos_profile_overrides_path"])
     arguments = ["--ros-args", *(word for rule in remap for word in ("--remap", rule))]
     with (
-        graph.node(_SPIN_TIME, name="rosbag2_player", arguments=arguments) as node,
+        graph.node(graph.default_spin_time(), name="rosbag2_player", arguments=arguments) as node,
         graph.spinning(node),
     ):
         topics = [topic for topic in metadata.topics if _is_wanted(topic.name, options, bool(clock))]
         publishers = _publishers(node, topics, overrides)
-        graph.wait_for(lambda: _are_matched(node, publishers), _SPIN_TIME)
+        graph.wait_for(lambda: _are_matched(node, publishers), _MATCHING_TIME)
         player = _Player(metadata, publishers, options)
         if clock:
             player.publish_clock(node, clock)

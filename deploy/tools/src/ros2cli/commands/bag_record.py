@@ -26,8 +26,6 @@ if TYPE_CHECKING:
 
 _DEPTH = 1000
 """Messages of a topic that may wait to be written."""
-_DISCOVERY_TIME = 0.5
-"""How long --no-discovery looks for topics at startup [s]."""
 
 
 @click.command(cls=VerbWithManyValues)
@@ -108,7 +106,7 @@ def record(
             recorder = _Recorder(node, writer, _Selection(node, options), overrides, use_sim_time)
             node.get_logger().info("Listening for topics...")
             if options["no_discovery"]:
-                graph.discover(node, _DISCOVERY_TIME)
+                graph.discover(node, graph.default_spin_time())
                 recorder.subscribe()
             else:
                 node.create_timer(options["polling_interval"] / 1000.0, recorder.subscribe)

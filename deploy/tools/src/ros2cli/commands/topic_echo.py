@@ -71,7 +71,8 @@ def echo(
     from rclpy.task import Future
 
     show = _printer(options)
-    with graph.node(spin_time, use_sim_time=use_sim_time) as node:
+    published = graph.is_published(topic_name)
+    with graph.node(spin_time, until=published, use_sim_time=use_sim_time) as node:
         chosen = qos_profile(options) if has_qos_policies(options) else _matching(node, topic_name, options)
         if message_type is None:
             class_ = get_msg_class(node, topic_name, include_hidden_topics=True)

@@ -45,7 +45,8 @@ def hz(
     from rclpy.qos import qos_profile_sensor_data
 
     wanted = expression.condition(condition)
-    with graph.node(spin_time, use_sim_time=use_sim_time) as node:
+    published = graph.is_published(topic_name)
+    with graph.node(spin_time, until=published, use_sim_time=use_sim_time) as node:
         class_ = get_msg_class(node, topic_name, blocking=True, include_hidden_topics=True)
         clock = Clock(clock_type=ClockType.SYSTEM_TIME) if wall_time else node.get_clock()
         rate = _Rate(clock, window)
@@ -114,7 +115,8 @@ def bw(topic_name: str, window: int, spin_time: float, use_sim_time: bool) -> No
     """Display bandwidth used by topic."""
     from rclpy.qos import qos_profile_sensor_data
 
-    with graph.node(spin_time, use_sim_time=use_sim_time) as node:
+    published = graph.is_published(topic_name)
+    with graph.node(spin_time, until=published, use_sim_time=use_sim_time) as node:
         class_ = get_msg_class(node, topic_name, blocking=True, include_hidden_topics=True)
         bandwidth = _Bandwidth(node.get_clock(), window)
         node.create_subscription(class_, topic_name, bandwidth.count, qos_profile_sensor_data, raw=True)

@@ -20,7 +20,8 @@ class NodeStrategy:
     """
 
     def __init__(self, args: Any) -> None:
-        spin_time = getattr(args, "spin_time", graph.SPIN_TIME)
+        spin_time = getattr(args, "spin_time", None)
+        spin_time = graph.default_spin_time() if spin_time is None else spin_time
         use_sim_time = getattr(args, "use_sim_time", False)
         self._scope = graph.node(spin_time, use_sim_time=use_sim_time)
         self._node: Node | None = None
@@ -43,8 +44,6 @@ class NodeStrategy:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options that :class:`NodeStrategy` reads."""
-    parser.add_argument(
-        "--spin-time", type=float, default=graph.SPIN_TIME, help="how long to look for other nodes [s]"
-    )
+    parser.add_argument("--spin-time", type=float, help="how long to look for other nodes [s]")
     parser.add_argument("-s", "--use-sim-time", action="store_true", help="use simulated time")
     parser.add_argument("--no-daemon", action="store_true", help="no effect: there is no daemon")
