@@ -9,7 +9,15 @@ from geometry_msgs.msg import (
 )
 from rclpy.duration import Duration
 from rclpy.time import Time
-from tf2_msgs.msg import TFMessage
+
+try:
+    from tf2_msgs.msg import TFMessage
+except ModuleNotFoundError as error:
+    raise ModuleNotFoundError(
+        "tf2_ros needs the messages of tf2_msgs, which ROS 2's wheels on PyPI do not have:"
+        " use an installed ROS 2 or reactive-arm-runtime, or build tf2_msgs",
+        name=error.name,
+    ) from None
 from tf2_py import (
     BufferCore,
     ConnectivityException,

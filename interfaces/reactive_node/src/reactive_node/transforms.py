@@ -13,12 +13,12 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.time import Time
 from reactivex import Observable, abc
 from reactivex.disposable import CompositeDisposable, Disposable
-from tf2_msgs.msg import TFMessage
 from tf2_ros import (
     BufferCore,
     ConnectivityException,
     ExtrapolationException,
     LookupException,
+    TFMessage,
     TransformException,
 )
 
