@@ -18,7 +18,11 @@ from rclpy.duration import Duration
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64, Header, String
-from tf2_msgs.msg import TFMessage
+
+try:
+    from tf2_msgs.msg import TFMessage
+except ModuleNotFoundError:  # ROS 2's wheels on PyPI do not have it
+    TFMessage = None  # type: ignore[assignment,misc]
 
 TURN_ON, TURN_OFF = "turn_on", "turn_off"
 ON, OFF = "on", "off"
@@ -145,7 +149,7 @@ TF = Topic(
     _qos(100),  # as of tf2_ros
     "m, rad",
     ("robot_state",),
-    f"from `{FRAME}` to `link1`, `link2` and `effector`",
+    f"from `{FRAME}` to `link1`, `link2` and `effector`; only where the package tf2_msgs is installed",
 )
 OPERATOR_HEARTBEAT = Topic(
     "operator_heartbeat",
@@ -207,7 +211,7 @@ DIAGNOSTICS = Topic(
     longest_gap=1.0,
 )
 
-CONTRACT = (
+CONTRACT: tuple[Topic, ...] = (
     L1,
     L2,
     THETA1,
@@ -216,7 +220,7 @@ CONTRACT = (
     EFFECTOR_SPEED,
     JOINT_STATES,
     ROBOT_DESCRIPTION,
-    TF,
+    *([TF] if TF.type else []),
     OPERATOR_HEARTBEAT,
     OPERATOR_PRESENCE,
     OPERATOR_ACTIVITY,

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from operator import attrgetter
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import reactivex as rx
 from builtin_interfaces.msg import Time
@@ -16,12 +16,11 @@ from geometry_msgs.msg import TransformStamped
 from reactivex import Observable
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header, String
-from tf2_msgs.msg import TFMessage
 
 from interfaces import robot_model, service
 from interfaces.robot_model import JOINTS, frame_id, urdf
 from interfaces.service import ServiceNode, parameter
-from interfaces.topics import JOINT_STATES, L1, L2, ROBOT_DESCRIPTION, TF, THETA1, THETA2
+from interfaces.topics import CONTRACT, JOINT_STATES, L1, L2, ROBOT_DESCRIPTION, TF, THETA1, THETA2
 
 REPEAT = 0.1  # s: transforms are volatile, and a listener that asks for the present needs young ones
 DESCRIPTION_PERIOD = 1.0  # s: tools build the model anew for each description
@@ -71,8 +70,8 @@ def wire(node: ServiceNode) -> None:
     def joint_state(stamp: Time, it: Configuration) -> JointState:
         return JointState(header=Header(stamp=stamp), name=list(JOINTS), position=[it.theta1, it.theta2])
 
-    def transforms(stamp: Time, it: Configuration) -> TFMessage:
-        return TFMessage(
+    def transforms(stamp: Time, it: Configuration) -> Any:
+        return TF.type(
             transforms=[
                 TransformStamped(
                     header=Header(stamp=stamp, frame_id=frame_id(parent, namespace)),
@@ -91,7 +90,8 @@ def wire(node: ServiceNode) -> None:
     stamped = states.map(lambda it: (node.get_clock().now().to_msg(), it)).share()
     # Most of the time nobody looks.
     node.publish(JOINT_STATES, stamped.starmap(joint_state), on_demand=True)
-    node.publish(TF, stamped.starmap(transforms), on_demand=True)
+    if TF in CONTRACT:
+        node.publish(TF, stamped.starmap(transforms), on_demand=True)
     node.publish(ROBOT_DESCRIPTION, lengths(l1, l2).starmap(description))
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import itertools
 import math
 import re
+import subprocess
+import sys
 from collections.abc import Callable
 from typing import Any
 from xml.etree import ElementTree
@@ -19,7 +21,7 @@ from std_msgs.msg import Float64
 from interfaces import robot_model
 from interfaces.robot_model import BASE, EFFECTOR, LINK1, LINK2, frame_id, transforms, urdf
 from interfaces.service import ServiceNode
-from interfaces.topics import CONFIGURATION, JOINT_STATES, ROBOT_DESCRIPTION, TF
+from interfaces.topics import CONFIGURATION, CONTRACT, JOINT_STATES, ROBOT_DESCRIPTION, TF
 from reactive_node.testing import MakeNode, SpinUntil, VirtualTime
 from services.kinematics import forward_kinematics
 from services.robot_state import Configuration, configurations, lengths, wire
@@ -143,11 +145,15 @@ def test_frames_of_a_namespace_carry_its_name(namespace: str, prefix: str) -> No
     assert {link.attrib["link"] for link in robot.iter() if "link" in link.attrib} == set(frames)
 
 
+VIEWED = [topic for topic in CONTRACT if topic in (JOINT_STATES, TF)]
+"""What tools read all the time: without tf2_msgs, there is no `/tf`."""
+
+
 def test_node_in_a_namespace_describes_its_arm(make_node: MakeNode, spin_until: SpinUntil) -> None:
     wire(make_node("robot_state", kind=ServiceNode, namespace="/arm1"))
     peer = make_node("peer", kind=Node, namespace="/arm1")
     last: dict[str, Any] = {}
-    for topic in (JOINT_STATES, TF, ROBOT_DESCRIPTION):
+    for topic in (*VIEWED, ROBOT_DESCRIPTION):
         name = topic.name
         keep: Callable[[Any], None] = lambda message, name=name: last.update({name: message})  # noqa: E731
         peer.create_subscription(topic.type, name, keep, topic.qos)
@@ -158,20 +164,22 @@ def test_node_in_a_namespace_describes_its_arm(make_node: MakeNode, spin_until: 
     for name, publisher in publishers.items():
         publisher.publish(Float64(data=values[name]))
 
-    spin_until(lambda: len(last) == 3)
-    state, tf = last[JOINT_STATES.name], last[TF.name]
+    spin_until(lambda: len(last) == len(VIEWED) + 1)
+    state = last[JOINT_STATES.name]
     assert dict(zip(state.name, state.position, strict=True)) == {"theta1": 0.5, "theta2": -0.25}
-    assert [(it.header.frame_id, it.child_frame_id) for it in tf.transforms] == [
-        ("arm1/base", "arm1/link1"),
-        ("arm1/link1", "arm1/link2"),
-        ("arm1/link2", "arm1/effector"),
-    ]
-    assert len({(it.header.stamp.sec, it.header.stamp.nanosec) for it in tf.transforms}) == 1
     assert last[ROBOT_DESCRIPTION.name].data == urdf(2.0, 3.0, "/arm1")
 
     publishers["l1"].publish(Float64(data=4.0))
     spin_until(lambda: last[ROBOT_DESCRIPTION.name].data == urdf(4.0, 3.0, "/arm1"))
-    spin_until(lambda: last[TF.name].transforms[1].transform.translation.x == 4.0)
+    if TF in VIEWED:
+        spin_until(lambda: last[TF.name].transforms[1].transform.translation.x == 4.0)
+        sent = last[TF.name].transforms
+        assert [(it.header.frame_id, it.child_frame_id) for it in sent] == [
+            ("arm1/base", "arm1/link1"),
+            ("arm1/link1", "arm1/link2"),
+            ("arm1/link2", "arm1/effector"),
+        ]
+        assert len({(it.header.stamp.sec, it.header.stamp.nanosec) for it in sent}) == 1
 
 
 def test_angles_are_read_only_while_somebody_looks(make_node: MakeNode, spin_until: SpinUntil) -> None:
@@ -181,10 +189,10 @@ def test_angles_are_read_only_while_somebody_looks(make_node: MakeNode, spin_unt
     def read() -> set[str]:
         return {each.topic_name for each in node.subscriptions}
 
-    spin_until(lambda: peer.count_publishers(TF.name) == 1)
+    spin_until(lambda: peer.count_publishers(JOINT_STATES.name) == 1)
     assert {"/l1", "/l2"} <= read()
     assert not {"/theta1", "/theta2"} & read()
-    for topic in (JOINT_STATES, TF):
+    for topic in VIEWED:
         viewer = peer.create_subscription(topic.type, topic.name, lambda _: None, topic.qos)
         spin_until(lambda: {"/theta1", "/theta2"} <= read())
         peer.destroy_subscription(viewer)
@@ -194,3 +202,27 @@ def test_angles_are_read_only_while_somebody_looks(make_node: MakeNode, spin_unt
 def test_joints_are_named_after_the_topics_of_their_angles() -> None:
     moving = re.findall(r'<joint name="(\w+)" type="continuous">', urdf(2.0, 3.0))
     assert moving == list(robot_model.JOINTS) == ["theta1", "theta2"]
+
+
+WITHOUT_TF2_MSGS = """
+import sys
+
+sys.modules["tf2_msgs"] = None  # as if it were not installed
+import rclpy
+from interfaces import topics
+from interfaces.service import ServiceNode
+from services import robot_state
+
+rclpy.init()
+node = ServiceNode("robot_state")
+robot_state.wire(node)
+published = {one.topic_name.lstrip("/") for one in node.publishers}
+print(topics.TF in topics.CONTRACT, *sorted(published & {"joint_states", "robot_description", "tf"}))
+node.destroy_node()
+rclpy.shutdown()
+"""
+
+
+def test_without_tf2_msgs_the_arm_publishes_all_but_transforms(domain_id: int) -> None:
+    run = subprocess.run([sys.executable, "-c", WITHOUT_TF2_MSGS], capture_output=True, text=True, timeout=30)
+    assert (run.stdout, run.stderr) == ("False joint_states robot_description\n", "")
