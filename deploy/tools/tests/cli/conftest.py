@@ -1,12 +1,7 @@
-"""A graph, and commands that run as processes beside it.
-
-These tests pass on ROS 2's own ros2cli, too, except for those marked `embedded`: they need what ROS 2 does
-differently (its daemon, tracebacks) or what its installation may lack.
-"""
+"""A graph, and commands that run as processes beside it."""
 
 from __future__ import annotations
 
-import importlib.util
 import os
 import subprocess
 import sys
@@ -28,20 +23,6 @@ from std_srvs.srv import SetBool
 
 PROGRAM = "import sys; sys.argv[0] = 'ros2'; from ros2cli.cli import main; sys.exit(main())"
 TIMEOUT = 60.0
-
-
-def pytest_configure(config: pytest.Config) -> None:
-    """Register the mark `embedded`."""
-    config.addinivalue_line("markers", "embedded: needs the command line of the embedded runtime")
-
-
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Skip tests marked `embedded` on ROS 2."""
-    if importlib.util.find_spec("rosidl_runtime_embedded"):
-        return
-    for item in items:
-        if item.get_closest_marker("embedded"):
-            item.add_marker(pytest.mark.skip(reason="platform: needs the embedded runtime"))
 
 
 class Lab(Node):

@@ -10,13 +10,19 @@ from typing import Any
 
 import pytest
 
-from example_interfaces.action import Fibonacci
 from rclpy.action import ActionServer, CancelResponse, GoalResponse
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.context import Context
 from rclpy.executors import MultiThreadedExecutor
 from rclpy.node import Node
 
+try:
+    from example_interfaces.action import Fibonacci
+except ModuleNotFoundError:  # ROS 2's wheels
+    from test_msgs.action import Fibonacci
+
+PACKAGE = Fibonacci.__module__.partition(".")[0]
+TYPE = f"{PACKAGE}/action/Fibonacci"
 ACCEPTED = r"Goal accepted with ID: [0-9a-f]{32}\n\n"
 SENDING = "Waiting for an action server to become available...\nSending goal:\n     order: {}\n\n"
 
@@ -72,21 +78,18 @@ def server(module_domain_id: int) -> Iterator[Server]:
     context.try_shutdown()
 
 
-@pytest.mark.embedded  # ROS 2 starts its daemon
+@pytest.mark.own  # ROS 2 starts its daemon
 def test_list_and_info_show_actions(server: Server, ros2: Any) -> None:
     assert ros2("action", "list").stdout == "/fibonacci\n"
-    assert ros2("action", "list", "-t").stdout == "/fibonacci [example_interfaces/action/Fibonacci]\n"
+    assert ros2("action", "list", "-t").stdout == f"/fibonacci [{TYPE}]\n"
     assert ros2("action", "list", "-c").stdout == "1\n"
     assert ros2("action", "info", "/fibonacci", "-t").stdout == (
-        "Action: /fibonacci\nAction clients: 0\nAction servers: 1\n"
-        "    /server [example_interfaces/action/Fibonacci]\n"
+        f"Action: /fibonacci\nAction clients: 0\nAction servers: 1\n    /server [{TYPE}]\n"
     )
 
 
 def test_goal_succeeds_with_feedback_and_result(server: Server, ros2: Any) -> None:
-    done = ros2(
-        *("action", "send_goal", "-f", "/fibonacci", "example_interfaces/action/Fibonacci", "{order: 3}")
-    )
+    done = ros2("action", "send_goal", "-f", "/fibonacci", TYPE, "{order: 3}")
     feedback = r"Feedback:\n    sequence:\n- 0\n\n"
     result = r"Result:\n    sequence:\n- 0\n- 1\n\nGoal finished with status: SUCCEEDED\n"
     # the server may send the feedback before its acceptance arrives
@@ -105,18 +108,17 @@ def test_goal_succeeds_with_feedback_and_result(server: Server, ros2: Any) -> No
     ],
 )
 def test_goal_may_be_rejected_or_aborted(server: Server, ros2: Any, order: int, end: str) -> None:
-    out = ros2(
-        "action", "send_goal", "/fibonacci", "example_interfaces/Fibonacci", f"{{order: {order}}}"
-    ).stdout
+    short = f"{PACKAGE}/Fibonacci"
+    out = ros2("action", "send_goal", "/fibonacci", short, f"{{order: {order}}}").stdout
     assert re.fullmatch(re.escape(SENDING.format(order)) + end, out)
 
 
-@pytest.mark.embedded  # in ROS 2, the signal ends the node before the goal is canceled
+@pytest.mark.own  # in ROS 2, the signal ends the node before the goal is canceled
 @pytest.mark.parametrize("line", ["Sending goal:", "Goal accepted"])
 def test_ctrl_c_cancels_the_goal(server: Server, start: Any, line: str) -> None:
     server.begun.clear()
     server.canceled.clear()
-    process = start("action", "send_goal", "/fibonacci", "example_interfaces/Fibonacci", "{order: 99}")
+    process = start("action", "send_goal", "/fibonacci", TYPE, "{order: 99}")
     while not (read := process.stdout.readline()).startswith(line):
         assert read, process.stderr.read()
     process.send_signal(signal.SIGINT)
@@ -134,7 +136,7 @@ def test_ctrl_c_cancels_the_goal(server: Server, start: Any, line: str) -> None:
     [
         (["std_srvs/srv/SetBool"], "The passed action type is invalid\n"),
         (
-            ["example_interfaces/action/Fibonacci", "{nothing: 1}"],
+            [TYPE, "{nothing: 1}"],
             "Failed to populate message fields: "
             "AttributeError(\"'Fibonacci_Goal' object has no attribute 'nothing'\")\n",
         ),

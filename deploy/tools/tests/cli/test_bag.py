@@ -18,7 +18,7 @@ from geometry_msgs.msg import PointStamped
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import String
 
-pytestmark = pytest.mark.embedded  # ROS 2's is C++; its bags have the same format
+pytestmark = pytest.mark.own  # ROS 2's is C++; its bags have the same format
 
 Wait = Callable[[Callable[[], object]], None]
 Record = Callable[..., Path]

@@ -24,7 +24,7 @@ import pytest
         ["service", "call", "/nothing", "std_srvs/srv/Trigger"],
     ],
 )
-@pytest.mark.embedded  # in ROS 2, some of these print a traceback
+@pytest.mark.own  # in ROS 2, some of these print a traceback
 def test_signal_ends_a_command_without_a_traceback(
     lab: Any, start: Any, arguments: list[str], number: signal.Signals, code: int
 ) -> None:
@@ -50,7 +50,7 @@ sys.exit(main())
 """
 
 
-@pytest.mark.embedded
+@pytest.mark.own
 @pytest.mark.parametrize("module", ["click", "ros2cli.commands", "rclpy"])
 def test_ctrl_c_during_start_up_shows_no_traceback(module: str) -> None:
     command = [sys.executable, "-c", INTERRUPTED.format(module=module)]
@@ -58,7 +58,7 @@ def test_ctrl_c_during_start_up_shows_no_traceback(module: str) -> None:
     assert (done.stdout, done.stderr, done.returncode) == ("", "", 2)
 
 
-@pytest.mark.embedded
+@pytest.mark.own
 def test_closed_pipe_ends_a_command(lab: Any, start: Any) -> None:
     process = start("topic", "echo", "/arm/chatter")
     assert process.stdout.readline() == "data: hello\n"
@@ -85,7 +85,7 @@ def test_help_ends_with_0(ros2: Any, arguments: list[str]) -> None:
     assert done.returncode == 0
 
 
-@pytest.mark.embedded
+@pytest.mark.own
 def test_help_and_bags_import_only_what_they_need() -> None:
     program = "import sys; from ros2cli.commands import ros2, {}; print(*sys.modules)"
 

@@ -23,7 +23,7 @@ def test_show_reads_the_type_from_a_pipe(ros2: Any) -> None:
     assert done.stdout == POINT_STAMPED
 
 
-@pytest.mark.embedded
+@pytest.mark.own
 def test_show_keeps_comments_as_asked(ros2: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     definition = tmp_path / "share" / "user_msgs" / "msg" / "Mixed.msg"
     definition.parent.mkdir(parents=True)

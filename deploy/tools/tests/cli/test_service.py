@@ -55,7 +55,7 @@ def test_call_of_something_wrong_is_one_line(lab: Any, ros2: Any, arguments: lis
     assert (done.stderr, done.returncode) == (error, 1)
 
 
-@pytest.mark.embedded
+@pytest.mark.own
 def test_type_prints_the_type_or_only_ends_with_1(lab: Any, ros2: Any) -> None:
     assert ros2("service", "type", "/arm/switch").stdout == "std_srvs/srv/SetBool\n"
     done = ros2("service", "type", "/nothing")
