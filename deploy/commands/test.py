@@ -31,14 +31,11 @@ EMBEDDED_ONLY = (
     "tests/simulation",
 )
 """Tests of the embedded rclpy, and of what runs only on it."""
-ACTIONS = (
-    "deploy/runtime/tests/conformance/test_action_classes.py",
-    "deploy/runtime/tests/conformance/test_action_graph.py",
-    "deploy/runtime/tests/conformance/test_actions.py",
-    "deploy/tools/tests/cli/test_action.py",
-    "interfaces/reactive_node/tests/test_actions.py",
+TRANSFORMS = (
+    "interfaces/reactive_node/tests/test_readme.py",
+    "interfaces/reactive_node/tests/test_transforms.py",
 )
-"""Tests with a type of actions: ROS 2's wheels have none."""
+"""Tests that need tf2_msgs, which ROS 2's wheels do not have."""
 
 
 class Part(NamedTuple):
@@ -104,7 +101,7 @@ def left_out_here() -> tuple[str, ...]:
     """Return the files and folders whose tests cannot run on the rclpy of this process."""
     if importlib.util.find_spec("rosidl_runtime_embedded"):
         return ()
-    return EMBEDDED_ONLY if importlib.util.find_spec("example_interfaces") else EMBEDDED_ONLY + ACTIONS
+    return EMBEDDED_ONLY if importlib.util.find_spec("tf2_msgs") else EMBEDDED_ONLY + TRANSFORMS
 
 
 def run(part: Part, reports: Path) -> list[int]:

@@ -12,7 +12,6 @@ from typing import Any
 import pytest
 import reactivex as rx
 from action_msgs.srv import CancelGoal
-from example_interfaces.action import Fibonacci
 from rclpy.action import ActionClient, ActionServer, CancelResponse, GoalResponse
 from rclpy.action.client import ClientGoalHandle
 from rclpy.node import Node
@@ -23,6 +22,11 @@ from reactivex.subject import Subject
 from reactive_node import ReactiveNode
 from reactive_node.actions import GoalAborted, GoalCanceled, GoalRejected, GoalUnknown
 from reactive_node.testing import SpinFor, SpinUntil
+
+try:
+    from example_interfaces.action import Fibonacci
+except ModuleNotFoundError:  # ROS 2's wheels
+    from test_msgs.action import Fibonacci
 
 
 class Server:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import pytest
-from example_interfaces.action import Fibonacci
 from rclpy.node import Node
 from reactivex import Observable
 from reactivex.subject import Subject
@@ -13,6 +12,12 @@ from std_msgs.msg import String
 from std_srvs.srv import SetBool
 
 from reactive_node import ReactiveNode
+
+try:
+    from example_interfaces.action import Fibonacci
+except ModuleNotFoundError:  # ROS 2's wheels
+    from test_msgs.action import Fibonacci
+
 
 Create = Callable[[ReactiveNode], Observable[object]]
 OBSERVABLES: dict[str, Create] = {

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
+import importlib
 import pickle
 from typing import Any
 
 import pytest
+from deploy.runtime.tests.conformance.fibonacci import PACKAGE, Fibonacci
 
 import action_msgs.msg
 import action_msgs.srv
-import example_interfaces.action
-from example_interfaces.action import Fibonacci
-from example_interfaces.msg import Int32
-from example_interfaces.srv import AddTwoInts
 from rclpy.serialization import deserialize_message, serialize_message
 
 
@@ -20,7 +18,7 @@ def test_an_action_has_a_goal_a_result_and_feedback() -> None:
     assert Fibonacci.Goal(order=5).order == 5
     assert list(Fibonacci.Result(sequence=[0, 1, 1]).sequence) == [0, 1, 1]
     assert list(Fibonacci.Feedback().sequence) == []
-    assert repr(Fibonacci.Goal(order=5)) == "example_interfaces.action.Fibonacci_Goal(order=5)"
+    assert repr(Fibonacci.Goal(order=5)) == f"{PACKAGE}.action.Fibonacci_Goal(order=5)"
 
 
 def test_an_action_cannot_be_instantiated() -> None:
@@ -32,8 +30,9 @@ def test_an_action_knows_the_types_that_transport_it() -> None:
     impl = Fibonacci.Impl
     assert impl.CancelGoalService is action_msgs.srv.CancelGoal
     assert impl.GoalStatusMessage is action_msgs.msg.GoalStatusArray
-    assert impl.SendGoalService.Request is example_interfaces.action.Fibonacci_SendGoal_Request
-    assert impl.GetResultService.Response is example_interfaces.action.Fibonacci_GetResult_Response
+    action_module = importlib.import_module(f"{PACKAGE}.action")
+    assert impl.SendGoalService.Request is action_module.Fibonacci_SendGoal_Request
+    assert impl.GetResultService.Response is action_module.Fibonacci_GetResult_Response
     assert impl.FeedbackMessage.__name__ == "Fibonacci_FeedbackMessage"
 
 
@@ -43,7 +42,7 @@ def test_an_action_knows_the_types_that_transport_it() -> None:
         (Fibonacci.Goal, {"order": "int32"}),
         (
             Fibonacci.Impl.SendGoalService.Request,
-            {"goal_id": "unique_identifier_msgs/UUID", "goal": "example_interfaces/Fibonacci_Goal"},
+            {"goal_id": "unique_identifier_msgs/UUID", "goal": f"{PACKAGE}/Fibonacci_Goal"},
         ),
         (
             Fibonacci.Impl.SendGoalService.Response,
@@ -52,11 +51,11 @@ def test_an_action_knows_the_types_that_transport_it() -> None:
         (Fibonacci.Impl.GetResultService.Request, {"goal_id": "unique_identifier_msgs/UUID"}),
         (
             Fibonacci.Impl.GetResultService.Response,
-            {"status": "int8", "result": "example_interfaces/Fibonacci_Result"},
+            {"status": "int8", "result": f"{PACKAGE}/Fibonacci_Result"},
         ),
         (
             Fibonacci.Impl.FeedbackMessage,
-            {"goal_id": "unique_identifier_msgs/UUID", "feedback": "example_interfaces/Fibonacci_Feedback"},
+            {"goal_id": "unique_identifier_msgs/UUID", "feedback": f"{PACKAGE}/Fibonacci_Feedback"},
         ),
     ],
     ids=lambda value: getattr(value, "__name__", ""),
@@ -72,8 +71,3 @@ def test_the_messages_of_an_action_are_serialized_and_pickled() -> None:
     assert data.hex() == "00010000" + "00" * 15 + "07" + "02000000" + "01000000" + "02000000"
     assert deserialize_message(data, Fibonacci.Impl.FeedbackMessage) == feedback
     assert pickle.loads(pickle.dumps(feedback)) == feedback
-
-
-def test_example_interfaces_also_has_messages_and_services() -> None:
-    assert Int32(data=-1).data == -1
-    assert AddTwoInts.Request(a=1, b=2).b == 2

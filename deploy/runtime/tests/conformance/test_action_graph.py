@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterator
 from contextlib import suppress
 
 import pytest
+from deploy.runtime.tests.conformance.fibonacci import PACKAGE, Fibonacci
 
-from example_interfaces.action import Fibonacci
 from rclpy.action import (
     ActionClient,
     ActionServer,
@@ -26,7 +26,7 @@ from type_description_interfaces.srv import GetTypeDescription
 MakeNode = Callable[..., Node]
 SpinUntil = Callable[..., None]
 
-FIBONACCI = "example_interfaces/action/Fibonacci"
+FIBONACCI = f"{PACKAGE}/action/Fibonacci"
 # The hash of this type in ROS 2.
 FIBONACCI_HASH = "RIHS01_9508051da1ea4658de144b09bd0690ff3de52104683d847aed764d2915906f51"
 
@@ -62,12 +62,12 @@ def test_an_action_is_made_of_hidden_topics_and_services(
     assert client.wait_for_server(timeout_sec=10)
     topics = dict(node.get_topic_names_and_types())
     services = dict(node.get_service_names_and_types())
-    assert topics["/fibonacci/_action/feedback"] == ["example_interfaces/action/Fibonacci_FeedbackMessage"]
+    assert topics["/fibonacci/_action/feedback"] == [f"{FIBONACCI}_FeedbackMessage"]
     assert topics["/fibonacci/_action/status"] == ["action_msgs/msg/GoalStatusArray"]
     assert {name: types for name, types in services.items() if "_action" in name} == {
         "/fibonacci/_action/cancel_goal": ["action_msgs/srv/CancelGoal"],
-        "/fibonacci/_action/get_result": ["example_interfaces/action/Fibonacci_GetResult"],
-        "/fibonacci/_action/send_goal": ["example_interfaces/action/Fibonacci_SendGoal"],
+        "/fibonacci/_action/get_result": [f"{FIBONACCI}_GetResult"],
+        "/fibonacci/_action/send_goal": [f"{FIBONACCI}_SendGoal"],
     }
     (status,) = node.get_publishers_info_by_topic("/fibonacci/_action/status")
     assert status.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL

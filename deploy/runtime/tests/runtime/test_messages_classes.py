@@ -14,6 +14,8 @@ import pytest
 
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from example_interfaces.msg import Int32
+from example_interfaces.srv import AddTwoInts
 from geometry_msgs.msg import Point, Point32, PointStamped, PoseWithCovariance, Quaternion
 from rcl_interfaces.msg import IntegerRange, Parameter, ParameterDescriptor, ParameterValue
 from rmw_dds_common.msg import Gid
@@ -212,3 +214,8 @@ def test_messages_of_numbers_need_no_numpy() -> None:
         "assert 'numpy' not in sys.modules"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_example_interfaces_has_messages_and_services() -> None:
+    assert Int32(data=-1).data == -1
+    assert AddTwoInts.Request(a=1, b=2).b == 2
