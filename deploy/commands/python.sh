@@ -13,7 +13,7 @@ print(os.path.realpath(sys._base_executable))'
 module=$1
 cd "$(dirname "$0")/../.."
 if [ -n "${2-}" ]; then
-    base=$(base_of "$2") && [ -n "$base" ] && exec "$base" -m "$module"
+    base=$(base_of "$2" 2>/dev/null) && [ -n "$base" ] && exec "$base" -m "$module"
     echo "PYTHON=$2 is not a Python 3.11, 3.12 or 3.13" >&2
     exit 1
 fi
