@@ -217,7 +217,7 @@ def _show(system: System, member: Member, *, owner: bool = False) -> None:
                 if not owner or not system.start_again():
                     say(system.how_it_ended())
                     return
-                say("supervisord was killed: everything has been started anew.")
+                say("supervisord was killed: everything has started again.")
         member.spin_some()  # sends what was typed just before `quit`
 
 
@@ -270,8 +270,11 @@ def main(arguments: list[str]) -> int:
     except BrokenPipeError:  # the reader has gone, as in `make run | head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
-    except (DeploymentError, OSError) as error:  # OSError: a file of the system cannot be written or read
+    except DeploymentError as error:
         print(error, file=sys.stderr)
+        return 1
+    except OSError as error:  # a file of the system cannot be written or read
+        print(f"{error.filename}: {error.strerror}" if error.filename else error, file=sys.stderr)
         return 1
     return 0
 

@@ -221,23 +221,31 @@ class System:
 
     def origin(self) -> float:
         """The origin of the running system's scenario [s, monotonic clock]; NOT_YET before it begins."""
-        import yaml
-
-        return float(yaml.safe_load(self.parameters.read_text())[ALL][KEY]["scenario_epoch"])
+        return float(self._written_parameters()[ALL][KEY]["scenario_epoch"])
 
     def keep_origin(self, origin: float) -> None:
         """Write the origin of the scenario [s, monotonic clock] for services that start from now on."""
-        import yaml
-
-        document = yaml.safe_load(self.parameters.read_text())
+        document = self._written_parameters()
         document[ALL][KEY]["scenario_epoch"] = origin
         self.write_parameters(document)
+
+    def _written_parameters(self) -> dict[str, Any]:
+        import yaml
+
+        try:
+            document: dict[str, Any] = yaml.safe_load(self.parameters.read_text())
+            document[ALL][KEY]["scenario_epoch"]
+        except (OSError, ValueError, LookupError, TypeError, yaml.YAMLError):
+            reason = "was deleted or damaged: make stop, make start"
+            raise DeploymentError(f"{self.parameters} {reason}") from None
+        return document
 
     # The steps of start and stop
 
     def _prepare(self, parameters: Mapping[str, object]) -> None:
         if pid := self.supervisor():
-            raise DeploymentError(f"Already running: supervisord has pid {pid} and works in {self.run}")
+            where = f"supervisord has pid {pid} and works in {self.run}"
+            raise DeploymentError(f"Already running: {where}. make console shows it, make stop ends it")
         self.logs.mkdir(exist_ok=True)
         shutil.rmtree(self.run / SETTINGS, ignore_errors=True)
         self.write_parameters(parameters)

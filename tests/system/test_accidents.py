@@ -49,7 +49,7 @@ def test_it_starts_again_when_supervisord_is_killed(small_site: Site) -> None:
     command.await_line("Engines are off")
     before = small_site.members
     os.kill(before[""], signal.SIGKILL)
-    command.await_line("supervisord was killed: everything has been started anew")
+    command.await_line("supervisord was killed: everything has started again")
     after = small_site.members
     assert set(after.values()).isdisjoint(before.values())
     command.type("quit\n")

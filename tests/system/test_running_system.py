@@ -60,7 +60,7 @@ def test_a_second_start_reports_the_running_system(module_site: Site) -> None:
         code, printed = module_site.do(command, STEADY)
         assert code == 1
         where = f"supervisord has pid {module_site.members['']} and works in {module_site.run}"
-        assert printed == f"Already running: {where}"
+        assert printed == f"Already running: {where}. make console shows it, make stop ends it"
 
 
 def test_a_second_system_in_the_same_domain_is_refused(module_site: Site, tmp_path: Path) -> None:
