@@ -17,21 +17,27 @@ def check(node: Node, arguments: Sequence[str]) -> None:
     A parameter file is not checked here: its ``/**`` may name parameters of other services.
 
     :param arguments: the command line, without the program.
-    :raises UserError: for parameters that the node does not have, and for options outside of ``--ros-args``.
+    :raises UserError: for parameters of another node and those that this one does not have, and for options
+        outside of ``--ros-args``.
     """
     if options := [word for word in remove_ros_args(arguments) if word.startswith("-")]:
         raise UserError(f"{' '.join(options)}: no such option; those of ROS follow after --ros-args")
-    if unknown := [name for name in _parameters(arguments) if not node.has_parameter(name)]:
+    given = [*_parameters(arguments)]
+    own = node.get_fully_qualified_name()
+    if others := [f"{other}:{name}" for other, name in given if other and f"/{other}" != own]:
+        raise UserError(f"{', '.join(others)}: this node is {own}; leave the name of the node out")
+    if unknown := [name for _, name in given if not node.has_parameter(name)]:
         known = ", ".join(sorted(node.list_parameters([], 0).names))
         raise UserError(f"{', '.join(unknown)}: no such parameter; the parameters are {known}")
 
 
-def _parameters(arguments: Sequence[str]) -> Iterator[str]:
-    """Yield the names of the parameters that ``-p [node:]name:=value`` sets."""
+def _parameters(arguments: Sequence[str]) -> Iterator[tuple[str, str]]:
+    """Yield the node, '' for any, and the name of each parameter that ``-p [node:]name:=value`` sets."""
     words = iter(arguments)
     is_ros = False
     for word in words:
         if word in ("--ros-args", "--"):
             is_ros = word == "--ros-args"
         elif is_ros and word in ("-p", "--param"):
-            yield next(words).partition(":=")[0].rpartition(":")[2]
+            node, _, name = next(words).partition(":=")[0].rpartition(":")
+            yield node, name

@@ -275,6 +275,10 @@ def test_killed_instance_frees_its_name_at_once(start: Start) -> None:
             "robot_state: raet: no such parameter; the parameters are .*rate",
         ),
         (
+            ["services.robot_state", "--ros-args", "-p", "robot_stat:rate:=30.0", "-r", "__ns:=/arm1"],
+            "robot_state: robot_stat:rate: this node is /arm1/robot_state; leave the name of the node out",
+        ),
+        (
             ["services.kinematics", "--rate=3"],
             "kinematics: --rate=3: no such option; those of ROS follow after --ros-args",
         ),
