@@ -17,6 +17,7 @@ import importlib.util
 import os
 import platform
 import shlex
+import shutil
 import signal
 import subprocess
 import sys
@@ -48,6 +49,8 @@ SCRIPTS = {
     "ros2": "ros2cli.cli",
 }
 """Commands in .venv/bin and the modules of their `main`; pip's own scripts fail in a path with quotes."""
+
+ENOUGH_SPACE = 1e9  # bytes of the disk, for a set-up
 
 
 class SetupError(Exception):
@@ -213,7 +216,7 @@ def _step(title: str, command: list[str], log: Path | None = LOG) -> None:
             words = line.split()
             if live and words[:1] in (["Collecting"], ["Installing"], ["Building"]):
                 print(f"\r\x1b[K  {title}: {words[0].lower()} {words[1]}", end="", flush=True)
-        process.wait()
+        process.communicate()  # closes the pipe, too
     except BaseException:
         with suppress(ProcessLookupError):
             os.killpg(process.pid, signal.SIGTERM)
@@ -229,6 +232,8 @@ def _step(title: str, command: list[str], log: Path | None = LOG) -> None:
         reasons = [line for line in lines if line.startswith("ERROR")] or lines[-5:]
         if any("Retrying" in line for line in lines):  # pip then blames the requirement
             reasons.append("The package index was not reached: network, proxy, PIP_INDEX_URL?")
+        if (free := shutil.disk_usage(ROOT).free) < ENOUGH_SPACE:  # venv does not tell that the disk is full
+            reasons.append(f"{free / 1e6:.0f} MB are free on the disk of {ROOT}")
         where = f" (full log: {log.relative_to(ROOT)})" if log is not None else ""
         raise SetupError(f"Set-up failed at {title}{where}:\n{''.join(reasons).rstrip()}")
 

@@ -15,6 +15,7 @@ import time
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
 import pytest
 
@@ -141,6 +142,16 @@ def test_a_variable_that_make_would_ignore_is_refused(checkout: Path, words: str
         assert re.fullmatch(rf"Makefile:\d+: \*\*\* make {problem}\.  Stop\.\n", done.stderr)
     else:
         assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.parametrize(("free", "words"), [(2e9, ""), (3e6, f"3 MB are free on the disk of {ROOT}")])
+def test_a_step_that_fails_on_a_full_disk_tells_the_free_space(
+    monkeypatch: pytest.MonkeyPatch, free: float, words: str
+) -> None:
+    monkeypatch.setattr(shutil, "disk_usage", lambda path: mock.Mock(free=free))
+    with pytest.raises(setup.SetupError) as raised:
+        setup._step("a step", ["sh", "-c", "echo no reason; exit 1"], log=None)
+    assert str(raised.value) == f"Set-up failed at a step:\nno reason\n{words}".rstrip()
 
 
 def test_an_interrupt_waits_until_the_step_can_be_ended(monkeypatch: pytest.MonkeyPatch) -> None:
