@@ -28,7 +28,10 @@ SpinUntil = Callable[..., None]
 
 FIBONACCI = f"{PACKAGE}/action/Fibonacci"
 # The hash of this type in ROS 2.
-FIBONACCI_HASH = "RIHS01_9508051da1ea4658de144b09bd0690ff3de52104683d847aed764d2915906f51"
+FIBONACCI_HASH = {
+    "example_interfaces": "RIHS01_9508051da1ea4658de144b09bd0690ff3de52104683d847aed764d2915906f51",
+    "test_msgs": "RIHS01_be9273e3557225044b4a040811112491f7079326e3a573f83258b0b4c30bd069",
+}[PACKAGE]
 
 
 def fibonacci(goal_handle: ServerGoalHandle) -> Fibonacci.Result:
