@@ -42,7 +42,7 @@ GIVEN := $(foreach name,$(.VARIABLES),$(if $(filter command,$(origin $(name))),$
 $(foreach name,$(filter-out $(USED) $(ENVIRONMENT),$(GIVEN)),$(error make $(GOALS) has no variable $(name); it has $(USED)))
 endif
 
-.PHONY: help setup run start stop status logs record console chaos simulate replay test mutants check bench
+.PHONY: help setup tables run start stop status logs record console chaos simulate replay test mutants check bench
 
 help:
 	@echo "make run      start the system, show it in this terminal, stop it with Ctrl-C"
@@ -60,6 +60,7 @@ help:
 	@echo "                                                  for its rclpy, TESTS=tests/page for its page)"
 	@echo "make mutants  change the safety path in every small way: do the tests notice?  (MODULES= for a part)"
 	@echo "make bench    compare the costs with those of the alternatives  (BENCH=\"--rounds 5\", minutes each)"
+	@echo "make tables   write the tables of interfaces/README.md from the code"
 	@echo "make check    ruff, mypy, import rules, shellcheck, yamllint"
 	@echo "make setup    only set up .venv                   (PYTHON= chooses the interpreter, 3.11 to 3.13)"
 	@echo "All of them run on ROS 2's own rclpy from PyPI, or on a sourced ROS 2. RUNTIME=embedded takes our lighter one."
@@ -94,6 +95,9 @@ mutants: setup
 
 bench: setup
 	@exec $(HOLD) $(PY) -m deploy.benchmarks $(BENCH)
+
+tables: setup
+	@RUNTIME=embedded $(PY) -m deploy.commands.tables
 
 check: setup
 	@$(PY) -m ruff check .

@@ -1,4 +1,4 @@
-"""The README agrees with the code."""
+"""The pages of the repository agree with the code."""
 
 from __future__ import annotations
 
@@ -6,59 +6,67 @@ import re
 import textwrap
 from pathlib import Path
 
-from deploy.commands.parameter_file import USE_SIM_TIME, declared
+import pytest
+
+from deploy.commands import tables
 from interfaces import topics
 
 ROOT = Path(__file__).parents[2]
-README = (ROOT / "README.md").read_text()
-CONTRACT = README if topics.TF in topics.CONTRACT else re.sub(r".*/tf.*\n", "", README)
-"""What the README shows of the contract: without `/tf`, where tf2_msgs is not installed."""
+PAGES = (
+    "README.md",
+    "CONTRIBUTING.md",
+    "deploy/README.md",
+    "deploy/SAFETY.md",
+    "deploy/benchmarks/README.md",
+    "interfaces/README.md",
+    "services/README.md",
+    "tests/README.md",
+)
+RECIPES = {
+    "README.md": "services/operator_watchdog.py",
+    "services/README.md": "services/examples/speed_guard.py",
+}
+"""The file that has the recipe of a page."""
 
 
-def test_contract_table_is_current() -> None:
-    (table,) = re.findall(r"^\| topic \|.*?\n(?=\n)", CONTRACT, re.MULTILINE | re.DOTALL)
-    assert table == topics.markdown()
+def text_of(page: str) -> str:
+    """Return the text of a page; without `/tf`, where tf2_msgs is not installed."""
+    text = (ROOT / page).read_text(encoding="utf-8")
+    return text if topics.TF in topics.CONTRACT else re.sub(r".*(`/tf` \||-- /tf).*\n", "", text)
+
+
+def test_first_page_is_one_screen() -> None:
+    assert text_of("README.md").count("\n") <= 120
+
+
+def test_tables_are_current() -> None:
+    shown = text_of("interfaces/README.md")
+    assert shown == tables.updated(shown)
 
 
 def test_graph_shows_the_publishers_of_each_topic() -> None:
-    arrows = re.findall(r"^ +(\w+) -- (\S+) -->", CONTRACT, re.MULTILINE)
+    arrows = re.findall(r"^ +(\w+) -- (\S+) -->", text_of("services/README.md"), re.MULTILINE)
     drawn = {(topic, publisher) for publisher, topic in arrows}
     promised = {(topic.name, name) for topic in topics.CONTRACT for name in topic.publishers}
     assert drawn == {pair for pair in promised if pair[0] != topics.DIAGNOSTICS.name}
 
 
-def test_parameter_table_is_current() -> None:
-    rows = [
-        f"| {program} | `{each.name}` | {_shown(each.default)} | {_range(each.within)} | {each.unit} "
-        f"| {'yes' if each.settable else ''} | {each.meaning} |"
-        for program, parameters in declared().items()
-        for each in parameters.values()
-        if each != USE_SIM_TIME
-    ]
-    assert re.findall(r"^\| \w+ \| `\w+` \| .*\|$", README, re.MULTILINE) == rows, "\n".join(rows)
+@pytest.mark.parametrize("page", RECIPES)
+def test_shown_recipe_is_the_one_of_the_service(page: str) -> None:
+    code = (ROOT / RECIPES[page]).read_text()
+    recipe = re.findall(r"```python\n(.*?)```", text_of(page), re.DOTALL)[0]
+    assert any(textwrap.indent(recipe, " " * depth) in code for depth in (0, 4, 8))
 
 
-def _shown(value: object) -> str:
-    return str(value).lower() if isinstance(value, bool) else repr(value)
+@pytest.mark.parametrize("page", PAGES)
+def test_linked_files_exist(page: str) -> None:
+    links = [link.partition("#")[0] for link in re.findall(r"\]\(([^)]+)\)", text_of(page))]
+    folder = (ROOT / page).parent
+    assert [link for link in links if "://" not in link and not (folder / link).exists()] == []
 
 
-def _range(within: tuple[object, object] | None) -> str:
-    return f"{_shown(within[0])} to {_shown(within[1])}" if within else ""
-
-
-def test_shown_recipe_is_the_one_of_the_watchdog() -> None:
-    (recipe,) = re.findall(r"```python\n(alive = .*?)```", README, re.DOTALL)
-    assert textwrap.indent(recipe, " " * 8) in (ROOT / "services" / "operator_watchdog.py").read_text()
-
-
-def test_named_folders_and_linked_files_exist() -> None:
-    table = README[README.index("| place |") :]
-    places = re.findall(r"^\| `([\w/.]+)` \|", table, re.MULTILINE)
-    links = re.findall(r"\]\(([^)]+)\)", README)
-    named = [*places, *(link for link in links if "#" not in link and "://" not in link)]
-    assert [name for name in named if name != ".run/" and not (ROOT / name).exists()] == []
-
-
-def test_named_make_targets_exist() -> None:
+@pytest.mark.parametrize("page", PAGES)
+def test_named_commands_of_make_exist(page: str) -> None:
     targets = re.findall(r"^([a-z ]+):", (ROOT / "Makefile").read_text(), re.MULTILINE)
-    assert set(re.findall(r"make ([a-z]+)", README)) <= {name for names in targets for name in names.split()}
+    known = {name for names in targets for name in names.split()}
+    assert set(re.findall(r"(?:`|^ +|[A-Z]=\S+ )make ([a-z]+)", text_of(page), re.MULTILINE)) <= known

@@ -245,13 +245,10 @@ def test_a_second_arm_runs_in_a_namespace_of_the_same_domain(module_site: Site, 
     assert module_site.members == first
 
 
-def test_the_service_of_the_readme_works(module_site: Site, peer: Peer, tmp_path: Path) -> None:
-    readme = (ROOT / "README.md").read_text()
-    (code,) = re.findall(r"```python\n([^`]*? too fast\.\"\"\".*?)```", readme, re.DOTALL)
-    (tmp_path / "speed_guard.py").write_text(code)
+def test_example_of_a_service_joins_the_system(module_site: Site, peer: Peer) -> None:
     commands, speed = peer.collect(topics.ENGINES), peer.publisher(topics.EFFECTOR_SPEED)
     reports = peer.collect(topics.DIAGNOSTICS)
-    guard = module_site.begin_python(str(tmp_path / "speed_guard.py"), "--ros-args", "-p", "limit:=3.0")
+    guard = module_site.begin_python("-m", "services.examples.speed_guard", "--ros-args", "-p", "limit:=3.0")
 
     def it_has_commanded() -> bool:  # the operator watchdog may command, too
         for value in (2.9, 3.1, 3.2):  # the last two in a row are too fast

@@ -1,0 +1,1 @@
+"""Services to copy from; the manifest does not start them."""

@@ -1,0 +1,30 @@
+"""Turns the engines off when the effector is too fast."""
+
+from dataclasses import dataclass
+
+from reactivex import Observable
+from std_msgs.msg import String
+
+from interfaces import service, topics
+
+
+def too_fast(speeds: Observable[float], limit: float) -> Observable[str]:
+    """Emit `turn_off` when two speeds in a row are above the limit [m/s]: one may be late by a timer."""
+    excess = speeds.pairwise().map(lambda pair: min(pair) > limit).distinct_until_changed()
+    return excess.filter(bool).map(lambda _: topics.TURN_OFF)
+
+
+@dataclass(frozen=True)
+class Parameters:
+    limit: float = service.parameter(2.0, (0.0, 100.0), "m/s", "greatest speed allowed")
+
+
+def wire(node: service.ServiceNode) -> None:
+    """Connect the recipe with its topics."""
+    speeds = node.observe(topics.EFFECTOR_SPEED, lambda message: message.data)
+    commands = too_fast(speeds, node.declare(Parameters).limit)
+    node.publish(topics.ENGINES, commands, lambda command: String(data=command))
+
+
+if __name__ == "__main__":
+    service.run("speed_guard", wire)
