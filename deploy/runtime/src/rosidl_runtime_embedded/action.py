@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 from .definition_files import action_definition
+from .interface_class import make_class, module_of
 from .message import Message, message_class
 from .service import InterfaceTypeHash, Service, service_class
 
@@ -46,8 +47,7 @@ def action_class(name: str) -> type[Action]:
 def _make_action_class(full_name: str) -> type[Action]:
     """Make the class of an action type."""
     definition = action_definition(full_name)
-    package, kind, name = full_name.split("/")
-    module = f"{package}.{kind}"
+    name = full_name.rpartition("/")[2]
     transport = {
         "SendGoalService": service_class(definition.send_goal.name),
         "GetResultService": service_class(definition.get_result.name),
@@ -55,13 +55,12 @@ def _make_action_class(full_name: str) -> type[Action]:
         "CancelGoalService": service_class("action_msgs/srv/CancelGoal"),
         "GoalStatusMessage": message_class("action_msgs/msg/GoalStatusArray"),
     }
+    names = {"__module__": module_of(full_name), "__qualname__": f"{name}.Impl"}
     namespace = {
-        "__module__": module,
         "__doc__": f"Action {full_name}.",
-        "_TYPE_NAME": full_name,
         "Goal": message_class(definition.goal.name),
         "Result": message_class(definition.result.name),
         "Feedback": message_class(definition.feedback.name),
-        "Impl": type("Impl", (Action.Impl,), {"__module__": module, **transport}),
+        "Impl": type("Impl", (Action.Impl,), {**names, **transport}),
     }
-    return type(name, (Action,), namespace)
+    return make_class(Action, full_name, namespace)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from . import generated
 from .definition_files import message_definition
 from .fields import converter, initial_value, is_numeric, numeric_field, python_value, slot_of
+from .interface_class import make_class
 from .validation import validate_assignment
 
 if TYPE_CHECKING:
@@ -205,7 +206,8 @@ class Message:
         fields = (
             f"{name}={value.tolist() if isinstance(value, array) else value!r}" for name, value in values
         )
-        return f"{self.__module__}.{type(self).__name__}({', '.join(fields)})"
+        module = self.__module__.rpartition(".")[0]
+        return f"{module}{'.' if module else ''}{type(self).__name__}({', '.join(fields)})"
 
     def __eq__(self, other: object) -> bool:
         """Whether both have the same type and equal fields."""
@@ -238,23 +240,22 @@ def _make_message_class(definition: MessageDefinition) -> type[Message]:
     """Make the class of a message type."""
     package, kind, name = definition.name.split("/")
     namespace: dict[str, Any] = {
-        "__module__": f"{package}.{kind}",
         "__doc__": f"Message {definition.name}.",
         "__slots__": (*(slot_of(field) for field in definition.fields), _FLAG),
         "_DEFINITION": definition,
-        "_TYPE_NAME": definition.name,
         "_DDS_TYPE_NAME": f"{package}::{kind}::dds_::{name}_",
         "_fields_and_field_types": {field.name: str(field.type) for field in definition.fields},
+    }
+    constants = {
+        constant.name: python_value(constant.type, constant.value) for constant in definition.constants
     }
     for field in definition.fields:
         if is_numeric(field):
             namespace[field.name] = numeric_field(definition.name, field)
         if field.default is not None:
             initial, is_factory = initial_value(field, message_class)
-            namespace[f"{field.name.upper()}__DEFAULT"] = initial() if is_factory else initial
-    for constant in definition.constants:
-        namespace[constant.name] = python_value(constant.type, constant.value)
-    cls = type(name, (Message,), namespace)
+            constants[f"{field.name.upper()}__DEFAULT"] = initial() if is_factory else initial
+    cls: type = make_class(Message, definition.name, namespace, constants)
     # __slots__ lists the names of rclpy. The real slots have the names of the fields, faster than a property.
     slots = []
     for field in definition.fields:

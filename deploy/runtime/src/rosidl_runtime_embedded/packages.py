@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import re
 import sys
 from importlib.machinery import ModuleSpec, PathFinder
 from typing import TYPE_CHECKING, Any, cast
 
 from .action import action_class
 from .definition_files import ACTION_PARTS, ACTION_SERVICES, KINDS, SERVICE_PARTS, interface_names, is_defined
+from .interface_class import module_of
 from .message import message_class
 from .service import service_class
 
@@ -19,10 +19,6 @@ if TYPE_CHECKING:
 
 _PARTS: dict[str, tuple[str, ...]] = {"msg": (), "srv": SERVICE_PARTS, "action": ACTION_PARTS}
 """Suffixes of the messages that an interface of each kind defines."""
-
-
-def _snake_case(name: str) -> str:
-    return re.sub(r"(?<=[a-z0-9])(?=[A-Z])|(?<=.)(?=[A-Z][a-z])", "_", name).lower()
 
 
 def interfaces(module_name: str) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
@@ -45,6 +41,20 @@ def interfaces(module_name: str) -> tuple[Callable[[str], Any], Callable[[], lis
         return value
 
     return get, names
+
+
+def _one_interface(module_name: str) -> Callable[[str], Any]:
+    """The function ``__getattr__`` of the module of an interface: its classes, and their metaclasses."""
+    parent = module_name.rpartition(".")[0]
+
+    def get(name: str) -> Any:
+        class_name = name.removeprefix("Metaclass_")
+        if module_of(f"{parent.replace('.', '/')}/{class_name}") != module_name:
+            raise AttributeError(f"module '{module_name}' has no attribute '{name}'")
+        cls = getattr(sys.modules[parent], class_name)
+        return cls if name == class_name else type(cls)
+
+    return get
 
 
 def _make(kind: str, part: str) -> Callable[[str], Any]:
@@ -71,7 +81,7 @@ class _UserPackages:
             if kind in KINDS and (found := PathFinder.find_spec(name, path, target)):
                 return found  # of a ROS 2 that is sourced beside this distribution
             names = interface_names(package, kind) if kind in KINDS else []
-            known = any(f"_{_snake_case(interface)}" == module for interface in names)
+            known = any(module_of(f"{package}/{kind}/{interface}") == name for interface in names)
             return ModuleSpec(name, cast("Loader", self)) if known else None
         kinds = [kind] if kind in KINDS else [] if kind else list(KINDS)
         if not kinds:
@@ -86,9 +96,11 @@ class _UserPackages:
 
     def exec_module(self, module: ModuleType) -> None:
         """Let the module provide its classes."""
-        if "." in module.__name__:
-            parent = ".".join(module.__name__.split(".")[:2])
-            vars(module)["__getattr__"], vars(module)["__dir__"] = interfaces(parent)
+        name, members = module.__name__, vars(module)
+        if name.count(".") == 1:
+            members["__getattr__"], members["__dir__"] = interfaces(name)
+        elif "." in name:
+            members["__getattr__"] = _one_interface(name)
 
 
 def install() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from .definition_files import SERVICE_PARTS, service_definition
+from .interface_class import make_class
 from .message import Message, message_class
 
 if TYPE_CHECKING:
@@ -49,11 +50,5 @@ def service_class(name: str) -> type[Service]:
 
 def _make_service_class(definition: ServiceDefinition) -> type[Service]:
     """Make the class of a service type."""
-    package, kind, name = definition.name.split("/")
     parts = {part: message_class(f"{definition.name}_{part}") for part in SERVICE_PARTS}
-    namespace = {
-        "__module__": f"{package}.{kind}",
-        "__doc__": f"Service {definition.name}.",
-        "_TYPE_NAME": definition.name,
-    }
-    return type(name, (Service,), {**namespace, **parts})
+    return make_class(Service, definition.name, {"__doc__": f"Service {definition.name}.", **parts})

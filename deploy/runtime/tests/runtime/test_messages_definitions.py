@@ -351,7 +351,11 @@ def test_an_action_of_a_user_is_imported_without_a_build_step(define: Define) ->
     assert type(request)._deserialize(type(request)._serialize(request)) == request
     assert f"{package}::action::dds_::Move_SendGoal_Request_" == type(request)._DDS_TYPE_NAME
     assert load(package, "Move_FeedbackMessage", "action") is move.Impl.FeedbackMessage
-    assert importlib.import_module(f"{package}.action._move").Move is move
+    module = importlib.import_module(f"{package}.action._move")
+    assert module.Move is move
+    assert module.Metaclass_Move_SendGoal is move.Impl.SendGoalService.__class__
+    for cls in (move, move.Goal, move.Impl, move.Impl.SendGoalService.Request):
+        assert cls.__module__ == f"{package}.action._move"
     assert action_class(f"{package}/action/Move") is move
 
 
