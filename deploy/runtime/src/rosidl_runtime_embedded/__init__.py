@@ -3,7 +3,7 @@
 from .action import Action, action_class
 from .definition import InvalidDefinition
 from .message import Message, message_class
-from .packages import install, interfaces
+from .packages import install, interfaces, kinds
 from .service import Service, service_class
 
 install()
@@ -15,6 +15,7 @@ __all__ = [
     "Service",
     "action_class",
     "interfaces",
+    "kinds",
     "message_class",
     "service_class",
 ]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from importlib import import_module
 from importlib.machinery import ModuleSpec, PathFinder
 from typing import TYPE_CHECKING, Any, cast
 
@@ -41,6 +42,20 @@ def interfaces(module_name: str) -> tuple[Callable[[str], Any], Callable[[], lis
         return value
 
     return get, names
+
+
+def kinds(package: str) -> Callable[[str], Any]:
+    """The function ``__getattr__`` of a package: it imports ``msg``, ``srv`` or ``action`` on first use.
+
+    In ROS 2, a class in use has mostly imported them before, so programs write ``import std_msgs`` only.
+    """
+
+    def get(name: str) -> Any:
+        if name in KINDS and interface_names(package, name):
+            return import_module(f"{package}.{name}")
+        raise AttributeError(f"module '{package}' has no attribute '{name}'")
+
+    return get
 
 
 def _one_interface(module_name: str) -> Callable[[str], Any]:
@@ -95,12 +110,15 @@ class _UserPackages:
         """Leave the creation to the import system."""
 
     def exec_module(self, module: ModuleType) -> None:
-        """Let the module provide its classes."""
+        """Let the module provide its classes, or the package its modules."""
         name, members = module.__name__, vars(module)
-        if name.count(".") == 1:
-            members["__getattr__"], members["__dir__"] = interfaces(name)
-        elif "." in name:
-            members["__getattr__"] = _one_interface(name)
+        match name.count("."):
+            case 0:
+                members["__getattr__"] = kinds(name)
+            case 1:
+                members["__getattr__"], members["__dir__"] = interfaces(name)
+            case _:
+                members["__getattr__"] = _one_interface(name)
 
 
 def install() -> None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import importlib
 import pickle
+import subprocess
+import sys
 from typing import Any
 
 import pytest
@@ -91,3 +93,16 @@ def test_a_module_of_an_interface_has_no_other_classes() -> None:
         exec("from std_msgs.msg._string import Bool")
     with pytest.raises(ImportError, match="Metaclass_Bool"):
         exec("from std_msgs.msg._string import Metaclass_Bool")
+
+
+def test_a_package_in_use_has_its_modules_without_their_import() -> None:
+    # diagnostic_updater's example imports `diagnostic_msgs` and `std_msgs` only
+    code = (
+        "import std_msgs, std_srvs, rclpy\n"
+        "from rclpy.type_support import check_for_type_support\n"
+        "from diagnostic_msgs.msg import DiagnosticArray\n"
+        "check_for_type_support(DiagnosticArray)\n"
+        "assert std_msgs.msg.Header() == DiagnosticArray().header\n"
+        "assert not hasattr(std_msgs, 'srv') and not hasattr(std_msgs, 'nothing')"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=60)

@@ -116,6 +116,12 @@ def test_a_users_package_is_imported_without_a_build_step(define: Define) -> Non
     assert dir(importlib.import_module(f"{package}.msg")) == ["Arm", "Joint"]
 
 
+def test_a_users_package_has_its_modules_without_their_import(define: Define) -> None:
+    package = importlib.import_module(define({"Joint.msg": JOINT}))
+    assert package.msg.Joint().angle == 0.5
+    assert not hasattr(package, "srv")
+
+
 def test_the_first_import_of_a_process_finds_a_users_package(define: Define) -> None:
     package = define({"Joint.msg": JOINT})
     # as site does with the .pth file of an installed distribution
