@@ -86,7 +86,7 @@ def get_global_executor() -> Executor:
         from rclpy.executors import SingleThreadedExecutor
 
         _executor = SingleThreadedExecutor()
-        _executor._is_global = True
+        _executor._rclpy_is_global = True
 
         def end() -> None:
             global _executor

@@ -69,7 +69,7 @@ def _closed(profile: QoSProfile, **best: Any) -> QoSProfile:
     """A copy of the profile whose "best available" policies have the given values."""
     if not has_open_policy(profile):
         return profile
-    closed = profile._copy()
+    closed = profile._rclpy_copy()
     for policy, value in best.items():
         if _is_open(profile, policy):
             setattr(closed, policy, value)

@@ -50,21 +50,21 @@ class Owner:
     """Base of publishers and subscriptions: uses DDS entities of a node until it is destroyed."""
 
     def __init__(self, node: Node, name: str, *entities: Writer | Reader) -> None:
-        self._node = node
-        self._name = name
-        self._entities = entities
-        self._destroyed = False
+        self._rclpy_node = node
+        self._rclpy_name = name
+        self._rclpy_entities = entities
+        self._rclpy_destroyed = False
         self.event_handlers: list[EventHandler] = []
 
-    def _check_usable(self) -> None:
-        if self._destroyed:
+    def _rclpy_check_usable(self) -> None:
+        if self._rclpy_destroyed:
             kind = type(self).__name__.lower()
-            raise InvalidHandle(f"cannot use a {kind} of {self._name} that was destroyed")
+            raise InvalidHandle(f"cannot use a {kind} of {self._rclpy_name} that was destroyed")
 
     def destroy(self) -> None:
         """Destroy it. The node's ``destroy_…`` method also removes it from the node."""
-        if not self._destroyed:
-            self._destroyed = True
+        if not self._rclpy_destroyed:
+            self._rclpy_destroyed = True
             for handler in self.event_handlers:
                 handler.destroy()
-            self._node._rclpy_graph.destroy(self._node, *self._entities)
+            self._rclpy_node._rclpy_graph.destroy(self._rclpy_node, *self._rclpy_entities)

@@ -32,7 +32,7 @@ class EntityHandle(Handle, Generic[_Entity]):
     """A handle with which waitables add an entity to a wait set."""
 
     def __init__(self, entity: _Entity) -> None:
-        self._entity = entity
+        self._rclpy_entity = entity
 
 
 def ignore_change() -> None:

@@ -131,7 +131,7 @@ def _info(
         node_name=node_name,
         node_namespace=node_namespace,
         topic_type=_names.type_from_dds(endpoint.type_name),
-        topic_type_hash=TypeHash._parse(user_data_value(endpoint.user_data, "typehash")),
+        topic_type_hash=TypeHash._rclpy_parse(user_data_value(endpoint.user_data, "typehash")),
         endpoint_type=kind,
         endpoint_gid=list(endpoint.gid),
         qos_profile=copy(endpoint.profile),  # the user may change it

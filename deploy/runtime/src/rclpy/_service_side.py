@@ -38,10 +38,10 @@ class ServiceSide(Owner):
         qos_profile: QoSProfile,
     ) -> None:
         super().__init__(endpoint.node, endpoint.name, endpoint.writer, endpoint.reader)
-        self._handles = (endpoint.reader.condition,)
-        self._bad_input = BadInput(self._node.get_logger(), self._name)
-        self._lock = threading.Lock()
-        self._introspection: _Introspection | None = None
+        self._rclpy_handles = (endpoint.reader.condition,)
+        self._rclpy_bad_input = BadInput(self._rclpy_node.get_logger(), self._rclpy_name)
+        self._rclpy_lock = threading.Lock()
+        self._rclpy_introspection: _Introspection | None = None
         self.srv_type = srv_type
         self.srv_name = srv_name
         self.callback_group = callback_group
@@ -50,7 +50,7 @@ class ServiceSide(Owner):
     @property
     def service_name(self) -> str:
         """The fully qualified, remapped name."""
-        return self._name
+        return self._rclpy_name
 
     def configure_introspection(
         self,
@@ -68,27 +68,27 @@ class ServiceSide(Owner):
         :param introspection_state: the content of the events; OFF publishes none.
         :raises InvalidHandle: if the service or client was destroyed.
         """
-        self._check_usable()
+        self._rclpy_check_usable()
         if introspection_state == ServiceIntrospectionState.OFF:
-            self._end_introspection()
-        elif self._introspection is not None:
-            self._introspection = replace(self._introspection, state=introspection_state)
+            self._rclpy_end_introspection()
+        elif self._rclpy_introspection is not None:
+            self._rclpy_introspection = replace(self._rclpy_introspection, state=introspection_state)
         else:
-            publisher = self._node._rclpy_create_own_publisher(
-                self.srv_type.Event, f"{self._name}/_service_event", service_event_qos_profile
+            publisher = self._rclpy_node._rclpy_create_own_publisher(
+                self.srv_type.Event, f"{self._rclpy_name}/_service_event", service_event_qos_profile
             )
-            self._introspection = _Introspection(publisher, clock, introspection_state)
+            self._rclpy_introspection = _Introspection(publisher, clock, introspection_state)
 
-    def _end_introspection(self) -> None:
-        introspection, self._introspection = self._introspection, None
+    def _rclpy_end_introspection(self) -> None:
+        introspection, self._rclpy_introspection = self._rclpy_introspection, None
         if introspection is not None:
             introspection.publisher.destroy()
 
-    def _publish_event(
+    def _rclpy_publish_event(
         self, event_type: int, client_gid: bytes, sequence_number: int, **message: Any
     ) -> None:
         """Publish an event unless introspection is off; ``message`` is the ``request`` or ``response``."""
-        introspection = self._introspection
+        introspection = self._rclpy_introspection
         if introspection is None:
             return
         event = self.srv_type.Event()
@@ -104,5 +104,5 @@ class ServiceSide(Owner):
 
     def destroy(self) -> None:
         """Destroy it. The node's ``destroy_…`` method also removes it from the node."""
-        self._end_introspection()
+        self._rclpy_end_introspection()
         super().destroy()

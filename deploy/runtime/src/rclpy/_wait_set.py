@@ -37,11 +37,11 @@ class WaitSet:
 
     def add_timer(self, timer: TimerHandle) -> int:
         """Add the ``handle`` of a timer; return its index."""
-        return self._add("timer", timer._entity)
+        return self._add("timer", timer._rclpy_entity)
 
     def add_guard_condition(self, gc: GuardConditionHandle) -> int:
         """Add the ``handle`` of a guard condition; return its index."""
-        return self._add("guard_condition", gc._entity)
+        return self._add("guard_condition", gc._rclpy_entity)
 
     def _add(self, kind: str, entity: Any) -> int:
         self._entities[kind].append(entity)
@@ -75,10 +75,10 @@ class WaitableEntity:
         """The callback group of the waitable."""
         return self.waitable.callback_group
 
-    def _take(self) -> tuple[Any]:
+    def _rclpy_take(self) -> tuple[Any]:
         return (self.waitable.take_data(),)
 
-    def _execute(self, taken: tuple[Any]) -> Any:
+    def _rclpy_execute(self, taken: tuple[Any]) -> Any:
         executor = self._executor()
         for future in list(getattr(self.waitable, "_futures", ())):
             future._set_executor(executor)
@@ -93,7 +93,7 @@ class _Wake:
 
     def __call__(self) -> None:
         if (executor := self._executor()) is not None:
-            executor._wake_if_waiting()
+            executor._rclpy_wake_if_waiting()
 
 
 class WaitableWatch:
@@ -144,33 +144,33 @@ class WaitableWatch:
             return 0
         if any(map(self._is_triggered, self._watched("guard_condition"))):
             return 0
-        return min((timer._remaining() for timer in self._watched("timer")), default=INFINITY)
+        return min((timer._rclpy_remaining() for timer in self._watched("timer")), default=INFINITY)
 
     def _watched(self, kind: str) -> list[Any]:
         """The timers or guard conditions in the wait set, whose changes will wake the executor."""
         for entity in self._wait_set._entities[kind]:
-            if entity._on_change is ignore_change or isinstance(entity._on_change, _Wake):
-                entity._on_change = self._wake
+            if entity._rclpy_on_change is ignore_change or isinstance(entity._rclpy_on_change, _Wake):
+                entity._rclpy_on_change = self._wake
         return self._wait_set._entities[kind]
 
     def _attach(self, handles: dict[int, None]) -> None:
         for handle in [each for each in self._tokens if each not in handles]:
             del self._tokens[handle]
-            self._executor._waitset.detach(handle)
+            self._executor._rclpy_waitset.detach(handle)
         for handle in handles:
-            if handle in self._tokens or handle in self._executor._tokens:
+            if handle in self._tokens or handle in self._executor._rclpy_tokens:
                 continue
-            self._executor._last_token += 1
-            if self._executor._waitset.attach(handle, self._executor._last_token):
-                self._tokens[handle] = self._executor._last_token
+            self._executor._rclpy_last_token += 1
+            if self._executor._rclpy_waitset.attach(handle, self._executor._rclpy_last_token):
+                self._tokens[handle] = self._executor._rclpy_last_token
 
     def _is_triggered(self, guard: GuardCondition) -> bool:
-        return guard._last_trigger != self._triggers.get(guard, 0) and not guard._destroyed
+        return guard._rclpy_last_trigger != self._triggers.get(guard, 0) and not guard._rclpy_destroyed
 
     def ready(self, tokens: list[int]) -> list[WaitableEntity]:
         """Return the waitables that are ready after a wait, which has returned the tokens."""
         guards = {
-            guard: guard._last_trigger
+            guard: guard._rclpy_last_trigger
             for guard in self._wait_set._entities["guard_condition"]
             if self._is_triggered(guard)
         }
@@ -179,10 +179,10 @@ class WaitableWatch:
         def is_ready(kind: str, entity: Any) -> bool:
             if kind == "timer":
                 timer: Timer = entity
-                return not timer._destroyed and timer.is_ready()
+                return not timer._rclpy_destroyed and timer.is_ready()
             if kind == "guard_condition":
                 return entity in guards
-            return (self._tokens.get(entity) or self._executor._tokens.get(entity)) in tokens
+            return (self._tokens.get(entity) or self._executor._rclpy_tokens.get(entity)) in tokens
 
         self._wait_set._is_ready = is_ready
         ready = [entity for entity in self._postponed if self._executor.can_execute(entity)]

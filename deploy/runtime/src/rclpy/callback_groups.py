@@ -60,16 +60,16 @@ class MutuallyExclusiveCallbackGroup(CallbackGroup):
         super().__init__()
         self._active_entity: Any = None
         # The single item is the permission to run. Popping it is atomic and much cheaper than a lock.
-        self._permission = [None]
+        self._rclpy_permission = [None]
 
     def can_execute(self, entity: Any) -> bool:
         """Return whether no callback of the group is running."""
-        return bool(self._permission)
+        return bool(self._rclpy_permission)
 
     def beginning_execution(self, entity: Any) -> bool:
         """Return `True`, and bar other callbacks, if no callback of the group is running."""
         try:
-            self._permission.pop()
+            self._rclpy_permission.pop()
         except IndexError:
             return False
         self._active_entity = entity
@@ -79,4 +79,4 @@ class MutuallyExclusiveCallbackGroup(CallbackGroup):
         """Allow the next callback to run."""
         assert self._active_entity is entity, "ending_execution() of an entity that is not being executed"
         self._active_entity = None
-        self._permission.append(None)
+        self._rclpy_permission.append(None)

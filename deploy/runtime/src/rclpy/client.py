@@ -34,18 +34,18 @@ class Client(ServiceSide):
         callback_group: CallbackGroup,
     ) -> None:
         super().__init__(client_impl, srv_type, srv_name, callback_group, qos_profile)
-        self._requests = client_impl.writer
-        self._replies = client_impl.reader
-        self._identifier = client_impl.identifier
-        self._sequence_numbers = itertools.count(1)
+        self._rclpy_requests = client_impl.writer
+        self._rclpy_replies = client_impl.reader
+        self._rclpy_identifier = client_impl.identifier
+        self._rclpy_sequence_numbers = itertools.count(1)
         self._pending_requests: dict[int, Future] = {}
         self.context = context
 
     @property
     def handle(self) -> Writer:
         """The DDS writer of the requests. Raises InvalidHandle if the client was destroyed."""
-        self._check_usable()
-        return self._requests
+        self._rclpy_check_usable()
+        return self._rclpy_requests
 
     def call(self, request: Any, timeout_sec: float | None = None) -> Any:
         """
@@ -57,8 +57,8 @@ class Client(ServiceSide):
         """
         event = threading.Event()
         future = self.call_async(request)
-        future._call_when_complete(event.set)
-        self.context._wake_on_shutdown(event)
+        future._rclpy_call_when_complete(event.set)
+        self.context._rclpy_wake_on_shutdown(event)
         event.wait(timeout_sec)
         if not future.done():
             self.remove_pending_request(future)
@@ -72,26 +72,28 @@ class Client(ServiceSide):
         """
         if not isinstance(request, self.srv_type.Request):
             expected = self.srv_type.Request._TYPE_NAME
-            raise TypeError(f"{self._name} is called with {expected}, not {request!r}")
+            raise TypeError(f"{self._rclpy_name} is called with {expected}, not {request!r}")
         data = self.srv_type.Request._serialize(request)
-        future = Future(executor=self._node.executor)
-        with self._lock:
-            number = next(self._sequence_numbers)
+        future = Future(executor=self._rclpy_node.executor)
+        with self._rclpy_lock:
+            number = next(self._rclpy_sequence_numbers)
             self._pending_requests[number] = future
         # Not a done callback, which only runs on an executor.
-        future._call_when_complete(lambda: self.remove_pending_request(future))
-        self.handle.write(wrap(RequestId(self._requests.instance_handle, number), data))
-        self._publish_event(ServiceEventInfo.REQUEST_SENT, self._identifier, number, request=request)
+        future._rclpy_call_when_complete(lambda: self.remove_pending_request(future))
+        self.handle.write(wrap(RequestId(self._rclpy_requests.instance_handle, number), data))
+        self._rclpy_publish_event(
+            ServiceEventInfo.REQUEST_SENT, self._rclpy_identifier, number, request=request
+        )
         return future
 
     def get_pending_request(self, sequence_number: int) -> Future:
         """Return the future of a request without a reply. Raises KeyError if there is none."""
-        with self._lock:
+        with self._rclpy_lock:
             return self._pending_requests[sequence_number]
 
     def remove_pending_request(self, future: Future) -> None:
         """Stop waiting for the reply to a request: its future will not be completed."""
-        with self._lock:
+        with self._rclpy_lock:
             for number, pending in list(self._pending_requests.items()):
                 if pending is future:
                     del self._pending_requests[number]
@@ -99,8 +101,8 @@ class Client(ServiceSide):
     def service_is_ready(self) -> bool:
         """Whether a server is matched in both directions. Raises RCLError after the shutdown."""
         if not self.context.ok():
-            raise RCLError(f"cannot look for a server of {self._name}: the context was shut down")
-        return server_is_matched(self.handle, self._replies)
+            raise RCLError(f"cannot look for a server of {self._rclpy_name}: the context was shut down")
+        return server_is_matched(self.handle, self._rclpy_replies)
 
     def wait_for_service(self, timeout_sec: float | None = None) -> bool:
         """
@@ -109,36 +111,36 @@ class Client(ServiceSide):
         :raises RCLError: if the context is shut down, so that a loop around this call ends.
         """
         timeout = None if timeout_sec is None else max(0.0, timeout_sec)
-        graph = self._node._rclpy_graph
+        graph = self._rclpy_node._rclpy_graph
         return graph.wait_for(self.service_is_ready, timeout, self.context.ok) or self.service_is_ready()
 
     # The interface that executors use for every entity.
 
-    def _take(self) -> tuple[Future, Any] | None:
-        while not self._destroyed and (sample := self._replies.take()) is not None:
+    def _rclpy_take(self) -> tuple[Future, Any] | None:
+        while not self._rclpy_destroyed and (sample := self._rclpy_replies.take()) is not None:
             try:
                 request_id, data = unwrap(sample.data)
-                if request_id.client != self._requests.instance_handle:
+                if request_id.client != self._rclpy_requests.instance_handle:
                     continue  # all clients of a service share a topic: this reply is for another client
                 response = self.srv_type.Response._deserialize(data)
             except ValueError as error:
-                self._bad_input.drop(sample, error)
+                self._rclpy_bad_input.drop(sample, error)
                 continue
             number = request_id.sequence_number
-            self._publish_event(
-                ServiceEventInfo.RESPONSE_RECEIVED, self._identifier, number, response=response
+            self._rclpy_publish_event(
+                ServiceEventInfo.RESPONSE_RECEIVED, self._rclpy_identifier, number, response=response
             )
-            with self._lock:
+            with self._rclpy_lock:
                 future = self._pending_requests.get(number)
             if future is not None:
                 return future, response
-            self._ignore_reply()
+            self._rclpy_ignore_reply()
         return None
 
-    def _ignore_reply(self) -> None:
+    def _rclpy_ignore_reply(self) -> None:
         """Do nothing for a reply to a request that was removed, or that another server has answered."""
 
-    def _execute(self, taken: tuple[Future, Any]) -> None:
+    def _rclpy_execute(self, taken: tuple[Future, Any]) -> None:
         future, response = taken
-        future._set_executor(self._node.executor)
+        future._set_executor(self._rclpy_node.executor)
         future.set_result(response)

@@ -188,7 +188,7 @@ class _ClockSource(Handle):
         return self._read() if override is None else override
 
     def get_now(self) -> Time:
-        return Time._of(self.nanoseconds(), self._type)
+        return Time._rclpy_of(self.nanoseconds(), self._type)
 
     def get_ros_time_override_is_enabled(self) -> bool:
         return self._override is not None
@@ -238,34 +238,34 @@ class _ClockSource(Handle):
 class Clock:
     """A source of time: system time, unless ``clock_type`` chooses another."""
 
-    _source: _ClockSource
-    _clock_type: ClockType
+    _rclpy_source: _ClockSource
+    _rclpy_clock_type: ClockType
 
     def __new__(cls, *, clock_type: ClockType = ClockType.SYSTEM_TIME) -> Clock:
         """Create a clock, a :class:`ROSClock` for ROS time. Raises TypeError for another type of argument."""
         if not isinstance(clock_type, ClockType):
             raise TypeError("Clock type must be a ClockType enum")
         self = super().__new__(ROSClock if clock_type == ClockType.ROS_TIME else cls)
-        self._source = _ClockSource(clock_type)
-        self._clock_type = clock_type
+        self._rclpy_source = _ClockSource(clock_type)
+        self._rclpy_clock_type = clock_type
         return self
 
     @property
     def clock_type(self) -> ClockType:
         """The type of time of this clock."""
-        return self._clock_type
+        return self._rclpy_clock_type
 
     @property
     def handle(self) -> _ClockSource:
         """The source behind this clock."""
-        return self._source
+        return self._rclpy_source
 
     def __repr__(self) -> str:
-        return f"Clock(clock_type={self._clock_type.name})"
+        return f"Clock(clock_type={self._rclpy_clock_type.name})"
 
     def now(self) -> Time:
         """Return the current time."""
-        return self._source.get_now()
+        return self._rclpy_source.get_now()
 
     def create_jump_callback(
         self,
@@ -311,7 +311,7 @@ class Clock:
             context = get_default_context()
         if not context.ok():
             raise NotInitializedException
-        if until.clock_type != self._clock_type:
+        if until.clock_type != self._rclpy_clock_type:
             raise ValueError("until's clock type does not match this clock's type")
         event = threading.Event()
         source_changed = False
@@ -324,13 +324,13 @@ class Clock:
 
         step = Duration(nanoseconds=1)
         threshold = JumpThreshold(min_forward=step, min_backward=Duration(nanoseconds=-1))
-        context._wake_on_shutdown(event)
+        context._rclpy_wake_on_shutdown(event)
         with self.create_jump_callback(threshold, post_callback=on_jump):
             while not source_changed and context.ok():
-                remaining = until.nanoseconds - self._source.nanoseconds()
+                remaining = until.nanoseconds - self._rclpy_source.nanoseconds()
                 if remaining <= 0:
                     return True
-                simulated = self._source.get_ros_time_override_is_enabled()
+                simulated = self._rclpy_source.get_ros_time_override_is_enabled()
                 event.wait(None if simulated else remaining / S_TO_NS)
                 event.clear()
         return False
@@ -351,10 +351,10 @@ class ROSClock(Clock):
     @property
     def ros_time_is_active(self) -> bool:
         """Whether the time is simulated."""
-        return self._source.get_ros_time_override_is_enabled()
+        return self._rclpy_source.get_ros_time_override_is_enabled()
 
     def _set_ros_time_is_active(self, enabled: bool) -> None:
-        self._source.set_ros_time_override_is_enabled(enabled)
+        self._rclpy_source.set_ros_time_override_is_enabled(enabled)
 
     def set_ros_time_override(self, time: Time) -> None:
         """
@@ -364,4 +364,4 @@ class ROSClock(Clock):
         """
         if not isinstance(time, Time):
             raise TypeError("Time must be specified as rclpy.time.Time")
-        self._source.set_ros_time_override(time)
+        self._rclpy_source.set_ros_time_override(time)

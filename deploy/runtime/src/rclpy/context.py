@@ -31,26 +31,26 @@ _joined: set[Context] = set()
 @atexit.register  # registered on import: exit handlers of users run earlier and may still publish
 def _leave_domains() -> None:
     for context in list(_joined):
-        context._leave_domain()
+        context._rclpy_leave_domain()
 
 
 class ContextHandle(Handle):
     """A handle for a context."""
 
     def __init__(self, context: Context) -> None:
-        self._context = context
+        self._rclpy_context = context
 
     def ok(self) -> bool:
         """Whether the context is initialized and not shut down."""
-        return self._context.ok()
+        return self._rclpy_context.ok()
 
     def get_domain_id(self) -> int:
         """Return the DDS domain."""
-        return self._context.get_domain_id()
+        return self._rclpy_context.get_domain_id()
 
     def shutdown(self) -> None:
         """Shut down the context. Raises RCLError if it is not initialized or already shut down."""
-        self._context.shutdown()
+        self._rclpy_context.shutdown()
 
 
 class Context(AbstractContextManager["Context"]):
@@ -62,26 +62,26 @@ class Context(AbstractContextManager["Context"]):
 
     def __init__(self) -> None:
         self._lock = threading.RLock()
-        self._initialized = False
-        self._valid = False
-        self._ended_by_signal = False
-        self._logging = False
-        self._domain_id = 0
-        self._arguments = RosArguments()
+        self._rclpy_initialized = False
+        self._rclpy_valid = False
+        self._rclpy_ended_by_signal = False
+        self._rclpy_logging = False
+        self._rclpy_domain_id = 0
+        self._rclpy_arguments = RosArguments()
         self._callbacks: list[Callable[[], Callable[[], None] | None]] = []  # references to them
-        self._nodes: weakref.WeakSet[Node] = weakref.WeakSet()
-        self._executors: Listeners[Executor] = Listeners()
-        self._events: Listeners[threading.Event] = Listeners()
-        self._graph: Graph | None = None
+        self._rclpy_nodes: weakref.WeakSet[Node] = weakref.WeakSet()
+        self._rclpy_executors: Listeners[Executor] = Listeners()
+        self._rclpy_events: Listeners[threading.Event] = Listeners()
+        self._rclpy_graph: Graph | None = None
 
     @property
     def handle(self) -> ContextHandle:
         """A handle for the context. Raises NotInitializedException before ``init``."""
-        self._check_initialized()
+        self._rclpy_check_initialized()
         return ContextHandle(self)
 
-    def _check_initialized(self) -> None:
-        if not self._initialized:
+    def _rclpy_check_initialized(self) -> None:
+        if not self._rclpy_initialized:
             raise NotInitializedException("Context.init() must be called first")
 
     def init(
@@ -100,48 +100,48 @@ class Context(AbstractContextManager["Context"]):
         :raises RuntimeError: if the context is already initialized, or an argument is invalid.
         """
         with self._lock:
-            if self._initialized:
+            if self._rclpy_initialized:
                 raise RuntimeError("Context.init() must only be called once")
             if domain_id is not None and domain_id < 0:
                 raise RuntimeError(f"domain id ({domain_id}) should not be lower than zero.")
-            self._arguments = parse(args)
-            self._domain_id = domain.domain_id_from_environment() if domain_id is None else domain_id
+            self._rclpy_arguments = parse(args)
+            self._rclpy_domain_id = domain.domain_id_from_environment() if domain_id is None else domain_id
             domain.configuration()  # reports errors in the environment now, not with the first node
-            self._initialized = self._valid = True
+            self._rclpy_initialized = self._rclpy_valid = True
             signals._shut_down_by_signal(self)
             if initialize_logging:
-                self._initialize_logging()
+                self._rclpy_initialize_logging()
 
-    def _initialize_logging(self) -> None:
+    def _rclpy_initialize_logging(self) -> None:
         global g_logging_ref_count
         with _logging_lock:
             if not g_logging_ref_count:  # logging belongs to the process: the first context configures it
-                logging._apply_arguments(self._arguments)
+                logging._apply_arguments(self._rclpy_arguments)
             g_logging_ref_count += 1
-        self._logging = True
+        self._rclpy_logging = True
 
     def ok(self) -> bool:
         """Whether the context is initialized and not shut down."""
-        return self._valid
+        return self._rclpy_valid
 
     def get_domain_id(self) -> int:
         """Return the DDS domain. Raises NotInitializedException before ``init``."""
-        self._check_initialized()
-        return self._domain_id
+        self._rclpy_check_initialized()
+        return self._rclpy_domain_id
 
     def on_shutdown(self, callback: Callable[[], None]) -> None:
         """Call ``callback`` at shutdown, or now after it. A bound method does not keep its object alive."""
         if not callable(callback):
             raise TypeError("callback should be callable, got {}", type(callback))
         with self._lock:
-            if self._initialized and not self._valid:
+            if self._rclpy_initialized and not self._rclpy_valid:
                 callback()
             elif inspect.ismethod(callback):  # only methods written in Python have weak references
-                self._callbacks.append(weakref.WeakMethod(callback, self._forget_callback))
+                self._callbacks.append(weakref.WeakMethod(callback, self._rclpy_forget_callback))
             else:
                 self._callbacks.append(lambda: callback)
 
-    def _forget_callback(self, reference: Callable[[], Callable[[], None] | None]) -> None:
+    def _rclpy_forget_callback(self, reference: Callable[[], Callable[[], None] | None]) -> None:
         with suppress(ValueError):  # the shutdown takes all callbacks
             self._callbacks.remove(reference)
 
@@ -151,39 +151,39 @@ class Context(AbstractContextManager["Context"]):
 
         :raises RCLError: if the context is not initialized or already shut down.
         """
-        if not self._end():
-            if self._initialized:
+        if not self._rclpy_end():
+            if self._rclpy_initialized:
                 raise RCLError("failed to shutdown: rcl_shutdown already called on the given context")
             raise RCLError("Context must be initialized before it can be shutdown")
 
     def try_shutdown(self) -> None:
         """Shut down unless the context is not initialized or already shut down."""
-        self._end()
+        self._rclpy_end()
 
     def destroy(self) -> None:
         """Shut down, and leave the DDS domain even if nodes still exist."""
-        self._end()
-        self._leave_domain()
+        self._rclpy_end()
+        self._rclpy_leave_domain()
 
-    def _end(self, by_signal: bool = False) -> bool:
+    def _rclpy_end(self, by_signal: bool = False) -> bool:
         with self._lock:
-            if not self._valid:
+            if not self._rclpy_valid:
                 return False
-            self._ended_by_signal = by_signal
-            self._valid = False
+            self._rclpy_ended_by_signal = by_signal
+            self._rclpy_valid = False
             callbacks, self._callbacks = self._callbacks, []
-        for event in self._events:
+        for event in self._rclpy_events:
             event.set()
-        for executor in self._executors:
+        for executor in self._rclpy_executors:
             executor.wake()
         for reference in callbacks:
             if (callback := reference()) is not None:
                 callback()
-        if self._logging:
+        if self._rclpy_logging:
             global g_logging_ref_count
             with _logging_lock:
                 g_logging_ref_count -= 1
-        self._leave_if_unused()
+        self._rclpy_leave_if_unused()
         return True
 
     def __enter__(self) -> Context:
@@ -201,38 +201,40 @@ class Context(AbstractContextManager["Context"]):
 
     # Used by nodes and executors
 
-    def _wake_on_shutdown(self, event: threading.Event) -> None:
-        self._events.add(event)
-        if not self._valid:
+    def _rclpy_wake_on_shutdown(self, event: threading.Event) -> None:
+        self._rclpy_events.add(event)
+        if not self._rclpy_valid:
             event.set()
 
-    def _join_domain(self, node: Node) -> Graph:
+    def _rclpy_join_domain(self, node: Node) -> Graph:
         """Register a node; the first one makes the process join the DDS domain."""
         from rclpy._graph import Graph
 
         with self._lock:
-            if not self._valid:
+            if not self._rclpy_valid:
                 raise NotInitializedException("cannot create node")
-            if self._graph is None:
-                self._graph = Graph(self._domain_id, self._arguments.enclave)
+            if self._rclpy_graph is None:
+                self._rclpy_graph = Graph(self._rclpy_domain_id, self._rclpy_arguments.enclave)
                 _joined.add(self)
-            self._nodes.add(node)
-            return self._graph
+            self._rclpy_nodes.add(node)
+            return self._rclpy_graph
 
-    def _forget(self, node: Node) -> None:
+    def _rclpy_forget(self, node: Node) -> None:
         with self._lock:
-            self._nodes.discard(node)
-            self._leave_if_unused()
+            self._rclpy_nodes.discard(node)
+            self._rclpy_leave_if_unused()
 
-    def _leave_if_unused(self) -> None:
+    def _rclpy_leave_if_unused(self) -> None:
         """Leave the DDS domain if the context was shut down and has no nodes."""
         with self._lock:
-            if not self._valid and not list(self._nodes):  # a WeakSet's length includes dying nodes
-                self._leave_domain()
+            if not self._rclpy_valid and not list(
+                self._rclpy_nodes
+            ):  # a WeakSet's length includes dying nodes
+                self._rclpy_leave_domain()
 
-    def _leave_domain(self) -> None:
+    def _rclpy_leave_domain(self) -> None:
         with self._lock:
-            graph, self._graph = self._graph, None
+            graph, self._rclpy_graph = self._rclpy_graph, None
             if graph is not None:
                 _joined.discard(self)
                 graph.close()

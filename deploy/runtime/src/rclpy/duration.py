@@ -21,7 +21,7 @@ class DurationType(Protocol):
 class Duration:
     """A duration, possibly negative, with a resolution of one nanosecond."""
 
-    __slots__ = ("__weakref__", "_nanoseconds")
+    __slots__ = ("__weakref__", "_rclpy_nanoseconds")
 
     # Not hashable, as rclpy's Duration.
     __hash__ = None  # type: ignore[assignment]
@@ -35,37 +35,57 @@ class Duration:
         total = int(seconds * S_TO_NS) + int(nanoseconds)
         if not _MIN <= total <= _MAX:
             raise OverflowError("Total nanoseconds value is too large to store in C duration.")
-        self._nanoseconds = total
+        self._rclpy_nanoseconds = total
 
     @property
     def nanoseconds(self) -> int:
         """The duration [ns]."""
-        return self._nanoseconds
+        return self._rclpy_nanoseconds
 
     def __repr__(self) -> str:
-        return f"Duration(nanoseconds={self._nanoseconds})"
+        return f"Duration(nanoseconds={self._rclpy_nanoseconds})"
 
     def __str__(self) -> str:
-        return "Infinite" if self._nanoseconds == _MAX else f"{self._nanoseconds} nanoseconds"
+        return "Infinite" if self._rclpy_nanoseconds == _MAX else f"{self._rclpy_nanoseconds} nanoseconds"
 
     def __eq__(self, other: object) -> bool:
-        return self._nanoseconds == other._nanoseconds if isinstance(other, Duration) else NotImplemented
+        return (
+            self._rclpy_nanoseconds == other._rclpy_nanoseconds
+            if isinstance(other, Duration)
+            else NotImplemented
+        )
 
     def __lt__(self, other: object) -> bool:
-        return self._nanoseconds < other._nanoseconds if isinstance(other, Duration) else NotImplemented
+        return (
+            self._rclpy_nanoseconds < other._rclpy_nanoseconds
+            if isinstance(other, Duration)
+            else NotImplemented
+        )
 
     def __le__(self, other: object) -> bool:
-        return self._nanoseconds <= other._nanoseconds if isinstance(other, Duration) else NotImplemented
+        return (
+            self._rclpy_nanoseconds <= other._rclpy_nanoseconds
+            if isinstance(other, Duration)
+            else NotImplemented
+        )
 
     def __gt__(self, other: object) -> bool:
-        return self._nanoseconds > other._nanoseconds if isinstance(other, Duration) else NotImplemented
+        return (
+            self._rclpy_nanoseconds > other._rclpy_nanoseconds
+            if isinstance(other, Duration)
+            else NotImplemented
+        )
 
     def __ge__(self, other: object) -> bool:
-        return self._nanoseconds >= other._nanoseconds if isinstance(other, Duration) else NotImplemented
+        return (
+            self._rclpy_nanoseconds >= other._rclpy_nanoseconds
+            if isinstance(other, Duration)
+            else NotImplemented
+        )
 
     def to_msg(self) -> builtin_interfaces.msg.Duration:
         """Convert to a message. Its nanoseconds are never negative: -0.1 s is -1 s + 900,000,000 ns."""
-        seconds, nanoseconds = divmod(self._nanoseconds, S_TO_NS)
+        seconds, nanoseconds = divmod(self._rclpy_nanoseconds, S_TO_NS)
         return builtin_interfaces.msg.Duration(sec=seconds, nanosec=nanoseconds)
 
     @classmethod

@@ -172,14 +172,14 @@ class EventHandler(Waitable):
         events = _PUBLISHER_EVENTS if isinstance(event_type, QoSPublisherEventType) else _SUBSCRIPTION_EVENTS
         self.callback = callback
         self.event_type = event_type
-        self._status, self._make_info = events[event_type]
-        self._parent = parent_impl
-        self._destroyed = False
-        self._index = 0
+        self._rclpy_status, self._rclpy_make_info = events[event_type]
+        self._rclpy_parent = parent_impl
+        self._rclpy_destroyed = False
+        self._rclpy_index = 0
 
     def destroy(self) -> None:
         """Stop calling back."""
-        self._destroyed = True
+        self._rclpy_destroyed = True
 
     def get_num_entities(self) -> NumberOfEntities:
         """Return one event."""
@@ -187,13 +187,13 @@ class EventHandler(Waitable):
 
     def add_to_wait_set(self, wait_set: Any) -> None:
         """Add the DDS entity; executors do without for the handlers of publishers and subscriptions."""
-        if self._status != _NO_STATUS:
-            self._parent.watch_also(self._status)
-        self._index = wait_set._add("event", self._parent.handle)
+        if self._rclpy_status != _NO_STATUS:
+            self._rclpy_parent.watch_also(self._rclpy_status)
+        self._rclpy_index = wait_set._add("event", self._rclpy_parent.handle)
 
     def is_ready(self, wait_set: Any) -> bool:
         """Return whether the DDS entity has any event."""
-        return bool(wait_set.is_ready("event", self._index))
+        return bool(wait_set.is_ready("event", self._rclpy_index))
 
     async def execute(self, taken_data: Any) -> None:
         """Call back, unless the event is of another type."""
@@ -204,10 +204,10 @@ class EventHandler(Waitable):
 
     def take_data(self) -> Any:
         """Return the changes since the last call, ``None`` without any."""
-        if self._destroyed or self._status == _NO_STATUS:
+        if self._rclpy_destroyed or self._rclpy_status == _NO_STATUS:
             return None
-        found = self._parent.changed(self._status)
-        return None if found is None else _info(self._make_info, found)
+        found = self._rclpy_parent.changed(self._rclpy_status)
+        return None if found is None else _info(self._rclpy_make_info, found)
 
 
 class QoSEventHandler(EventHandler):
@@ -228,7 +228,7 @@ def _handlers(
         for event, callback in callbacks.items()
         if callback is not None
     ]
-    parent.watch([handler._status for handler in handlers if handler._status != _NO_STATUS])
+    parent.watch([handler._rclpy_status for handler in handlers if handler._rclpy_status != _NO_STATUS])
     return handlers
 
 
@@ -339,15 +339,17 @@ class EndpointEvents:
     """All events of a publisher or subscription: an executor waits for them on one DDS entity."""
 
     def __init__(self, handlers: list[EventHandler], parent: Writer | Reader) -> None:
-        self._handlers = handlers
-        self._handles = (parent.handle,)
+        self._rclpy_handlers = handlers
+        self._rclpy_handles = (parent.handle,)
         self.callback_group = handlers[0].callback_group
 
-    def _take(self) -> list[tuple[EventHandler, Any]] | None:
-        events = [(handler, data) for handler in self._handlers if (data := handler.take_data()) is not None]
+    def _rclpy_take(self) -> list[tuple[EventHandler, Any]] | None:
+        events = [
+            (handler, data) for handler in self._rclpy_handlers if (data := handler.take_data()) is not None
+        ]
         return events or None
 
-    def _execute(self, taken: list[tuple[EventHandler, Any]]) -> Any:
+    def _rclpy_execute(self, taken: list[tuple[EventHandler, Any]]) -> Any:
         results = [handler.callback(data) for handler, data in taken]
         coroutines = [result for result in results if inspect.iscoroutine(result)]
         return _await_all(coroutines) if coroutines else None

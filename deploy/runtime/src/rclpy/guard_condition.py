@@ -19,7 +19,7 @@ class GuardConditionHandle(EntityHandle["GuardCondition"]):
 
     def trigger_guard_condition(self) -> None:
         """Trigger the guard condition; may be called from any thread."""
-        self._entity.trigger()
+        self._rclpy_entity.trigger()
 
 
 class GuardCondition:
@@ -35,43 +35,43 @@ class GuardCondition:
         self.callback = callback
         self.callback_group = callback_group
         self._context = context
-        self._numbers = itertools.count(1)
-        self._last_trigger = 0
-        self._last_call = 0  # the trigger that caused it
-        self._destroyed = False
-        self._on_change: Callable[[], None] = ignore_change
+        self._rclpy_numbers = itertools.count(1)
+        self._rclpy_last_trigger = 0
+        self._rclpy_last_call = 0  # the trigger that caused it
+        self._rclpy_destroyed = False
+        self._rclpy_on_change: Callable[[], None] = ignore_change
 
     @property
     def handle(self) -> GuardConditionHandle:
         """A handle for the guard condition. Raises InvalidHandle if it was destroyed."""
-        self._check_usable()
+        self._rclpy_check_usable()
         return GuardConditionHandle(self)
 
-    def _check_usable(self) -> None:
-        if self._destroyed:
+    def _rclpy_check_usable(self) -> None:
+        if self._rclpy_destroyed:
             raise InvalidHandle("cannot use a guard condition that was destroyed")
 
     def trigger(self) -> None:
         """Make the callback run; may be called from any thread."""
-        self._check_usable()
-        self._last_trigger = next(self._numbers)
-        self._on_change()
+        self._rclpy_check_usable()
+        self._rclpy_last_trigger = next(self._rclpy_numbers)
+        self._rclpy_on_change()
 
     def destroy(self) -> None:
         """Destroy it. :meth:`rclpy.node.Node.destroy_guard_condition` also removes it from the node."""
-        self._destroyed = True
+        self._rclpy_destroyed = True
 
     # The interface that executors use for every entity.
 
-    def _is_ready(self) -> bool:
+    def _rclpy_is_ready(self) -> bool:
         """Whether it is triggered and its callback has not started."""
-        return self._last_trigger != self._last_call and not self._destroyed
+        return self._rclpy_last_trigger != self._rclpy_last_call and not self._rclpy_destroyed
 
-    def _take(self) -> tuple[()] | None:
-        if not self._is_ready():
+    def _rclpy_take(self) -> tuple[()] | None:
+        if not self._rclpy_is_ready():
             return None
-        self._last_call = self._last_trigger
+        self._rclpy_last_call = self._rclpy_last_trigger
         return ()
 
-    def _execute(self, taken: tuple[()]) -> Any:
+    def _rclpy_execute(self, taken: tuple[()]) -> Any:
         return None if self.callback is None else self.callback()

@@ -132,7 +132,7 @@ class Node(NodeParameters, NodeGraph):
         validate_node_name(node_name)
         namespace = namespace if namespace and namespace[0] == "/" else f"/{namespace or ''}"
         validate_namespace(namespace)
-        process_arguments = self._context._arguments if use_global_arguments else parse([])
+        process_arguments = self._context._rclpy_arguments if use_global_arguments else parse([])
         own_arguments = parse(cli_args or [])
         self._rclpy_arguments = own_arguments.before(process_arguments)
         self._rclpy_name, self._rclpy_namespace = self._rclpy_arguments.node_name(node_name, namespace)
@@ -160,13 +160,13 @@ class Node(NodeParameters, NodeGraph):
 
         self._rclpy_rosout_publisher: Publisher | None = None
         self._rclpy_log_listener = _weak_call(self._rclpy_publish_log)
-        self._rclpy_graph = self._context._join_domain(self)
+        self._rclpy_graph = self._context._rclpy_join_domain(self)
         with self._rclpy_graph.one_announcement():
             self._rclpy_graph.add_node(
                 self, partial(_forget_dropped, self._context, self._rclpy_log_listener)
             )
             try:
-                if enable_rosout and self._context._arguments.rosout_logs:
+                if enable_rosout and self._context._rclpy_arguments.rosout_logs:
                     self._rclpy_rosout_publisher = self._rclpy_create_own_publisher(
                         Log, "/rosout", _ROSOUT_QOS
                     )
@@ -223,13 +223,13 @@ class Node(NodeParameters, NodeGraph):
     def _wake_executor(self) -> None:
         executor = self.executor
         if executor is not None:
-            executor._wake_if_waiting()
+            executor._rclpy_wake_if_waiting()
 
     def _rclpy_entities_have_changed(self) -> None:
         self._rclpy_entities_version += 1
         executor = self.executor
         if executor is not None:
-            executor._entities_have_changed()
+            executor._rclpy_entities_have_changed()
 
     def _rclpy_waitables(self) -> list[Any]:
         """The entities that an executor waits for in DDS."""
@@ -243,7 +243,7 @@ class Node(NodeParameters, NodeGraph):
 
     def _rclpy_entities(self) -> list[Any]:
         """All entities with a callback."""
-        timers = (timer for action in list(self._rclpy_actions) for timer in action._timers)
+        timers = (timer for action in list(self._rclpy_actions) for timer in action._rclpy_timers)
         entities = [*self._rclpy_waitables(), *list(self._rclpy_added_waitables)]
         return [*entities, *list(self._timers), *timers, *list(self._guards)]
 
@@ -532,7 +532,7 @@ class Node(NodeParameters, NodeGraph):
             context=self._context,
             autostart=autostart,
         )
-        timer._on_change = self._wake_executor
+        timer._rclpy_on_change = self._wake_executor
         group.add_entity(timer)
         self._rclpy_add(self._timers, timer)
         return timer
@@ -544,7 +544,7 @@ class Node(NodeParameters, NodeGraph):
         self._rclpy_check_usable()
         group = callback_group or self._default_callback_group
         guard = GuardCondition(callback, group, context=self._context)
-        guard._on_change = self._wake_executor
+        guard._rclpy_on_change = self._wake_executor
         group.add_entity(guard)
         self._rclpy_add(self._guards, guard)
         return guard
@@ -639,9 +639,9 @@ class Node(NodeParameters, NodeGraph):
                 for entity in list(entities):
                     self._rclpy_destroy(entities, entity)
             for action in list(self._rclpy_actions):
-                action._close()
+                action._rclpy_close()
             self._rclpy_graph.remove_node(self)
-        self._context._forget(self)
+        self._context._rclpy_forget(self)
 
     # Internal publishers
 
@@ -674,4 +674,4 @@ def _weak_call(method: Callable[[Any], None]) -> Callable[[Any], None]:
 def _forget_dropped(context: Context, log_listener: Callable[[Any], None]) -> None:
     """Clean up after a node that was garbage-collected without ``destroy_node``."""
     _logging_output.remove_rosout_publisher(log_listener)
-    context._leave_if_unused()
+    context._rclpy_leave_if_unused()

@@ -62,7 +62,7 @@ class AsyncParameterClient:
         self._describe_parameters_client = create(DescribeParameters, "describe_parameters")
         self._set_parameters_atomically_client = create(SetParametersAtomically, "set_parameters_atomically")
 
-    def _clients(self) -> list[Client]:
+    def _rclpy_clients(self) -> list[Client]:
         return [
             self._get_parameter_client,
             self._list_parameter_client,
@@ -74,7 +74,7 @@ class AsyncParameterClient:
 
     def services_are_ready(self) -> bool:
         """Return whether all services are available."""
-        return all(client.service_is_ready() for client in self._clients())
+        return all(client.service_is_ready() for client in self._rclpy_clients())
 
     def wait_for_services(self, timeout_sec: float | None = None) -> bool:
         """
@@ -83,7 +83,7 @@ class AsyncParameterClient:
         :returns: whether they are available.
         """
         deadline = None if timeout_sec is None else time.monotonic() + timeout_sec
-        for client in self._clients():
+        for client in self._rclpy_clients():
             remaining = None if deadline is None else deadline - time.monotonic()
             if not client.wait_for_service(timeout_sec=remaining):
                 return False

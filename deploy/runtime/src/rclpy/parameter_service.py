@@ -29,19 +29,19 @@ class ParameterService:
         """Create the services, such as `<node>/describe_parameters`."""
         self._node_weak_ref = weakref.ref(node)
         services: dict[str, tuple[Any, Any]] = {
-            "describe_parameters": (DescribeParameters, self._describe_parameters),
-            "get_parameters": (GetParameters, self._get_parameters),
-            "get_parameter_types": (GetParameterTypes, self._get_parameter_types),
-            "list_parameters": (ListParameters, self._list_parameters),
-            "set_parameters": (SetParameters, self._set_parameters),
-            "set_parameters_atomically": (SetParametersAtomically, self._set_parameters_atomically),
+            "describe_parameters": (DescribeParameters, self._rclpy_describe_parameters),
+            "get_parameters": (GetParameters, self._rclpy_get_parameters),
+            "get_parameter_types": (GetParameterTypes, self._rclpy_get_parameter_types),
+            "list_parameters": (ListParameters, self._rclpy_list_parameters),
+            "set_parameters": (SetParameters, self._rclpy_set_parameters),
+            "set_parameters_atomically": (SetParametersAtomically, self._rclpy_set_parameters_atomically),
         }
         for name, (service_type, callback) in services.items():
             node.create_service(
                 service_type, f"{node.get_name()}/{name}", callback, qos_profile=qos_profile_parameters
             )
 
-    def _describe_parameters(
+    def _rclpy_describe_parameters(
         self, request: DescribeParameters.Request, response: DescribeParameters.Response
     ) -> DescribeParameters.Response:
         try:
@@ -51,7 +51,7 @@ class ParameterService:
             response.descriptors = []
         return response
 
-    def _get_parameters(
+    def _rclpy_get_parameters(
         self, request: GetParameters.Request, response: GetParameters.Response
     ) -> GetParameters.Response:
         try:
@@ -61,7 +61,7 @@ class ParameterService:
         response.values = [parameter.get_parameter_value() for parameter in parameters]
         return response
 
-    def _get_parameter_types(
+    def _rclpy_get_parameter_types(
         self, request: GetParameterTypes.Request, response: GetParameterTypes.Response
     ) -> GetParameterTypes.Response:
         try:
@@ -72,7 +72,7 @@ class ParameterService:
         response.types = [getattr(type_, "value", type_) for type_ in types]
         return response
 
-    def _list_parameters(
+    def _rclpy_list_parameters(
         self, request: ListParameters.Request, response: ListParameters.Response
     ) -> ListParameters.Response:
         try:
@@ -81,19 +81,19 @@ class ParameterService:
             response.result = ListParametersResult()
         return response
 
-    def _set_parameters(
+    def _rclpy_set_parameters(
         self, request: SetParameters.Request, response: SetParameters.Response
     ) -> SetParameters.Response:
-        response.results = [self._set([message]) for message in request.parameters]
+        response.results = [self._rclpy_set([message]) for message in request.parameters]
         return response
 
-    def _set_parameters_atomically(
+    def _rclpy_set_parameters_atomically(
         self, request: SetParametersAtomically.Request, response: SetParametersAtomically.Response
     ) -> SetParametersAtomically.Response:
-        response.result = self._set(request.parameters)
+        response.result = self._rclpy_set(request.parameters)
         return response
 
-    def _set(self, messages: Any) -> SetParametersResult:
+    def _rclpy_set(self, messages: Any) -> SetParametersResult:
         """Set all parameters of these messages or none."""
         try:
             parameters = [Parameter.from_parameter_msg(message) for message in messages]

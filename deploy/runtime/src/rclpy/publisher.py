@@ -28,9 +28,9 @@ class Publisher(Owner):
         callback_group: CallbackGroup,
     ) -> None:
         super().__init__(publisher_impl.node, publisher_impl.name, publisher_impl.writer)
-        self._writer = publisher_impl.writer
-        self._context = publisher_impl.node.context
-        self._serialize = msg_type._serialize
+        self._rclpy_writer = publisher_impl.writer
+        self._rclpy_context = publisher_impl.node.context
+        self._rclpy_serialize = msg_type._serialize
         self.msg_type = msg_type
         self.topic = topic
         self.qos_profile = qos_profile
@@ -41,13 +41,13 @@ class Publisher(Owner):
     @property
     def handle(self) -> Writer:
         """The DDS writer. Raises InvalidHandle if the publisher was destroyed."""
-        self._check_usable()
-        return self._writer
+        self._rclpy_check_usable()
+        return self._rclpy_writer
 
     @property
     def topic_name(self) -> str:
         """The fully qualified, remapped topic."""
-        return self._name
+        return self._rclpy_name
 
     def publish(self, msg: Any) -> None:
         """
@@ -58,17 +58,17 @@ class Publisher(Owner):
         :raises RCLError: if the context was shut down.
         :raises InvalidHandle: if the publisher was destroyed.
         """
-        if self._destroyed:  # checked inline: this is the path of every message
-            self._check_usable()
-        if not self._context._valid:
-            raise RCLError(f"cannot publish on {self._name}: the context was shut down")
+        if self._rclpy_destroyed:  # checked inline: this is the path of every message
+            self._rclpy_check_usable()
+        if not self._rclpy_context._rclpy_valid:
+            raise RCLError(f"cannot publish on {self._rclpy_name}: the context was shut down")
         if msg.__class__ is self.msg_type or isinstance(msg, self.msg_type):
-            self._writer.write(self._serialize(msg, Pieces))
+            self._rclpy_writer.write(self._rclpy_serialize(msg, Pieces))
         elif isinstance(msg, bytes):
-            self._writer.write(msg)
+            self._rclpy_writer.write(msg)
         else:
             expected = self.msg_type._TYPE_NAME
-            raise TypeError(f"Expected {expected} on {self._name}, got {type(msg).__name__}: {msg!r}")
+            raise TypeError(f"Expected {expected} on {self._rclpy_name}, got {type(msg).__name__}: {msg!r}")
 
     def get_subscription_count(self) -> int:
         """Return the number of matched subscriptions."""

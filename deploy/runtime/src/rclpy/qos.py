@@ -309,7 +309,7 @@ class QoSProfile:
         policies = ", ".join(f"{slot[1:]}={getattr(self, slot)}" for slot in self.__slots__)
         return f"{type(self).__name__}({policies})"
 
-    def _copy(self) -> QoSProfile:
+    def _rclpy_copy(self) -> QoSProfile:
         """Return a copy."""
         return QoSProfile(**{slot[1:]: getattr(self, slot) for slot in self.__slots__})
 

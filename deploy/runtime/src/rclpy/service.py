@@ -37,16 +37,16 @@ class Service(ServiceSide):
         qos_profile: QoSProfile,
     ) -> None:
         super().__init__(service_impl, srv_type, srv_name, callback_group, qos_profile)
-        self._replies = service_impl.writer
-        self._requests = service_impl.reader
-        self._known_clients: set[int] = set()
+        self._rclpy_replies = service_impl.writer
+        self._rclpy_requests = service_impl.reader
+        self._rclpy_known_clients: set[int] = set()
         self.callback = callback
 
     @property
     def handle(self) -> Reader:
         """The DDS reader of the requests. Raises InvalidHandle if the service was destroyed."""
-        self._check_usable()
-        return self._requests
+        self._rclpy_check_usable()
+        return self._rclpy_requests
 
     def send_response(self, response: Any, header: RequestId) -> None:
         """
@@ -56,56 +56,56 @@ class Service(ServiceSide):
         """
         if not isinstance(response, self.srv_type.Response):
             expected = self.srv_type.Response._TYPE_NAME
-            raise TypeError(f"{self._name} must answer with {expected}, not {response!r}")
+            raise TypeError(f"{self._rclpy_name} must answer with {expected}, not {response!r}")
         data = wrap(header, self.srv_type.Response._serialize(response))
-        self._wait_for_client(header.publication_handle)
+        self._rclpy_wait_for_client(header.publication_handle)
         # Another thread may just have destroyed the service.
         with suppress(InvalidHandle):
-            self._replies.write(data)
-        self._publish_request_event(ServiceEventInfo.RESPONSE_SENT, header, response=response)
+            self._rclpy_replies.write(data)
+        self._rclpy_publish_request_event(ServiceEventInfo.RESPONSE_SENT, header, response=response)
 
-    def _publish_request_event(self, event_type: int, request_id: RequestId, **message: Any) -> None:
+    def _rclpy_publish_request_event(self, event_type: int, request_id: RequestId, **message: Any) -> None:
         # A server does not know the client's GID. Like rmw_cyclonedds, it uses the identity of the request.
         client = struct.pack("<QQ", request_id.client, request_id.publication_handle)
-        self._publish_event(event_type, client, request_id.sequence_number, **message)
+        self._rclpy_publish_event(event_type, client, request_id.sequence_number, **message)
 
-    def _wait_for_client(self, publication_handle: int) -> None:
-        with self._lock:
-            if publication_handle in self._known_clients:
+    def _rclpy_wait_for_client(self, publication_handle: int) -> None:
+        with self._rclpy_lock:
+            if publication_handle in self._rclpy_known_clients:
                 return
         deadline = time.monotonic() + _MATCH_TIMEOUT
-        matched = client_is_matched(self._requests, self._replies, publication_handle)
+        matched = client_is_matched(self._rclpy_requests, self._rclpy_replies, publication_handle)
         while matched is False and time.monotonic() < deadline:
             time.sleep(0.001)
-            matched = client_is_matched(self._requests, self._replies, publication_handle)
+            matched = client_is_matched(self._rclpy_requests, self._rclpy_replies, publication_handle)
         if matched:
-            with self._lock:
-                if len(self._known_clients) >= 1000:  # bounds the memory: most of them are gone
-                    self._known_clients.clear()
-                self._known_clients.add(publication_handle)
+            with self._rclpy_lock:
+                if len(self._rclpy_known_clients) >= 1000:  # bounds the memory: most of them are gone
+                    self._rclpy_known_clients.clear()
+                self._rclpy_known_clients.add(publication_handle)
 
     # The interface that executors use for every entity.
 
-    def _take(self) -> tuple[Any, RequestId] | None:
-        while not self._destroyed and (sample := self._requests.take()) is not None:
+    def _rclpy_take(self) -> tuple[Any, RequestId] | None:
+        while not self._rclpy_destroyed and (sample := self._rclpy_requests.take()) is not None:
             try:
                 request_id, data = unwrap(sample.data)
                 request = self.srv_type.Request._deserialize(data)
             except ValueError as error:
-                self._bad_input.drop(sample, error)
+                self._rclpy_bad_input.drop(sample, error)
                 continue
             request_id = request_id._replace(publication_handle=sample.publication_handle)
-            self._publish_request_event(ServiceEventInfo.REQUEST_RECEIVED, request_id, request=request)
+            self._rclpy_publish_request_event(ServiceEventInfo.REQUEST_RECEIVED, request_id, request=request)
             return request, request_id
         return None
 
-    def _execute(self, taken: tuple[Any, RequestId]) -> Coroutine[Any, Any, None] | None:
+    def _rclpy_execute(self, taken: tuple[Any, RequestId]) -> Coroutine[Any, Any, None] | None:
         request, request_id = taken
         response = self.callback(request, self.srv_type.Response())
         if inspect.iscoroutine(response):
-            return self._answer(response, request_id)
+            return self._rclpy_answer(response, request_id)
         self.send_response(response, request_id)
         return None
 
-    async def _answer(self, response: Coroutine[Any, Any, Any], request_id: RequestId) -> None:
+    async def _rclpy_answer(self, response: Coroutine[Any, Any, Any], request_id: RequestId) -> None:
         self.send_response(await response, request_id)

@@ -71,7 +71,7 @@ def _handle(signum: int, frame: FrameType | None) -> None:
 
 def _shut_down(contexts: Iterable[Context]) -> None:
     for context in contexts:
-        context._end(by_signal=True)
+        context._rclpy_end(by_signal=True)
     for guard in _guards:
         guard.trigger()
 
@@ -94,13 +94,13 @@ def _wake_executors(signals: int, steps: int | None) -> None:
         if steps in ready:
             _clock_steps.acknowledge(steps)
         numbers = os.read(signals, 64) if signals in ready else b""
-        contexts = [context for context in _contexts if context._valid]
+        contexts = [context for context in _contexts if context._rclpy_valid]
         for executor in _executors:
             executor.wake()
         if contexts and any(signal.getsignal(number) is _handle for number in numbers):
             time.sleep(_HANDLER_TIME)
             # Not newer contexts: the program initialized them after the signal.
-            left = [context for context in contexts if context._valid]
+            left = [context for context in contexts if context._rclpy_valid]
             if left and _options:
                 _shut_down(left)
 

@@ -37,28 +37,28 @@ class Subscription(Owner):
         event_callbacks: SubscriptionEventCallbacks,
     ) -> None:
         super().__init__(subscription_impl.node, subscription_impl.name, subscription_impl.reader)
-        self._reader = subscription_impl.reader
-        self._handles = (self._reader.condition,)
-        self._deserialize = msg_type._deserialize
-        self._bad_input = BadInput(self._node.get_logger(), self._name)
+        self._rclpy_reader = subscription_impl.reader
+        self._rclpy_handles = (self._rclpy_reader.condition,)
+        self._rclpy_deserialize = msg_type._deserialize
+        self._rclpy_bad_input = BadInput(self._rclpy_node.get_logger(), self._rclpy_name)
         self.callback = callback
         self.callback_group = callback_group
         self.msg_type = msg_type
         self.topic = topic
         self.qos_profile = qos_profile
         self.raw = raw
-        self.event_handlers = event_callbacks.create_event_handlers(callback_group, self._reader, topic)
+        self.event_handlers = event_callbacks.create_event_handlers(callback_group, self._rclpy_reader, topic)
 
     @property
     def handle(self) -> Reader:
         """The DDS reader. Raises InvalidHandle if the subscription was destroyed."""
-        self._check_usable()
-        return self._reader
+        self._rclpy_check_usable()
+        return self._rclpy_reader
 
     @property
     def topic_name(self) -> str:
         """The fully qualified, remapped topic."""
-        return self._name
+        return self._rclpy_name
 
     @property
     def callback(self) -> Callable[..., Any]:
@@ -69,7 +69,7 @@ class Subscription(Owner):
     def callback(self, value: Callable[..., Any]) -> None:
         self._callback = value
         self._callback_type = _callback_type(value)
-        self._takes_info = self._callback_type is Subscription.CallbackType.WithMessageInfo
+        self._rclpy_takes_info = self._callback_type is Subscription.CallbackType.WithMessageInfo
 
     def get_publisher_count(self) -> int:
         """Return the number of matched publishers."""
@@ -77,20 +77,20 @@ class Subscription(Owner):
 
     # The interface that executors use for every entity.
 
-    def _take(self) -> tuple[Any, ...] | None:
+    def _rclpy_take(self) -> tuple[Any, ...] | None:
         """Return the arguments for the callback; drop and count malformed messages."""
-        while not self._destroyed and (sample := self._reader.take(not self.raw)) is not None:
+        while not self._rclpy_destroyed and (sample := self._rclpy_reader.take(not self.raw)) is not None:
             try:
-                message = sample.data if self.raw else self._deserialize(sample.data)
+                message = sample.data if self.raw else self._rclpy_deserialize(sample.data)
             except ValueError as error:
-                self._bad_input.drop(sample, error)
+                self._rclpy_bad_input.drop(sample, error)
                 continue
-            if not self._takes_info:
+            if not self._rclpy_takes_info:
                 return (message,)
             return (message, sample.info())
         return None
 
-    def _execute(self, taken: tuple[Any, ...]) -> Any:
+    def _rclpy_execute(self, taken: tuple[Any, ...]) -> Any:
         return self._callback(*taken)
 
 

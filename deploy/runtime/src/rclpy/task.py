@@ -23,14 +23,14 @@ class Future:
 
     def __init__(self, *, executor: Executor | None = None) -> None:
         """Create a future. Its done callbacks run on `executor`, or without one on the completing thread."""
-        self._done = False
-        self._cancelled = False
+        self._rclpy_done = False
+        self._rclpy_cancelled = False
         self._result: Any = None
         self._exception: BaseException | None = None
         self._exception_fetched = False
         self._callbacks: list[Callable[[Any], Any]] = []
         # Called on the completing thread, for example by tasks that await this future.
-        self._waiters: list[Callable[[], None]] = []
+        self._rclpy_waiters: list[Callable[[], None]] = []
         self._lock = threading.Lock()
         self._executor: Callable[[], Executor | None] = _no_executor
         self._set_executor(executor)
@@ -40,7 +40,7 @@ class Future:
             print(f"The following exception was never retrieved: {self._exception}", file=sys.stderr)
 
     def __await__(self) -> Generator[None, None, Any]:
-        while not self._is_over():
+        while not self._rclpy_is_over():
             # Not yielded: tasks of asyncio may also await this, and to them None means "call again".
             _running.awaited = self
             yield
@@ -53,21 +53,21 @@ class Future:
         `done()` stays `False`, as in rclpy.
         """
         with self._lock:
-            if not self._done:
-                self._cancelled = True
-        self._complete()
+            if not self._rclpy_done:
+                self._rclpy_cancelled = True
+        self._rclpy_complete()
 
     def cancelled(self) -> bool:
         """Return whether the future was cancelled."""
-        return self._cancelled
+        return self._rclpy_cancelled
 
     def done(self) -> bool:
         """Return whether there is a result or an exception."""
-        return self._done
+        return self._rclpy_done
 
-    def _is_over(self) -> bool:
+    def _rclpy_is_over(self) -> bool:
         """Return whether the future is done or cancelled."""
-        return self._done or self._cancelled
+        return self._rclpy_done or self._rclpy_cancelled
 
     def result(self) -> Any:
         """
@@ -89,18 +89,18 @@ class Future:
         """Complete the future with a result."""
         with self._lock:
             self._result = result
-            self._done = True
-            self._cancelled = False
-        self._complete()
+            self._rclpy_done = True
+            self._rclpy_cancelled = False
+        self._rclpy_complete()
 
     def set_exception(self, exception: BaseException) -> None:
         """Complete the future with an exception, which `result` raises."""
         with self._lock:
             self._exception = exception
             self._exception_fetched = False
-            self._done = True
-            self._cancelled = False
-        self._complete()
+            self._rclpy_done = True
+            self._rclpy_cancelled = False
+        self._rclpy_complete()
 
     def add_done_callback(self, callback: Callable[[Any], Any]) -> None:
         """
@@ -109,7 +109,7 @@ class Future:
         The callback runs as a task of the future's executor, if there is one. It should not raise.
         """
         with self._lock:
-            if not self._done:
+            if not self._rclpy_done:
                 self._callbacks.append(callback)
                 return
             executor = self._executor()
@@ -123,20 +123,20 @@ class Future:
         with self._lock:
             self._executor = _no_executor if executor is None else weakref.ref(executor)
 
-    def _call_when_complete(self, waiter: Callable[[], None]) -> None:
+    def _rclpy_call_when_complete(self, waiter: Callable[[], None]) -> None:
         """Call `waiter` once: on the completing thread, or now if the future is done or cancelled."""
         with self._lock:
-            if not self._is_over():
+            if not self._rclpy_is_over():
                 # A caller that waits with timeouts adds the same waiter repeatedly.
-                if waiter not in self._waiters:
-                    self._waiters.append(waiter)
+                if waiter not in self._rclpy_waiters:
+                    self._rclpy_waiters.append(waiter)
                 return
         waiter()
 
-    def _complete(self) -> None:
+    def _rclpy_complete(self) -> None:
         """Call the waiters and callbacks; the caller must not hold the lock."""
         with self._lock:
-            waiters, self._waiters = self._waiters, []
+            waiters, self._rclpy_waiters = self._rclpy_waiters, []
             callbacks, self._callbacks = self._callbacks, []
             executor = self._executor()
         for waiter in waiters:
@@ -186,7 +186,7 @@ class Task(Future):
         if inspect.iscoroutinefunction(handler):
             self._handler = handler(*self._args, **self._kwargs)
         # The future that this task awaits; None: the task can continue.
-        self._awaited: Future | None = None
+        self._rclpy_awaited: Future | None = None
         self._executing = False
         # Two threads must not run the task at the same time.
         self._task_lock = threading.Lock()
@@ -200,21 +200,21 @@ class Task(Future):
         if not self._task_lock.acquire(blocking=False):
             return
         try:
-            if self._done or self._handler is None:
+            if self._rclpy_done or self._handler is None:
                 return
-            if self._cancelled:
-                self._drop_handler()
+            if self._rclpy_cancelled:
+                self._rclpy_drop_handler()
                 return
             self._executing = True
             if inspect.iscoroutine(self._handler):
-                self._step(self._handler)
+                self._rclpy_step(self._handler)
             else:
-                self._run()
+                self._rclpy_run()
         finally:
             self._executing = False
             self._task_lock.release()
 
-    def _cancel_before_start(self) -> None:
+    def _rclpy_cancel_before_start(self) -> None:
         """Cancel a coroutine that has not started; others go on."""
         if inspect.iscoroutine(self._handler) and inspect.getcoroutinestate(self._handler) == "CORO_CREATED":
             self.cancel()
@@ -224,9 +224,9 @@ class Task(Future):
         """Return whether the task is running now."""
         return self._executing
 
-    def _run(self) -> None:
+    def _rclpy_run(self) -> None:
         handler, args, kwargs = self._handler, self._args, self._kwargs
-        self._drop_handler()
+        self._rclpy_drop_handler()
         try:
             result = handler(*args, **kwargs)
         except Exception as error:
@@ -238,24 +238,24 @@ class Task(Future):
         else:
             self.set_result(result)
 
-    def _step(self, coroutine: Coroutine[Any, Any, Any]) -> None:
-        self._awaited = _running.awaited = None
+    def _rclpy_step(self, coroutine: Coroutine[Any, Any, Any]) -> None:
+        self._rclpy_awaited = _running.awaited = None
         try:
             coroutine.send(None)
         except StopIteration as stop:
-            self._drop_handler()
+            self._rclpy_drop_handler()
             self.set_result(stop.value)
         except Exception as error:
-            self._drop_handler()
+            self._rclpy_drop_handler()
             self.set_exception(error)
         except BaseException:
-            self._drop_handler()
+            self._rclpy_drop_handler()
             self.cancel()
             raise
         else:
-            self._awaited, _running.awaited = _running.awaited, None
+            self._rclpy_awaited, _running.awaited = _running.awaited, None
 
-    def _drop_handler(self) -> None:
+    def _rclpy_drop_handler(self) -> None:
         """Release the handler and its arguments; a cancelled coroutine runs its `finally` clauses."""
         if inspect.iscoroutine(self._handler):
             self._handler.close()

@@ -29,7 +29,7 @@ class Time:
     Only times of the same clock type can be compared and subtracted.
     """
 
-    __slots__ = ("__weakref__", "_clock_type", "_nanoseconds")
+    __slots__ = ("__weakref__", "_rclpy_clock_type", "_rclpy_nanoseconds")
 
     # Not hashable, as rclpy's Time.
     __hash__ = None  # type: ignore[assignment]
@@ -57,39 +57,42 @@ class Time:
         total = int(seconds * S_TO_NS) + int(nanoseconds)
         if total > _MAX:
             raise OverflowError("Total nanoseconds value is too large to store in C time point.")
-        self._nanoseconds = total
-        self._clock_type = clock_type
+        self._rclpy_nanoseconds = total
+        self._rclpy_clock_type = clock_type
 
     @classmethod
-    def _of(cls, nanoseconds: int, clock_type: ClockType) -> Time:
+    def _rclpy_of(cls, nanoseconds: int, clock_type: ClockType) -> Time:
         """Create a time from a clock's reading, without checks."""
         time: Time = object.__new__(cls)
-        time._nanoseconds = nanoseconds
-        time._clock_type = clock_type
+        time._rclpy_nanoseconds = nanoseconds
+        time._rclpy_clock_type = clock_type
         return time
 
     @property
     def nanoseconds(self) -> int:
         """The time since the epoch of the clock [ns]."""
-        return self._nanoseconds
+        return self._rclpy_nanoseconds
 
     def seconds_nanoseconds(self) -> tuple[int, int]:
         """Return the whole seconds since the epoch, and the remaining nanoseconds."""
-        return divmod(self._nanoseconds, S_TO_NS)
+        return divmod(self._rclpy_nanoseconds, S_TO_NS)
 
     @property
     def clock_type(self) -> ClockType:
         """The type of the clock."""
-        return self._clock_type
+        return self._rclpy_clock_type
 
     def __repr__(self) -> str:
-        return f"Time(nanoseconds={self._nanoseconds}, clock_type={self._clock_type.name})"
+        return f"Time(nanoseconds={self._rclpy_nanoseconds}, clock_type={self._rclpy_clock_type.name})"
 
     def __add__(self, other: Duration) -> Time:
         if not isinstance(other, Duration):
             return NotImplemented
         try:
-            return Time(nanoseconds=self._nanoseconds + other._nanoseconds, clock_type=self._clock_type)
+            return Time(
+                nanoseconds=self._rclpy_nanoseconds + other._rclpy_nanoseconds,
+                clock_type=self._rclpy_clock_type,
+            )
         except OverflowError as error:
             raise OverflowError("Addition leads to overflow in C storage.") from error
 
@@ -104,42 +107,69 @@ class Time:
 
     def __sub__(self, other: Time | Duration) -> Time | Duration:
         if isinstance(other, Time):
-            if self._clock_type != other._clock_type:
+            if self._rclpy_clock_type != other._rclpy_clock_type:
                 raise TypeError("Can't subtract times with different clock types")
-            return Duration(nanoseconds=self._nanoseconds - other._nanoseconds)
+            return Duration(nanoseconds=self._rclpy_nanoseconds - other._rclpy_nanoseconds)
         if isinstance(other, Duration):
             try:
-                return Time(nanoseconds=self._nanoseconds - other._nanoseconds, clock_type=self._clock_type)
+                return Time(
+                    nanoseconds=self._rclpy_nanoseconds - other._rclpy_nanoseconds,
+                    clock_type=self._rclpy_clock_type,
+                )
             except ValueError as error:
                 raise ValueError("Subtraction leads to negative time.") from error
         return NotImplemented
 
-    def _comparable(self, other: Time) -> int:
-        if self._clock_type != other._clock_type:
+    def _rclpy_comparable(self, other: Time) -> int:
+        if self._rclpy_clock_type != other._rclpy_clock_type:
             raise TypeError("Can't compare times with different clock types")
-        return other._nanoseconds
+        return other._rclpy_nanoseconds
 
     def __eq__(self, other: object) -> bool:
-        return self._nanoseconds == self._comparable(other) if isinstance(other, Time) else NotImplemented
+        return (
+            self._rclpy_nanoseconds == self._rclpy_comparable(other)
+            if isinstance(other, Time)
+            else NotImplemented
+        )
 
     def __ne__(self, other: object) -> bool:
-        return self._nanoseconds != self._comparable(other) if isinstance(other, Time) else NotImplemented
+        return (
+            self._rclpy_nanoseconds != self._rclpy_comparable(other)
+            if isinstance(other, Time)
+            else NotImplemented
+        )
 
     def __lt__(self, other: object) -> bool:
-        return self._nanoseconds < self._comparable(other) if isinstance(other, Time) else NotImplemented
+        return (
+            self._rclpy_nanoseconds < self._rclpy_comparable(other)
+            if isinstance(other, Time)
+            else NotImplemented
+        )
 
     def __le__(self, other: object) -> bool:
-        return self._nanoseconds <= self._comparable(other) if isinstance(other, Time) else NotImplemented
+        return (
+            self._rclpy_nanoseconds <= self._rclpy_comparable(other)
+            if isinstance(other, Time)
+            else NotImplemented
+        )
 
     def __gt__(self, other: object) -> bool:
-        return self._nanoseconds > self._comparable(other) if isinstance(other, Time) else NotImplemented
+        return (
+            self._rclpy_nanoseconds > self._rclpy_comparable(other)
+            if isinstance(other, Time)
+            else NotImplemented
+        )
 
     def __ge__(self, other: object) -> bool:
-        return self._nanoseconds >= self._comparable(other) if isinstance(other, Time) else NotImplemented
+        return (
+            self._rclpy_nanoseconds >= self._rclpy_comparable(other)
+            if isinstance(other, Time)
+            else NotImplemented
+        )
 
     def to_msg(self) -> builtin_interfaces.msg.Time:
         """Convert to a message, which does not contain the clock type."""
-        seconds, nanoseconds = divmod(self._nanoseconds, S_TO_NS)
+        seconds, nanoseconds = divmod(self._rclpy_nanoseconds, S_TO_NS)
         return builtin_interfaces.msg.Time(sec=seconds, nanosec=nanoseconds)
 
     @classmethod

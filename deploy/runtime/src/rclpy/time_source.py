@@ -31,7 +31,7 @@ class TimeSource:
     def __init__(self, *, node: Node | None = None) -> None:
         """Create a time source, and attach `node` if it is given."""
         self._clock_sub: Subscription | None = None
-        self._timeout: Timer | None = None
+        self._rclpy_timeout: Timer | None = None
         self._node_weak_ref: weakref.ReferenceType[Node] | None = None
         self._associated_clocks: dict[ROSClock, None] = {}  # in order
         # Zero: no time was received.
@@ -53,9 +53,9 @@ class TimeSource:
         for clock in self._associated_clocks:
             clock._set_ros_time_is_active(enabled)
         if enabled:
-            self._subscribe()
+            self._rclpy_subscribe()
         else:
-            self._unsubscribe()
+            self._rclpy_unsubscribe()
 
     def attach_node(self, node: Node) -> None:
         """
@@ -80,16 +80,16 @@ class TimeSource:
             node.get_logger().error(
                 f"Invalid type for parameter '{USE_SIM_TIME_NAME}' {parameter.type_!r} should be bool"
             )
-        node.add_on_set_parameters_callback(self._check)
-        node.add_post_set_parameters_callback(self._follow)
+        node.add_on_set_parameters_callback(self._rclpy_check)
+        node.add_post_set_parameters_callback(self._rclpy_follow)
 
     def detach_node(self) -> None:
         """Stop following the node's parameter."""
         node = self._get_node()
-        self._unsubscribe()
+        self._rclpy_unsubscribe()
         if node is not None:
-            node.remove_on_set_parameters_callback(self._check)
-            node.remove_post_set_parameters_callback(self._follow)
+            node.remove_on_set_parameters_callback(self._rclpy_check)
+            node.remove_post_set_parameters_callback(self._rclpy_follow)
         self._node_weak_ref = None
 
     def attach_clock(self, clock: ROSClock) -> None:
@@ -110,15 +110,15 @@ class TimeSource:
 
         :raises ValueError: if it is negative.
         """
-        if self._timeout is not None:
-            self._end_timeout()
+        if self._rclpy_timeout is not None:
+            self._rclpy_end_timeout()
         time = Time.from_msg(msg.clock)
         # The initial time of clocks that are attached later.
         self._last_time_set = time
         for clock in self._associated_clocks:
             clock.set_ros_time_override(time)
 
-    def _subscribe(self) -> None:
+    def _rclpy_subscribe(self) -> None:
         node = self._get_node()
         if node is None or self._clock_sub is not None:
             return
@@ -131,38 +131,41 @@ class TimeSource:
             QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT),
             callback_group=group,
         )
-        self._timeout = node.create_timer(
-            CLOCK_TIMEOUT, self._warn, callback_group=group, clock=Clock(clock_type=ClockType.STEADY_TIME)
+        self._rclpy_timeout = node.create_timer(
+            CLOCK_TIMEOUT,
+            self._rclpy_warn,
+            callback_group=group,
+            clock=Clock(clock_type=ClockType.STEADY_TIME),
         )
 
-    def _unsubscribe(self) -> None:
+    def _rclpy_unsubscribe(self) -> None:
         node = self._get_node()
         if node is not None and self._clock_sub is not None:
             node.destroy_subscription(self._clock_sub)
         self._clock_sub = None
-        self._end_timeout()
+        self._rclpy_end_timeout()
 
-    def _end_timeout(self) -> None:
+    def _rclpy_end_timeout(self) -> None:
         node = self._get_node()
-        if node is not None and self._timeout is not None:
-            node.destroy_timer(self._timeout)
-        self._timeout = None
+        if node is not None and self._rclpy_timeout is not None:
+            node.destroy_timer(self._rclpy_timeout)
+        self._rclpy_timeout = None
 
-    def _warn(self) -> None:
+    def _rclpy_warn(self) -> None:
         """Warn that no time has come. A message may wait: perhaps the node has not spun until now."""
-        self._end_timeout()
+        self._rclpy_end_timeout()
         node = self._get_node()
         if node is None or self._clock_sub is None:
             return
-        if (waiting := self._clock_sub._take()) is not None:
-            self._clock_sub._execute(waiting)
+        if (waiting := self._clock_sub._rclpy_take()) is not None:
+            self._clock_sub._rclpy_execute(waiting)
             return
         node.get_logger().warning(
             f"{USE_SIM_TIME_NAME} is true, but {self._clock_sub.topic_name} was silent for {CLOCK_TIMEOUT:g}"
             f" s: start a simulator, or set {USE_SIM_TIME_NAME} to false"
         )
 
-    def _check(self, parameters: list[Parameter]) -> SetParametersResult:
+    def _rclpy_check(self, parameters: list[Parameter]) -> SetParametersResult:
         """Reject values of `use_sim_time` that are not bool."""
         for parameter in parameters:
             if parameter.name == USE_SIM_TIME_NAME and parameter.type_ is not Parameter.Type.BOOL:
@@ -172,7 +175,7 @@ class TimeSource:
                 return SetParametersResult(successful=False, reason=reason)
         return SetParametersResult(successful=True)
 
-    def _follow(self, parameters: list[Parameter]) -> None:
+    def _rclpy_follow(self, parameters: list[Parameter]) -> None:
         """Apply `use_sim_time` after all callbacks have accepted it."""
         for parameter in parameters:
             if parameter.name == USE_SIM_TIME_NAME:

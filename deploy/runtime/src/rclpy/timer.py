@@ -26,11 +26,11 @@ class TimerHandle(EntityHandle["Timer"]):
 
     def is_timer_ready(self) -> bool:
         """Whether the next call is due."""
-        return self._entity.is_ready()
+        return self._rclpy_entity.is_ready()
 
     def call_timer(self) -> None:
         """Start the next period, as a call of the timer's callback does."""
-        self._entity._take()
+        self._rclpy_entity._rclpy_take()
 
 
 class Timer:
@@ -58,42 +58,42 @@ class Timer:
         self.callback_group = callback_group
         self._context = get_default_context() if context is None else context
         self._clock = clock
-        self._source = clock.handle
-        self._is_steady = clock.clock_type == ClockType.STEADY_TIME
-        self._period = int(timer_period_ns)
-        self._last_call = self._source.nanoseconds()
-        self._next_call = self._last_call + self._period
-        self._canceled = not autostart
-        self._destroyed = False
+        self._rclpy_source = clock.handle
+        self._rclpy_is_steady = clock.clock_type == ClockType.STEADY_TIME
+        self._rclpy_period = int(timer_period_ns)
+        self._rclpy_last_call = self._rclpy_source.nanoseconds()
+        self._rclpy_next_call = self._rclpy_last_call + self._rclpy_period
+        self._rclpy_canceled = not autostart
+        self._rclpy_destroyed = False
         # Called when the time until the next call changes.
-        self._on_change: Callable[[], None] = ignore_change
-        self._jump_handle = None
+        self._rclpy_on_change: Callable[[], None] = ignore_change
+        self._rclpy_jump_handle = None
         if clock.clock_type == ClockType.ROS_TIME:
-            self._jump_handle = clock.create_jump_callback(
+            self._rclpy_jump_handle = clock.create_jump_callback(
                 JumpThreshold(min_forward=Duration(nanoseconds=1), min_backward=Duration(nanoseconds=-1)),
-                post_callback=self._time_has_jumped,
+                post_callback=self._rclpy_time_has_jumped,
             )
 
-    def _time_has_jumped(self, jump: TimeJump) -> None:
-        now = self._source.nanoseconds()
+    def _rclpy_time_has_jumped(self, jump: TimeJump) -> None:
+        now = self._rclpy_source.nanoseconds()
         if jump.clock_change in (ClockChange.ROS_TIME_ACTIVATED, ClockChange.ROS_TIME_DEACTIVATED):
             # The source of time changes: keep the rest of the period. Except before the first simulated time,
             # which will be a jump back and start a new period.
-            if self._source._latest:
-                self._next_call += jump.delta.nanoseconds
-                self._last_call += jump.delta.nanoseconds
-        elif now < self._last_call:
-            self._last_call = now
-            self._next_call = now + self._period
-        self._on_change()
+            if self._rclpy_source._latest:
+                self._rclpy_next_call += jump.delta.nanoseconds
+                self._rclpy_last_call += jump.delta.nanoseconds
+        elif now < self._rclpy_last_call:
+            self._rclpy_last_call = now
+            self._rclpy_next_call = now + self._rclpy_period
+        self._rclpy_on_change()
 
     @property
     def handle(self) -> TimerHandle:
         """A handle for the timer. Raises InvalidHandle if it was destroyed."""
-        return TimerHandle(self._usable())
+        return TimerHandle(self._rclpy_usable())
 
-    def _usable(self) -> Timer:
-        if self._destroyed:
+    def _rclpy_usable(self) -> Timer:
+        if self._rclpy_destroyed:
             raise InvalidHandle("cannot use a timer that was destroyed")
         return self
 
@@ -105,71 +105,80 @@ class Timer:
     @property
     def timer_period_ns(self) -> int:
         """The period [ns]. A change takes effect with the next call."""
-        return self._usable()._period
+        return self._rclpy_usable()._rclpy_period
 
     @timer_period_ns.setter
     def timer_period_ns(self, value: int) -> None:
-        self._usable()._period = int(value)
+        self._rclpy_usable()._rclpy_period = int(value)
 
     def is_ready(self) -> bool:
         """Whether the next call is due."""
-        return not self._usable()._canceled and self._source.nanoseconds() >= self._next_call
+        return (
+            not self._rclpy_usable()._rclpy_canceled
+            and self._rclpy_source.nanoseconds() >= self._rclpy_next_call
+        )
 
     def is_canceled(self) -> bool:
         """Whether it is canceled."""
-        return self._usable()._canceled
+        return self._rclpy_usable()._rclpy_canceled
 
     def cancel(self) -> None:
         """Stop until :meth:`reset`."""
-        self._usable()._canceled = True
+        self._rclpy_usable()._rclpy_canceled = True
 
     def reset(self) -> None:
         """Start a new period now."""
-        self._usable()._next_call = self._source.nanoseconds() + self._period
-        self._canceled = False
-        self._on_change()
+        self._rclpy_usable()._rclpy_next_call = self._rclpy_source.nanoseconds() + self._rclpy_period
+        self._rclpy_canceled = False
+        self._rclpy_on_change()
 
     def time_since_last_call(self) -> int:
         """Return the time since the last call, or since the creation [ns]."""
-        return self._source.nanoseconds() - self._usable()._last_call
+        return self._rclpy_source.nanoseconds() - self._rclpy_usable()._rclpy_last_call
 
     def time_until_next_call(self) -> int | None:
         """Return the time until the next call [ns], negative if overdue, ``None`` if canceled."""
-        return None if self._usable()._canceled else self._next_call - self._source.nanoseconds()
+        return (
+            None
+            if self._rclpy_usable()._rclpy_canceled
+            else self._rclpy_next_call - self._rclpy_source.nanoseconds()
+        )
 
     def destroy(self) -> None:
         """Destroy it. :meth:`rclpy.node.Node.destroy_timer` also removes it from the node."""
-        self._destroyed = self._canceled = True
-        if self._jump_handle is not None:
-            self._jump_handle.unregister()
+        self._rclpy_destroyed = self._rclpy_canceled = True
+        if self._rclpy_jump_handle is not None:
+            self._rclpy_jump_handle.unregister()
 
     # The interface that executors use for every entity.
 
-    def _remaining(self) -> int:
+    def _rclpy_remaining(self) -> int:
         """Return the time to wait [ns]: infinite if canceled, or not yet due in simulated time."""
-        if self._canceled:
+        if self._rclpy_canceled:
             return INFINITY
-        override = self._source._override
+        override = self._rclpy_source._override
         if override is None:
-            return self._next_call - self._source._read()
+            return self._rclpy_next_call - self._rclpy_source._read()
         # Simulated time advances by messages, which wake the executor.
-        return INFINITY if self._next_call > override else 0
+        return INFINITY if self._rclpy_next_call > override else 0
 
-    def _take(self) -> tuple[()] | None:
-        if self._canceled:
+    def _rclpy_take(self) -> tuple[()] | None:
+        if self._rclpy_canceled:
             return None
-        override = self._source._override
-        now = self._source._read() if override is None else override
-        if now < self._next_call:
+        override = self._rclpy_source._override
+        now = self._rclpy_source._read() if override is None else override
+        if now < self._rclpy_next_call:
             return None
-        self._last_call = now
-        self._next_call += self._period
-        if self._next_call <= now:
-            behind = now - self._next_call
-            self._next_call = now if not self._period else now + self._period - behind % self._period
+        self._rclpy_last_call = now
+        self._rclpy_next_call += self._rclpy_period
+        if self._rclpy_next_call <= now:
+            behind = now - self._rclpy_next_call
+            self._rclpy_next_call = (
+                now if not self._rclpy_period else now + self._rclpy_period - behind % self._rclpy_period
+            )
         return ()
 
-    def _execute(self, taken: tuple[()]) -> Any:
+    def _rclpy_execute(self, taken: tuple[()]) -> Any:
         return self.callback()
 
 
@@ -179,29 +188,29 @@ class Rate:
     def __init__(self, timer: Timer, *, context: Context) -> None:
         """Create a rate from a timer; usually, :meth:`rclpy.node.Node.create_rate` does."""
         self._timer = timer
-        self._clock = timer.clock
-        self._context = context
-        self._ticks = threading.Condition()
-        self._tick = 0
-        self._overrun = False  # whether the latest tick has not ended a sleep
+        self._rclpy_clock = timer.clock
+        self._rclpy_context = context
+        self._rclpy_ticks = threading.Condition()
+        self._rclpy_tick = 0
+        self._rclpy_overrun = False  # whether the latest tick has not ended a sleep
         self._is_destroyed = False
-        timer.callback = self._wake
-        context.on_shutdown(self._end)
+        timer.callback = self._rclpy_wake
+        context.on_shutdown(self._rclpy_end)
 
-    def _wake(self) -> None:
-        with self._ticks:
-            self._tick += 1
-            self._overrun = True
-            self._ticks.notify_all()
+    def _rclpy_wake(self) -> None:
+        with self._rclpy_ticks:
+            self._rclpy_tick += 1
+            self._rclpy_overrun = True
+            self._rclpy_ticks.notify_all()
 
-    def _end(self) -> None:
-        with self._ticks:
+    def _rclpy_end(self) -> None:
+        with self._rclpy_ticks:
             self._is_destroyed = True
-            self._ticks.notify_all()
+            self._rclpy_ticks.notify_all()
 
     def destroy(self) -> None:
         """Destroy the rate and wake its sleepers."""
-        self._end()
+        self._rclpy_end()
 
     def sleep(self) -> None:
         """
@@ -210,12 +219,12 @@ class Rate:
         :raises ROSInterruptException: if the context is shut down, also during the sleep.
         :raises RuntimeError: if the rate was destroyed before; its destruction during the sleep just ends it.
         """
-        with self._ticks:
-            if self._is_destroyed and self._context.ok():
+        with self._rclpy_ticks:
+            if self._is_destroyed and self._rclpy_context.ok():
                 raise RuntimeError("Rate cannot sleep because it has been destroyed")
-            if not self._overrun:
-                tick = self._tick
-                self._ticks.wait_for(lambda: self._tick != tick or self._is_destroyed)
-            self._overrun = False
-            if not self._context.ok():
+            if not self._rclpy_overrun:
+                tick = self._rclpy_tick
+                self._rclpy_ticks.wait_for(lambda: self._rclpy_tick != tick or self._is_destroyed)
+            self._rclpy_overrun = False
+            if not self._rclpy_context.ok():
                 raise ROSInterruptException

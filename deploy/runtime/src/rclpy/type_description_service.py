@@ -21,8 +21,8 @@ class TypeDescriptionService:
 
     def __init__(self, node: Node) -> None:
         """Declare the parameter, and create the service if it is true."""
-        self._node = node
-        self._service: Any = None
+        self._rclpy_node = node
+        self._rclpy_service: Any = None
         from rcl_interfaces.msg import ParameterDescriptor
 
         name = START_TYPE_DESCRIPTION_SERVICE_PARAM
@@ -37,27 +37,27 @@ class TypeDescriptionService:
         if node.get_parameter(name).value:
             from type_description_interfaces.srv import GetTypeDescription
 
-            self._service = node.create_service(
+            self._rclpy_service = node.create_service(
                 GetTypeDescription,
                 "~/get_type_description",
-                self._describe,
+                self._rclpy_describe,
                 qos_profile=qos_profile_services_default,
             )
 
     def destroy(self) -> None:
         """Destroy the service."""
-        if self._service is not None:
-            self._node.destroy_service(self._service)
-            self._service = None
+        if self._rclpy_service is not None:
+            self._rclpy_node.destroy_service(self._rclpy_service)
+            self._rclpy_service = None
 
-    def _describe(self, request: Any, response: Any) -> Any:
+    def _rclpy_describe(self, request: Any, response: Any) -> Any:
         """Answer as rcl does: the hash identifies the type, which must be in use; its name is ignored."""
         from rosidl_runtime_embedded.type_description import type_description, type_sources
 
-        names = {used._TYPE_HASH: used._TYPE_NAME for used in list(self._node._rclpy_used_types)}
+        names = {used._TYPE_HASH: used._TYPE_NAME for used in list(self._rclpy_node._rclpy_used_types)}
         name = names.get(request.type_hash)
         if name is None:
-            known = TypeHash._parse(request.type_hash) != TypeHash()
+            known = TypeHash._rclpy_parse(request.type_hash) != TypeHash()
             response.failure_reason = _NOT_IN_USE if known else "Failed to parse type hash"
             return response
         response.successful, response.type_description = True, type_description(name)

@@ -50,7 +50,7 @@ class TypeHash:
         return f"RIHS{self._version:02}_{self._value.hex()}"
 
     @classmethod
-    def _parse(cls, text: str) -> TypeHash:
+    def _rclpy_parse(cls, text: str) -> TypeHash:
         """Parse the result of `str`; for other texts, return the unknown hash."""
         version, separator, value = text.removeprefix("RIHS").partition("_")
         if not (text.startswith("RIHS") and separator and version.isdecimal() and len(value) == 2 * _SIZE):

@@ -142,6 +142,34 @@ def send(client: ActionClient, spin_until: SpinUntil) -> Callable[..., Goal]:
 Send = Callable[..., Goal]
 
 
+def test_subclasses_may_use_any_private_name(node: Node, spin_until: SpinUntil) -> None:
+    class Server(ActionServer):
+        def __init__(self) -> None:
+            super().__init__(node, Fibonacci, "fibonacci", self._execute)
+            self._logger, self._status, self._timers = node.get_logger(), "idle", []
+            self._feedback = Fibonacci.Feedback(sequence=[1])
+
+        def _execute(self, goal_handle: ServerGoalHandle) -> Fibonacci.Result:
+            self._status = "busy"
+            goal_handle.publish_feedback(self._feedback)
+            return fibonacci(goal_handle)
+
+    class Client(ActionClient):
+        def __init__(self) -> None:
+            super().__init__(node, Fibonacci, "fibonacci")
+            self._feedback, self._status, self._handles, self._timers = [], None, {}, None
+
+        def _take(self) -> None:
+            raise AssertionError("rclpy calls a private method of a user's class")
+
+    server, client = Server(), Client()
+    goal = Goal(client, spin_until, 1)
+    assert goal.result().status == SUCCEEDED
+    assert server._status == "busy"
+    server.destroy()
+    client.destroy()
+
+
 def test_a_goal_has_feedback_and_a_result(serve: MakeServer, send: Send, spin_until: SpinUntil) -> None:
     serve()
     goal = send(3)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from typing import Any
 
@@ -9,7 +10,7 @@ import pytest
 
 from rclpy.context import Context
 from rclpy.exceptions import InvalidHandle
-from rclpy.executors import SingleThreadedExecutor
+from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from std_msgs.msg import Float64
@@ -73,3 +74,45 @@ def test_a_subclass_may_use_any_private_name(
     with pytest.raises(InvalidHandle):
         node.count_publishers("x")
     assert {name: vars(node)[name] for name in FOREIGN} == FOREIGN
+
+
+class Threaded(SingleThreadedExecutor):
+    """An executor that spins on a thread of its own, with names as users choose them."""
+
+    def __init__(self, context: Context) -> None:
+        super().__init__(context=context)
+        self._ready, self._changed, self._timers, self._idle = None, None, None, None
+        self._thread = threading.Thread(target=self._spin, daemon=True)
+
+    def _spin(self) -> None:
+        self.spin()
+
+    _run = _handle = _work = _collect = _begin = never_called
+
+
+class Pool(MultiThreadedExecutor):
+    """An executor with attributes as users name them."""
+
+    def __init__(self, context: Context) -> None:
+        super().__init__(2, context=context)
+        self._threads, self._errors, self._pool, self._in_pool = [], {}, None, "none"
+        self._thread = threading.Thread(target=self.spin, daemon=True)
+
+    _spin = _run = _handle = _run_in_pool = never_called
+
+
+@pytest.mark.parametrize("make", [Threaded, Pool])
+def test_a_subclass_of_an_executor_may_use_any_private_name(
+    context: Context, make: type[Threaded | Pool]
+) -> None:
+    called = threading.Event()
+    node = Node("node", context=context)
+    node.create_timer(0.01, called.set)
+    executor = make(context)
+    executor.add_node(node)
+    executor._thread.start()
+    assert called.wait(10)
+    executor.shutdown()
+    executor._thread.join(10)
+    assert not executor._thread.is_alive()
+    node.destroy_node()

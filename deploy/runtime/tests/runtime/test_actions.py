@@ -83,7 +83,7 @@ def test_feedback_that_arrived_before_the_result_is_not_lost(
         future = sent.result().get_result_async()
         goals[0].execute()
         spin_until(lambda: server._result_futures[uuid_bytes(goals[0].goal_id)].done())
-        spin_until(lambda: blocking.dds_triggered(client._result_calls._handles[0]))
+        spin_until(lambda: blocking.dds_triggered(client._rclpy_result_calls._rclpy_handles[0]))
         other_executor.spin_until_future_complete(future, 10)
     assert heard == [0, 1, 2, 3, 4]
     client.destroy()
@@ -116,11 +116,11 @@ def test_a_malformed_goal_is_dropped(node: Node, spin_until: SpinUntil) -> None:
     server = ActionServer(node, Fibonacci, "fibonacci", succeed)
     client = ActionClient(node, Fibonacci, "fibonacci")
     assert client.wait_for_server(timeout_sec=10)
-    client._goal_calls.handle.write(b"\0\1\0\0" + bytes(20))
+    client._rclpy_goal_calls.handle.write(b"\0\1\0\0" + bytes(20))
     future = client.send_goal_async(Fibonacci.Goal())
     spin_until(future.done)
     assert future.result().accepted
-    assert server._goal_service._bad_input.count == 1
+    assert server._rclpy_goal_service._rclpy_bad_input.count == 1
     client.destroy()
     server.destroy()
 
@@ -130,7 +130,7 @@ def test_a_second_server_of_an_action_is_reported(
 ) -> None:
     servers = [ActionServer(node, Fibonacci, "fibonacci", succeed) for _ in range(2)]
     client = ActionClient(node, Fibonacci, "fibonacci")
-    spin_until(lambda: client._goal_calls.handle.matched() == 2)
+    spin_until(lambda: client._rclpy_goal_calls.handle.matched() == 2)
     client.send_goal_async(Fibonacci.Goal())
     text = "There may be more than one action server for the action '/fibonacci'"
     log = ""
@@ -234,7 +234,7 @@ def test_a_finished_goal_is_forgotten_by_its_client(node: Node, spin_until: Spin
     spin_until(sent.done)
     result = sent.result().get_result_async()
     spin_until(lambda: result.done() and sent.result().status == GoalStatus.STATUS_SUCCEEDED)
-    assert (client._goal_ids, client._goal_handles, client._feedback_callbacks) == ({}, {}, {})
+    assert (client._rclpy_goal_ids, client._goal_handles, client._feedback_callbacks) == ({}, {}, {})
     client.destroy()
     server.destroy()
 
@@ -252,18 +252,18 @@ def test_a_destroyed_server_starts_no_execution(
     client.send_goal_async(Fibonacci.Goal())
     spin_until(lambda: goals)
     goals[0].execute()
-    (task,) = server._executions
+    (task,) = server._rclpy_executions
     server.destroy()
     assert task.cancelled()
     executor.spin_once(0.0)
-    assert (executed, server._executions) == ([], set())
+    assert (executed, server._rclpy_executions) == ([], set())
     client.destroy()
 
 
 def test_a_cancelled_send_is_forgotten(node: Node) -> None:
     client = ActionClient(node, Fibonacci, "fibonacci")
     client.send_goal_async(Fibonacci.Goal(), lambda _: None).cancel()
-    assert (client._goal_ids, client._feedback_callbacks) == ({}, {})
+    assert (client._rclpy_goal_ids, client._feedback_callbacks) == ({}, {})
     client.destroy()
     client.destroy()
 

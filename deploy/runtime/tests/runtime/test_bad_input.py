@@ -64,7 +64,7 @@ def test_bad_samples_are_dropped_counted_and_logged_once(
     writer.write(HEADER + struct.pack("<d", 2.0))
     spin_until(lambda: received)
     assert received == [2.0]
-    assert subscription._bad_input.count == 50
+    assert subscription._rclpy_bad_input.count == 50
     assert capfd.readouterr().err.count("octets on /x") == 1
 
 
@@ -91,7 +91,7 @@ def test_each_writer_of_bad_samples_is_logged_once(
     writers = [writer_for(participant, "rt/x", "std_msgs::msg::dds_::String_", spin_until) for _ in range(3)]
     for writer in writers * 2:
         writer.write(HEADER + b"\xff\xff\xff\x7fabcd")  # claims a string of 2 GB
-    spin_until(lambda: subscription._bad_input.count == 6)
+    spin_until(lambda: subscription._rclpy_bad_input.count == 6)
     assert capfd.readouterr().err.count("octets on /x") == 3
 
 
@@ -111,7 +111,7 @@ def test_an_invalid_clock_message_is_bad_input(
     # one by one, because the subscription keeps only the last sample
     for number, writer in enumerate(writers * 2, 1):
         writer.write(HEADER + struct.pack("<iI", -1, 0))
-        spin_until(lambda number=number: subscription._bad_input.count == number)
+        spin_until(lambda number=number: subscription._rclpy_bad_input.count == number)
     assert node.get_clock().now().nanoseconds == 0
     writers[0].write(HEADER + struct.pack("<iI", 5, 7))
     spin_until(lambda: node.get_clock().now().nanoseconds == 5_000_000_007)
@@ -126,7 +126,7 @@ def test_samples_with_huge_counts_are_dropped(
     stamp_and_frame = bytes(8) + b"\1\0\0\0\0\0\0\0"
     for count in (0x7FFFFFFF, 0xFFFFFFFF, 1_000_000):
         writer.write(HEADER + stamp_and_frame + struct.pack("<I", count) + bytes(64))
-    spin_until(lambda: subscription._bad_input.count == 3)
+    spin_until(lambda: subscription._rclpy_bad_input.count == 3)
 
 
 @pytest.mark.parametrize("message_type", [DiagnosticArray, Float64MultiArray, String])
@@ -159,10 +159,10 @@ def test_bad_samples_leave_no_memory_behind(
     writer = writer_for(participant, "rt/x", "std_msgs::msg::dds_::Float64_", spin_until)
 
     def feed(number: int) -> None:
-        wanted = subscription._bad_input.count + number
+        wanted = subscription._rclpy_bad_input.count + number
         for _ in range(number):
             writer.write(HEADER + b"\1")
-        spin_until(lambda: subscription._bad_input.count == wanted)
+        spin_until(lambda: subscription._rclpy_bad_input.count == wanted)
 
     feed(200)
     before = allocated()
@@ -180,8 +180,8 @@ def test_random_samples_are_dropped_or_delivered(
     for _ in range(10):
         for _ in range(50):
             writer.write(HEADER + source.randbytes(source.randrange(1, 200)))
-        done = subscription._bad_input.count + len(good) + 50
-        spin_until(lambda done=done: subscription._bad_input.count + len(good) == done)
+        done = subscription._rclpy_bad_input.count + len(good) + 50
+        spin_until(lambda done=done: subscription._rclpy_bad_input.count + len(good) == done)
 
 
 def test_a_service_survives_bad_requests(node: Node, participant: Participant, spin_until: SpinUntil) -> None:
@@ -198,7 +198,7 @@ def test_a_service_survives_bad_requests(node: Node, participant: Participant, s
     future = client.call_async(SetBool.Request(data=True))
     spin_until(future.done)
     assert future.result() == SetBool.Response(success=True)
-    assert service._bad_input.count >= 4
+    assert service._rclpy_bad_input.count >= 4
 
 
 def test_the_parameter_services_survive_bad_requests(
@@ -242,7 +242,7 @@ def test_a_client_survives_bad_replies(node: Node, participant: Participant, spi
     identity = samples[0][4:20]
     for data in (b"\1", bytes(12), identity + b"\1", identity + b"\1\0\0\0\xff\xff\xff\xff"):
         writer.write(HEADER + data)
-    spin_until(lambda: client._bad_input.count == 4)
+    spin_until(lambda: client._rclpy_bad_input.count == 4)
     assert not future.done()
     writer.write(HEADER + identity + b"\1\0\0\0\1\0\0\0\0")
     spin_until(future.done)

@@ -29,10 +29,10 @@ def test_malformed_samples_leave_no_memory_behind(
     spin_until(writer.matched)
 
     def drop(count: int) -> None:
-        done = subscription._bad_input.count + count
+        done = subscription._rclpy_bad_input.count + count
         for _ in range(count):
             writer.write(TRUNCATED)
-        spin_until(lambda: subscription._bad_input.count == done)
+        spin_until(lambda: subscription._rclpy_bad_input.count == done)
 
     drop(100)  # buffers grow once
     before = resident()

@@ -146,7 +146,7 @@ def test_dropping_the_last_node_after_shutdown_leaves_the_domain(domain_id: int)
     gc.collect()
     listener.join(10)
     assert not listener.is_alive()
-    assert context._graph is None
+    assert context._rclpy_graph is None
 
 
 @pytest.mark.parametrize("kind", [SingleThreadedExecutor, MultiThreadedExecutor])
@@ -158,7 +158,7 @@ def test_a_dropped_executor_leaves_nothing_in_dds(
     executor.spin_until_future_complete(task, 10)
     assert task.result() == 42
     dropped = weakref.ref(executor)
-    handles = [entity.handle for entity in executor._dds]
+    handles = [entity.handle for entity in executor._rclpy_dds]
     assert all(blocking.dds_triggered(handle) >= 0 for handle in handles)
     del executor
     assert becomes_true_after_collection(

@@ -16,8 +16,8 @@ HASH = "RIHS01_" + "0123456789abcdef" * 4
 
 
 def test_a_type_hash_survives_as_text() -> None:
-    assert str(TypeHash._parse(HASH)) == HASH
-    assert TypeHash._parse(HASH) == TypeHash(1, bytes.fromhex("0123456789abcdef" * 4))
+    assert str(TypeHash._rclpy_parse(HASH)) == HASH
+    assert TypeHash._rclpy_parse(HASH) == TypeHash(1, bytes.fromhex("0123456789abcdef" * 4))
     assert TypeHash() != TypeHash(version=1)
 
 
@@ -25,8 +25,8 @@ def test_a_type_hash_survives_as_text() -> None:
     "text", ["", "RIHS01", "RIHS01_00", "RIHSxx_" + "0" * 64, "RIHS01_" + "g" * 64, HASH[1:]]
 )
 def test_an_invalid_text_is_the_unknown_type_hash(text: str) -> None:
-    assert TypeHash._parse(text) == TypeHash()
-    assert str(TypeHash._parse(text)) == "INVALID"
+    assert TypeHash._rclpy_parse(text) == TypeHash()
+    assert str(TypeHash._rclpy_parse(text)) == "INVALID"
 
 
 def test_a_service_type_cannot_be_deserialized() -> None:

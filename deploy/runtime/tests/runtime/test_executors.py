@@ -56,7 +56,7 @@ def test_a_take_that_fails_releases_the_callback_group(
         raise ZeroDivisionError("planted")
 
     with monkeypatch.context() as patch:
-        patch.setattr(subscription, "_deserialize", fail)
+        patch.setattr(subscription, "_rclpy_deserialize", fail)
         publisher.publish(Float64(data=1.0))
         with pytest.raises(ZeroDivisionError, match="planted"):
             executor.spin_once(timeout_sec=5)
@@ -216,13 +216,13 @@ def test_a_reader_is_asked_again_only_in_a_flood(
 
         return count
 
-    monkeypatch.setattr(executor._waitset, "wait", counted("waits", executor._waitset.wait))
-    monkeypatch.setattr(subscription, "_take", counted("looks", subscription._take))
+    monkeypatch.setattr(executor._rclpy_waitset, "wait", counted("waits", executor._rclpy_waitset.wait))
+    monkeypatch.setattr(subscription, "_rclpy_take", counted("looks", subscription._rclpy_take))
     for number in range(5):
         publisher.publish(Float64(data=float(number)))
     while len(received) < 5:
         executor.spin_once(timeout_sec=5)
-    monkeypatch.setattr(executor._waitset, "wait", lambda timeout: [])
+    monkeypatch.setattr(executor._rclpy_waitset, "wait", lambda timeout: [])
     executor.spin_once(timeout_sec=0)  # ends the burst
 
     assert received == [0.0, 1.0, 2.0, 3.0, 4.0]
@@ -263,7 +263,7 @@ def test_spin_once_ends_at_its_timeout_while_ready_data_cannot_be_taken(
 ) -> None:
     subscription = node.create_subscription(Float64, "x", lambda _: None, 10)
     looks: list[None] = []
-    monkeypatch.setattr(subscription, "_take", lambda: looks.append(None))
+    monkeypatch.setattr(subscription, "_rclpy_take", lambda: looks.append(None))
     node.create_publisher(Float64, "x", 10).publish(Float64())
     executor.spin_once(timeout_sec=0.05)
     assert looks
@@ -316,13 +316,13 @@ def test_shutdown_by_a_signal_handler_may_interrupt_the_pool(
 ) -> None:
     node = make_node()
     executor = MultiThreadedExecutor(2, context=context)
-    start_thread = executor._pool._adjust_thread_count
+    start_thread = executor._rclpy_pool._adjust_thread_count
 
     def interrupted() -> None:  # while the pool holds its lock
         assert executor.shutdown()
         start_thread()
 
-    monkeypatch.setattr(executor._pool, "_adjust_thread_count", interrupted)
+    monkeypatch.setattr(executor._rclpy_pool, "_adjust_thread_count", interrupted)
     called = threading.Event()
     guard = node.create_guard_condition(called.set)
     executor.add_node(node)
@@ -331,4 +331,4 @@ def test_shutdown_by_a_signal_handler_may_interrupt_the_pool(
     executor.spin_once(timeout_sec=5)
 
     assert called.wait(10)
-    assert executor._pool._shutdown
+    assert executor._rclpy_pool._shutdown

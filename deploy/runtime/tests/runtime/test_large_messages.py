@@ -359,9 +359,9 @@ def test_damaged_large_samples_are_dropped_and_leave_no_memory(
 
     def drop(samples: list[bytes]) -> None:
         for sample in samples:
-            dropped = subscription._bad_input.count + 1
+            dropped = subscription._rclpy_bad_input.count + 1
             writer.write(sample)
-            spin_until(lambda: subscription._bad_input.count == dropped)  # noqa: B023, it is called at once
+            spin_until(lambda: subscription._rclpy_bad_input.count == dropped)  # noqa: B023, it is called at once
 
     drop(damaged)
     before = resident()

@@ -98,7 +98,7 @@ def test_an_unknown_value_of_a_policy_is_refused(make_node: MakeNode) -> None:
 
 def test_an_unknown_profile_is_refused(node: Node) -> None:
     with pytest.raises(ValueError, match="invalid"):
-        declare(node, qos_profile_unknown._copy(), QoSOverridingOptions.with_default_policies())
+        declare(node, qos_profile_unknown._rclpy_copy(), QoSOverridingOptions.with_default_policies())
 
 
 def test_a_callback_accepts_or_refuses_the_whole_profile(make_node: MakeNode) -> None:

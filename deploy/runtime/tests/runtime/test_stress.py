@@ -186,7 +186,7 @@ def test_shutdown_wakes_threads_that_begin_to_wait_meanwhile() -> None:
     def begin(context: Context, events: list[threading.Event], under_way: threading.Event) -> None:
         for number in range(2000):
             events.append(threading.Event())
-            context._wake_on_shutdown(events[-1])
+            context._rclpy_wake_on_shutdown(events[-1])
             if number == 1000:
                 under_way.set()
 

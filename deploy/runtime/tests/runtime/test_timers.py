@@ -43,7 +43,7 @@ def test_a_tick_before_a_sleep_ends_the_sleep_at_once(
 ) -> None:
     rate = node.create_rate(1e6, clock)
     waits: list[bool] = []
-    monkeypatch.setattr(rate._ticks, "wait_for", lambda woken: waits.append(woken()))
+    monkeypatch.setattr(rate._rclpy_ticks, "wait_for", lambda woken: waits.append(woken()))
     clock.set_ros_time_override(ros_time(2000))
     executor.spin_once(timeout_sec=0)
     rate.sleep()
@@ -64,7 +64,7 @@ def test_a_tick_ends_only_one_sleep(
             executor.spin_once(timeout_sec=0)
         waits.append(woken())
 
-    monkeypatch.setattr(rate._ticks, "wait_for", tick)
+    monkeypatch.setattr(rate._rclpy_ticks, "wait_for", tick)
     for _ in range(3):
         rate.sleep()
     assert waits == [True, True, False]

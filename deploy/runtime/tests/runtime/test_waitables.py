@@ -79,13 +79,13 @@ def test_a_trigger_while_the_callback_group_is_busy_is_kept(
     node.add_waitable(waitable)
     executor.spin_once(0.0)
     guard.trigger()
-    watch = executor._watch
+    watch = executor._rclpy_watch
     assert watch is not None
     assert watch.prepare() == 0
     (entity,) = watch.ready([])
     other = object()
     assert group.beginning_execution(other)
-    executor._block(entity)
+    executor._rclpy_block(entity)
     executor.spin_once(0.0)
     assert waitable.runs == 0
     group.ending_execution(other)

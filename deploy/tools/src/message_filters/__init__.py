@@ -100,15 +100,15 @@ class Cache(SimpleFilter):
     def getInterval(self, from_stamp: Time, to_stamp: Time) -> list[Any]:
         """Return the messages between two times, inclusive."""
         assert from_stamp <= to_stamp, "the interval ends before it begins"
-        return [msg for msg, time in self._items() if from_stamp <= time <= to_stamp]
+        return [msg for msg, time in self._message_filters_items() if from_stamp <= time <= to_stamp]
 
     def getElemAfterTime(self, stamp: Time) -> Any:
         """Return the first message at or after a time, ``None`` without one."""
-        return next((msg for msg, time in self._items() if time >= stamp), None)
+        return next((msg for msg, time in self._message_filters_items() if time >= stamp), None)
 
     def getElemBeforeTime(self, stamp: Time) -> Any:
         """Return the last message at or before a time, ``None`` without one."""
-        return next((msg for msg, time in reversed(self._items()) if time <= stamp), None)
+        return next((msg for msg, time in reversed(self._message_filters_items()) if time <= stamp), None)
 
     def getLastestTime(self) -> Time | None:
         """Return the time of the last message, ``None`` without one."""
@@ -123,7 +123,7 @@ class Cache(SimpleFilter):
         latest = self.getLastestTime()
         return None if latest is None else self.getElemAfterTime(latest)
 
-    def _items(self) -> list[tuple[Any, Time]]:
+    def _message_filters_items(self) -> list[tuple[Any, Time]]:
         return list(zip(self.cache_msgs, self.cache_times, strict=True))
 
 
@@ -148,16 +148,16 @@ class TimeSynchronizer(SimpleFilter):
     def add(self, msg: Any, my_queue: dict[int, Any], my_queue_index: int | None = None) -> None:
         """Take a message of an input."""
         with self.lock:
-            self._enqueue(msg, Time.from_msg(msg.header.stamp).nanoseconds, my_queue)
+            self._message_filters_enqueue(msg, Time.from_msg(msg.header.stamp).nanoseconds, my_queue)
             for stamp in sorted(set.intersection(*map(set, self.queues))):
-                self._output([stamp] * len(self.queues))
+                self._message_filters_output([stamp] * len(self.queues))
 
-    def _enqueue(self, msg: Any, stamp: int, queue: dict[int, Any]) -> None:
+    def _message_filters_enqueue(self, msg: Any, stamp: int, queue: dict[int, Any]) -> None:
         queue[stamp] = msg
         while len(queue) > self.queue_size:
             del queue[min(queue)]
 
-    def _output(self, stamps: Sequence[int]) -> None:
+    def _message_filters_output(self, stamps: Sequence[int]) -> None:
         """Remove the messages with these stamps, one for each input, and output them."""
         self.signalMessage(*[queue.pop(stamp) for queue, stamp in zip(self.queues, stamps, strict=True)])
 
@@ -186,7 +186,7 @@ class ApproximateTimeSynchronizer(TimeSynchronizer):
             return
         new, slop = time.nanoseconds, self.slop.nanoseconds
         with self.lock:
-            self._enqueue(msg, new, my_queue)
+            self._message_filters_enqueue(msg, new, my_queue)
             candidates = [
                 [new] if index == my_queue_index else _closest(queue, new, slop)
                 for index, queue in enumerate(self.queues)
@@ -194,7 +194,7 @@ class ApproximateTimeSynchronizer(TimeSynchronizer):
             for stamps in itertools.product(*candidates):
                 known = all(stamp in queue for stamp, queue in zip(stamps, self.queues, strict=True))
                 if known and max(stamps) - min(stamps) < slop:
-                    self._output(stamps)
+                    self._message_filters_output(stamps)
                     break
 
 

@@ -40,10 +40,12 @@ class BufferCore:
             by default.
         :raises TypeError: if it is not a duration.
         """
-        self._cache_time = _DEFAULT_CACHE_TIME if cache_time is None else nanoseconds(cache_time, "duration")
-        self._frames: dict[str, TimeCache | StaticCache | None] = {}  # None: a frame without a parent
-        self._authorities: dict[str, str] = {}
-        self._lock = threading.RLock()
+        self._tf2_cache_time = (
+            _DEFAULT_CACHE_TIME if cache_time is None else nanoseconds(cache_time, "duration")
+        )
+        self._tf2_frames: dict[str, TimeCache | StaticCache | None] = {}  # None: a frame without a parent
+        self._tf2_authorities: dict[str, str] = {}
+        self._tf2_lock = threading.RLock()
 
     # Input
 
@@ -56,13 +58,13 @@ class BufferCore:
         :param authority: who says so, for display.
         :raises TypeError: if the translation is no Vector3, or the stamp no time.
         """
-        self._set(transform, authority, TimeCache)
+        self._tf2_set(transform, authority, TimeCache)
 
     def set_transform_static(self, transform: TransformStamped, authority: str) -> None:
         """Add a transform that holds at all times; see :meth:`set_transform`."""
-        self._set(transform, authority, StaticCache)
+        self._tf2_set(transform, authority, StaticCache)
 
-    def _set(
+    def _tf2_set(
         self, transform: TransformStamped, authority: str, kind: type[TimeCache] | type[StaticCache]
     ) -> None:
         if not isinstance(transform.transform.translation, Vector3):
@@ -79,14 +81,14 @@ class BufferCore:
             return
         x, y, z, w = (component / length for component in rotation)
         sample = Sample(0 if kind is StaticCache else stamp, parent, translation, (x, y, z, w))
-        with self._lock:
-            cache = self._frames.get(child)
+        with self._tf2_lock:
+            cache = self._tf2_frames.get(child)
             if not isinstance(cache, kind):
-                cache = StaticCache() if kind is StaticCache else TimeCache(self._cache_time)
-                self._frames[child] = cache
-            self._frames.setdefault(parent, None)
+                cache = StaticCache() if kind is StaticCache else TimeCache(self._tf2_cache_time)
+                self._tf2_frames[child] = cache
+            self._tf2_frames.setdefault(parent, None)
             if cache.insert(sample):
-                self._authorities[child] = authority
+                self._tf2_authorities[child] = authority
                 return
         _LOGGER.warning(
             f"TF_OLD_DATA ignoring data from the past for frame {child} at time {seconds(stamp)} according to"
@@ -95,8 +97,8 @@ class BufferCore:
 
     def clear(self) -> None:
         """Remove all transforms but the static ones. The frames remain known."""
-        with self._lock:
-            for cache in self._frames.values():
+        with self._tf2_lock:
+            for cache in self._tf2_frames.values():
                 if cache is not None:
                     cache.clear()
 
@@ -111,8 +113,8 @@ class BufferCore:
         :raises ConnectivityException: if nothing connects the frames.
         :raises ExtrapolationException: if the transform is not known at that time.
         """
-        with self._lock:
-            matrix, stamp = self._lookup(target_frame, source_frame, nanoseconds(time))
+        with self._tf2_lock:
+            matrix, stamp = self._tf2_lookup(target_frame, source_frame, nanoseconds(time))
         return _message(target_frame, source_frame, stamp, matrix)
 
     def lookup_transform_full_core(
@@ -129,11 +131,11 @@ class BufferCore:
         ``fixed_frame`` does not move between the two times. Errors are those of
         :meth:`lookup_transform_core`.
         """
-        with self._lock:
+        with self._tf2_lock:
             for name, frame in (("target", target_frame), ("source", source_frame), ("fixed", fixed_frame)):
-                self._check_frame(frame, f"lookupTransform argument {name}_frame")
-            to_fixed, _ = self._lookup(fixed_frame, source_frame, nanoseconds(source_time))
-            to_target, stamp = self._lookup(target_frame, fixed_frame, nanoseconds(target_time))
+                self._tf2_check_frame(frame, f"lookupTransform argument {name}_frame")
+            to_fixed, _ = self._tf2_lookup(fixed_frame, source_frame, nanoseconds(source_time))
+            to_target, stamp = self._tf2_lookup(target_frame, fixed_frame, nanoseconds(target_time))
         return _message(target_frame, source_frame, stamp, to_target @ to_fixed)
 
     def can_transform_core(self, target_frame: str, source_frame: str, time: TimeLike) -> tuple[bool, str]:
@@ -141,8 +143,8 @@ class BufferCore:
         stamp = nanoseconds(time)
         if target_frame == source_frame:
             return True, ""
-        with self._lock:
-            return self._can(
+        with self._tf2_lock:
+            return self._tf2_can(
                 {"target": target_frame, "source": source_frame},
                 (target_frame, source_frame, stamp),
             )
@@ -156,8 +158,8 @@ class BufferCore:
         fixed_frame: str,
     ) -> tuple[bool, str]:
         """Return whether :meth:`lookup_transform_full_core` has a result, and the reason if not."""
-        with self._lock:
-            return self._can(
+        with self._tf2_lock:
+            return self._tf2_can(
                 {"target": target_frame, "source": source_frame, "fixed": fixed_frame},
                 (target_frame, fixed_frame, nanoseconds(target_time)),
                 (fixed_frame, source_frame, nanoseconds(source_time)),
@@ -170,11 +172,11 @@ class BufferCore:
         :raises LookupException: if a frame does not exist.
         :raises TransformException: if nothing connects the frames.
         """
-        with self._lock:
+        with self._tf2_lock:
             for frame in (target_frame, source_frame):
-                self._check_frame(frame, "get_latest_common_time")
+                self._tf2_check_frame(frame, "get_latest_common_time")
             try:
-                return Time(nanoseconds=latest_common_time(self._frames, target_frame, source_frame))
+                return Time(nanoseconds=latest_common_time(self._tf2_frames, target_frame, source_frame))
             except TransformException as error:
                 raise TransformException(str(error)) from None  # of no subclass, as in tf2
 
@@ -214,11 +216,11 @@ class BufferCore:
         :param reference_frame: the frame whose axes the result uses.
         :param reference_point: a point in ``reference_point_frame`` [m].
         """
-        with self._lock:
-            self._check_frame(observation_frame, "lookupTransform argument target_frame")
-            self._check_frame(tracking_frame, "lookupTransform argument source_frame")
+        with self._tf2_lock:
+            self._tf2_check_frame(observation_frame, "lookupTransform argument target_frame")
+            self._tf2_check_frame(tracking_frame, "lookupTransform argument source_frame")
             return average_velocity(
-                lambda target, source, stamp: self._lookup(target, source, stamp)[0],
+                lambda target, source, stamp: self._tf2_lookup(target, source, stamp)[0],
                 tracking_frame,
                 observation_frame,
                 reference_frame,
@@ -226,28 +228,28 @@ class BufferCore:
                 reference_point_frame,
                 nanoseconds(time),
                 nanoseconds(averaging_interval, "duration"),
-                latest_common_time(self._frames, observation_frame, tracking_frame),
+                latest_common_time(self._tf2_frames, observation_frame, tracking_frame),
             )
 
     # Display
 
     def all_frames_as_yaml(self) -> str:
         """Return the frames that have a parent, with statistics of their transforms, as YAML."""
-        with self._lock:
-            return _frame_graph.as_yaml(self._frames, self._authorities)
+        with self._tf2_lock:
+            return _frame_graph.as_yaml(self._tf2_frames, self._tf2_authorities)
 
     def all_frames_as_string(self) -> str:
         """Return the frames and their parents, a line for each."""
-        with self._lock:
-            return _frame_graph.as_string(self._frames)
+        with self._tf2_lock:
+            return _frame_graph.as_string(self._tf2_frames)
 
     def _frameExists(self, frame_id: str) -> bool:
-        with self._lock:
-            return frame_id in self._frames
+        with self._tf2_lock:
+            return frame_id in self._tf2_frames
 
     def _getFrameStrings(self) -> list[str]:
-        with self._lock:
-            return list(self._frames)
+        with self._tf2_lock:
+            return list(self._tf2_frames)
 
     def _chain(
         self,
@@ -257,47 +259,49 @@ class BufferCore:
         source_time: TimeLike,
         fixed_frame: str,
     ) -> list[str]:
-        with self._lock:
-            to_fixed = self._path(fixed_frame, source_frame, nanoseconds(source_time)).frames
-            to_target = self._path(target_frame, fixed_frame, nanoseconds(target_time)).frames
+        with self._tf2_lock:
+            to_fixed = self._tf2_path(fixed_frame, source_frame, nanoseconds(source_time)).frames
+            to_target = self._tf2_path(target_frame, fixed_frame, nanoseconds(target_time)).frames
         return [*to_fixed, *to_target[1:]]
 
     # The search; the caller holds the lock.
 
-    def _check_frame(self, frame: str, function: str) -> None:
+    def _tf2_check_frame(self, frame: str, function: str) -> None:
         """Raise InvalidArgumentException or LookupException if the frame cannot be looked up."""
         if reason := reason_against(frame):
             raise InvalidArgumentException(f'Invalid argument "{frame}" passed to {function} - {reason}')
-        if frame not in self._frames:
+        if frame not in self._tf2_frames:
             raise LookupException(f'"{frame}" passed to {function} does not exist. ')
 
-    def _can(self, frames: dict[str, str], *paths: tuple[str, str, int]) -> tuple[bool, str]:
+    def _tf2_can(self, frames: dict[str, str], *paths: tuple[str, str, int]) -> tuple[bool, str]:
         """Return whether the frames exist and the paths from target to source, and the reason if not."""
         for name, frame in frames.items():
-            if reason := reason_against(frame) or ("" if frame in self._frames else "frame does not exist"):
+            if reason := reason_against(frame) or (
+                "" if frame in self._tf2_frames else "frame does not exist"
+            ):
                 where = f"canTransform argument {name}_frame"
                 return False, f'Invalid frame ID "{frame}" passed to {where} - {reason}'
         try:
             for target, source, stamp in paths:
-                self._path(target, source, stamp)
+                self._tf2_path(target, source, stamp)
         except TransformException as error:
             return False, str(error)
         return True, ""
 
-    def _path(self, target: str, source: str, stamp: int) -> Path:
+    def _tf2_path(self, target: str, source: str, stamp: int) -> Path:
         """Return the path at a time, 0: at the latest common time."""
-        stamp = stamp or latest_common_time(self._frames, target, source)
-        return find_path(self._frames, target, source, stamp)
+        stamp = stamp or latest_common_time(self._tf2_frames, target, source)
+        return find_path(self._tf2_frames, target, source, stamp)
 
-    def _lookup(self, target: str, source: str, stamp: int) -> tuple[Matrix, int]:
+    def _tf2_lookup(self, target: str, source: str, stamp: int) -> tuple[Matrix, int]:
         """Return the transform, and its time, which is not 0 unless all transforms are static."""
         if target == source:
-            cache = self._frames.get(target)
+            cache = self._tf2_frames.get(target)
             return IDENTITY, cache.latest if stamp == 0 and cache is not None else stamp
-        self._check_frame(target, "lookupTransform argument target_frame")
-        self._check_frame(source, "lookupTransform argument source_frame")
-        stamp = stamp or latest_common_time(self._frames, target, source)
-        return find_path(self._frames, target, source, stamp).matrix, stamp
+        self._tf2_check_frame(target, "lookupTransform argument target_frame")
+        self._tf2_check_frame(source, "lookupTransform argument source_frame")
+        stamp = stamp or latest_common_time(self._tf2_frames, target, source)
+        return find_path(self._tf2_frames, target, source, stamp).matrix, stamp
 
 
 def _message(target: str, source: str, stamp: int, matrix: Matrix) -> TransformStamped:

@@ -38,17 +38,17 @@ class Buffer(BufferCore, BufferInterface):
         """
         BufferCore.__init__(self, cache_time)
         BufferInterface.__init__(self)
-        self._new_data = threading.Condition(self._lock)
-        self._pending: dict[Future, Callable[[], TransformStamped]] = {}
+        self._tf2_new_data = threading.Condition(self._tf2_lock)
+        self._tf2_pending: dict[Future, Callable[[], TransformStamped]] = {}
         if node is not None:
-            self.srv = node.create_service(FrameGraph, "tf2_frames", self._on_frames_request)
+            self.srv = node.create_service(FrameGraph, "tf2_frames", self._tf2_on_frames_request)
             self.clock = node.get_clock()
         else:
             self.clock = Clock()
         threshold = JumpThreshold(min_forward=None, min_backward=Duration(seconds=-1), on_clock_change=True)
         self.jump_handle = self.clock.create_jump_callback(threshold, post_callback=self.time_jump_callback)
 
-    def _on_frames_request(
+    def _tf2_on_frames_request(
         self, request: FrameGraph.Request, response: FrameGraph.Response
     ) -> FrameGraph.Response:
         response.frame_yaml = self.all_frames_as_yaml()
@@ -61,23 +61,23 @@ class Buffer(BufferCore, BufferInterface):
 
     def set_transform(self, transform: TransformStamped, authority: str) -> None:
         super().set_transform(transform, authority)
-        self._on_new_data()
+        self._tf2_on_new_data()
 
     def set_transform_static(self, transform: TransformStamped, authority: str) -> None:
         super().set_transform_static(transform, authority)
-        self._on_new_data()
+        self._tf2_on_new_data()
 
-    def _on_new_data(self) -> None:
+    def _tf2_on_new_data(self) -> None:
         """Wake the waiting threads, and complete the futures whose transform is known now."""
         results = []
-        with self._new_data:
-            self._new_data.notify_all()
-            for future, lookup in list(self._pending.items()):
+        with self._tf2_new_data:
+            self._tf2_new_data.notify_all()
+            for future, lookup in list(self._tf2_pending.items()):
                 try:
                     results.append((future, lookup()))
                 except TransformException:
                     continue
-                del self._pending[future]
+                del self._tf2_pending[future]
         for future, transform in results:
             future.set_result(transform)
 
@@ -144,7 +144,7 @@ class Buffer(BufferCore, BufferInterface):
 
         :param return_debug_tuple: whether to return also the reason if it is not.
         """
-        result = self._wait(lambda: self.can_transform_core(target_frame, source_frame, time), timeout)
+        result = self._tf2_wait(lambda: self.can_transform_core(target_frame, source_frame, time), timeout)
         return result if return_debug_tuple else result[0]
 
     def can_transform_full(
@@ -159,22 +159,22 @@ class Buffer(BufferCore, BufferInterface):
     ) -> Any:
         """Return whether the transform between two times is known; see :meth:`can_transform`."""
         arguments = target_frame, target_time, source_frame, source_time, fixed_frame
-        result = self._wait(lambda: self.can_transform_full_core(*arguments), timeout)
+        result = self._tf2_wait(lambda: self.can_transform_full_core(*arguments), timeout)
         return result if return_debug_tuple else result[0]
 
-    def _wait(self, can_transform: Callable[[], tuple[bool, str]], timeout: Duration) -> tuple[bool, str]:
+    def _tf2_wait(self, can_transform: Callable[[], tuple[bool, str]], timeout: Duration) -> tuple[bool, str]:
         deadline = system_time.monotonic() + timeout.nanoseconds / S_TO_NS
-        with self._new_data:
+        with self._tf2_new_data:
             while not (result := can_transform())[0]:
                 remaining = deadline - system_time.monotonic()
                 if remaining <= 0.0:
                     break
-                self._new_data.wait(min(remaining, threading.TIMEOUT_MAX))
+                self._tf2_new_data.wait(min(remaining, threading.TIMEOUT_MAX))
         return result
 
     def wait_for_transform_async(self, target_frame: str, source_frame: str, time: Time | TimeMsg) -> Future:
         """Return a future that gets the transform as soon as it is known."""
-        return self._future(lambda: self.lookup_transform_core(target_frame, source_frame, time))
+        return self._tf2_future(lambda: self.lookup_transform_core(target_frame, source_frame, time))
 
     def wait_for_transform_full_async(
         self,
@@ -186,14 +186,14 @@ class Buffer(BufferCore, BufferInterface):
     ) -> Future:
         """Return a future that gets the transform between two times as soon as it is known."""
         arguments = target_frame, target_time, source_frame, source_time, fixed_frame
-        return self._future(lambda: self.lookup_transform_full_core(*arguments))
+        return self._tf2_future(lambda: self.lookup_transform_full_core(*arguments))
 
-    def _future(self, lookup: Callable[[], TransformStamped]) -> Future:
+    def _tf2_future(self, lookup: Callable[[], TransformStamped]) -> Future:
         future = Future()
-        with self._lock:
+        with self._tf2_lock:
             try:
                 future.set_result(lookup())
             except TransformException:
-                self._pending[future] = lookup
-                future.add_done_callback(lambda done: self._pending.pop(done, None))  # if it is cancelled
+                self._tf2_pending[future] = lookup
+                future.add_done_callback(lambda done: self._tf2_pending.pop(done, None))  # if it is cancelled
         return future

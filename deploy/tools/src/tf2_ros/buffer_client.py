@@ -75,7 +75,7 @@ class BufferClient(BufferInterface):
         :raises TransformException: as ``BufferCore.lookup_transform_core``; its subclass TimeoutException if
             there is no server or no answer.
         """
-        return self._ask(
+        return self._tf2_ask(
             LookupTransform.Goal(
                 target_frame=target_frame,
                 source_frame=source_frame,
@@ -94,7 +94,7 @@ class BufferClient(BufferInterface):
         timeout: Duration = NO_WAIT,
     ) -> TransformStamped:
         """Return the transform between two times, see :meth:`lookup_transform`."""
-        return self._ask(
+        return self._tf2_ask(
             LookupTransform.Goal(
                 target_frame=target_frame,
                 source_frame=source_frame,
@@ -138,7 +138,7 @@ class BufferClient(BufferInterface):
         """Destroy the action client."""
         self.action_client.destroy()
 
-    def _ask(self, goal: Any) -> TransformStamped:
+    def _tf2_ask(self, goal: Any) -> TransformStamped:
         if not self.action_client.server_is_ready():
             raise TimeoutException("The BufferServer is not ready.")
         padding = self.timeout_padding

@@ -128,51 +128,51 @@ def Stamped(obj: Any, stamp: TimeMsg, frame_id: str) -> Any:
 class TransformRegistration:
     """The functions that transform objects, by type; all instances share them."""
 
-    _functions: ClassVar[dict[type, _DoTransform]] = {}
+    _tf2_functions: ClassVar[dict[type, _DoTransform]] = {}
 
     def print_me(self) -> None:
         """Print the registered types."""
-        print(self._functions)
+        print(self._tf2_functions)
 
     def add(self, key: type, callback: _DoTransform) -> None:
         """Register ``callback(object, transform) -> object`` for a type."""
-        self._functions[key] = callback
+        self._tf2_functions[key] = callback
 
     def get(self, key: type) -> _DoTransform:
         """Return the function of a type. Raises TypeException."""
-        return _registered(self._functions, key)
+        return _registered(self._tf2_functions, key)
 
 
 class ConvertRegistration:
     """The functions that convert types to and from messages, and to each other; all instances share them."""
 
-    _to_msg: ClassVar[dict[type, _Convert]] = {}
-    _from_msg: ClassVar[dict[type, _Convert]] = {}
-    _direct: ClassVar[dict[tuple[type, type], _Convert]] = {}
+    _tf2_to_msg: ClassVar[dict[type, _Convert]] = {}
+    _tf2_from_msg: ClassVar[dict[type, _Convert]] = {}
+    _tf2_direct: ClassVar[dict[tuple[type, type], _Convert]] = {}
 
     def add_from_msg(self, key: type, callback: _Convert) -> None:
         """Register a function that makes an object of a type from a message."""
-        self._from_msg[key] = callback
+        self._tf2_from_msg[key] = callback
 
     def add_to_msg(self, key: type, callback: _Convert) -> None:
         """Register a function that makes a message from an object of a type."""
-        self._to_msg[key] = callback
+        self._tf2_to_msg[key] = callback
 
     def add_convert(self, key: tuple[type, type], callback: _Convert) -> None:
         """Register a function that converts from a type to another one."""
-        self._direct[key] = callback
+        self._tf2_direct[key] = callback
 
     def get_from_msg(self, key: type) -> _Convert:
         """Return the function that makes an object of a type from a message. Raises TypeException."""
-        return _registered(self._from_msg, key)
+        return _registered(self._tf2_from_msg, key)
 
     def get_to_msg(self, key: type) -> _Convert:
         """Return the function that makes a message from an object of a type. Raises TypeException."""
-        return _registered(self._to_msg, key)
+        return _registered(self._tf2_to_msg, key)
 
     def get_convert(self, key: tuple[type, type]) -> _Convert:
         """Return the function that converts from a type to another one. Raises TypeException."""
-        return _registered(self._direct, key)
+        return _registered(self._tf2_direct, key)
 
 
 def _registered(functions: dict[Any, Callable[..., Any]], key: Any) -> Callable[..., Any]:

@@ -21,11 +21,11 @@ class StaticTransformBroadcaster:
             qos = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self.pub_tf = node.create_publisher(TFMessage, "/tf_static", qos)
         self.net_message = TFMessage()
-        self._transforms: dict[str, TransformStamped] = {}  # by child frame
+        self._tf2_transforms: dict[str, TransformStamped] = {}  # by child frame
 
     def sendTransform(self, transform: TransformStamped | Iterable[TransformStamped]) -> None:
         """Publish all static transforms so far. A new transform of a child frame replaces the old one."""
         for one in as_list(transform):
-            self._transforms[one.child_frame_id] = deepcopy(one)  # the caller may reuse the message
-        self.net_message.transforms = list(self._transforms.values())
+            self._tf2_transforms[one.child_frame_id] = deepcopy(one)  # the caller may reuse the message
+        self.net_message.transforms = list(self._tf2_transforms.values())
         self.pub_tf.publish(self.net_message)

@@ -261,3 +261,22 @@ def test_the_interface_itself_has_no_transforms() -> None:
 def test_a_buffer_without_a_node_uses_system_time(buffer: Buffer) -> None:
     assert isinstance(buffer.clock, Clock)
     assert buffer.clock.clock_type == ClockType.SYSTEM_TIME
+
+
+def test_a_subclass_may_use_any_private_name() -> None:
+    class Mine(Buffer):
+        def __init__(self) -> None:
+            super().__init__()
+            self._pending, self._lock, self._frames, self._path = [], None, None, None
+
+        def _wait(self) -> Any:
+            return self.lookup_transform("a", "b", Time(), Duration(seconds=0.1))
+
+        def _set(self, *arguments: Any) -> None:
+            raise AssertionError("tf2_ros calls a private method of a user's class")
+
+        _can = _lookup = _set
+
+    buffer = Mine()
+    buffer.set_transform(transform("a", "b", x=1.0), "test")
+    assert buffer._wait().transform.translation.x == 1.0

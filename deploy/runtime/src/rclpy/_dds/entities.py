@@ -200,7 +200,7 @@ class _Endpoint(Handle):
 
     def __init__(self, handle: int) -> None:
         self.handle = handle
-        self._entity = Entity.from_param(handle)
+        self._rclpy_entity = Entity.from_param(handle)
         # Of the latest message: most messages of a topic have the same.
         self._size = 0, ct.c_size_t.from_param(0)
         self.logger_name = ""  # of the node that it belongs to
@@ -257,7 +257,7 @@ class Writer(_Endpoint):
         del data  # other threads may change the message from here on
         if not serdata:
             raise ValueError(f"invalid CDR of {octets} octets: it needs an encapsulation header and data")
-        result = blocking.dds_writecdr(self._entity, serdata)
+        result = blocking.dds_writecdr(self._rclpy_entity, serdata)
         if result:
             if self._sertype is None:
                 raise InvalidHandle("cannot use a writer that was destroyed")
@@ -308,7 +308,7 @@ class Reader(_Endpoint):
         except IndexError:
             serdata, info = Serdata(), SampleInfo()
             to_serdata, to_info = ct.byref(serdata), ct.byref(info)
-            buffer = serdata, info, (self._entity, to_serdata, _ONE_SAMPLE, to_info, _ANY)
+            buffer = serdata, info, (self._rclpy_entity, to_serdata, _ONE_SAMPLE, to_info, _ANY)
         serdata, info, arguments = buffer
         sample = None
         while quick.dds_takecdr(*arguments) > 0:

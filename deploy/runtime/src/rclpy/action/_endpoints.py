@@ -62,7 +62,9 @@ class Endpoints:
 
     def handles(self) -> tuple[int, ...]:
         """The DDS conditions that an executor waits for."""
-        return tuple(handle for endpoint in self.created for handle in getattr(endpoint, "_handles", ()))
+        return tuple(
+            handle for endpoint in self.created for handle in getattr(endpoint, "_rclpy_handles", ())
+        )
 
     def destroy(self) -> None:
         """Destroy the endpoints."""
@@ -117,5 +119,5 @@ def add_to_wait_set(wait_set: Any, endpoints: Endpoints) -> list[tuple[str, int]
         (kind, wait_set._add(kind, handle))
         for endpoint in endpoints.created
         for kind in (kinds.get(type(endpoint), "client"),)
-        for handle in getattr(endpoint, "_handles", ())
+        for handle in getattr(endpoint, "_rclpy_handles", ())
     ]

@@ -94,10 +94,10 @@ class _Calls(Client):
 
     kind = ""
 
-    def _ignore_reply(self) -> None:
-        self._node.get_logger().get_child("action_client").warning(
+    def _rclpy_ignore_reply(self) -> None:
+        self._rclpy_node.get_logger().get_child("action_client").warning(
             f"Ignoring unexpected {self.kind} response. There may be more than one action server for the"
-            f" action '{self._name.partition('/_action/')[0]}'"
+            f" action '{self._rclpy_name.partition('/_action/')[0]}'"
         )
 
 
@@ -143,31 +143,33 @@ class ActionClient(Waitable):
         self._node = node
         self._action_type = action_type
         self._action_name = action_name
-        self._lock = threading.Lock()
-        self._goal_ids: dict[Future, UUID] = {}  # of the goals that the server has not answered yet
+        self._rclpy_lock = threading.Lock()
+        self._rclpy_goal_ids: dict[Future, UUID] = {}  # of the goals that the server has not answered yet
         self._goal_handles: dict[bytes, weakref.ref[ClientGoalHandle]] = {}
         self._feedback_callbacks: dict[bytes, Callable[[Any], Any]] = {}
-        self._last_statuses: dict[bytes, int] = {}
+        self._rclpy_last_statuses: dict[bytes, int] = {}
         with creation(node, "action client", action_type, action_name, group) as endpoints:
             impl = action_type.Impl
-            self._goal_calls = endpoints.client(
+            self._rclpy_goal_calls = endpoints.client(
                 impl.SendGoalService, "send_goal", goal_service_qos_profile, _GoalCalls
             )
-            self._cancel_calls = endpoints.client(
+            self._rclpy_cancel_calls = endpoints.client(
                 impl.CancelGoalService, "cancel_goal", cancel_service_qos_profile, _CancelCalls
             )
-            self._result_calls = endpoints.client(
+            self._rclpy_result_calls = endpoints.client(
                 impl.GetResultService, "get_result", result_service_qos_profile, _ResultCalls
             )
-            self._feedback = endpoints.subscription(
+            self._rclpy_feedback = endpoints.subscription(
                 impl.FeedbackMessage, "feedback", feedback_sub_qos_profile
             )
-            self._status = endpoints.subscription(impl.GoalStatusMessage, "status", status_sub_qos_profile)
-        self._endpoints = endpoints
-        self._in_wait_set: list[tuple[str, int]] = []
+            self._rclpy_status = endpoints.subscription(
+                impl.GoalStatusMessage, "status", status_sub_qos_profile
+            )
+        self._rclpy_endpoints = endpoints
+        self._rclpy_in_wait_set: list[tuple[str, int]] = []
         # The interface that executors use for every entity.
-        self._handles = endpoints.handles()
-        self._timers: tuple[Timer, ...] = ()
+        self._rclpy_handles = endpoints.handles()
+        self._rclpy_timers: tuple[Timer, ...] = ()
         node._rclpy_add_action(self)
 
     # Sending
@@ -181,7 +183,7 @@ class ActionClient(Waitable):
 
         :raises TypeError: if ``goal`` is not of the action's goal type.
         """
-        goal_handle = self._wait_for(self.send_goal_async(goal, **kwargs))
+        goal_handle = self._rclpy_wait_for(self.send_goal_async(goal, **kwargs))
         return None if goal_handle is None else self._get_result(goal_handle)
 
     def send_goal_async(
@@ -203,47 +205,47 @@ class ActionClient(Waitable):
         request = self._action_type.Impl.SendGoalService.Request(goal_id=goal_id, goal=goal)
         if feedback_callback is not None:  # before the request: the server may be quick
             self._feedback_callbacks[uuid_bytes(goal_id)] = feedback_callback
-        with self._lock:  # until the goal is registered, no other thread may handle the response
-            future = self._goal_calls.call_async(request)
-            self._goal_ids[future] = goal_id
-        future._call_when_complete(lambda: self._forget_request(future))
+        with self._rclpy_lock:  # until the goal is registered, no other thread may handle the response
+            future = self._rclpy_goal_calls.call_async(request)
+            self._rclpy_goal_ids[future] = goal_id
+        future._rclpy_call_when_complete(lambda: self._rclpy_forget_request(future))
         return future
 
-    def _forget_request(self, future: Future) -> None:
+    def _rclpy_forget_request(self, future: Future) -> None:
         """Forget the UUID of a goal that was answered or cancelled, and the callback of a rejected goal."""
-        with self._lock:
-            goal_id = self._goal_ids.pop(future, None)
+        with self._rclpy_lock:
+            goal_id = self._rclpy_goal_ids.pop(future, None)
         if goal_id is not None and (future.cancelled() or not future.result().accepted):
-            self._forget_callback(uuid_bytes(goal_id))
+            self._rclpy_forget_callback(uuid_bytes(goal_id))
 
     def _cancel_goal(self, goal_handle: ClientGoalHandle) -> Any:
-        return self._wait_for(self._cancel_goal_async(goal_handle))
+        return self._rclpy_wait_for(self._cancel_goal_async(goal_handle))
 
     def _cancel_goal_async(self, goal_handle: ClientGoalHandle) -> Future:
         _check_goal_handle(goal_handle)
         request = CancelGoal.Request()
         request.goal_info.goal_id = goal_handle.goal_id
-        return self._cancel_calls.call_async(request)
+        return self._rclpy_cancel_calls.call_async(request)
 
     def _get_result(self, goal_handle: ClientGoalHandle) -> Any:
-        return self._wait_for(self._get_result_async(goal_handle))
+        return self._rclpy_wait_for(self._get_result_async(goal_handle))
 
     def _get_result_async(self, goal_handle: ClientGoalHandle) -> Future:
         _check_goal_handle(goal_handle)
         request = self._action_type.Impl.GetResultService.Request(goal_id=goal_handle.goal_id)
-        future = self._result_calls.call_async(request)
+        future = self._rclpy_result_calls.call_async(request)
         goal_uuid = uuid_bytes(goal_handle.goal_id)
-        future._call_when_complete(lambda: self._forget_callback(goal_uuid))
+        future._rclpy_call_when_complete(lambda: self._rclpy_forget_callback(goal_uuid))
         return future
 
-    def _forget_callback(self, goal_uuid: bytes) -> None:
+    def _rclpy_forget_callback(self, goal_uuid: bytes) -> None:
         self._feedback_callbacks.pop(goal_uuid, None)
 
-    def _wait_for(self, future: Future) -> Any:
+    def _rclpy_wait_for(self, future: Future) -> Any:
         """Wait for the result; return ``None`` if the context is shut down."""
         event = threading.Event()
-        future._call_when_complete(event.set)
-        self._node.context._wake_on_shutdown(event)
+        future._rclpy_call_when_complete(event.set)
+        self._node.context._rclpy_wake_on_shutdown(event)
         event.wait()
         return future.result()
 
@@ -251,8 +253,8 @@ class ActionClient(Waitable):
 
     def server_is_ready(self) -> bool:
         """Whether there is a server that receives goals and whose feedback and status arrive."""
-        calls = (self._goal_calls, self._cancel_calls, self._result_calls)
-        topics = (self._feedback, self._status)
+        calls = (self._rclpy_goal_calls, self._rclpy_cancel_calls, self._rclpy_result_calls)
+        topics = (self._rclpy_feedback, self._rclpy_status)
         return all(call.service_is_ready() for call in calls) and all(
             topic.get_publisher_count() > 0 for topic in topics
         )
@@ -275,24 +277,24 @@ class ActionClient(Waitable):
 
     def add_to_wait_set(self, wait_set: Any) -> None:
         """Add the subscriptions and clients to a wait set; the node's executor does without."""
-        self._in_wait_set = add_to_wait_set(wait_set, self._endpoints)
+        self._rclpy_in_wait_set = add_to_wait_set(wait_set, self._rclpy_endpoints)
 
     def is_ready(self, wait_set: Any) -> bool:
         """Return whether anything has arrived, after a wait."""
-        return any(wait_set.is_ready(kind, index) for kind, index in self._in_wait_set)
+        return any(wait_set.is_ready(kind, index) for kind, index in self._rclpy_in_wait_set)
 
     def take_data(self) -> dict[str, Any]:
         """Take what has arrived: a response of each service, a status message and feedback messages."""
         feedback: list[Any] = []
         taken = {
-            "goal": self._goal_calls._take(),
-            "cancel": self._cancel_calls._take(),
-            "result": self._result_calls._take(),
+            "goal": self._rclpy_goal_calls._rclpy_take(),
+            "cancel": self._rclpy_cancel_calls._rclpy_take(),
+            "result": self._rclpy_result_calls._rclpy_take(),
             "feedback": feedback,
-            "status": self._status._take(),
+            "status": self._rclpy_status._rclpy_take(),
         }
         # With the result, the goal's callback is forgotten: first call it with all feedback that has arrived.
-        while (message := self._feedback._take()) is not None:
+        while (message := self._rclpy_feedback._rclpy_take()) is not None:
             feedback += message
             if taken["result"] is None:
                 break
@@ -301,43 +303,43 @@ class ActionClient(Waitable):
     async def execute(self, taken_data: dict[str, Any]) -> None:
         """Complete the futures of the responses, call back with the feedback, and update the goal handles."""
         if "goal" in taken_data:
-            self._handle_goal_response(*taken_data["goal"])
+            self._rclpy_handle_goal_response(*taken_data["goal"])
         if "cancel" in taken_data:
-            self._cancel_calls._execute(taken_data["cancel"])
+            self._rclpy_cancel_calls._rclpy_execute(taken_data["cancel"])
         for feedback in taken_data.get("feedback", ()):
             callback = self._feedback_callbacks.get(uuid_bytes(feedback.goal_id))
             if callback is not None:
                 await await_or_execute(callback, feedback)
         if "result" in taken_data:
-            self._result_calls._execute(taken_data["result"])
+            self._rclpy_result_calls._rclpy_execute(taken_data["result"])
         if "status" in taken_data:
-            self._handle_statuses(*taken_data["status"])
+            self._rclpy_handle_statuses(*taken_data["status"])
 
-    def _handle_goal_response(self, future: Future, response: Any) -> None:
-        with self._lock:
-            goal_id = self._goal_ids.get(future)
+    def _rclpy_handle_goal_response(self, future: Future, response: Any) -> None:
+        with self._rclpy_lock:
+            goal_id = self._rclpy_goal_ids.get(future)
         if goal_id is None:  # the future was just cancelled
             return
         goal_handle = ClientGoalHandle(self, goal_id, response)
         if goal_handle.accepted:
             goal_uuid = uuid_bytes(goal_id)
-            with self._lock:
+            with self._rclpy_lock:
                 if goal_uuid in self._goal_handles:
                     raise RuntimeError(f"Two goals were accepted with the same ID ({goal_handle})")
                 self._goal_handles[goal_uuid] = weakref.ref(goal_handle)
                 # The topic may be quicker than the service.
-                self._update_status(goal_uuid, self._last_statuses.get(goal_uuid))
-        self._goal_calls._execute((future, goal_handle))
+                self._rclpy_update_status(goal_uuid, self._rclpy_last_statuses.get(goal_uuid))
+        self._rclpy_goal_calls._rclpy_execute((future, goal_handle))
 
-    def _handle_statuses(self, message: Any) -> None:
-        with self._lock:
-            self._last_statuses = {
+    def _rclpy_handle_statuses(self, message: Any) -> None:
+        with self._rclpy_lock:
+            self._rclpy_last_statuses = {
                 uuid_bytes(status.goal_info.goal_id): status.status for status in message.status_list
             }
             for goal_uuid in list(self._goal_handles):
-                self._update_status(goal_uuid, self._last_statuses.get(goal_uuid))
+                self._rclpy_update_status(goal_uuid, self._rclpy_last_statuses.get(goal_uuid))
 
-    def _update_status(self, goal_uuid: bytes, status: int | None) -> None:
+    def _rclpy_update_status(self, goal_uuid: bytes, status: int | None) -> None:
         """Update a goal handle; forget it if it will not change any more. The caller holds the lock."""
         goal_handle = self._goal_handles[goal_uuid]()
         if goal_handle is not None and status is not None:
@@ -345,20 +347,20 @@ class ActionClient(Waitable):
         if goal_handle is None or status in _TERMINAL:
             del self._goal_handles[goal_uuid]
 
-    def _take(self) -> dict[str, Any] | None:
+    def _rclpy_take(self) -> dict[str, Any] | None:
         return self.take_data() or None
 
-    def _execute(self, taken: dict[str, Any]) -> Coroutine[Any, Any, None]:
+    def _rclpy_execute(self, taken: dict[str, Any]) -> Coroutine[Any, Any, None]:
         return self.execute(taken)
 
     def destroy(self) -> None:
         """Destroy the client: it receives nothing any more."""
         if self in self._node.waitables:
             self._node.remove_waitable(self)
-        self._close()
+        self._rclpy_close()
 
-    def _close(self) -> None:
-        self._endpoints.destroy()
+    def _rclpy_close(self) -> None:
+        self._rclpy_endpoints.destroy()
 
 
 def _check_goal_handle(goal_handle: Any) -> None:

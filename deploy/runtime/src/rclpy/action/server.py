@@ -86,9 +86,9 @@ class ServerGoalHandle:
         self._action_server = action_server
         self._goal_info = goal_info
         self._goal_request = goal_request
-        self._state: int = _ACCEPTED
-        self._ended_at = 0  # [ns] of the node's clock
-        self._destroyed = False
+        self._rclpy_state: int = _ACCEPTED
+        self._rclpy_ended_at = 0  # [ns] of the node's clock
+        self._rclpy_destroyed = False
         self._lock = threading.Lock()
 
     def __eq__(self, other: object) -> bool:
@@ -120,23 +120,23 @@ class ServerGoalHandle:
     @property
     def status(self) -> int:
         """The state of the goal, a constant of ``action_msgs/msg/GoalStatus``."""
-        return GoalStatus.STATUS_UNKNOWN if self._destroyed else self._state
+        return GoalStatus.STATUS_UNKNOWN if self._rclpy_destroyed else self._rclpy_state
 
     def _update_state(self, event: GoalEvent) -> None:
         """Change the state and publish it. Raises RCLError if the state does not allow the event."""
         with self._lock:
-            if self._destroyed:
+            if self._rclpy_destroyed:
                 return
-            state = _TRANSITIONS.get((self._state, event))
+            state = _TRANSITIONS.get((self._rclpy_state, event))
             if state is None:
                 raise RCLError(
                     "Failed to update goal state: goal_handle attempted invalid transition from state"
-                    f" {_STATE_NAMES[self._state]} with event {event.name}"
+                    f" {_STATE_NAMES[self._rclpy_state]} with event {event.name}"
                 )
             if state not in _ACTIVE:
-                self._ended_at = self._action_server._now()
-            self._state = state
-            self._action_server._publish_status()
+                self._rclpy_ended_at = self._action_server._rclpy_now()
+            self._rclpy_state = state
+            self._action_server._rclpy_publish_status()
             if state not in _ACTIVE:
                 self._action_server.notify_goal_done()
 
@@ -162,8 +162,8 @@ class ServerGoalHandle:
             raise TypeError(f"Expected {action_type.Feedback._TYPE_NAME}, got {feedback!r}")
         message = action_type.Impl.FeedbackMessage(goal_id=self.goal_id, feedback=feedback)
         with self._lock:
-            if not self._destroyed:
-                self._action_server._publish_feedback(message)
+            if not self._rclpy_destroyed:
+                self._action_server._rclpy_publish_feedback(message)
 
     def succeed(self) -> None:
         """Declare that the goal was reached. Raises RCLError if it was not being executed."""
@@ -180,7 +180,7 @@ class ServerGoalHandle:
     def destroy(self) -> None:
         """Forget the goal: its state becomes unknown, and later changes have no effect."""
         with self._lock:
-            self._destroyed = True
+            self._rclpy_destroyed = True
 
 
 def default_handle_accepted_callback(goal_handle: ServerGoalHandle) -> None:
@@ -245,42 +245,44 @@ class ActionServer(Waitable):
             raise ValueError("Failed to create action server: result_timeout must be non-negative")
         self._node = node
         self._action_type = action_type
-        self._lock = threading.RLock()
+        self._rclpy_lock = threading.RLock()
         self._goal_handles: dict[bytes, ServerGoalHandle] = {}
         self._result_futures: dict[bytes, Future] = {}
-        self._executions: set[Task] = set()
-        self._result_timeout = int(result_timeout * S_TO_NS)
+        self._rclpy_executions: set[Task] = set()
+        self._rclpy_result_timeout = int(result_timeout * S_TO_NS)
         with creation(node, "action server", action_type, action_name, group) as endpoints:
             impl = action_type.Impl
-            self._goal_service = endpoints.service(
+            self._rclpy_goal_service = endpoints.service(
                 impl.SendGoalService, "send_goal", goal_service_qos_profile
             )
-            self._cancel_service = endpoints.service(
+            self._rclpy_cancel_service = endpoints.service(
                 impl.CancelGoalService, "cancel_goal", cancel_service_qos_profile
             )
-            self._result_service = endpoints.service(
+            self._rclpy_result_service = endpoints.service(
                 impl.GetResultService, "get_result", result_service_qos_profile
             )
-            self._feedback = endpoints.publisher(impl.FeedbackMessage, "feedback", feedback_pub_qos_profile)
-            self._status = endpoints.publisher(impl.GoalStatusMessage, "status", status_pub_qos_profile)
-        self._endpoints = endpoints
-        self._in_wait_set: list[tuple[str, int]] = []
-        self._expiry = Timer(
-            self._expire_goals,
+            self._rclpy_feedback = endpoints.publisher(
+                impl.FeedbackMessage, "feedback", feedback_pub_qos_profile
+            )
+            self._rclpy_status = endpoints.publisher(impl.GoalStatusMessage, "status", status_pub_qos_profile)
+        self._rclpy_endpoints = endpoints
+        self._rclpy_in_wait_set: list[tuple[str, int]] = []
+        self._rclpy_expiry = Timer(
+            self._rclpy_expire_goals,
             group,
-            self._result_timeout,
+            self._rclpy_result_timeout,
             node.get_clock(),
             context=node.context,
             autostart=False,
         )
-        self._expiry._on_change = node._wake_executor
+        self._rclpy_expiry._rclpy_on_change = node._wake_executor
         # The interface that executors use for every entity.
-        self._handles = endpoints.handles()
-        self._timers = (self._expiry,)
+        self._rclpy_handles = endpoints.handles()
+        self._rclpy_timers = (self._rclpy_expiry,)
         node._rclpy_add_action(self)
 
     @property
-    def _logger(self) -> RcutilsLogger:
+    def _rclpy_logger(self) -> RcutilsLogger:
         # Made for each message: the end of a logger takes a lock, which a garbage collection must not do.
         return self._node.get_logger().get_child("action_server")
 
@@ -291,27 +293,27 @@ class ActionServer(Waitable):
 
     # Goals
 
-    async def _handle_goal_request(self, request: Any, request_id: RequestId) -> None:
+    async def _rclpy_handle_goal_request(self, request: Any, request_id: RequestId) -> None:
         goal_uuid = uuid_bytes(request.goal_id)
         accepted = False
         if goal_uuid not in self._goal_handles:
             response = await await_or_execute(self._goal_callback, request.goal)
             if not isinstance(response, GoalResponse):
-                self._logger.warning(
+                self._rclpy_logger.warning(
                     "Goal request callback did not return a GoalResponse type. Rejecting goal."
                 )
             accepted = response is GoalResponse.ACCEPT
         goal_info = GoalInfo(goal_id=request.goal_id, stamp=self._node.get_clock().now().to_msg())
         goal_handle = ServerGoalHandle(self, goal_info, request.goal)
         if accepted:
-            with self._lock:  # two requests with the same UUID may be handled in parallel
+            with self._rclpy_lock:  # two requests with the same UUID may be handled in parallel
                 accepted = self._goal_handles.setdefault(goal_uuid, goal_handle) is goal_handle
                 if accepted:
                     self._result_futures[goal_uuid] = Future()
         answer = self._action_type.Impl.SendGoalService.Response(accepted=accepted)
         if accepted:
             answer.stamp = goal_info.stamp
-        self._respond(self._goal_service, answer, request_id)
+        self._rclpy_respond(self._rclpy_goal_service, answer, request_id)
         if accepted:
             await await_or_execute(self._handle_accepted_callback, goal_handle)
 
@@ -327,8 +329,8 @@ class ActionServer(Waitable):
         task = executor.create_task(
             self._execute_goal, execute_callback or self._execute_callback, goal_handle
         )
-        self._executions.add(task)
-        task._call_when_complete(lambda: self._executions.discard(task))
+        self._rclpy_executions.add(task)
+        task._rclpy_call_when_complete(lambda: self._rclpy_executions.discard(task))
 
     async def _execute_goal(
         self, execute_callback: Callable[[ServerGoalHandle], Any], goal_handle: ServerGoalHandle
@@ -337,23 +339,23 @@ class ActionServer(Waitable):
         try:
             result = await await_or_execute(execute_callback, goal_handle)
         except Exception as error:
-            self._logger.error(f"Error raised in execute callback: {error}")
+            self._rclpy_logger.error(f"Error raised in execute callback: {error}")
             traceback.print_exc()
             result = self._action_type.Result()
         if goal_handle.is_active:
-            self._logger.warning(f"Goal state not set, assuming aborted. Goal ID: {goal_uuid.hex()}")
+            self._rclpy_logger.warning(f"Goal state not set, assuming aborted. Goal ID: {goal_uuid.hex()}")
             goal_handle.abort()
         if not isinstance(result, self._action_type.Result):
             expected = self._action_type.Result._TYPE_NAME
-            self._logger.error(f"The execute callback must return {expected}, not {result!r}")
+            self._rclpy_logger.error(f"The execute callback must return {expected}, not {result!r}")
             result = self._action_type.Result()
         response = self._action_type.Impl.GetResultService.Response(status=goal_handle.status, result=result)
         future = self._result_futures.get(goal_uuid)
         if future is not None:  # else the goal has expired meanwhile
             future.set_result(response)
 
-    async def _handle_cancel_request(self, request: Any, request_id: RequestId) -> None:
-        return_code, goal_handles = self._goals_to_cancel(request.goal_info)
+    async def _rclpy_handle_cancel_request(self, request: Any, request_id: RequestId) -> None:
+        return_code, goal_handles = self._rclpy_goals_to_cancel(request.goal_info)
         response = self._action_type.Impl.CancelGoalService.Response(return_code=return_code)
         for goal_handle in goal_handles:
             answer = await await_or_execute(self._cancel_callback, goal_handle)
@@ -362,12 +364,12 @@ class ActionServer(Waitable):
             try:
                 goal_handle._update_state(GoalEvent.CANCEL_GOAL)
             except RCLError as error:  # the goal has ended meanwhile
-                self._logger.debug(f"Failed to cancel goal in cancel callback: {error}")
+                self._rclpy_logger.debug(f"Failed to cancel goal in cancel callback: {error}")
                 continue
             response.goals_canceling.append(goal_handle._goal_info)
-        self._respond(self._cancel_service, response, request_id)
+        self._rclpy_respond(self._rclpy_cancel_service, response, request_id)
 
-    def _goals_to_cancel(self, goal_info: GoalInfo) -> tuple[int, list[ServerGoalHandle]]:
+    def _rclpy_goals_to_cancel(self, goal_info: GoalInfo) -> tuple[int, list[ServerGoalHandle]]:
         """
         Return the response's code, and the goals that a request to cancel selects.
 
@@ -375,7 +377,7 @@ class ActionServer(Waitable):
         until then, in addition to the goal with the UUID; without both, all goals are selected.
         """
         goal_uuid, stamp = uuid_bytes(goal_info.goal_id), _nanoseconds(goal_info.stamp)
-        with self._lock:
+        with self._rclpy_lock:
             goal_handles = dict(self._goal_handles)
         cancelable = {
             key: goal_handle
@@ -395,66 +397,68 @@ class ActionServer(Waitable):
         ]
         return CancelGoal.Response.ERROR_NONE, selected
 
-    def _handle_result_request(self, request: Any, request_id: RequestId) -> None:
+    def _rclpy_handle_result_request(self, request: Any, request_id: RequestId) -> None:
         future = self._result_futures.get(uuid_bytes(request.goal_id))
         if future is None:
             response = self._action_type.Impl.GetResultService.Response(status=GoalStatus.STATUS_UNKNOWN)
-            self._respond(self._result_service, response, request_id)
+            self._rclpy_respond(self._rclpy_result_service, response, request_id)
         else:
-            future.add_done_callback(partial(self._send_result, request_id))
+            future.add_done_callback(partial(self._rclpy_send_result, request_id))
 
-    def _send_result(self, request_id: RequestId, future: Future) -> None:
+    def _rclpy_send_result(self, request_id: RequestId, future: Future) -> None:
         try:
-            self._respond(self._result_service, future.result(), request_id)
+            self._rclpy_respond(self._rclpy_result_service, future.result(), request_id)
         except (TypeError, ValueError) as error:
-            self._logger.error(f"The execute callback returned an invalid result: {error}")
+            self._rclpy_logger.error(f"The execute callback returned an invalid result: {error}")
             future.result().result = self._action_type.Result()
-            self._respond(self._result_service, future.result(), request_id)
+            self._rclpy_respond(self._rclpy_result_service, future.result(), request_id)
 
-    def _respond(self, service: Service, response: Any, request_id: RequestId) -> None:
+    def _rclpy_respond(self, service: Service, response: Any, request_id: RequestId) -> None:
         try:
             service.send_response(response, request_id)
         except (RCLError, InvalidHandle) as error:
-            self._logger.warning(f"Failed to send a response on {service.service_name}: {error}")
+            self._rclpy_logger.warning(f"Failed to send a response on {service.service_name}: {error}")
 
     # State
 
-    def _now(self) -> int:
+    def _rclpy_now(self) -> int:
         return self._node.get_clock().now().nanoseconds
 
-    def _publish_status(self) -> None:
+    def _rclpy_publish_status(self) -> None:
         """Publish the states of all goals that are kept."""
-        with self._lock:
+        with self._rclpy_lock:
             statuses = [
-                GoalStatus(goal_info=goal_handle._goal_info, status=goal_handle._state)
+                GoalStatus(goal_info=goal_handle._goal_info, status=goal_handle._rclpy_state)
                 for goal_handle in self._goal_handles.values()
             ]
-            self._status.publish(GoalStatusArray(status_list=statuses))
+            self._rclpy_status.publish(GoalStatusArray(status_list=statuses))
 
-    def _publish_feedback(self, message: Any) -> None:
-        self._feedback.publish(message)
+    def _rclpy_publish_feedback(self, message: Any) -> None:
+        self._rclpy_feedback.publish(message)
 
     def notify_goal_done(self) -> None:
         """Let the timer forget the goal that has ended when its time has come."""
-        with self._lock:
+        with self._rclpy_lock:
             ends = [
-                goal_handle._ended_at
+                goal_handle._rclpy_ended_at
                 for goal_handle in self._goal_handles.values()
-                if goal_handle._state not in _ACTIVE
+                if goal_handle._rclpy_state not in _ACTIVE
             ]
             if not ends:
-                self._expiry.cancel()
+                self._rclpy_expiry.cancel()
                 return
-            self._expiry.timer_period_ns = max(0, min(ends) + self._result_timeout - self._now())
-            self._expiry.reset()
+            self._rclpy_expiry.timer_period_ns = max(
+                0, min(ends) + self._rclpy_result_timeout - self._rclpy_now()
+            )
+            self._rclpy_expiry.reset()
 
-    def _expire_goals(self) -> None:
-        oldest = self._now() - self._result_timeout
-        with self._lock:
+    def _rclpy_expire_goals(self) -> None:
+        oldest = self._rclpy_now() - self._rclpy_result_timeout
+        with self._rclpy_lock:
             expired = {
                 goal_uuid: goal_handle
                 for goal_uuid, goal_handle in self._goal_handles.items()
-                if goal_handle._state not in _ACTIVE and goal_handle._ended_at <= oldest
+                if goal_handle._rclpy_state not in _ACTIVE and goal_handle._rclpy_ended_at <= oldest
             }
             for goal_uuid in expired:
                 del self._goal_handles[goal_uuid], self._result_futures[goal_uuid]
@@ -496,50 +500,50 @@ class ActionServer(Waitable):
 
     def add_to_wait_set(self, wait_set: Any) -> None:
         """Add the services to a wait set; the node's executor does without."""
-        self._in_wait_set = add_to_wait_set(wait_set, self._endpoints)
+        self._rclpy_in_wait_set = add_to_wait_set(wait_set, self._rclpy_endpoints)
 
     def is_ready(self, wait_set: Any) -> bool:
         """Return whether anything has arrived, after a wait."""
-        return any(wait_set.is_ready(kind, index) for kind, index in self._in_wait_set)
+        return any(wait_set.is_ready(kind, index) for kind, index in self._rclpy_in_wait_set)
 
     def take_data(self) -> dict[str, Any]:
         """Take what has arrived: at most one request of each service."""
         sources = {
-            "goal": self._goal_service,
-            "cancel": self._cancel_service,
-            "result": self._result_service,
+            "goal": self._rclpy_goal_service,
+            "cancel": self._rclpy_cancel_service,
+            "result": self._rclpy_result_service,
         }
-        taken = ((name, source._take()) for name, source in sources.items())
+        taken = ((name, source._rclpy_take()) for name, source in sources.items())
         return {name: data for name, data in taken if data is not None}
 
     async def execute(self, taken_data: dict[str, Any]) -> None:
         """Handle the requests, with the callbacks of the server."""
         if "goal" in taken_data:
-            await self._handle_goal_request(*taken_data["goal"])
+            await self._rclpy_handle_goal_request(*taken_data["goal"])
         if "cancel" in taken_data:
-            await self._handle_cancel_request(*taken_data["cancel"])
+            await self._rclpy_handle_cancel_request(*taken_data["cancel"])
         if "result" in taken_data:
-            self._handle_result_request(*taken_data["result"])
+            self._rclpy_handle_result_request(*taken_data["result"])
 
-    def _take(self) -> dict[str, Any] | None:
+    def _rclpy_take(self) -> dict[str, Any] | None:
         return self.take_data() or None
 
-    def _execute(self, taken: dict[str, Any]) -> Coroutine[Any, Any, None]:
+    def _rclpy_execute(self, taken: dict[str, Any]) -> Coroutine[Any, Any, None]:
         return self.execute(taken)
 
     def destroy(self) -> None:
         """Destroy the server: its goals are forgotten, and clients get no more responses."""
         if self in self._node.waitables:
             self._node.remove_waitable(self)
-        self._close()
+        self._rclpy_close()
 
-    def _close(self) -> None:
-        for task in list(self._executions):
-            task._cancel_before_start()
+    def _rclpy_close(self) -> None:
+        for task in list(self._rclpy_executions):
+            task._rclpy_cancel_before_start()
         for goal_handle in list(self._goal_handles.values()):
             goal_handle.destroy()
-        self._expiry.destroy()
-        self._endpoints.destroy()
+        self._rclpy_expiry.destroy()
+        self._rclpy_endpoints.destroy()
 
 
 def _nanoseconds(stamp: Any) -> int:

@@ -129,11 +129,11 @@ class RcutilsLogger:
         self.name = name
         # Position of a call in the source -> its filters.
         self.contexts: dict[tuple[CodeType, int], _Filters] = {}
-        self._shared_publisher: Callable[[_logging_output.LogRecord], None] | None = None
+        self._rclpy_shared_publisher: Callable[[_logging_output.LogRecord], None] | None = None
 
     def __del__(self) -> None:
-        if self._shared_publisher is not None:
-            _logging_output.unshare_rosout_publisher(self.name, self._shared_publisher)
+        if self._rclpy_shared_publisher is not None:
+            _logging_output.unshare_rosout_publisher(self.name, self._rclpy_shared_publisher)
 
     def get_child(self, name: str) -> RcutilsLogger:
         """
@@ -146,7 +146,7 @@ class RcutilsLogger:
         if not self.name:
             return RcutilsLogger(name)
         child = RcutilsLogger(self.name + _SEPARATOR + name)
-        child._shared_publisher = _logging_output.share_rosout_publisher(self.name, child.name)
+        child._rclpy_shared_publisher = _logging_output.share_rosout_publisher(self.name, child.name)
         return child
 
     def set_level(self, level: int | LoggingSeverity) -> None:
