@@ -64,7 +64,7 @@ class _OwnNode(NodeEntities):
     __slots__ = ("dropped", "endpoints")
 
     def __init__(self, node: Node, dropped: Callable[[], None]) -> None:
-        super().__init__(node.get_namespace(), node.get_name())
+        super().__init__(node._rclpy_namespace, node._rclpy_name)
         self.endpoints: list[Writer | Reader] = []
         self.dropped = dropped
 
@@ -242,7 +242,7 @@ class Graph:
             profile = _best_available.for_publisher(profile, readers)
         user_data = f"{extra}typehash={msg_type._TYPE_HASH};"
         writer = self.participant.create_writer(topic, msg_type._DDS_TYPE_NAME, profile, user_data)
-        writer.logger_name = node.get_logger().name
+        writer.logger_name = node._logger.name
 
         def add(own: _OwnNode) -> None:
             own.writers.append(writer.gid)
@@ -260,7 +260,7 @@ class Graph:
             profile = _best_available.for_subscription(profile, writers)
         user_data = f"{extra}typehash={msg_type._TYPE_HASH};"
         reader = self.participant.create_reader(topic, msg_type._DDS_TYPE_NAME, profile, user_data)
-        reader.logger_name = node.get_logger().name
+        reader.logger_name = node._logger.name
 
         def add(own: _OwnNode) -> None:
             own.readers.append(reader.gid)

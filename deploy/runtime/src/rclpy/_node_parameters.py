@@ -46,6 +46,7 @@ class NodeParameters(NodeNames):
 
     PARAM_REL_TOL = 1e-6
     """Relative tolerance with which a double must meet a bound or step of its range."""
+    _clock: Clock
 
     def _rclpy_init_parameters(self, overrides: dict[str, Parameter], *, allow_undeclared: bool) -> None:
         """
@@ -72,10 +73,6 @@ class NodeParameters(NodeNames):
 
     def _rclpy_publish_parameter_event(self, event: ParameterEvent) -> None:
         """Publish a change on `/parameter_events`."""
-        raise NotImplementedError
-
-    def get_clock(self) -> Clock:
-        """Return the clock of the node."""
         raise NotImplementedError
 
     # Declaring
@@ -329,7 +326,7 @@ class NodeParameters(NodeNames):
                 parameter.to_parameter_msg()
             )
             self._rclpy_store(parameter, descriptors[parameter.name] if descriptors else None)
-        event.stamp = self.get_clock().now().to_msg()
+        event.stamp = self._clock.now().to_msg()
         self._rclpy_publish_parameter_event(event)
         for notify in list(self._post_set_parameters_callbacks):
             notify(parameters)

@@ -39,7 +39,7 @@ class ServiceSide(Owner):
     ) -> None:
         super().__init__(endpoint.node, endpoint.name, endpoint.writer, endpoint.reader)
         self._rclpy_handles = (endpoint.reader.condition,)
-        self._rclpy_bad_input = BadInput(self._rclpy_node.get_logger(), self._rclpy_name)
+        self._rclpy_bad_input = BadInput(self._rclpy_node._logger, self._rclpy_name)
         self._rclpy_lock = threading.Lock()
         self._rclpy_introspection: _Introspection | None = None
         self.srv_type = srv_type

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import weakref
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from typing import Any
 
 
@@ -80,3 +83,19 @@ class MutuallyExclusiveCallbackGroup(CallbackGroup):
         assert self._active_entity is entity, "ending_execution() of an entity that is not being executed"
         self._active_entity = None
         self._rclpy_permission.append(None)
+
+
+_own_group: ContextVar[CallbackGroup | None] = ContextVar("_own_group", default=None)
+
+
+@contextmanager
+def _as_default(group: CallbackGroup) -> Iterator[None]:
+    """Let the subscriptions that the block creates without a group belong to `group`.
+
+    The methods of a user's node may know no parameter `callback_group`.
+    """
+    token = _own_group.set(group)
+    try:
+        yield
+    finally:
+        _own_group.reset(token)

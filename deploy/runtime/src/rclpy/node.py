@@ -8,7 +8,7 @@ from functools import partial
 from typing import Any, TypeVar
 
 from rcl_interfaces.msg import Log, ParameterEvent
-from rclpy import _best_available, _names
+from rclpy import _best_available, _names, callback_groups
 from rclpy._arguments import parse
 from rclpy._endpoint import PublisherEndpoint, ServiceEndpoint, SubscriptionEndpoint
 from rclpy._node_graph import NodeGraph
@@ -291,16 +291,16 @@ class Node(NodeParameters, NodeGraph):
 
     def add_waitable(self, waitable: Waitable) -> None:
         """Add a waitable: the executor waits for what it adds to the wait set, and runs it."""
-        self._rclpy_add(self._rclpy_added_waitables, waitable)
+        self._rclpy_add(self._rclpy_list_of(waitable), waitable)
 
     def remove_waitable(self, waitable: Waitable) -> None:
         """Remove a waitable. Raises ValueError if it was not added."""
-        waitables = self._rclpy_actions if waitable in self._rclpy_actions else self._rclpy_added_waitables
-        waitables.remove(waitable)
+        self._rclpy_list_of(waitable).remove(waitable)
         self._rclpy_entities_have_changed()
 
-    def _rclpy_add_action(self, action: Waitable) -> None:
-        self._rclpy_add(self._rclpy_actions, action)
+    def _rclpy_list_of(self, waitable: Waitable) -> list[Any]:
+        """The list of action clients and servers, which executors know, or of the user's waitables."""
+        return self._rclpy_actions if hasattr(waitable, "_rclpy_handles") else self._rclpy_added_waitables
 
     # Creating
 
@@ -348,7 +348,7 @@ class Node(NodeParameters, NodeGraph):
     def _rclpy_create_own_publisher(self, msg_type: Any, topic: str, qos_profile: QoSProfile) -> Publisher:
         """Create an internal publisher: it is not listed, and its events are not reported."""
         silent = PublisherEventCallbacks(use_default_callbacks=False)
-        publisher = self.create_publisher(msg_type, topic, qos_profile, event_callbacks=silent)
+        publisher = Node.create_publisher(self, msg_type, topic, qos_profile, event_callbacks=silent)
         self._publishers.remove(publisher)
         return publisher
 
@@ -379,7 +379,7 @@ class Node(NodeParameters, NodeGraph):
             topic,
             callback,
             qos_profile,
-            callback_group or self._default_callback_group,
+            callback_group or callback_groups._own_group.get() or self._default_callback_group,
             event_callbacks or SubscriptionEventCallbacks(),
             qos_overriding_options,
             raw=raw,
@@ -643,7 +643,12 @@ class Node(NodeParameters, NodeGraph):
             self._rclpy_graph.remove_node(self)
         self._context._rclpy_forget(self)
 
-    # Internal publishers
+    # Internal entities, for which rclpy of ROS 2 calls no method that a user's class may override
+
+    _rclpy_create_service = create_service
+    _rclpy_destroy_service = destroy_service
+    _rclpy_create_timer = create_timer
+    _rclpy_destroy_timer = destroy_timer
 
     def _rclpy_publish_parameter_event(self, event: ParameterEvent) -> None:
         self._parameter_event_publisher.publish(event)

@@ -40,7 +40,7 @@ class Subscription(Owner):
         self._rclpy_reader = subscription_impl.reader
         self._rclpy_handles = (self._rclpy_reader.condition,)
         self._rclpy_deserialize = msg_type._deserialize
-        self._rclpy_bad_input = BadInput(self._rclpy_node.get_logger(), self._rclpy_name)
+        self._rclpy_bad_input = BadInput(self._rclpy_node._logger, self._rclpy_name)
         self.callback = callback
         self.callback_group = callback_group
         self.msg_type = msg_type

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import weakref
-from functools import cache
 from typing import TYPE_CHECKING
 
 from rcl_interfaces.msg import SetParametersResult
-from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, _as_default
 from rclpy.clock import Clock, ROSClock
 from rclpy.clock_type import ClockType
 from rclpy.parameter import Parameter
@@ -81,7 +80,7 @@ class TimeSource:
                 f"Invalid type for parameter '{USE_SIM_TIME_NAME}' {parameter.type_!r} should be bool"
             )
         node.add_on_set_parameters_callback(self._rclpy_check)
-        node.add_post_set_parameters_callback(self._rclpy_follow)
+        node._post_set_parameters_callbacks.insert(0, self._rclpy_follow)
 
     def detach_node(self) -> None:
         """Stop following the node's parameter."""
@@ -89,7 +88,7 @@ class TimeSource:
         self._rclpy_unsubscribe()
         if node is not None:
             node.remove_on_set_parameters_callback(self._rclpy_check)
-            node.remove_post_set_parameters_callback(self._rclpy_follow)
+            node._post_set_parameters_callbacks.remove(self._rclpy_follow)
         self._node_weak_ref = None
 
     def attach_clock(self, clock: ROSClock) -> None:
@@ -119,19 +118,22 @@ class TimeSource:
             clock.set_ros_time_override(time)
 
     def _rclpy_subscribe(self) -> None:
+        from rosgraph_msgs.msg import Clock as ClockMessage
+
         node = self._get_node()
         if node is None or self._clock_sub is not None:
             return
         # A separate group: time must go on while a callback of the node sleeps.
         group = MutuallyExclusiveCallbackGroup()
-        self._clock_sub = node.create_subscription(
-            _valid_clock(),
-            CLOCK_TOPIC,
-            self.clock_callback,
-            QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT),
-            callback_group=group,
-        )
-        self._rclpy_timeout = node.create_timer(
+        with _as_default(group):
+            self._clock_sub = node.create_subscription(
+                ClockMessage,
+                CLOCK_TOPIC,
+                self.clock_callback,
+                QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT),
+            )
+        self._clock_sub._rclpy_deserialize = _deserialize_valid
+        self._rclpy_timeout = node._rclpy_create_timer(
             CLOCK_TIMEOUT,
             self._rclpy_warn,
             callback_group=group,
@@ -148,7 +150,7 @@ class TimeSource:
     def _rclpy_end_timeout(self) -> None:
         node = self._get_node()
         if node is not None and self._rclpy_timeout is not None:
-            node.destroy_timer(self._rclpy_timeout)
+            node._rclpy_destroy_timer(self._rclpy_timeout)
         self._rclpy_timeout = None
 
     def _rclpy_warn(self) -> None:
@@ -185,16 +187,10 @@ class TimeSource:
         return None if self._node_weak_ref is None else self._node_weak_ref()
 
 
-@cache
-def _valid_clock() -> type[rosgraph_msgs.msg.Clock]:
-    """The message of `/clock`; its deserialization rejects negative times as malformed."""
+def _deserialize_valid(data: bytes) -> rosgraph_msgs.msg.Clock:
+    """Message of `/clock`. Raises ValueError if it is malformed, or its time negative."""
     from rosgraph_msgs.msg import Clock
 
-    class ValidClock(Clock):
-        @classmethod
-        def _deserialize(cls, data: bytes) -> Clock:  # type: ignore[override]
-            message = Clock._deserialize(data)
-            Time.from_msg(message.clock)
-            return message
-
-    return ValidClock
+    message = Clock._deserialize(data)
+    Time.from_msg(message.clock)
+    return message

@@ -37,7 +37,7 @@ class TypeDescriptionService:
         if node.get_parameter(name).value:
             from type_description_interfaces.srv import GetTypeDescription
 
-            self._rclpy_service = node.create_service(
+            self._rclpy_service = node._rclpy_create_service(
                 GetTypeDescription,
                 "~/get_type_description",
                 self._rclpy_describe,
@@ -47,7 +47,7 @@ class TypeDescriptionService:
     def destroy(self) -> None:
         """Destroy the service."""
         if self._rclpy_service is not None:
-            self._rclpy_node.destroy_service(self._rclpy_service)
+            self._rclpy_node._rclpy_destroy_service(self._rclpy_service)
             self._rclpy_service = None
 
     def _rclpy_describe(self, request: Any, response: Any) -> Any:

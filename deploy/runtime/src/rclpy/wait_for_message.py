@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, cast
 
-from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.callback_groups import ReentrantCallbackGroup, _as_default
 from rclpy.exceptions import NotInitializedException
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.qos import QoSProfile
@@ -31,14 +31,9 @@ def wait_for_message(
     :returns: `True` and the message, or `False` and `None` after a timeout or the shutdown of the context.
     """
     message = Future()
-    subscription = node.create_subscription(
-        msg_type,
-        topic,
-        message.set_result,
-        qos_profile,
-        # A separate group: the caller may be a callback of the node's default group.
-        callback_group=ReentrantCallbackGroup(),
-    )
+    # A separate group: the caller may be a callback of the node's default group.
+    with _as_default(ReentrantCallbackGroup()):
+        subscription = node.create_subscription(msg_type, topic, message.set_result, qos_profile=qos_profile)
     try:
         with SingleThreadedExecutor(context=node.context) as executor:
             executor.add_node(cast("Node", _NodeWithOneSubscription(subscription)))

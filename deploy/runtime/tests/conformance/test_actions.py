@@ -142,6 +142,22 @@ def send(client: ActionClient, spin_until: SpinUntil) -> Callable[..., Goal]:
 Send = Callable[..., Goal]
 
 
+def test_add_waitable_of_a_users_node_is_called_for_actions(context: Context) -> None:
+    added: list[Any] = []
+
+    class Mine(Node):
+        def add_waitable(self, waitable: Any) -> None:
+            added.append(waitable)
+            super().add_waitable(waitable)
+
+    node = Mine("node", context=context)
+    client = ActionClient(node, Fibonacci, "fibonacci")
+    assert client in added
+    client.destroy()
+    assert client not in node.waitables
+    node.destroy_node()
+
+
 def test_subclasses_may_use_any_private_name(node: Node, spin_until: SpinUntil) -> None:
     class Server(ActionServer):
         def __init__(self) -> None:

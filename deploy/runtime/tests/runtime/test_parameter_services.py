@@ -33,6 +33,7 @@ class Node(NodeParameters):
 
     def __init__(self, *, allow_undeclared: bool = False) -> None:
         self.services: dict[str, tuple[Any, Callable[[Any, Any], Any], QoSProfile]] = {}
+        self._clock = ROSClock()
         self._rclpy_init_parameters({}, allow_undeclared=allow_undeclared)
 
     def get_name(self) -> str:
@@ -40,9 +41,6 @@ class Node(NodeParameters):
 
     def get_fully_qualified_name(self) -> str:
         return "/node"
-
-    def get_clock(self) -> ROSClock:
-        return ROSClock()
 
     def _rclpy_publish_parameter_event(self, event: object) -> None:
         pass

@@ -49,7 +49,7 @@ class Subscriber(SimpleFilter):
         self.node: Node = args[0]
         self.topic: str = args[2]
         kwargs.setdefault("qos_profile", 10)
-        self.sub = self.node.create_subscription(*args[1:], callback=self.callback, **kwargs)
+        self.sub = self.node.create_subscription(*args[1:], self.callback, **kwargs)
 
     def callback(self, msg: Any) -> None:
         """Output a message."""

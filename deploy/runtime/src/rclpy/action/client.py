@@ -170,7 +170,7 @@ class ActionClient(Waitable):
         # The interface that executors use for every entity.
         self._rclpy_handles = endpoints.handles()
         self._rclpy_timers: tuple[Timer, ...] = ()
-        node._rclpy_add_action(self)
+        node.add_waitable(self)
 
     # Sending
 

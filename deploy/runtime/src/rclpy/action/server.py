@@ -279,7 +279,7 @@ class ActionServer(Waitable):
         # The interface that executors use for every entity.
         self._rclpy_handles = endpoints.handles()
         self._rclpy_timers = (self._rclpy_expiry,)
-        node._rclpy_add_action(self)
+        node.add_waitable(self)
 
     @property
     def _rclpy_logger(self) -> RcutilsLogger:
