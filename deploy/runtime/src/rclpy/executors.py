@@ -577,7 +577,6 @@ class Executor(AbstractContextManager["Executor"]):
             self._rclpy_closed = True
             for node in self.get_nodes():
                 self.remove_node(node)
-                node.executor = None
             self._context._rclpy_executors.discard(self)
             self._rclpy_close()
         return True

@@ -620,7 +620,6 @@ class Node(NodeParameters, NodeGraph):
         executor = self.executor
         if executor is not None:
             executor.remove_node(self)
-            self.executor = None
         for rate in list(self._rclpy_rates):
             self.destroy_rate(rate)
         with self._rclpy_graph.one_announcement():

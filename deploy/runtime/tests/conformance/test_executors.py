@@ -449,6 +449,19 @@ def test_unread_messages_of_a_removed_node_wait_for_its_return(
     assert received == [0.0, 1.0, 2.0]
 
 
+@pytest.mark.parametrize("kind", [SingleThreadedExecutor, MultiThreadedExecutor])
+def test_a_node_still_knows_its_executor_after_their_end(
+    context: Context, kind: type[SingleThreadedExecutor | MultiThreadedExecutor]
+) -> None:
+    node, executor = Node("node", context=context), kind(context=context)
+    executor.add_node(node)
+    executor.shutdown()
+    assert node.executor is executor
+    assert executor.get_nodes() == []
+    node.destroy_node()
+    assert node.executor is executor
+
+
 def test_a_user_executor_spins_until_a_future_is_complete(
     make_node: MakeNode, user_executor: Executor
 ) -> None:

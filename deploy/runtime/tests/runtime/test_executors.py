@@ -65,13 +65,6 @@ def test_a_take_that_fails_releases_the_callback_group(
     assert received == [2.0]
 
 
-def test_shutting_an_executor_down_removes_it_from_its_nodes(
-    executor: SingleThreadedExecutor, node: Node
-) -> None:
-    executor.shutdown()
-    assert node.executor is None
-
-
 def test_a_callback_ending_on_another_thread_frees_its_group(
     make_node: MakeNode, user_executor: Executor
 ) -> None:
