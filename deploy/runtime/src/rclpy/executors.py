@@ -17,6 +17,7 @@ import weakref
 from collections import deque
 from collections.abc import Callable, Coroutine
 from contextlib import AbstractContextManager
+from functools import partial
 from types import CoroutineType, TracebackType
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -63,6 +64,9 @@ class ExternalShutdownException(Exception):
 
 class ConditionReachedException(Exception):
     """Future has been completed."""
+
+
+_ENDS = (TimeoutException, ShutdownException, ExternalShutdownException, ConditionReachedException)
 
 
 class TimeoutObject:
@@ -161,6 +165,12 @@ class Executor(AbstractContextManager["Executor"]):
         self._rclpy_burst_end = 0
         self._rclpy_flood_end = 0
         self._rclpy_tasks_were_first = False
+        # For wait_for_ready_callbacks(): entities of tasks that have not begun; tasks that are not done, with
+        # what else was returned; those of them to return before the next wait.
+        self._rclpy_reserved: set[Any] = set()
+        self._rclpy_offers: dict[Task, tuple[Any, Node | None]] = {}
+        self._rclpy_offers_changed = False
+        self._rclpy_round: deque[Task] | None = None
         self._context._rclpy_executors.add(self)
         signals._watch(self)
 
@@ -214,15 +224,15 @@ class Executor(AbstractContextManager["Executor"]):
         self._tasks.append(task)
         self._rclpy_wake_if_waiting()
 
-    def _rclpy_run_task(self, task: Task) -> None:
-        task()
-        if task.done() or task.cancelled():
-            return
+    def _rclpy_continue_later(self, task: Task) -> None:
+        """Continue a task when the future that it awaits is over."""
+        offered = task in self._rclpy_offers
+        resume = self._rclpy_change_offers if offered else partial(self._rclpy_schedule, task)
         awaited = task._rclpy_awaited
         if awaited is None:
-            self._rclpy_schedule(task)
+            resume()
         else:
-            awaited._rclpy_call_when_complete(lambda: self._rclpy_schedule(task))
+            awaited._rclpy_call_when_complete(resume)
 
     # Spinning
 
@@ -284,31 +294,99 @@ class Executor(AbstractContextManager["Executor"]):
         :raises TimeoutException, ShutdownException, ExternalShutdownException, ConditionReachedException:
             if the wait ends without one.
         """
-        if nodes is not None:
-            self._rclpy_wait_only_for(list(nodes))
-        found: list[tuple[Any, Any]] = []
-
-        def keep(entity: Any) -> bool:
-            taken = self._rclpy_begin(entity)
-            if taken is not None:
-                found.append((entity, taken))
-            return taken is not None
-
-        try:
-            end = self._rclpy_work(keep, _deadline(timeout_sec), condition, once=True)
-        finally:
-            if nodes is not None:
-                self._rclpy_wait_only_for(None)
-        if end is not None:
+        if (end := self._rclpy_reason_to_end(condition)) is not None:
             raise end
-        entity, taken = found[0]
-        task = Task(self._rclpy_run, (entity, taken), executor=self)
-        entity = getattr(entity, "waitable", entity)
-        candidates = self.get_nodes() if nodes is None else nodes
-        node = next((node for node in candidates if entity in node._rclpy_entities()), None)
+        deadline = _deadline(timeout_sec)
+        while (offer := self._rclpy_next_offer(nodes)) is None:
+            found: list[Any] = []
+            if nodes is not None:
+                self._rclpy_wait_only_for(list(nodes))
+            try:
+                end = self._rclpy_work(
+                    partial(self._rclpy_reserve, found.append),
+                    deadline,
+                    lambda: condition() or self._rclpy_offers_changed,
+                    once=True,
+                )
+            finally:
+                if nodes is not None:
+                    self._rclpy_wait_only_for(None)
+            if found:
+                return self._rclpy_offer(found[0], self.get_nodes() if nodes is None else nodes)
+            if end is not None and (end is not ConditionReachedException or condition()):
+                raise end
+        return offer
+
+    def _rclpy_next_offer(self, nodes: list[Node] | None) -> tuple[Task, Any, Node | None] | None:
+        """
+        Return a task that was returned before, but is not done, and can run now; ``None``: wait for others.
+
+        Between two waits, each such task is returned once.
+        """
+        if self._rclpy_round is None:
+            self._rclpy_offers_changed = False  # first: later changes are handled in the next round
+            for task in [task for task in self._rclpy_offers if task._rclpy_is_over()]:
+                del self._rclpy_offers[task]
+            self._rclpy_round = deque(self._rclpy_offers)
+        while self._rclpy_round:
+            task = self._rclpy_round.popleft()
+            entity, node = self._rclpy_offers[task]
+            if task._rclpy_can_run() and (nodes is None or node is None or node in nodes):
+                return task, entity, node
+        self._rclpy_round = None
+        return None
+
+    def _rclpy_reserve(self, use: Callable[[Any], None], entity: Any) -> bool:
+        """Use a ready task or entity, unless the entity must not run; return whether it was used."""
+        if entity.__class__ is not Task:
+            if not self.can_execute(entity):
+                self._rclpy_block(entity)
+                return False
+            self._rclpy_reserved.add(entity)
+            self._rclpy_detach(entity)
+        use(entity)
+        return True
+
+    def _rclpy_offer(self, entity: Any, nodes: list[Node]) -> tuple[Task, Any, Node | None]:
+        """Return the task of a reserved entity, which runs its callback, or a task of ``create_task()``."""
+        task, node = entity, None
+        if entity.__class__ is Task:
+            entity = None
+        else:
+            task = Task(self._rclpy_run_reserved, (entity,), executor=self)
+            entity = getattr(entity, "waitable", entity)
+            node = next((node for node in nodes if entity in node._rclpy_entities()), None)
+        self._rclpy_offers[task] = (entity, node)
         # When the task ends, its callback group may allow other callbacks, for which another thread may wait.
-        task._rclpy_call_when_complete(self.wake)
+        task._rclpy_call_when_complete(self._rclpy_change_offers)
         return task, entity, node
+
+    async def _rclpy_run_reserved(self, entity: Any) -> None:
+        """Run the callback of an entity whose task a user's class has called."""
+        group = entity.callback_group
+        if group is not None and not group.beginning_execution(entity):
+            self._rclpy_release(entity)
+            return
+        try:
+            try:
+                taken = entity._rclpy_take()
+            finally:
+                self._rclpy_release(entity)
+            result = None if taken is None else entity._rclpy_execute(taken)
+            if result.__class__ is CoroutineType:
+                await result
+        finally:
+            self._rclpy_end_execution(entity)
+
+    def _rclpy_release(self, entity: Any) -> None:
+        """Wait for a reserved entity again."""
+        self._rclpy_reserved.discard(entity)
+        self._rclpy_groups_changed = True
+        self.wake()
+
+    def _rclpy_change_offers(self) -> None:
+        self._rclpy_offers_changed = True
+        self.wake()
 
     def _rclpy_wait_only_for(self, nodes: list[Node] | None) -> None:
         self._rclpy_only_nodes = nodes
@@ -316,6 +394,8 @@ class Executor(AbstractContextManager["Executor"]):
 
     def can_execute(self, entity: Any) -> bool:
         """Return whether the callback group of ``entity`` allows it to run now."""
+        if entity in self._rclpy_reserved:
+            return False
         return entity.callback_group is None or bool(entity.callback_group.can_execute(entity))
 
     def _rclpy_work(
@@ -506,14 +586,17 @@ class Executor(AbstractContextManager["Executor"]):
         """Stop waiting for an entity whose callback group is busy: its data would end every wait at once."""
         if self._rclpy_watch is not None and entity in self._rclpy_watch.entities:
             self._rclpy_watch.postpone(entity)
+        self._rclpy_detach(entity)
+        # Never set to False here: another thread may just have freed the group and set it.
+        if self.can_execute(entity):
+            self._rclpy_groups_changed = self._rclpy_changed = True
+
+    def _rclpy_detach(self, entity: _Entity) -> None:
         for token, (attached, handle) in list(self._rclpy_attached.items()):
             if attached is entity:
                 del self._rclpy_attached[token]
                 self._rclpy_waitset.detach(handle)
                 self._rclpy_blocked[token] = (entity, handle)
-        # Never set to False here: another thread may just have freed the group and set it.
-        if self.can_execute(entity):
-            self._rclpy_groups_changed = self._rclpy_changed = True
 
     def _rclpy_unblock(self) -> None:
         """Wait again for entities whose callback group is free again."""
@@ -529,7 +612,7 @@ class Executor(AbstractContextManager["Executor"]):
     def _rclpy_run(self, entity: Any, taken: Any) -> None:
         """Run a task, or the callback of an entity with the data; exceptions of the callback propagate."""
         if entity.__class__ is Task:
-            self._rclpy_run_task(entity)
+            entity()
             _raise_exception_of(entity)
             return
         try:
@@ -546,7 +629,7 @@ class Executor(AbstractContextManager["Executor"]):
         """Run what a callback has returned; its callback group is busy until the coroutine ends."""
         task = Task(coroutine, executor=self)
         task._rclpy_call_when_complete(lambda: self._rclpy_end_execution(entity))
-        self._rclpy_run_task(task)
+        task()
         _raise_exception_of(task)
 
     def _rclpy_end_execution(self, entity: _Entity) -> None:
@@ -577,6 +660,8 @@ class Executor(AbstractContextManager["Executor"]):
             self._rclpy_closed = True
             for node in self.get_nodes():
                 self.remove_node(node)
+            for task in self._rclpy_offers:
+                task._rclpy_cancel_before_start()
             self._context._rclpy_executors.discard(self)
             self._rclpy_close()
         return True
@@ -609,7 +694,7 @@ def _raise_exception_of(task: Task) -> None:
 class _BuiltInExecutor(Executor):
     """Base of this module's executors, with a minimum of code between waiting and callback."""
 
-    _rclpy_SPIN_ENDS: tuple[type[Exception], ...] = (
+    _rclpy_spin_ends: tuple[type[Exception], ...] = (
         TimeoutException,
         ShutdownException,
         ConditionReachedException,
@@ -618,8 +703,8 @@ class _BuiltInExecutor(Executor):
 
     def spin(self) -> None:
         """Run callbacks until the context or this executor is shut down."""
-        if type(self).spin_once is not _BuiltInExecutor.spin_once:
-            super().spin()  # a user's class has a spin_once() of its own
+        if self._rclpy_overrides("spin_once", "wait_for_ready_callbacks"):
+            super().spin()
             return
         while self._context._rclpy_valid and not self._is_shutdown:
             self._rclpy_spin(None, None)
@@ -637,6 +722,9 @@ class _BuiltInExecutor(Executor):
 
     def spin_until_future_complete(self, future: Future, timeout_sec: float | None = None) -> None:
         """Run callbacks until ``future`` is done or cancelled, at most for ``timeout_sec``."""
+        if self._rclpy_overrides("spin_once_until_future_complete", "wait_for_ready_callbacks"):
+            super().spin_until_future_complete(future, timeout_sec)
+            return
         future._rclpy_call_when_complete(self.wake)
         if self._context._rclpy_valid:
             self._rclpy_spin(_deadline(timeout_sec), future._rclpy_is_over)
@@ -650,8 +738,12 @@ class _BuiltInExecutor(Executor):
             raise ValueError("another thread already spins this executor")
         self._rclpy_spinning_thread = thread  # it may already be, if a callback spins
         try:
-            end = self._rclpy_work(self._rclpy_handle, deadline, condition, once=once)
-            if end is not None and end not in self._rclpy_SPIN_ENDS:
+            if self._rclpy_overrides("wait_for_ready_callbacks"):
+                end = self._rclpy_work_of_user(deadline, condition)
+            else:
+                self._rclpy_take_back_offers()
+                end = self._rclpy_work(self._rclpy_handle, deadline, condition, once=once)
+            if end is not None and end not in self._rclpy_spin_ends:
                 raise end
         finally:
             self._rclpy_spinning_thread = self._rclpy_callback_thread = outer
@@ -659,6 +751,28 @@ class _BuiltInExecutor(Executor):
             if self._is_shutdown:  # shutdown() may be waiting for this
                 with self._rclpy_idle:
                     self._rclpy_idle.notify_all()
+
+    def _rclpy_overrides(self, *methods: str) -> bool:
+        """Whether a user's class has one of these methods of its own."""
+        return any(getattr(type(self), name) is not getattr(_BuiltInExecutor, name) for name in methods)
+
+    def _rclpy_work_of_user(
+        self, deadline: int | None, condition: Callable[[], bool] | None
+    ) -> type[Exception] | None:
+        """Do one piece of work that the user's class has selected; return the reason to end."""
+        timeout = None if deadline is None else _remaining(deadline) / S_TO_NS
+        try:
+            task, _, _ = self.wait_for_ready_callbacks(timeout, None, condition or (lambda: False))
+        except _ENDS as end:
+            return type(end)
+        self._rclpy_handle(task)
+        return None
+
+    def _rclpy_take_back_offers(self) -> None:
+        """Run what wait_for_ready_callbacks() has returned, and the user's class has not run to its end."""
+        if self._rclpy_offers:
+            offers, self._rclpy_offers, self._rclpy_round = self._rclpy_offers, {}, None
+            self._tasks.extend(task for task in offers if not task._rclpy_is_over())
 
     def _rclpy_handle(self, entity: Any) -> bool:
         """Run a task or the callback of a ready entity, here or on another thread; return whether it does."""
@@ -699,8 +813,8 @@ class SingleThreadedExecutor(_BuiltInExecutor):
 class MultiThreadedExecutor(_BuiltInExecutor):
     """Runs callbacks on a pool of threads, in parallel if their callback groups allow it."""
 
-    _rclpy_SPIN_ENDS = (
-        *_BuiltInExecutor._rclpy_SPIN_ENDS,
+    _rclpy_spin_ends = (
+        *_BuiltInExecutor._rclpy_spin_ends,
         ExternalShutdownException,
     )  # as in rclpy
 

@@ -199,6 +199,7 @@ class Task(Future):
         """
         if not self._task_lock.acquire(blocking=False):
             return
+        waits = False
         try:
             if self._rclpy_done or self._handler is None:
                 return
@@ -208,11 +209,21 @@ class Task(Future):
             self._executing = True
             if inspect.iscoroutine(self._handler):
                 self._rclpy_step(self._handler)
+                waits = not self._rclpy_is_over()
             else:
                 self._rclpy_run()
         finally:
             self._executing = False
             self._task_lock.release()
+        # Without the lock: another thread may continue the task at once.
+        if waits and (executor := self._executor()) is not None:
+            executor._rclpy_continue_later(self)
+
+    def _rclpy_can_run(self) -> bool:
+        """Return whether calling the task would do something now."""
+        awaited = self._rclpy_awaited
+        ready = awaited is None or awaited._rclpy_is_over()
+        return ready and not self._executing and not self._rclpy_is_over()
 
     def _rclpy_cancel_before_start(self) -> None:
         """Cancel a coroutine that has not started; others go on."""

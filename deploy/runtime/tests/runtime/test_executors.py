@@ -16,7 +16,7 @@ from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallb
 from rclpy.context import Context
 from rclpy.executors import Executor, MultiThreadedExecutor, SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.task import Future
+from rclpy.task import Future, Task
 from std_msgs.msg import Float64
 
 MakeNode = Callable[..., Node]
@@ -65,28 +65,45 @@ def test_a_take_that_fails_releases_the_callback_group(
     assert received == [2.0]
 
 
+def test_a_future_of_another_thread_ends_the_wait_for_its_coroutine(user_executor: Executor) -> None:
+    future: Future = Future()
+
+    async def wait() -> Any:
+        return await future
+
+    created = user_executor.create_task(wait)
+    user_executor.wait_for_ready_callbacks(10)[0]()
+    thread = threading.Timer(0.05, future.set_result, [None])
+    thread.start()
+    user_executor.wait_for_ready_callbacks(10)[0]()
+    thread.join()
+    assert created.done()
+
+
 def test_a_callback_ending_on_another_thread_frees_its_group(
     make_node: MakeNode, user_executor: Executor
 ) -> None:
     node = make_node()
     user_executor.add_node(node)
     group = MutuallyExclusiveCallbackGroup()
-    node.create_subscription(Float64, "x", lambda message: None, 10, callback_group=group)
-    node.create_subscription(Float64, "x", lambda message: None, 10, callback_group=group)
+    began, polled = threading.Event(), threading.Event()
+
+    def callback(message: Float64) -> None:
+        began.set()
+        polled.wait(10)
+
+    node.create_subscription(Float64, "x", callback, 10, callback_group=group)
+    node.create_subscription(Float64, "x", callback, 10, callback_group=group)
     node.create_publisher(Float64, "x", 10).publish(Float64())
     first, entity, _ = user_executor.wait_for_ready_callbacks(10)
-    polled = threading.Event()
-
-    def run() -> None:
-        polled.wait(10)
-        first()
 
     def poll() -> bool:
         polled.set()
         return False
 
-    thread = threading.Thread(target=run)
+    thread = threading.Thread(target=first)
     thread.start()
+    assert began.wait(10)
     second = user_executor.wait_for_ready_callbacks(10, condition=poll)[1]
     thread.join()
     assert {entity, second} == set(node.subscriptions)
@@ -100,19 +117,27 @@ def test_a_callback_ending_during_the_check_of_the_next_frees_its_group(
 
         def can_execute(self, entity: object) -> bool:
             could = super().can_execute(entity)
-            first()
+            if running:
+                future.set_result(None)
+                running.pop()()
             return could
+
+    async def callback(message: Float64) -> None:
+        received.append(message.data)
+        await future
 
     node = make_node()
     user_executor.add_node(node)
     received: list[float] = []
-    node.create_subscription(
-        Float64, "x", lambda message: received.append(message.data), 10, callback_group=EndingFirst()
-    )
+    running: list[Task] = []
+    future = Future()
+    node.create_subscription(Float64, "x", callback, 10, callback_group=EndingFirst())
     publisher = node.create_publisher(Float64, "x", 10)
     publisher.publish(Float64(data=1.0))
     publisher.publish(Float64(data=2.0))
     first = user_executor.wait_for_ready_callbacks(10)[0]
+    first()
+    running.append(first)
     second = user_executor.wait_for_ready_callbacks(10)[0]
     assert received == [1.0]
     second()
