@@ -54,12 +54,13 @@ def sources() -> dict[str, list[str]]:
 setup(
     name=PACKAGE,
     version=version(),
-    packages=[PACKAGE, "reactive_node"],
+    packages=[PACKAGE, "reactive_node", "mcap_files"],
     package_dir={
         PACKAGE: "deploy/package/executables",
         "reactive_node": "interfaces/reactive_node/src/reactive_node",
+        "mcap_files": "deploy/tools/src/mcap_files",
     },
-    package_data={"reactive_node": ["py.typed"]},
+    package_data={"reactive_node": ["py.typed"], "mcap_files": ["py.typed"]},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"deploy/package/share/{PACKAGE}"]),
         (SHARE, ["package.xml"]),
