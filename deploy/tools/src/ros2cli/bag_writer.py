@@ -6,8 +6,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from mcap.writer import CompressionType, Writer
+from mcap.writer import CompressionType
 
+from mcap_files import FileWriter
 from ros2cli import rosbag2
 from ros2cli.definition import message_type
 
@@ -29,9 +30,7 @@ class BagWriter:
         file = f"{directory.name}_0.mcap"
         self._metadata = rosbag2.Metadata(directory, [file], [], custom_data=custom_data)
         self._metadata.ros_distro = "jazzy"
-        self._file = (directory / file).open("wb")
-        self._writer = Writer(self._file, **_PRESETS[preset])
-        self._writer.start(profile="ros2", library="ros2-python-tools")
+        self._writer = FileWriter(directory / file, "ros2-python-tools", **_PRESETS[preset])
         self._schemas: dict[str, int] = {}
 
     def add_topic(self, topic: rosbag2.Topic) -> Callable[[bytes, int, int], None]:
@@ -57,12 +56,16 @@ class BagWriter:
 
         return write
 
+    def save(self) -> None:
+        """Bring everything so far to the disk. Raises OSError."""
+        self._writer.save()
+
     def close(self) -> None:
-        """Complete the file and write the metadata."""
-        self._writer.add_metadata("rosbag2", {"serialized_metadata": rosbag2.to_yaml(self._metadata)})
-        self._writer.finish()  # type: ignore[no-untyped-call]
-        self._file.close()
-        rosbag2.write(self._metadata)
+        """Complete the file and write the metadata, unless the disk is full. Raises OSError."""
+        if self._writer.is_open:
+            self._writer.add_metadata("rosbag2", {"serialized_metadata": rosbag2.to_yaml(self._metadata)})
+            self._writer.close()
+            rosbag2.write(self._metadata)
 
 
 def definition(type_name: str) -> tuple[str, str]:

@@ -29,6 +29,7 @@ class Topic:
     offered: list[QoSProfile] = field(default_factory=list)
     type_hash: str = ""
     count: int = 0
+    encoding: str = "cdr"
 
     def is_service_event(self) -> bool:
         """Whether it records the calls of a service."""
@@ -47,6 +48,8 @@ class Metadata:
     storage: str = "mcap"
     ros_distro: str = ""
     custom_data: dict[str, str] = field(default_factory=dict)
+    remarks: list[str] = field(default_factory=list)
+    """How much of files without an end can be read."""
 
     @property
     def count(self) -> int:
@@ -73,7 +76,7 @@ def to_yaml(metadata: Metadata) -> str:
             "topic_metadata": {
                 "name": topic.name,
                 "type": topic.type,
-                "serialization_format": "cdr",
+                "serialization_format": topic.encoding,
                 "offered_qos_profiles": [_qos_to_dict(profile) for profile in topic.offered],
                 "type_description_hash": topic.type_hash,
             },
@@ -97,9 +100,14 @@ def to_yaml(metadata: Metadata) -> str:
 
 
 def write(metadata: Metadata) -> None:
-    """Write ``metadata.yaml``."""
+    """Write ``metadata.yaml``, or nothing. Raises OSError."""
     text = to_yaml(metadata).replace("\n", "\n  ").rstrip(" ")
-    (metadata.directory / METADATA_FILE).write_text(f"rosbag2_bagfile_information:\n  {text}")
+    path = metadata.directory / METADATA_FILE
+    try:
+        path.write_text(f"rosbag2_bagfile_information:\n  {text}")
+    except OSError as error:
+        path.unlink(missing_ok=True)
+        raise OSError(error.errno, error.strerror, str(path)) from None
 
 
 def read(path: Path) -> Metadata:
@@ -109,7 +117,9 @@ def read(path: Path) -> Metadata:
     :raises ClickException: if it is no bag, damaged, or not in MCAP.
     """
     if path.is_file():
-        return _of_file(path)
+        return _of_files(path.parent, [path])
+    if not (path / METADATA_FILE).exists() and (files := sorted(path.glob("*.mcap*"))):
+        return _of_files(path, files)  # the recorder did not end in order
     try:
         document = yaml.safe_load((path / METADATA_FILE).read_text())["rosbag2_bagfile_information"]
         metadata = _from_dict(path, document)
@@ -136,6 +146,7 @@ def _from_dict(directory: Path, document: dict[str, Any]) -> Metadata:
                 offered=qos_from_yaml(topic["topic_metadata"].get("offered_qos_profiles")),
                 type_hash=topic["topic_metadata"].get("type_description_hash", ""),
                 count=topic["message_count"],
+                encoding=topic["topic_metadata"]["serialization_format"],
             )
             for topic in document["topics_with_message_count"] or []
         ],
@@ -147,31 +158,30 @@ def _from_dict(directory: Path, document: dict[str, Any]) -> Metadata:
     )
 
 
-def _of_file(path: Path) -> Metadata:
-    """The metadata in the summary of an MCAP file."""
-    from mcap.exceptions import McapError
-    from mcap.reader import make_reader
+def _of_files(directory: Path, paths: list[Path]) -> Metadata:
+    """The metadata in the files of a bag."""
+    from mcap_files import McapFile, UnreadableError
 
-    try:
-        with path.open("rb") as file:
-            summary = make_reader(file).get_summary()
-    except McapError as error:
-        raise click.ClickException(f"'{path}' is no complete MCAP file: {error!r}") from None
-    if summary is None or summary.statistics is None:
-        raise click.ClickException(f"'{path}' has no summary: its recording did not end in order")
-    counts = summary.statistics.channel_message_counts
-    topics = [
-        Topic(
-            name=channel.topic,
-            type=summary.schemas[channel.schema_id].name,
-            offered=qos_from_yaml(channel.metadata.get("offered_qos_profiles")),
-            type_hash=channel.metadata.get("topic_type_hash", ""),
-            count=counts.get(number, 0),
-        )
-        for number, channel in summary.channels.items()
-    ]
-    start, end = summary.statistics.message_start_time, summary.statistics.message_end_time
-    return Metadata(path.parent, [path.name], topics, start, end - start)
+    topics: dict[str, Topic] = {}
+    extents, remarks = [], []
+    for path in paths:
+        try:
+            with McapFile(path) as file:
+                remarks += [file.remark] if file.remark else []
+                extents += [file.start, file.end] if file.counts else []
+                for number, channel in file.channels.items():
+                    topic = topics.setdefault(channel.topic, Topic(channel.topic, file.type_name(channel)))
+                    topic.offered = qos_from_yaml(channel.metadata.get("offered_qos_profiles"))
+                    topic.type_hash = channel.metadata.get("topic_type_hash", "")
+                    topic.encoding = channel.message_encoding
+                    topic.count += file.counts[number]
+        except UnreadableError as error:
+            raise click.ClickException(str(error)) from None
+        except (AttributeError, LookupError, TypeError, ValueError, yaml.YAMLError) as error:
+            raise click.ClickException(f"{path} has a channel with an unknown QoS: {error}") from None
+    start, end = min(extents, default=0), max(extents, default=0)
+    names = [path.name for path in paths]
+    return Metadata(directory, names, list(topics.values()), start, end - start, remarks=remarks)
 
 
 def qos_to_yaml(profiles: list[QoSProfile]) -> str:

@@ -20,6 +20,8 @@ _INDENT = " " * 19
 def info(bag_path: str, topic_name: bool) -> None:
     """Print information about a bag to the screen."""
     metadata = rosbag2.read(Path(bag_path))
+    for remark in metadata.remarks:
+        click.echo(remark, err=True)
     topics = [topic for topic in metadata.topics if not topic.is_service_event()]
     services = [topic for topic in metadata.topics if topic.is_service_event()]
     if topic_name:
@@ -40,7 +42,8 @@ def info(bag_path: str, topic_name: bool) -> None:
     click.echo(
         "Topic information: "
         + _block(
-            f"Topic: {topic.name} | Type: {topic.type} | Count: {topic.count} | Serialization Format: cdr"
+            f"Topic: {topic.name} | Type: {topic.type or 'unknown'} | Count: {topic.count}"
+            f" | Serialization Format: {topic.encoding}"
             for topic in topics
         )
     )
@@ -51,7 +54,7 @@ def info(bag_path: str, topic_name: bool) -> None:
             (
                 f"Service: {service.name.removesuffix('/_service_event')}"
                 f" | Type: {service.type.removesuffix('_Event')}"
-                f" | Event Count: {service.count} | Serialization Format: cdr"
+                f" | Event Count: {service.count} | Serialization Format: {service.encoding}"
                 for service in services
             ),
             f"{_INDENT}  ",

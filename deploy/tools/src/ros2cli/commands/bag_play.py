@@ -56,7 +56,11 @@ _MATCHING_TIME = 0.5
     help="Publish to /clock at this frequency in Hz (40 without a value); a recorded /clock is not played.",
 )
 @click.option(
-    "-d", "--delay", type=click.FloatRange(min=0), default=0.0, help="Sleep before each play, in seconds."
+    "-d",
+    "--delay",
+    type=click.FloatRange(min=0),
+    default=0.0,
+    help="Sleep before the first play, in s.",
 )
 @click.option("--playback-duration", type=float, default=-1.0, help="Playback duration in seconds.")
 @click.option(
@@ -87,6 +91,8 @@ def play(
     from rclpy.duration import Duration
 
     metadata = rosbag2.read(Path(bag_path))
+    for remark in metadata.remarks:
+        click.echo(remark, err=True)
     overrides = rosbag2.qos_overrides(options["qos_profile_overrides_path"])
     arguments = ["--ros-args", *(word for rule in remap for word in ("--remap", rule))]
     with (
@@ -96,15 +102,13 @@ def play(
         topics = [topic for topic in metadata.topics if _is_wanted(topic.name, options, bool(clock))]
         publishers = _publishers(node, topics, overrides)
         graph.wait_for(lambda: _are_matched(node, publishers), _MATCHING_TIME)
-        player = _Player(metadata, publishers, options)
-        if clock:
-            player.publish_clock(node, clock)
+        player = _Player(node, metadata, publishers, options)
         try:
-            while True:
-                time.sleep(delay)
-                player.play()
-                if not loop:
-                    break
+            time.sleep(delay)
+            if clock:
+                player.publish_clock(clock)
+            while player.play() and loop:
+                pass
         except KeyboardInterrupt:
             return
         timeout = Duration(nanoseconds=wait_for_all_acked * 10**6 or -1)
@@ -126,6 +130,8 @@ def _publishers(
     made = {}
     for topic in topics:
         try:
+            if topic.encoding != "cdr":
+                raise RuntimeError(f"its messages are encoded as '{topic.encoding}', not as 'cdr'")
             class_ = graph.interface_class("message", topic.type, f"its type '{topic.type}' is unknown")
         except RuntimeError as error:
             node.get_logger().warn(f"Ignoring a topic '{topic.name}', reason: {error}.")
@@ -164,10 +170,12 @@ class _Player:
 
     def __init__(
         self,
+        node: Node,
         metadata: rosbag2.Metadata,
         publishers: dict[str, Publisher],
         options: dict[str, Any],
     ) -> None:
+        self._node = node
         self._files = metadata.paths()
         self._publishers = publishers
         self._rate = options["rate"]
@@ -180,39 +188,43 @@ class _Player:
         self._end = max(ends, default=metadata.start + metadata.duration)
         self._began = time.monotonic()
 
-    def publish_clock(self, node: Node, frequency: float) -> None:
+    def publish_clock(self, frequency: float) -> None:
         """Publish the time of the record on ``/clock``, at a frequency [Hz] of real time."""
         from rclpy.clock import Clock, ClockType
         from rclpy.time import Time
         from rosgraph_msgs.msg import Clock as ClockMessage
 
-        publisher = node.create_publisher(ClockMessage, "/clock", 1)
+        publisher = self._node.create_publisher(ClockMessage, "/clock", 1)
 
         def publish() -> None:
             now = self._start + int((time.monotonic() - self._began) * self._rate * 1e9)
             publisher.publish(ClockMessage(clock=Time(nanoseconds=min(now, self._end)).to_msg()))
 
-        node.create_timer(1.0 / frequency, publish, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self._node.create_timer(1.0 / frequency, publish, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
-    def play(self) -> None:
-        """Play once."""
+    def play(self) -> bool:
+        """Play once; return whether there was a message to play."""
         self._began = time.monotonic()
+        played = False
         for topic, message in self._messages():
             due = self._began + (message.log_time - self._start) / (self._rate * 1e9)
             time.sleep(max(0.0, due - time.monotonic()))
-            self._publishers[topic].publish(message.data)
+            played = True
+            try:
+                self._publishers[topic].publish(message.data)
+            except Exception as error:  # of any type, by the runtime: the message is unreadable
+                self._node.get_logger().error(f"Failed to publish a message on '{topic}': {error}")
+        return played
 
     def _messages(self) -> Iterator[tuple[str, Message]]:
-        from mcap.exceptions import McapError
-        from mcap.reader import make_reader
+        from mcap_files import McapFile, UnreadableError
 
         for path in self._files:
             try:
-                with path.open("rb") as file:
-                    found = make_reader(file).iter_messages(
-                        list(self._publishers), self._start, self._end + 1, log_time_order=True
-                    )
-                    for _, channel, message in found:
+                with McapFile(path) as file:
+                    for channel, message in file.messages(list(self._publishers), self._start, self._end):
                         yield channel.topic, message
-            except (OSError, McapError) as error:
-                raise click.ClickException(f"'{path}' cannot be read: {error!r}") from None
+            except UnreadableError as error:
+                raise click.ClickException(str(error)) from None
+            except OSError as error:
+                raise click.ClickException(f"'{path}' cannot be read: {error.strerror}") from None

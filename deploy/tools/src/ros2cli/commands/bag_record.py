@@ -79,6 +79,8 @@ def record(
     **options: Any,
 ) -> None:
     """Record ROS data to a bag, until Ctrl-C. New topics are recorded, too."""
+    from mcap_files import SAVE_PERIOD
+    from rclpy.clock import Clock, ClockType
     from ros2cli.bag_writer import BagWriter
 
     options["topics"] = options["topics"] or topics_positional
@@ -110,13 +112,23 @@ def record(
                 recorder.subscribe()
             else:
                 node.create_timer(options["polling_interval"] / 1000.0, recorder.subscribe)
+            node.create_timer(SAVE_PERIOD, writer.save, clock=Clock(clock_type=ClockType.STEADY_TIME))
             node.get_logger().info("Recording...")
-            graph.spin(node)
-        except (KeyboardInterrupt, SystemExit):
-            pass  # Ctrl-C or SIGTERM
+            _spin(node, writer)
+        except OSError as error:
+            raise _error(f"{error.filename}: {error.strerror}") from None
         finally:
-            writer.close()
             node.get_logger().info("Recording stopped")
+
+
+def _spin(node: Node, writer: BagWriter) -> None:
+    """Record until Ctrl-C or SIGTERM. Raises OSError, for example of a full disk."""
+    try:
+        graph.spin(node)
+    except (KeyboardInterrupt, SystemExit):
+        pass
+    finally:
+        writer.close()
 
 
 def _error(text: str) -> click.ClickException:
