@@ -76,6 +76,8 @@ def judge(path: Path, title: str, name: str = "report") -> int:
     namespaces = record.namespaces(path)
     if not namespaces:
         raise DeploymentError(f"{path} contains no arm")
+    if remark := record.remark(path):
+        print(remark)
     broken = [namespace for namespace in namespaces if not _holds(path, title, namespace, name)]
     if len(namespaces) > 1:
         result = f", but not for {', '.join(broken)}" if broken else ""

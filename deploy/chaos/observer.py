@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 import rclpy
+from mcap_files import SAVE_PERIOD
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
@@ -73,6 +74,11 @@ def _report_first(name: str) -> None:
     sys.stdout.flush()
 
 
+def _save(recorder: Recorder, ended: threading.Event) -> None:
+    while not ended.wait(SAVE_PERIOD):
+        recorder.save()
+
+
 def main(arguments: list[str]) -> int:
     """Observe until standard input ends; the first line of output is the origin of the record's times."""
     path, arms = Path(arguments[0]), [text.split("=", 2) for text in arguments[1:]]
@@ -97,6 +103,7 @@ def main(arguments: list[str]) -> int:
         for namespace, domain, _ in arms:
             stack.enter_context(_recording(namespace, int(domain), recorder, partial(blind, LOSS)))
         stack.enter_context(_on_thread(monitor.run))
+        stack.enter_context(_on_thread(partial(_save, recorder)))
         stack.callback(recorder.close)  # first, and for all arms at once: shutting the nodes down takes time
         print(f"observing {origin}", flush=True)
         for line in sys.stdin:
@@ -105,4 +112,7 @@ def main(arguments: list[str]) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    try:
+        sys.exit(main(sys.argv[1:]))
+    except OSError as error:  # such as a full disk
+        sys.exit(f"{error.filename}: {error.strerror}")

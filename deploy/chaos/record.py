@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import json
-import struct
 from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from mcap.exceptions import McapError
-from mcap.reader import McapReader, make_reader
+from mcap_files import McapFile, UnreadableError
 from rclpy.serialization import deserialize_message
 from std_msgs.msg import String
 
@@ -25,27 +23,32 @@ EARLY = 0.001  # s by which a message may seem to be sent after its reception: c
 
 
 @contextmanager
-def _reader(path: Path) -> Iterator[McapReader]:
+def _opened(path: Path) -> Iterator[McapFile]:
     """
     Open a record.
 
-    :raises DeploymentError: if the file cannot be read, is incomplete or not a record.
+    :raises DeploymentError: if the file cannot be read, or is not a record.
     """
     try:
-        with path.open("rb") as file:
-            yield make_reader(file)
+        with McapFile(path) as file:
+            yield file
     except OSError as error:
         raise DeploymentError(f"Record {path}: {error.strerror}") from None
-    except (McapError, struct.error) as error:  # struct.error: the file ends within a number
-        raise DeploymentError(f"{path} is not a complete record: {error}") from None
+    except UnreadableError as error:
+        raise DeploymentError(str(error)) from None
 
 
 def namespaces(path: Path) -> list[str]:
     """Return the namespaces of the arms in a record."""
-    with _reader(path) as reader:
-        events = reader.iter_messages(topics=[PROCESSES])
-        found = {_event(message.data)["namespace"] for *_, message in events}
+    with _opened(path) as file:
+        found = {_event(message.data)["namespace"] for _, message in file.messages([PROCESSES])}
     return sorted(found, key=lambda namespace: (len(namespace), namespace))
+
+
+def remark(path: Path) -> str:
+    """Return how much of a record without an end is judged; empty for a complete record."""
+    with _opened(path) as file:
+        return file.remark
 
 
 def load(path: Path, namespace: str = "/") -> History:
@@ -55,13 +58,10 @@ def load(path: Path, namespace: str = "/") -> History:
     streams: dict[str, list[Sample]] = {topic.name: [] for topic in topics.CONTRACT}
     lives: dict[tuple[int, float], Life] = {}
     faults: list[InjectedFault] = []
-    with _reader(path) as reader:
-        origin = next(int(m.metadata["origin"]) for m in reader.iter_metadata() if m.name == METADATA)
-        summary = reader.get_summary()
-        assert summary is not None
-        assert summary.statistics is not None
-        end = (summary.statistics.message_end_time - origin) / 1e9
-        for _, channel, message in reader.iter_messages(topics=[*names, PROCESSES, FAULTS]):
+    with _opened(path) as file:
+        origin = next(int(each.metadata["origin"]) for each in file.metadata if each.name == METADATA)
+        end = (file.end - origin) / 1e9
+        for channel, message in file.messages([*names, PROCESSES, FAULTS]):
             received, sent = ((t - origin) / 1e9 for t in (message.log_time, message.publish_time))
             if topic := names.get(channel.topic):
                 streams[topic.name] += [

@@ -16,7 +16,7 @@ from typing import Any
 
 import reactivex as rx
 import yaml
-from mcap.writer import Writer
+from mcap_files import FileWriter
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.qos import QoSProfile
 from rclpy.serialization import serialize_message
@@ -46,10 +46,13 @@ class Recorder:
     """A file of messages. Thread-safe."""
 
     def __init__(self, path: Path, monotonic: int, epoch: int) -> None:
-        """:param monotonic, epoch: the same moment on the monotonic clock and since 1970 [ns]."""
-        self._file = path.open("xb")
-        self._writer = Writer(self._file)
-        self._writer.start(profile="ros2", library="reactive-arm")
+        """
+        Create the file.
+
+        :param monotonic, epoch: the same moment on the monotonic clock and since 1970 [ns].
+        :raises OSError: like all methods, if the disk does not take the messages.
+        """
+        self._writer = FileWriter(path, "reactive-arm")
         self._origin = monotonic
         self._offset = epoch - monotonic
         self._types = get_typestore(Stores.ROS2_JAZZY)
@@ -62,7 +65,7 @@ class Recorder:
     def message(self, topic: str, type_name: str, qos: str, data: bytes, received: int, sent: int) -> None:
         """Record a serialized message; without effect after :meth:`close`. Times: monotonic clock [ns]."""
         with self._lock:
-            if self._file.closed:
+            if not self._writer.is_open:
                 return
             if topic not in self._channels:
                 self._add(topic, type_name, qos)
@@ -85,11 +88,15 @@ class Recorder:
         """The number of recorded messages."""
         return self._counts.total()
 
+    def save(self) -> None:
+        """Bring everything so far to the disk; called every ``SAVE_PERIOD``, it limits what a death costs."""
+        with self._lock:
+            self._writer.save()
+
     def close(self) -> None:
         """Complete the file."""
         with self._lock:
-            self._writer.finish()  # type: ignore[no-untyped-call]
-            self._file.close()
+            self._writer.close()
 
     def _add(self, topic: str, type_name: str, qos: str) -> None:
         if type_name not in self._schemas:

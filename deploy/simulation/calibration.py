@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from diagnostic_msgs.msg import DiagnosticArray
-from mcap.reader import make_reader
+from mcap_files import McapFile
 from rclpy.serialization import deserialize_message
 from rclpy_simulation import Delay
 
@@ -82,10 +82,9 @@ def _created(path: Path, history: History) -> dict[Life, float]:
     begin = min((fault.begin for fault in history.injected), default=0.0)  # until then, all start together
     lives = {(life.program, life.pid): life for life in history.lives if life.program and life.began > begin}
     created: dict[Life, float] = {}
-    with path.open("rb") as file:
-        reader = make_reader(file)
-        origin = next(int(each.metadata["origin"]) for each in reader.iter_metadata())
-        for *_, message in reader.iter_messages(topics=["/diagnostics"]):
+    with McapFile(path) as file:
+        origin = next(int(each.metadata["origin"]) for each in file.metadata)
+        for _, message in file.messages(["/diagnostics"]):
             for status in deserialize_message(message.data, DiagnosticArray).status:
                 values = {pair.key: pair.value for pair in status.values}
                 life = lives.pop((status.name.rpartition("/")[2], int(values.get("pid") or 0)), None)

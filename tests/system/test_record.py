@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import os
 import re
+import resource
 import signal
 import time
 from pathlib import Path
+from random import Random
 from typing import Any
 
+import pytest
+from mcap_files import McapFile
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
@@ -65,6 +69,37 @@ def test_ctrl_c_completes_a_record_of_all_topics_in_the_namespace(site: Site) ->
         assert frames == {"arm1/link1", "arm1/link2", "arm1/effector"}
     (description,) = {message.data for topic, message in messages if topic == "/arm1/robot_description"}
     assert re.search(r'<link name="arm1/base">', description)
+
+
+@pytest.mark.timed
+def test_killed_recorder_loses_at_most_a_second(small_site: Site) -> None:
+    assert small_site.do("start", "demo")[0] == 0
+    random = Random(7)
+    for _ in range(3):
+        command = record(small_site)
+        time.sleep(random.uniform(2.0, 4.0))
+        killed = time.time_ns()
+        command.signal(signal.SIGKILL)
+        command.wait()
+        path = max((small_site.run / "records").iterdir())
+        with McapFile(path) as file:
+            assert not file.is_complete
+            assert killed - file.end < 10**9
+        time.sleep(1.0)  # the name of a record is the second of its begin
+
+
+def test_full_disk_ends_a_record_in_one_line(small_site: Site) -> None:
+    """A limit of the size of a file takes the place of the disk's."""
+    assert small_site.do("start", "demo")[0] == 0
+    command = record(small_site)
+    resource.prlimit(command.pid, resource.RLIMIT_FSIZE, (20_000, resource.RLIM_INFINITY))
+    assert command.wait() == 1
+    (path,) = (small_site.run / "records").iterdir()
+    reason = r"File too large, [\d.]+ MB are free\. What was written before can be read"
+    assert re.fullmatch(rf"{path}: {reason}", command.lines[-1][1])
+    assert len(command.lines) == 2
+    with McapFile(path) as file:
+        assert file.counts.total() > 0
 
 
 def test_record_is_complete_when_the_system_ends(small_site: Site) -> None:
