@@ -5,6 +5,7 @@ This module writes and reads the format of these reports.
 
 from __future__ import annotations
 
+import json
 import math
 import os
 import socket
@@ -23,6 +24,7 @@ from interfaces.topics import DIAGNOSTICS
 
 PERIOD = 1.0  # [s]
 _PID, _PUBLISHED, _SINCE_OUTPUT = "pid", "published", "seconds_since_output"
+_PARAMETER = "parameter "  # before its name
 _REASONS, _OTHER_REASONS = 4, "other reasons"  # in a report, for each subject
 
 
@@ -43,6 +45,7 @@ class HealthReporter:
         self._last_output: float | None = None
         self._remarks: dict[str, Counter[str]] = {}  # since the last report: subject, reason, how often
         self._logged: set[str] = set()  # the remarks of the last report
+        self._parameters: dict[str, str] = {}
         self._publisher = node.create_publisher(
             DIAGNOSTICS.type,
             DIAGNOSTICS.name,
@@ -68,6 +71,10 @@ class HealthReporter:
         reasons = self._remarks.setdefault(subject, Counter())
         reasons[reason if reason in reasons or len(reasons) < _REASONS else _OTHER_REASONS] += 1
 
+    def note_parameter(self, name: str, value: object) -> None:
+        """Tell in each report that a parameter has another value than its default."""
+        self._parameters[f"{_PARAMETER}{name}"] = json.dumps(value)
+
     def report(self) -> None:
         """Publish the health, with all remarks since the last report."""
         remarks, self._remarks = self._remarks, {}
@@ -85,6 +92,7 @@ class HealthReporter:
             _PUBLISHED: self._published,
             "dropped": self._dropped,
             _SINCE_OUTPUT: "" if self._last_output is None else f"{now - self._last_output:.3f}",
+            **self._parameters,
         }
         status = DiagnosticStatus(
             level=DiagnosticStatus.WARN if warnings else DiagnosticStatus.OK,
@@ -105,6 +113,15 @@ class HealthReporter:
         # Without what comes before a report: a new process has its first output to make.
         if subscribers.current_count_change > 0:
             self.report()
+
+
+def reported_parameters(status: DiagnosticStatus) -> dict[str, Any]:
+    """Return the parameters in a report: those of which the value is not the default. Raises ValueError."""
+    return {
+        pair.key.removeprefix(_PARAMETER): json.loads(pair.value)
+        for pair in status.values
+        if pair.key.startswith(_PARAMETER)
+    }
 
 
 class Health(NamedTuple):

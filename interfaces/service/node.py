@@ -66,7 +66,10 @@ class ServiceNode(ReactiveNode):
             descriptor.floating_point_range = [FloatingPointRange(from_value=within[0], to_value=within[1])]
         elif within is not None:
             descriptor.integer_range = [IntegerRange(from_value=within[0], to_value=within[1])]
-        return self.declare_parameter(name, default, descriptor).value
+        value = self.declare_parameter(name, default, descriptor).value
+        if value != default and not settable:  # a record tells the parameters of a process by its health
+            self.health.note_parameter(name, value)
+        return value
 
     def observe(
         self,

@@ -10,12 +10,14 @@ from typing import Any
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.clock import ClockType
+from rclpy.parameter import Parameter
 from rclpy.time import Time
 
 from interfaces.service import ServiceNode
-from interfaces.service.health import healths, heard_healths
+from interfaces.service.health import healths, heard_healths, reported_parameters
 from interfaces.topics import DIAGNOSTICS
 from reactive_node.testing import MakeNode, SpinUntil
+from services import dead_mans_switch, operator_watchdog
 
 GOOD = {"pid": "7", "published": "3", "seconds_since_output": "0.5"}
 
@@ -129,6 +131,21 @@ def test_report_has_host_uptime_and_age_of_the_last_output(
     assert (values["uptime"], values["seconds_since_output"], values["published"]) == ("7.500", "0.500", "1")
     assert (status.hardware_id, status.level) == (socket.gethostname(), DiagnosticStatus.OK)
     assert before <= Time.from_msg(array.header.stamp) <= service.get_clock().now()
+
+
+def test_report_tells_the_parameters_that_are_not_the_default(
+    make_node: MakeNode, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    given = [Parameter("silence", value=1.5), Parameter("strikes", value=3), Parameter("rate", value=50.0)]
+    service = make_node("service", kind=ServiceNode, parameter_overrides=given)
+    service.declare(operator_watchdog.Parameters)
+    service.declare(dead_mans_switch.Parameters)
+    published: list[Any] = []
+    monkeypatch.setattr(service.health._publisher, "publish", published.append)
+    service.health.report()
+
+    (status,) = published[0].status
+    assert reported_parameters(status) == {"silence": 1.5}  # `rate` may change
 
 
 def test_report_is_sent_when_a_subscriber_comes_not_when_one_goes(
