@@ -1,7 +1,8 @@
 """`make replay`: feed a record through today's services in virtual time, and show what they do otherwise.
 
 Exit codes: 0 if the replayed output equals the recorded one within the bounds of
-:mod:`deploy.replay.comparison`, 1 if it differs, 2 if the record or the command line has an error.
+:mod:`deploy.replay.comparison`, 1 if it differs, 2 if nothing can be compared, or the record or the command
+line has an error.
 """
 
 from __future__ import annotations
@@ -49,7 +50,7 @@ def main(arguments: Sequence[str]) -> int:
         return 2
     lines, is_equal = report(record, outcomes)
     print("\n".join([*lines, f"Output: {output}"]))
-    return 0 if is_equal else 1
+    return 2 if is_equal is None else 0 if is_equal else 1
 
 
 def _parse(arguments: Sequence[str]) -> argparse.Namespace:
@@ -89,7 +90,7 @@ def _jobs(record: Record, options: argparse.Namespace, directory: Path) -> list[
         jobs += [
             Job(namespace, chain, parameters)
             for chain in chains.CHAINS
-            if any(messages for _, messages in chains.inputs(record, namespace, chain))
+            if chains.has_input(record, namespace, chain)
         ]
     if not jobs:
         raise DeploymentError(f"{options.record} contains nothing that a service hears")

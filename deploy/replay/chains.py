@@ -2,32 +2,42 @@
 
 from __future__ import annotations
 
-from rclpy.serialization import deserialize_message
+from builtin_interfaces.msg import Time
+from rclpy.serialization import deserialize_message, serialize_message
+from rclpy_simulation.host import SECOND
+from std_msgs.msg import Header, String
 
 from deploy.chaos.babbler import is_babble
+from deploy.replay.lives import Latch, begins_away, latch, lives
 from deploy.replay.record import Message, Record, text
 from interfaces.robot_model import BASE, frame_id
 from interfaces.topics import (
     CONFIGURATION,
     CONTRACT,
     EFFECTOR_POSITION,
+    EFFECTOR_SPEED,
     ENGINES,
+    ENGINES_STATE,
     INCAPACITATED,
+    ON,
     OPERATOR_ACTIVITY,
     OPERATOR_HEARTBEAT,
     OPERATOR_PRESENCE,
     TF,
     TURN_OFF,
+    TURN_ON,
     Topic,
+    is_latched,
 )
 
 WATCHDOG = OPERATOR_PRESENCE.publishers[0]
+CONTROLLER = ENGINES_STATE.publishers[0]
 
 HEARD: dict[str, tuple[Topic, ...]] = {
     "kinematics": tuple(CONFIGURATION.values()),
     "velocity": (EFFECTOR_POSITION,),
     WATCHDOG: (OPERATOR_HEARTBEAT,),
-    "engine_controller": (ENGINES, OPERATOR_PRESENCE),
+    CONTROLLER: (ENGINES, OPERATOR_PRESENCE),
     "robot_state": tuple(CONFIGURATION.values()),
 }
 """The topics that each replayed service hears."""
@@ -37,7 +47,7 @@ CHAINS: tuple[Chain, ...] = (
     ("robot_state",),
     ("kinematics",),
     ("velocity",),
-    (WATCHDOG, "engine_controller"),
+    (WATCHDOG, CONTROLLER),
 )
 """
 Services that hear the replayed output of each other. Chains hear the recorded output of each other.
@@ -53,14 +63,64 @@ def outputs(chain: Chain) -> list[Topic]:
 
 
 def inputs(record: Record, namespace: str, chain: Chain) -> list[tuple[Topic, list[Message]]]:
-    """Return the recorded messages that a chain hears, and that none of its services has sent."""
+    """
+    Return the recorded messages that a chain hears, and that none of its services has sent.
+
+    Of those that were sent before the arm began, it hears the latched ones.
+    """
     made = outputs(chain)
-    heard = [topic for service in chain for topic in HEARD[service]]
-    return [
-        (topic, commands(record, namespace)[0] if topic is ENGINES else record.of(topic, namespace))
-        for topic in heard
-        if topic is ENGINES or topic not in made
-    ]
+    found = []
+    for topic in (topic for service in chain for topic in HEARD[service]):
+        if topic is ENGINES or topic not in made:
+            sent = commands(record, namespace)[0] if topic is ENGINES else record.of(topic, namespace)
+            heard = [each for each in sent if each.sent >= record.begin or is_latched(topic.qos)]
+            found.append((topic, heard))
+    return found
+
+
+def has_input(record: Record, namespace: str, chain: Chain) -> bool:
+    """Return whether a record contains what a chain hears; a watchdog alone hears an operator who is away."""
+    if WATCHDOG in chain and record.of(OPERATOR_ACTIVITY, namespace):
+        return True
+    return any(messages for _, messages in inputs(record, namespace, chain))
+
+
+def past(record: Record, namespace: str, chain: Chain) -> list[tuple[Topic, list[Message]]]:
+    """Return made-up messages that bring the controller of a chain into the state that the record shows."""
+    shown = first_latch(record, namespace) if CONTROLLER in chain else None
+    if shown is None or not shown.operator_is_present:
+        return []
+    presence = Message(
+        shown.known,
+        serialize_message(Header(stamp=Time(sec=shown.known // SECOND, nanosec=shown.known % SECOND))),
+    )
+    turn_on = Message(shown.known + SECOND // 100, serialize_message(String(data=TURN_ON)))
+    return [(OPERATOR_PRESENCE, [presence]), (ENGINES, [turn_on] if shown.engines == ON else [])]
+
+
+def first_latch(record: Record, namespace: str) -> Latch | None:
+    """Return what the record shows first of the latch of the arm in a namespace."""
+    return latch(record, namespace, lives(record, namespace, CONTROLLER)[0])
+
+
+def known(record: Record, namespace: str, topic: Topic) -> int:
+    """
+    Return from when on the record shows what an output depends on [ns since 1970]; its end if it never does.
+
+    The strikes are known from the beginning: what comes later shows them.
+    """
+    if topic is EFFECTOR_SPEED:  # a speed that equals the last one is not published
+        shown = [record.of(topic, namespace)]
+    elif topic is ENGINES_STATE:
+        first = first_latch(record, namespace)
+        return record.end if first is None else first.known
+    elif WATCHDOG in topic.publishers:
+        # While the operator is away, there is neither. A presence shows that heartbeats were not recorded.
+        is_unknown = record.of(OPERATOR_PRESENCE, namespace) and not record.of(OPERATOR_HEARTBEAT, namespace)
+        return record.end if is_unknown else record.begin
+    else:
+        shown = [record.of(each, namespace) for each in CONFIGURATION.values()]
+    return max((each[0].sent if each else record.end for each in shown), default=record.begin)
 
 
 def recorded(record: Record, namespace: str, topic: Topic) -> list[Message]:
@@ -94,7 +154,7 @@ def commands(record: Record, namespace: str) -> tuple[list[Message], list[Messag
         for message in record.of(OPERATOR_ACTIVITY, namespace)
     ]
     conclusions.reverse()
-    is_away = False
+    is_away = begins_away(record, namespace, lives(record, namespace, WATCHDOG)[0])
     for message in record.of(ENGINES, namespace):
         while conclusions and conclusions[-1][0] <= message.sent:
             is_away = conclusions.pop()[1] == INCAPACITATED

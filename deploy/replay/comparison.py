@@ -21,7 +21,7 @@ BURST = 0.02
 """Messages that follow one another faster are a burst, and only its last one is compared [s]: the order in
 which samples of several writers arrive is not recorded."""
 COUNT, FEW = 0.1, 5
-"""The numbers of messages may differ by this part, and by this number."""
+"""The numbers of messages may differ by this part, and by this number. So many may be lost in any record."""
 
 Interval = tuple[int, int]
 Value = tuple[float, ...] | str
@@ -132,7 +132,7 @@ def compare(
             texts = _text(item.value), _text(nearest.value) if nearest else ""
             result.differences.append(Difference(item.time, *(texts if is_recorded else texts[::-1])))
     result.differences.sort()
-    few = len(result.differences) <= bounds.lost * result.compared
+    few = len(result.differences) <= (max(FEW, bounds.lost * result.compared) if bounds.lost else 0)
     alike = abs(counts[0] - counts[1]) <= max(FEW, COUNT * counts[0])
     result.is_equal = few and alike and not far
     return result

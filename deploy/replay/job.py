@@ -74,21 +74,26 @@ def _run(job: Job) -> Outcome:
 
 def run(record: Record, job: Job) -> Outcome:
     """Replay a chain, and compare its output."""
+    record = record.of_arm(job.namespace)
     playback = play(record, job.namespace, job.chain, job.parameters)
     comparisons = []
     for topic in chains.outputs(job.chain):
         recorded = chains.recorded(record, job.namespace, topic)
         if recorded or topic is ENGINES:  # which nobody may have sent
-            excused = _excused(record, playback, topic)
+            excused = _excused(record, playback, topic, chains.known(record, job.namespace, topic))
             replayed = playback.messages[topic.name]
             comparisons.append(compare(topic, recorded, replayed, excused, record.offsets))
     return Outcome(job, playback.messages, comparisons, playback.failures)
 
 
-def _excused(record: Record, playback: Playback, topic: Topic) -> list[Interval]:
-    """Return the times in which the output of a chain may differ."""
+def _excused(record: Record, playback: Playback, topic: Topic, known: int) -> list[Interval]:
+    """
+    Return the times in which the output of a chain may differ.
+
+    :param known: from when on the record shows what the output depends on [ns since 1970].
+    """
     around = round(BOUNDS[topic.name].time * SECOND)
-    found = [(0, record.begin + START), (record.end - around, record.end)]
+    found = [(0, max(record.begin, known) + START), (record.end - around, max(record.end, known) + START)]
     for life in (life for lives in playback.lives.values() for life in lives):
         found.append((life.began - around, life.began + START))
         if life.ended is not None:

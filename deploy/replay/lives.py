@@ -1,21 +1,30 @@
-"""When the recorded processes lived, and when they were suspended."""
+"""When the recorded processes lived, when they were suspended, and what they knew when the record began."""
 
 from __future__ import annotations
 
 from bisect import bisect_left
-from typing import NamedTuple
+from collections.abc import Mapping
+from dataclasses import replace
+from itertools import islice
+from typing import Any, NamedTuple
 
 from rclpy.serialization import deserialize_message
 from rclpy_simulation.host import SECOND
 
 from deploy.chaos.record import FAULTS, PROCESSES
 from deploy.replay.record import Message, Record, text
+from interfaces.service.health import reported_parameters
+from interfaces.service.parameters import declarations
 from interfaces.topics import (
+    ALIVE,
     CONTRACT,
     DIAGNOSTICS,
     ENGINES_STATE,
+    INCAPACITATED,
     MISSED,
+    OFF,
     OPERATOR_ACTIVITY,
+    OPERATOR_PRESENCE,
     ROBOT_DESCRIPTION,
     Topic,
 )
@@ -25,6 +34,8 @@ AHEAD = SECOND // 2
 """By which a process that is older than the record starts before it, to discover its inputs [ns]."""
 LATE = SECOND // 20
 """By which a process outlives its last message, as timers of a replay may be late [ns]."""
+YOUNG = 2 * SECOND
+"""A watchdog of this age [ns] has no strike yet, and the controller forgets a presence sooner."""
 SUSPENDING = ("stop", "slow")
 
 _WATCHDOG = operator_watchdog.DEFAULTS
@@ -56,6 +67,10 @@ class ReplayedLife(NamedTuple):
     ended: int | None
     """``None`` if it outlived the record."""
     suspensions: tuple[Suspension, ...] = ()
+    parameters: Mapping[str, Any] = {}
+    """Those that were not the default."""
+    has_past: bool = False
+    """Whether it is older than the record."""
 
 
 class _Seen(NamedTuple):
@@ -65,6 +80,8 @@ class _Seen(NamedTuple):
     """When its node was created."""
     last: int
     """When it sent the last report."""
+    parameters: Mapping[str, Any]
+    """Those that are not the default."""
 
 
 def lives(record: Record, namespace: str, service: str) -> list[ReplayedLife]:
@@ -83,10 +100,13 @@ def lives(record: Record, namespace: str, service: str) -> list[ReplayedLife]:
         ended = _last_message(record, namespace, service, process, min(known)) if known else None
         began = _begin_of_work(record, namespace, service, max(process.created, record.begin - AHEAD))
         if ended is None or ended > began:
-            found.append(ReplayedLife(began, ended, tuple(suspensions.get(pid, ()))))
-    if found:
-        return found
-    return [ReplayedLife(_begin_of_work(record, namespace, service, record.begin - AHEAD), None)]
+            suspended = tuple(suspensions.get(pid, ()))
+            has_past = process.created < record.begin - YOUNG
+            found.append(ReplayedLife(began, ended, suspended, process.parameters, has_past))
+    if not found:
+        began = _begin_of_work(record, namespace, service, record.begin - AHEAD)
+        found.append(ReplayedLife(began, None, has_past=True))
+    return found
 
 
 def _seen(record: Record, namespace: str, service: str) -> dict[int, _Seen]:
@@ -101,7 +121,8 @@ def _seen(record: Record, namespace: str, service: str) -> dict[int, _Seen]:
                 values = {pair.key: pair.value for pair in status.values}
                 if status.name == name and "uptime" in values:
                     pid, created = int(values["pid"]), sent - round(float(values["uptime"]) * SECOND)
-                    found[pid] = _Seen(found[pid].created if pid in found else created, sent)
+                    created = found[pid].created if pid in found else created
+                    found[pid] = _Seen(created, sent, reported_parameters(status))
         except Exception:  # of any type: the message is no report of ours
             continue
     return found
@@ -121,17 +142,96 @@ def _begin_of_work(record: Record, namespace: str, service: str, created: int) -
     return created + (messages[index].sent - round(first * SECOND) - created) % round(period * SECOND)
 
 
-def origin(record: Record, namespace: str) -> int:
+def origin(record: Record, namespace: str, life: ReplayedLife) -> int:
     """
-    Return when the watchdog began to expect the operator, which a record does not contain [ns since 1970].
+    Return when the first watchdog began to expect the operator [ns since 1970].
 
-    Its first conclusion follows at the first sample or, without a sign of life, after the first silence.
+    A record does not contain it. One with a past began so early that it has the strikes which the record
+    shows: for each of them, a silence before the record is made up.
     """
-    first = next(iter(record.of(OPERATOR_ACTIVITY, namespace)), None)
-    if first is None:
+    given = _watchdog_parameters(life)
+    sampling, silence = round(given.sampling * SECOND), round(given.silence * SECOND)
+    if begins_away(record, namespace, life):
+        return record.begin - given.strikes * silence - sampling
+    conclusions = _conclusions(record, namespace, life)
+    if not conclusions:
         return record.begin
-    waited = _WATCHDOG.silence if text(first, OPERATOR_ACTIVITY) == MISSED else _WATCHDOG.sampling
-    return first.sent - round(waited * SECOND)
+    sent, first = conclusions[0]
+    if not life.has_past:
+        return sent - (silence if first == MISSED else sampling)
+    strikes = _strikes_before(conclusions, given.strikes)
+    if first != ALIVE:
+        return sent - (strikes + 1 if first == MISSED else given.strikes) * silence
+    samples = min((sent - record.begin) // sampling + 1, (silence - 1) // sampling)
+    return sent - samples * sampling - strikes * silence
+
+
+def begins_away(record: Record, namespace: str, life: ReplayedLife) -> bool:
+    """Return whether the operator is incapacitated when the record begins: a watchdog is silent only then."""
+    given = _watchdog_parameters(life)
+    longest = round((given.silence + given.sampling) * SECOND)
+    conclusions = _conclusions(record, namespace, life)
+    if not life.has_past or (conclusions and conclusions[0][1] != ALIVE):
+        return False
+    end = record.end if life.ended is None else life.ended
+    return (conclusions[0][0] if conclusions else end) - record.begin > longest
+
+
+def _watchdog_parameters(life: ReplayedLife) -> operator_watchdog.Parameters:
+    known = {each.name: each for each in declarations(operator_watchdog.Parameters)}
+    values = life.parameters.items()
+    legal = {name: value for name, value in values if name in known and not known[name].problem(value)}
+    return replace(_WATCHDOG, **legal)
+
+
+def _conclusions(record: Record, namespace: str, life: ReplayedLife) -> list[tuple[int, str]]:
+    """Return the conclusions of a watchdog and their times."""
+    end = record.end if life.ended is None else life.ended
+    return [
+        (message.sent, text(message, OPERATOR_ACTIVITY))
+        for message in record.of(OPERATOR_ACTIVITY, namespace)
+        if record.begin <= message.sent <= end
+    ]
+
+
+def _strikes_before(conclusions: list[tuple[int, str]], strikes: int) -> int:
+    """Return how many strikes came before the record; none if it does not show the last one."""
+    names = [name for _, name in conclusions]
+    if INCAPACITATED not in names:
+        return 0
+    return max(0, strikes - names[: names.index(INCAPACITATED)].count(MISSED))
+
+
+class Latch(NamedTuple):
+    """What the record shows first of the latch."""
+
+    known: int
+    """When it is known [ns since 1970]."""
+    engines: str
+    operator_is_present: bool
+
+
+def latch(record: Record, namespace: str, life: ReplayedLife) -> Latch | None:
+    """
+    Return what the record shows first of the latch of a controller; ``None`` if it shows nothing.
+
+    The latch has two parts. The engines' state is repeated. The time of the last presence is known once there
+    is another presence, or once the engines are off for so long that no former presence turns them on.
+    """
+    end = record.end if life.ended is None else life.ended
+    states = [each for each in record.of(ENGINES_STATE, namespace) if record.begin <= each.sent <= end]
+    present = [each for each in record.of(OPERATOR_PRESENCE, namespace) if record.begin <= each.sent <= end]
+    found = []
+    if states and present:
+        known = max(states[0].sent, present[0].sent)
+        engines = text([each for each in states if each.sent <= known][-1], ENGINES_STATE)
+        found.append(Latch(known, engines, True))
+    off = (
+        Latch(each.sent, OFF, False)
+        for each in states
+        if each.sent >= record.begin + YOUNG and text(each, ENGINES_STATE) == OFF
+    )
+    return min([*found, *islice(off, 1)], default=None)
 
 
 def _last_message(record: Record, namespace: str, service: str, process: _Seen, before: int) -> int:

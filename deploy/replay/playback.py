@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
@@ -19,7 +20,7 @@ from rclpy_simulation.host import BOOT, SECOND
 
 from deploy.replay import chains
 from deploy.replay.chains import WATCHDOG, Chain
-from deploy.replay.lives import ReplayedLife, Suspension, lives, origin
+from deploy.replay.lives import AHEAD, ReplayedLife, Suspension, lives, origin
 from deploy.replay.record import Message, Record
 from deploy.simulation.arm import ROBOT
 from deploy.simulation.machine import simulated_services
@@ -29,7 +30,7 @@ from deploy.supervision.system import NAMESPACE
 from interfaces.scenario.origin import EPOCH
 from interfaces.topics import DIAGNOSTICS, Topic
 
-LEAD = 2 * SECOND  # ns from the beginning of the simulation to that of the record
+LEAD = 2 * SECOND  # ns from the beginning of the simulation to that of the record or of a process
 NETWORK = Network(latency=Delay(0.0002, 0.0002), discovery=Delay(0.01, 0.01), matching=Delay(0.002, 0.002))
 """As on an idle machine, without chance."""
 
@@ -53,25 +54,34 @@ def play(record: Record, namespace: str, chain: Chain, parameters: Path | None =
     :param parameters: a ROS parameter file.
     """
     with simulated_services("replay", NETWORK) as simulation:
-        player = _Player(simulation, record, namespace)
+        player = _Player(simulation, record, namespace, chain)
         for service in chain:
             player.start(service, parameters)
         player.hear(chain)
         environment = {NAMESPACE: namespace}
         simulation.start(view, name="viewer", host=ROBOT, environment=environment, delay=Delay(0.0, 0.0))
-        player.feed(chains.inputs(record, namespace, chain))
+        player.feed([*chains.inputs(record, namespace, chain), *chains.past(record, namespace, chain)])
         simulation.run((record.end - player.boot) / SECOND)
         return player.result
 
 
 class _Player:
-    def __init__(self, simulation: Simulation, record: Record, namespace: str) -> None:
-        self.result = Playback()
+    def __init__(self, simulation: Simulation, record: Record, namespace: str, chain: Chain) -> None:
+        self.result = Playback(lives={service: lives(record, namespace, service) for service in chain})
+        self._origin = record.begin
+        """When the watchdog begins to expect the operator [ns since 1970]."""
+        if WATCHDOG in chain:
+            first, *others = self.result.lives[WATCHDOG]
+            self._origin = origin(record, namespace, first)
+            if first.has_past:
+                first = first._replace(began=min(first.began, self._origin - AHEAD))
+            self.result.lives[WATCHDOG] = [first, *others]
+        earliest = min(each[0].began for each in self.result.lives.values())
         self._simulation = simulation
         self._record = record
         self._namespace = namespace
         host = simulation.host(ROBOT)
-        host.step((record.begin - LEAD - host.time_of_day(BOOT)) / SECOND)
+        host.step((min(record.begin, earliest) - LEAD - host.time_of_day(BOOT)) / SECOND)
         self.boot = host.time_of_day(BOOT)
         """The time of day at the beginning of the simulation [ns since 1970]."""
 
@@ -84,19 +94,20 @@ class _Player:
     def start(self, service: str, parameters: Path | None) -> None:
         """Let the processes of a service live as they did."""
         module = next(each.module for each in manifest.programs() if each.name == service)
-        arguments = ["--ros-args"]
-        if parameters:
-            arguments += ["--params-file", str(parameters)]
+        arguments = ["--params-file", str(parameters)] if parameters else []
         if service == WATCHDOG:
-            epoch = (BOOT + origin(self._record, self._namespace) - self.boot) / SECOND
+            epoch = (BOOT + self._origin - self.boot) / SECOND
             arguments += ["-p", f"{EPOCH}:={epoch:.9f}"]
-        self.result.lives[service] = lives(self._record, self._namespace, service)
         for life in self.result.lives[service]:
             self._at(life.began, partial(self._begin, service, module, arguments, life))
 
     def _begin(self, service: str, module: str, arguments: list[str], life: ReplayedLife) -> None:
+        parameters = life.parameters.items()  # JSON is YAML, as `-p` wants it
+        recorded = [word for name, value in parameters for word in ("-p", f"{name}:={json.dumps(value)}")]
         process = self._simulation.start(
             module,
+            "--ros-args",
+            *recorded,  # a user's file comes later, and wins
             *arguments,
             host=ROBOT,
             environment={NAMESPACE: self._namespace},
@@ -134,7 +145,8 @@ class _Player:
 
         def note(writer: Any, sample: Any) -> None:
             messages = heard.get(writer.topic)
-            if messages is not None and writer.participant.process.name in chain:
+            is_made_up = sample.source_timestamp < self._record.begin
+            if messages is not None and not is_made_up and writer.participant.process.name in chain:
                 messages.append(Message(sample.source_timestamp, sample.data))
 
         self._simulation.tap(note)
@@ -151,8 +163,9 @@ class _Player:
             rclpy.spin(node)
 
         player = self._simulation.start(publish_for_ever, name="replay", host=ROBOT, delay=Delay(0.0, 0.0))
+        begin = self._record.begin
         streams = [
-            [(max(sent, self._record.begin), number, data) for sent, data in messages]
+            [(max(sent, begin), number, data) for sent, data in messages]
             for number, (_, messages) in enumerate(inputs)
         ]
         following = merge(*streams, key=lambda item: item[:2])

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from itertools import islice
 from pathlib import Path
-from typing import IO, Any, NamedTuple
+from typing import Any, NamedTuple
 
-from mcap.reader import make_reader
-from mcap.records import Channel
+from mcap_files import McapFile, UnreadableError
 from rclpy.serialization import deserialize_message
 from rclpy_simulation.host import SECOND
 
@@ -16,7 +16,17 @@ from deploy.chaos.record import FAULTS, PROCESSES, clock_offsets, read_event, ti
 from deploy.recording.recorder import METADATA
 from deploy.supervision.system import DeploymentError
 from interfaces import topics
+from interfaces.service.health import healths
 from interfaces.topics import Topic
+
+_OUTPUTS = (
+    topics.EFFECTOR_POSITION,
+    topics.EFFECTOR_SPEED,
+    topics.OPERATOR_PRESENCE,
+    topics.OPERATOR_ACTIVITY,
+    topics.ENGINES_STATE,
+)
+"""Topics that only services of an arm publish; other robots have joint states and a description, too."""
 
 
 class Message(NamedTuple):
@@ -32,15 +42,24 @@ class Record(NamedTuple):
     """The messages of a record."""
 
     begin: int
-    """Time of the first reception [ns since 1970]."""
+    """When the first message of an arm's services was received [ns since 1970]."""
     end: int
-    """Time of the last reception."""
+    """When the last one was received."""
     origin: int
     """From which the events of the chaos monkey count their times [ns since 1970]."""
     messages: dict[str, list[Message]]
     """By full topic name, in the order of sending."""
     offsets: Collection[int] = ()
     """By which the chaos monkey has put the time of day of an arm forward [ns]."""
+    extents: Mapping[str, tuple[int, int]] = {}
+    """Begin and end of each arm, by namespace."""
+    remark: str = ""
+    """How much of a file without an end was read; empty for a complete file."""
+
+    def of_arm(self, namespace: str) -> Record:
+        """Return the record with begin and end of the arm in a namespace."""
+        begin, end = self.extents[namespace]
+        return self._replace(begin=begin, end=end)
 
     def of(self, topic: Topic, namespace: str) -> list[Message]:
         """Return the messages of a topic of the arm in a namespace."""
@@ -54,11 +73,7 @@ class Record(NamedTuple):
 
     def namespaces(self) -> list[str]:
         """Return the namespaces of the arms."""
-        relative = [f"/{topic.name}" for topic in topics.CONTRACT if topic.name[0] != "/"]
-        found = {
-            name.removesuffix(end) or "/" for name in self.messages for end in relative if name.endswith(end)
-        }
-        return sorted(found, key=lambda namespace: (len(namespace), namespace))
+        return _namespaces(self.messages)
 
 
 def text(message: Message, topic: Topic) -> str:
@@ -71,41 +86,41 @@ def text(message: Message, topic: Topic) -> str:
 
 def load(path: Path) -> Record:
     """
-    Read a record.
+    Read the topics of the contract, and the events of the chaos monkey.
 
-    :raises DeploymentError: if the file is damaged or incomplete, or contains no arm.
+    :raises DeploymentError: if the file is damaged, or contains no arm.
     """
     try:
-        with path.open("rb") as file:
+        with McapFile(path) as file:
             record = _read(file)
     except OSError as error:
         raise DeploymentError(f"{path}: {error.strerror or error}") from None
-    except Exception as error:  # of any type, by the parser or a decompressor
-        reason = " ".join(str(error).split()) or type(error).__name__
-        raise DeploymentError(f"{path} is not a complete MCAP: {reason}") from None
-    if record is None or not record.namespaces():
+    except UnreadableError as error:
+        raise DeploymentError(str(error)) from None
+    if not record.extents:
         raise DeploymentError(f"{path} contains no topic of an arm")
     return record
 
 
-def _read(file: IO[bytes]) -> Record | None:
-    """Read the topics of the contract, and the events of the chaos monkey; ``None`` without messages."""
-    reader = make_reader(file, validate_crcs=True)
-    summary = reader.get_summary()
-    if summary is None or summary.statistics is None:
-        raise ValueError("it has no summary")
-    if not summary.statistics.message_count:
-        return None
+class _Received(NamedTuple):
+    """A message as the file has it. Times: ns since 1970."""
+
+    received: int
+    stamp: int
+    data: bytes
+
+
+def _read(file: McapFile) -> Record:
     wanted = [
         channel.topic
-        for channel in summary.channels.values()
-        if _is_wanted(channel, summary.schemas[channel.schema_id].name if channel.schema_id else "")
+        for channel in file.channels.values()
+        if channel.message_encoding == "cdr" and _is_wanted(channel.topic, file.type_name(channel))
     ]
-    read: defaultdict[str, list[tuple[int, int, bytes]]] = defaultdict(list)
-    for _, channel, message in reader.iter_messages(wanted, log_time_order=False):
+    read: defaultdict[str, list[_Received]] = defaultdict(list)
+    for channel, message in file.messages(wanted):
         stamp = message.publish_time or message.log_time
-        read[channel.topic].append((message.log_time, stamp, message.data))
-    offsets = [round(each * 1e9) for each in clock_offsets(data for *_, data in read[FAULTS])]
+        read[channel.topic].append(_Received(message.log_time, stamp, message.data))
+    offsets = [round(each * 1e9) for each in clock_offsets(each.data for each in read[FAULTS])]
     messages = {
         topic: sorted(
             (
@@ -117,17 +132,49 @@ def _read(file: IO[bytes]) -> Record | None:
         for topic, each in read.items()
         if each
     }
-    origin = [int(each.metadata["origin"]) for each in reader.iter_metadata() if each.name == METADATA]
-    begin, end = summary.statistics.message_start_time, summary.statistics.message_end_time
-    return Record(begin, end, origin[0] if origin else begin, messages, offsets)
+    extents = {namespace: _extent(read, namespace) for namespace in _namespaces(messages)}
+    begin = min((begin for begin, _ in extents.values()), default=0)
+    end = max((end for _, end in extents.values()), default=0)
+    origin = [int(each.metadata["origin"]) for each in file.metadata if each.name == METADATA]
+    return Record(begin, end, origin[0] if origin else begin, messages, offsets, extents, file.remark)
 
 
-def _is_wanted(channel: Channel, type_name: str) -> bool:
-    if channel.message_encoding != "cdr":
+def _extent(read: Mapping[str, list[_Received]], namespace: str) -> tuple[int, int]:
+    """
+    Return when the first and the last message of an arm's services were received [ns since 1970].
+
+    Anybody may publish the inputs of the services, /tf and /diagnostics, before the arm begins and after its
+    end. They count only if the record has nothing else of the arm.
+    """
+    own = [read.get(topic.full_name(namespace), []) for topic in _OUTPUTS]
+    times = [each[end].received for each in own if each for end in (0, -1)]
+    reports = read.get(topics.DIAGNOSTICS.name, [])
+    for ordered in (reports, reversed(reports)):
+        times += islice((each.received for each in ordered if _is_health(each.data, namespace)), 1)
+    if not times:
+        relative = (topic.full_name(namespace) for topic in topics.CONTRACT if topic.name[0] != "/")
+        times = [each.received for name in relative for each in read.get(name, [])]
+    return min(times), max(times)
+
+
+def _is_health(data: bytes, namespace: str) -> bool:
+    """Return whether a message is the health of a service in a namespace."""
+    try:
+        message = deserialize_message(data, topics.DIAGNOSTICS.type)
+    except Exception:  # of any type, by the runtime
         return False
-    if channel.topic in (PROCESSES, FAULTS):
+    return bool(healths(message, namespace.rstrip("/")))
+
+
+def _namespaces(names: Iterable[str]) -> list[str]:
+    relative = [f"/{topic.name}" for topic in topics.CONTRACT if topic.name[0] != "/"]
+    found = {name.removesuffix(end) or "/" for name in names for end in relative if name.endswith(end)}
+    return sorted(found, key=lambda namespace: (len(namespace), namespace))
+
+
+def _is_wanted(name: str, type_name: str) -> bool:
+    if name in (PROCESSES, FAULTS):
         return True
     return any(
-        type_name == topic.type_name and f"/{channel.topic}".endswith(f"/{topic.name}")
-        for topic in topics.CONTRACT
+        type_name == topic.type_name and f"/{name}".endswith(f"/{topic.name}") for topic in topics.CONTRACT
     )

@@ -15,9 +15,9 @@ _TITLES = ("topic", "recorded", "replayed", "differ", "value by", "time by", "",
 HEAD = "{:24} {:>9} {:>9} {:>7} {:>11} {:>9}  {:9}  {}".format(*_TITLES)
 
 
-def report(record: Record, outcomes: Sequence[Outcome]) -> tuple[list[str], bool]:
-    """Return the result as text, and whether the output equals the recorded one."""
-    lines, differing = [], []
+def report(record: Record, outcomes: Sequence[Outcome]) -> tuple[list[str], bool | None]:
+    """Return the result as text, and whether the output equals the recorded one; ``None`` if unknown."""
+    lines, differing = [record.remark] if record.remark else [], []
     namespaces = list(dict.fromkeys(outcome.job.namespace for outcome in outcomes))
     lines.append(HEAD)
     for outcome in outcomes:
@@ -33,16 +33,21 @@ def report(record: Record, outcomes: Sequence[Outcome]) -> tuple[list[str], bool
     length = (record.end - record.begin) / SECOND
     if differing:
         lines.append(f"Different in {length:.0f} s: {', '.join(differing)}")
-    else:
-        lines.append(f"Equal within the bounds for {length:.0f} s")
-    return lines, not differing
+        return lines, False
+    if not any(comparison.compared for outcome in outcomes for comparison in outcome.comparisons):
+        lines.append(f"Nothing can be compared: the record of {length:.0f} s shows too little")
+        return lines, None
+    lines.append(f"Equal within the bounds for {length:.0f} s")
+    return lines, True
 
 
 def _row(prefix: str, it: Comparison) -> str:
     value = f"{it.value:.2g} {it.bounds.unit}" if it.bounds.unit else ""
+    is_unknown = it.recorded and not it.compared
+    verdict = "unknown" if is_unknown else "equal" if it.is_equal else "DIFFERENT"
     return (
         f"{prefix + it.topic:24} {it.recorded:9} {it.replayed:9} {len(it.differences):7} {value:>11} "
-        f"{it.time:7.3f} s  {'equal' if it.is_equal else 'DIFFERENT':9}  {it.bounds}"
+        f"{it.time:7.3f} s  {verdict:9}  {it.bounds}"
     )
 
 

@@ -13,10 +13,13 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import TransformStamped
+from mcap_files import FileWriter, McapFile
 from rclpy.serialization import deserialize_message, serialize_message
 from std_msgs.msg import Float64, Header, String
 from tf2_msgs.msg import TFMessage
@@ -35,6 +38,15 @@ from interfaces.robot_model import BASE, LINK1, frame_id
 ROOT = Path(__file__).parents[2]
 PLAY = Path(__file__).parent / "play.mcap"
 SECOND = 10**9
+BY_NAME = {topic.full_name("/"): topic for topic in topics.CONTRACT}
+
+
+class Received(NamedTuple):
+    """A message in a file; times in ns since 1970."""
+
+    log_time: int
+    publish_time: int
+    data: bytes
 
 
 def replay(
@@ -53,7 +65,7 @@ def replay(
 
 def verdicts(done: subprocess.CompletedProcess[str]) -> dict[str, str]:
     """Return what the command says about each topic."""
-    rows = re.findall(r"^(\S+) .* (equal|DIFFERENT) ", done.stdout, re.MULTILINE)
+    rows = re.findall(r"^(\S+) .* (equal|DIFFERENT|unknown) ", done.stdout, re.MULTILINE)
     return dict(rows)
 
 
@@ -132,23 +144,179 @@ def damaged(data: bytes) -> bytes:
 
 
 @pytest.mark.parametrize(
-    "change",
+    ("change", "reason"),
     [
-        lambda data: b"",
-        lambda data: data[:1000],
-        lambda data: data[:-10],
-        damaged,
-        lambda data: b"Dear arm,\n",
+        (lambda data: b"", "is no MCAP file"),
+        (lambda data: b"Dear arm,\n", "is no MCAP file"),
+        (damaged, "is damaged: "),
+        (lambda data: data[:1000], "contains no topic of an arm"),
     ],
-    ids=["empty", "beginning", "without end", "damaged", "letter"],
+    ids=["empty", "letter", "damaged", "beginning"],
 )
-def test_bad_file_is_refused_in_one_line(change: Callable[[bytes], bytes], tmp_path: Path) -> None:
+def test_bad_file_is_refused_in_one_line(
+    change: Callable[[bytes], bytes], reason: str, tmp_path: Path
+) -> None:
     record = tmp_path / "record.mcap"
     record.write_bytes(change(PLAY.read_bytes()))
     with pytest.raises(DeploymentError) as error:
         load(record)
-    assert str(error.value).startswith(f"{record} is not a complete MCAP: ")
+    assert str(error.value).startswith(f"{record} {reason}")
     assert "\n" not in str(error.value)
+
+
+def derived(
+    path: Path,
+    change: Callable[[str, Received], Received | None] = lambda topic, received: received,
+    *others: tuple[str, int],
+) -> Path:
+    """
+    Write a record like that of the play.
+
+    :param change: returns what is written in the place of a message; ``None`` for nothing.
+    :param others: topics that are not the arm's, and when a message of them was received [ns after the play's
+        begin].
+    """
+    with McapFile(PLAY) as play:
+        writer = FileWriter(path, "test")
+        numbers = {
+            channel.topic: writer.register_channel(
+                channel.topic,
+                "cdr",
+                writer.register_schema(play.type_name(channel), "ros2msg", b""),
+                channel.metadata,
+            )
+            for channel in play.channels.values()
+        }
+        for channel, message in play.messages():
+            received = Received(message.log_time, message.publish_time, message.data)
+            if (changed := change(channel.topic, received)) is not None:
+                writer.add_message(
+                    numbers[channel.topic], changed.log_time, changed.data, changed.publish_time
+                )
+        string = writer.register_schema("std_msgs/msg/String", "ros2msg", b"")
+        for topic, time in others:
+            at = play.start + time
+            other = writer.register_channel(topic, "cdr", string)
+            writer.add_message(other, at, serialize_message(String(data="x")), at)
+        writer.close()
+    return path
+
+
+def late(path: Path, begin: float, end: float = 60.0) -> Path:
+    """Write what a recorder receives that begins later and ends earlier [s after the play's begin]."""
+    with McapFile(PLAY) as play:
+        first, last = (play.start + round(time * SECOND) for time in (begin, end))
+        kept = {
+            channel.topic: message
+            for channel, message in play.messages(end=first - 1)
+            if topics.is_latched(BY_NAME[channel.topic].qos)
+        }
+
+    def received(topic: str, it: Received) -> Received | None:
+        if it.log_time >= first:
+            return it if it.log_time <= last else None
+        is_retained = topic in kept and kept[topic].log_time == it.log_time
+        return it._replace(log_time=first) if is_retained else None
+
+    return derived(path, received)
+
+
+@pytest.mark.parametrize(
+    "extent",
+    [(5.0,), (17.0,), (20.5,), (23.0,), (24.9165,), (27.0,), (25.2, 30.4)],
+    ids=[
+        "engines on",
+        "silence",
+        "a strike",
+        "two strikes",
+        "three strikes",
+        "incapacitated",
+        "until the end",
+    ],
+)
+def test_record_that_begins_with_a_past_is_equal(extent: tuple[float, ...], tmp_path: Path) -> None:
+    done = replay(late(tmp_path / "late.mcap", *extent))
+    assert (done.returncode, done.stderr) == (0, ""), done.stdout
+    assert set(verdicts(done).values()) == {"equal"}
+
+
+def test_record_of_an_absent_operator_is_compared(tmp_path: Path) -> None:
+    done = replay(late(tmp_path / "late.mcap", 17.0, 30.4))
+    assert done.returncode == 0, done.stdout
+    assert (
+        verdicts(done).items()
+        >= dict.fromkeys(("operator_activity", "engines", "engines/state"), "equal").items()
+    )
+
+
+def test_record_that_shows_too_little_cannot_be_compared(tmp_path: Path) -> None:
+    done = replay(late(tmp_path / "late.mcap", 5.0, 6.5))
+    assert done.returncode == 2
+    assert verdicts(done)["engines/state"] == verdicts(done)["effector/position"] == "unknown"
+    assert "\nNothing can be compared: the record of 1 s shows too little\n" in done.stdout
+
+
+def test_changed_recipe_differs_from_a_record_with_a_past(tmp_path: Path) -> None:
+    shutil.copytree(ROOT / "services", tmp_path / "services")
+    for file, text, other, _ in (ACTIVITY, STATE):
+        changed = tmp_path / "services" / file
+        changed.write_text(changed.read_text().replace(text, other))
+    done = replay(late(tmp_path / "late.mcap", 5.0), directory=tmp_path)
+    assert verdicts(done)["operator_activity"] == verdicts(done)["engines/state"] == "DIFFERENT"
+
+
+def test_other_topics_do_not_prolong_the_life_of_an_arm(tmp_path: Path) -> None:
+    path = tmp_path / "robot.mcap"
+    derived(path, lambda topic, it: it, ("/camera_info", -5 * SECOND), ("/map", 60 * SECOND))
+    done = replay(path)
+    assert (done.returncode, done.stderr) == (0, ""), done.stdout
+    assert "\nEqual within the bounds for 38 s\n" in done.stdout
+
+
+def test_foreign_commands_after_the_arm_do_not_prolong_its_life(tmp_path: Path) -> None:
+    path = tmp_path / "record.mcap"
+    health = DiagnosticArray(
+        status=[DiagnosticStatus(name="/camera", values=[KeyValue(key="pid", value="7")])]
+    )
+    state = topics.ENGINES_STATE
+    recorder = Recorder(path, 0, SECOND)
+    for second, topic, message in (
+        (1, topics.DIAGNOSTICS, health),
+        (2, topics.ENGINES, String(data=topics.TURN_ON)),
+        (3, state, String(data=topics.OFF)),
+        (4, state, String(data=topics.OFF)),
+        (5, topics.ENGINES, String(data=topics.TURN_ON)),
+        (6, topics.DIAGNOSTICS, health),
+    ):
+        data, at = serialize_message(message), second * SECOND
+        recorder.message(topic.full_name("/"), topic.type_name, "", data, at, at)
+    recorder.close()
+    record = load(path)
+    assert (record.begin, record.end) == (4 * SECOND, 5 * SECOND)
+
+
+def test_parameters_are_those_that_the_health_shows(tmp_path: Path) -> None:
+    """The play is that of a watchdog with a silence of three seconds."""
+
+    def shown(topic: str, it: Received) -> Received:
+        if topic != topics.DIAGNOSTICS.name:
+            return it
+        message = deserialize_message(it.data, DiagnosticArray)
+        for status in message.status:
+            if status.name == "/operator_watchdog":
+                status.values = [*status.values, KeyValue(key="parameter silence", value="1.0")]
+        return it._replace(data=serialize_message(message))
+
+    done = replay(derived(tmp_path / "shown.mcap", shown))
+    assert verdicts(done)["operator_activity"] == "DIFFERENT"
+
+
+def test_whole_part_of_a_record_without_an_end_is_replayed(tmp_path: Path) -> None:
+    path = tmp_path / "cut.mcap"
+    path.write_bytes(PLAY.read_bytes()[:-10])
+    done = replay(path)
+    assert (done.returncode, done.stderr) == (0, ""), done.stdout
+    assert done.stdout.startswith(f"{path} has no end: its ")
 
 
 def test_command_with_a_bad_record_says_so_and_writes_nothing(tmp_path: Path) -> None:
@@ -156,8 +324,7 @@ def test_command_with_a_bad_record_says_so_and_writes_nothing(tmp_path: Path) ->
     record.write_bytes(b"Dear arm,\n")
     done = replay(record)
     assert done.returncode == 2
-    assert done.stderr.startswith(f"{record} is not a complete MCAP: ")
-    assert done.stderr.count("\n") == 1
+    assert done.stderr == f"{record} is no MCAP file\n"
     assert list(tmp_path.iterdir()) == [record]
 
 
@@ -191,6 +358,25 @@ def test_turn_off_belongs_to_the_watchdog_while_it_misses_the_operator() -> None
     people, watchdog = chains.commands(record, "/")
     assert [message.sent / SECOND for message in people] == [2.0, 6.0, 9.0]
     assert [message.sent / SECOND for message in watchdog] == [5.001, 7.0]
+
+
+def test_turn_off_at_the_begin_belongs_to_the_watchdog_that_was_silent() -> None:
+    activity = text((8.0, topics.ALIVE))
+    sent = text((0.5, topics.TURN_OFF), (7.5, topics.TURN_OFF), (9.0, topics.TURN_OFF))
+    record = Record(0, 10 * SECOND, 0, {"/operator_activity": activity, "/engines": sent})
+    people, watchdog = chains.commands(record, "/")
+    assert [message.sent / SECOND for message in people] == [9.0]
+    assert [message.sent / SECOND for message in watchdog] == [0.5, 7.5]
+
+
+def test_only_latched_messages_from_before_the_arm_are_heard() -> None:
+    old = Message(4 * SECOND, serialize_message(Float64(data=1.0)))
+    commands = text((4.0, topics.TURN_ON), (6.0, topics.TURN_ON))
+    record = Record(5 * SECOND, 10 * SECOND, 0, {"/l1": [old], "/engines": commands})
+    (_, lengths), *_ = chains.inputs(record, "/", ("kinematics",))
+    assert lengths == [old]
+    (_, heard), _ = chains.inputs(record, "/", ("engine_controller",))
+    assert heard == commands[1:]
 
 
 def transforms(at: float, *arms: str) -> Message:
