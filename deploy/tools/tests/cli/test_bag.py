@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 import yaml
+from click.testing import CliRunner
 from mcap.reader import make_reader
 from rosbags.highlevel import AnyReader
 
@@ -20,6 +21,7 @@ from geometry_msgs.msg import PointStamped
 from mcap_files import FileWriter, McapFile
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import serialize_message
+from ros2cli.commands.bag_play import play
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import String
 
@@ -260,6 +262,14 @@ def test_bad_message_does_not_end_a_play(
 def test_options_outside_of_the_bag_play_nothing(ros2: Any, tmp_path: Path, options: str) -> None:
     done = ros2("bag", "play", str(played(GOOD, tmp_path / "bag.mcap")), *options.split())
     assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.parametrize("option", ["--start-offset", "--playback-duration", "--rate", "--clock", "--delay"])
+@pytest.mark.parametrize("value", ["inf", "nan"])
+def test_options_are_finite(option: str, value: str) -> None:
+    done = CliRunner().invoke(play, [__file__, option, value])
+    assert done.exit_code == 2
+    assert f"{option}': {value!r} is not finite." in done.output
 
 
 def test_clock_begins_after_the_delay_which_comes_once(

@@ -13,7 +13,7 @@ import click
 from ros2cli import graph, rosbag2
 from ros2cli.options import (
     NON_NEGATIVE_INT,
-    POSITIVE_FLOAT,
+    FiniteFloat,
     ManyValues,
     VerbWithManyValues,
     bag_argument,
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from rclpy.publisher import Publisher
     from rclpy.qos import QoSProfile
 
+_POSITIVE = FiniteFloat(min=0, min_open=True)
 _MATCHING_TIME = 0.5
 """How long the subscriptions that it has found may take to match before it plays [s]."""
 
@@ -35,7 +36,7 @@ _MATCHING_TIME = 0.5
 @click.command(cls=VerbWithManyValues)
 @bag_argument
 @click.option(
-    "-r", "--rate", type=POSITIVE_FLOAT, default=1.0, show_default=True, help="Rate at which to play back."
+    "-r", "--rate", type=_POSITIVE, default=1.0, show_default=True, help="Rate at which to play back."
 )
 @click.option("--topics", cls=ManyValues, metavar="TOPIC...", help="Topics to play.")
 @click.option(
@@ -50,7 +51,7 @@ _MATCHING_TIME = 0.5
 @click.option("-m", "--remap", cls=ManyValues, metavar="OLD:=NEW...", help="Topics to be remapped.")
 @click.option(
     "--clock",
-    type=POSITIVE_FLOAT,
+    type=_POSITIVE,
     is_flag=False,
     flag_value=40.0,
     help="Publish to /clock at this frequency in Hz (40 without a value); a recorded /clock is not played.",
@@ -58,17 +59,20 @@ _MATCHING_TIME = 0.5
 @click.option(
     "-d",
     "--delay",
-    type=click.FloatRange(min=0),
+    type=FiniteFloat(min=0),
     default=0.0,
     help="Sleep before the first play, in s.",
 )
-@click.option("--playback-duration", type=float, default=-1.0, help="Playback duration in seconds.")
+@click.option("--playback-duration", type=FiniteFloat(), default=-1.0, help="Playback duration in seconds.")
 @click.option(
-    "--playback-until-sec", type=float, default=-1.0, help="Playback until this time in seconds since epoch."
+    "--playback-until-sec",
+    type=FiniteFloat(),
+    default=-1.0,
+    help="Playback until this time [s since 1970].",
 )
 @click.option("--playback-until-nsec", type=int, default=-1, help="The same in nanoseconds since epoch.")
 @click.option(
-    "--start-offset", type=click.FloatRange(min=0), default=0.0, help="Start this many seconds into the bag."
+    "--start-offset", type=FiniteFloat(min=0), default=0.0, help="Start this many seconds into the bag."
 )
 @click.option(
     "--wait-for-all-acked",
