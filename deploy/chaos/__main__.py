@@ -22,7 +22,7 @@ from deploy.chaos.cost import Cost
 from deploy.chaos.findings import HOLDS, count, overall
 from deploy.chaos.page import page, verdict
 from deploy.chaos.pictures import framed, timeline
-from deploy.chaos.promises import CHECKERS
+from deploy.chaos.promises import CHECKERS, overloads
 from deploy.chaos.report import text
 from deploy.supervision import interruption, processes
 from deploy.supervision.system import DeploymentError, System, make_directory, set_middleware
@@ -93,13 +93,15 @@ def _holds(path: Path, title: str, namespace: str, name: str) -> bool:
     for checker in CHECKERS.values():
         interruption.check()
         findings.append(checker(history))
-    print("\n" + (f"{namespace}\n" if namespace != "/" else "") + text(findings))
+    overloaded = overloads(history, findings)
+    print("\n" + (f"{namespace}\n" if namespace != "/" else "") + f"{overloaded}\n\n{text(findings)}")
     faults = count(len(history.injected), "fault")
     messages = count(sum(map(len, history.streams.values())), "message")
     recorded = time.strftime("%Y-%m-%d %H:%M", time.localtime(path.stat().st_mtime))
     remarks = [
         f"{title} · {faults} · {messages} in {history.end:.0f} s",
         f"{recorded} · {count(os.cpu_count() or 1, 'core')} · {path.name}",
+        overloaded,
     ]
     report = path.with_name(f"{name}{file_suffix(namespace)}.html")
     report.write_text(page(title, remarks, findings, history), encoding="utf-8")

@@ -159,7 +159,13 @@ class History:
 
     def missed(self, begin: float, end: float) -> float:
         """Return how long [s] between two times the observer may have missed messages."""
-        return sum(min(end, f.end) - max(begin, f.begin) for f in self._blind(begin, end))
+        blind = merged((max(begin, f.begin), min(end, f.end)) for f in self._blind(begin, end))
+        return sum(two - one for one, two in blind)
+
+    @property
+    def overloads(self) -> list[tuple[float, float]]:
+        """Begin and end of each time in which the machine or the observer was overloaded."""
+        return merged((fault.begin, fault.end) for fault in self.faults if fault.kind == OVERLOAD)
 
     def _blind(self, begin: float, end: float) -> Iterator[InjectedFault]:
         return (f for f in self.faults if f.kind in (OVERLOAD, LOSS) and f.overlaps(begin, end))
@@ -190,6 +196,17 @@ def gaps(times: Iterable[float], begin: float, end: float) -> Iterable[tuple[flo
         if last < min(time, end):
             yield last, min(time, end)
             last = time
+
+
+def merged(intervals: Iterable[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Return the intervals in order; those that overlap are one. Those that only touch stay apart."""
+    found: list[tuple[float, float]] = []
+    for begin, end in sorted(intervals):
+        if found and begin < found[-1][1]:
+            found[-1] = (found[-1][0], max(found[-1][1], end))
+        else:
+            found.append((begin, end))
+    return found
 
 
 def _outlives(one: Life, two: Life) -> bool:

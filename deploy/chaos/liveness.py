@@ -49,10 +49,12 @@ def output_resumes(history: History) -> Finding:
     evidence, unknown = [], 0
     for fault in _kills(history):
         time = _recovery(history, fault)
-        if time is None or _is_disturbed(history, fault, fault.begin, fault.begin + min(time, SLOWEST)):
+        if (
+            time is None
+            or _is_disturbed(history, fault, fault.begin, fault.begin + min(time, SLOWEST))
+            or any(_paused(history, fault, time, bound) for bound in (MEDIAN, SLOWEST))
+        ):
             unknown += 1
-        elif time > SLOWEST >= time - history.missed(fault.begin, fault.begin + time):
-            unknown += 1  # the whole machine paused
         else:
             times.setdefault(fault.target, []).append(time)
             if time > SLOWEST:
@@ -178,6 +180,7 @@ def hung_is_replaced(history: History) -> Finding:
             or sentinel_was_hit
             or sentinel_was_new
             or _is_disturbed(history, fault, fault.begin, until)
+            or _paused(history, fault, time, HUNG)
         ):
             unknown += 1
             continue
@@ -200,6 +203,11 @@ def _recovery(history: History, fault: InjectedFault) -> float | None:
         return min(following) - begin
     # Silent for good, if the record is long enough to show it.
     return math.inf if history.end - begin > HUNG else None
+
+
+def _paused(history: History, fault: InjectedFault, time: float, bound: float) -> bool:
+    """Return whether a silence after a fault is above a bound only because the whole machine paused."""
+    return time > bound >= time - history.missed(fault.begin, fault.begin + time)
 
 
 def _death(history: History, fault: InjectedFault) -> float:

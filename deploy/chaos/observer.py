@@ -27,7 +27,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 
 from deploy.chaos.history import LOSS, NO_TARGET, OVERLOAD, InjectedFault, Life
-from deploy.chaos.process_monitor import ProcessMonitor
+from deploy.chaos.process_monitor import SCAN_PERIOD, ProcessMonitor, Rounds
 from deploy.chaos.record import FAULTS, PROCESSES
 from deploy.recording.recorder import Recorder, clocks, record
 from reactive_node import ReactiveNode
@@ -48,9 +48,18 @@ def _on_thread(work: Callable[[threading.Event], None]) -> Iterator[None]:
 
 @contextmanager
 def _recording(
-    namespace: str, domain: int, recorder: Recorder, lost: Callable[[float, float], None]
+    namespace: str,
+    domain: int,
+    recorder: Recorder,
+    lost: Callable[[float, float], None],
+    overload: Callable[[float, float], None],
 ) -> Iterator[None]:
-    """Record the messages of an arm on a thread; print `seen NAME` at the first message of each topic."""
+    """
+    Record the messages of an arm on a thread; print `seen NAME` at the first message of each topic.
+
+    :param lost: receives begin and end of each time in which messages to the observer were lost.
+    :param overload: receives begin and end of each time in which the thread was not scheduled.
+    """
     context = Context()
     rclpy.init(args=[], context=context, domain_id=domain, signal_handler_options=SignalHandlerOptions.NO)
     executor = SingleThreadedExecutor(context=context)
@@ -59,8 +68,10 @@ def _recording(
     record(node, recorder, _report_first, lost)
 
     def spin(ended: threading.Event) -> None:
+        rounds = Rounds(overload)
         while not ended.is_set():
-            executor.spin_once(timeout_sec=0.1)
+            executor.spin_once(timeout_sec=SCAN_PERIOD)
+            rounds.note(time.monotonic())
 
     with _on_thread(spin):
         yield
@@ -96,12 +107,11 @@ def main(arguments: list[str]) -> int:
     def blind(kind: str, begin: float, end: float) -> None:
         write(FAULTS, InjectedFault(kind, NO_TARGET, begin, end)._asdict(), "begin", "end")
 
-    monitor = ProcessMonitor(
-        {Path(run): namespace for namespace, _, run in arms}, report, partial(blind, OVERLOAD)
-    )
+    lost, overload = partial(blind, LOSS), partial(blind, OVERLOAD)
+    monitor = ProcessMonitor({Path(run): namespace for namespace, _, run in arms}, report, overload)
     with ExitStack() as stack:
         for namespace, domain, _ in arms:
-            stack.enter_context(_recording(namespace, int(domain), recorder, partial(blind, LOSS)))
+            stack.enter_context(_recording(namespace, int(domain), recorder, lost, overload))
         stack.enter_context(_on_thread(monitor.run))
         stack.enter_context(_on_thread(partial(_save, recorder)))
         stack.callback(recorder.close)  # first, and for all arms at once: shutting the nodes down takes time

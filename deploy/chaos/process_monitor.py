@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import select
 import threading
@@ -17,6 +18,21 @@ STALL = 0.1  # s; a round that takes longer shows that the machine is overloaded
 SCAN_PERIOD = 0.02  # s
 NAMING_TIMEOUT = 0.5  # s within which a new process shows its program
 FORK_TIME = 0.2  # s for which a child of supervisord may look like supervisord
+
+
+class Rounds:
+    """The rounds of a loop that never takes long, unless its thread is not scheduled."""
+
+    def __init__(self, overload: Callable[[float, float], None]) -> None:
+        """:param overload: receives begin and end of each round that takes longer than :data:`STALL`."""
+        self._overload = overload
+        self._last = math.inf
+
+    def note(self, now: float) -> None:
+        """Note the end of a round [s]."""
+        if now - self._last > STALL:
+            self._overload(self._last, now)
+        self._last = now
 
 
 class ProcessMonitor:
@@ -35,7 +51,7 @@ class ProcessMonitor:
         """
         self._namespaces = {str(run): namespace for run, namespace in runs.items()}
         self._report = report
-        self._overload = overload
+        self._rounds = Rounds(overload)
         self._poll = select.poll()
         self._known: set[int] = set()
         self._pending: dict[int, float] = {}  # new processes that do not show their program yet, since when
@@ -43,14 +59,12 @@ class ProcessMonitor:
 
     def run(self, ended: threading.Event) -> None:
         """Monitor until an event is set."""
-        before = time.monotonic()
+        self._rounds.note(time.monotonic())
         while not ended.is_set():
             self.scan()
             for handle, _ in self._poll.poll(SCAN_PERIOD * 1000):
                 self._end(handle, time.monotonic())
-            if (now := time.monotonic()) - before > STALL:
-                self._overload(before, now)
-            before = now
+            self._rounds.note(time.monotonic())
         for handle in list(self._alive):
             os.close(handle)
 

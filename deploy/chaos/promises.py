@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 from deploy.chaos import liveness, safety
-from deploy.chaos.findings import Finding
-from deploy.chaos.history import History
+from deploy.chaos.findings import Finding, count
+from deploy.chaos.history import OVERLOAD, History
 
 CHECKERS: dict[str, Callable[[History], Finding]] = {
     "S1": safety.engines_off_in_time,
@@ -22,6 +23,24 @@ CHECKERS: dict[str, Callable[[History], Finding]] = {
 
 DURATIONS = {"L1": "Silence after SIGKILL [s]", "L4": "Silence after a hang [s]"}
 """The titles of the durations that a finding on these promises lists."""
+
+
+def overloads(history: History, findings: Sequence[Finding]) -> str:
+    """Return how often the machine or the observer was overloaded, and which verdicts that weakens."""
+    intervals = history.overloads
+    if not intervals:
+        return "No overload of the machine or the observer"
+    rested = replace(history, faults=[fault for fault in history.faults if fault.kind != OVERLOAD])
+    weaker = [each.promise for each in findings if _cases(CHECKERS[each.promise](rested)) != _cases(each)]
+    seconds = sum(end - begin for begin, end in intervals)
+    return (
+        f"{count(len(intervals), 'overload')} of the machine or the observer, {seconds:.1f} s in all; "
+        f"weakened verdicts: {', '.join(weaker) or 'none'}"
+    )
+
+
+def _cases(finding: Finding) -> tuple[object, ...]:
+    return finding.cases, finding.unknown, finding.evidence
 
 
 def meaning(promise: str) -> str:

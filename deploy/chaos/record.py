@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,12 +14,26 @@ from rclpy.serialization import deserialize_message
 from std_msgs.msg import String
 
 from deploy.chaos.babbler import is_babble
-from deploy.chaos.history import History, InjectedFault, Life, Sample
+from deploy.chaos.history import (
+    BAD_LINE,
+    LOSS,
+    NO_TARGET,
+    OVERLOAD,
+    PARTITION,
+    REDISCOVERY,
+    History,
+    InjectedFault,
+    Life,
+    Sample,
+    merged,
+)
 from deploy.recording.recorder import METADATA
 from deploy.supervision.system import DeploymentError
 from interfaces import topics
 
 PROCESSES, FAULTS = "/chaos/processes", "/chaos/faults"  # topics
+LATE = 0.1  # s between sending and reception of a message; above it, machine or observer are overloaded
+MATCHED = 2.0  # s from the start of a process until every reader knows its publishers
 EARLY = 0.001  # s by which a message may seem to be sent after its reception: clocks are read one by one
 
 
@@ -76,11 +91,47 @@ def load(path: Path, namespace: str = "/") -> History:
     offsets = {0.0, *(fault.ahead for fault in faults)}
     for name, samples in streams.items():
         streams[name] = sorted(s._replace(sent=time_sent(s.received, s.sent, offsets)) for s in samples)
-    return History(
+    history = History(
         end,
         streams,
         sorted(lives.values(), key=lambda life: life.began),
         sorted(faults, key=lambda f: f.begin),
+    )
+    overloads = [InjectedFault(OVERLOAD, NO_TARGET, *each) for each in late_receptions(history)]
+    return replace(history, faults=sorted([*history.faults, *overloads], key=lambda f: f.begin))
+
+
+def late_receptions(history: History) -> list[tuple[float, float]]:
+    """
+    Return the times in which a message waited for the observer, or for its sender: an overload.
+
+    Messages that a fault of the network may have delayed do not count, nor those of a publisher that the
+    observer may not have discovered yet.
+    """
+    lines = [
+        (fault.begin, fault.end + REDISCOVERY)
+        for fault in history.faults
+        # A loss that lasts beyond the record was planned: DDS sends again what was lost.
+        if fault.kind in (PARTITION, BAD_LINE) or (fault.kind == LOSS and fault.end > history.end)
+    ]
+    late = (
+        (sample.sent, sample.received)
+        for topic in topics.CONTRACT
+        for sample in history.stream(topic)
+        if sample.received - sample.sent > LATE and not _is_new(history, topic, sample)
+    )
+    return merged(
+        (sent, received)
+        for sent, received in late
+        if not any(begin < received and sent < end for begin, end in lines)
+    )
+
+
+def _is_new(history: History, topic: topics.Topic, sample: Sample) -> bool:
+    """Return whether the observer may not have known the publisher of a message when that was sent."""
+    programs = topic.publishers if topic is not topics.DIAGNOSTICS else sample.value[:1]
+    return any(
+        life.program in programs and life.began < sample.sent < life.began + MATCHED for life in history.lives
     )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from bisect import bisect_left, bisect_right
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from operator import itemgetter
 
 from deploy.chaos.clock import SPREAD, STEP
@@ -26,6 +26,7 @@ from deploy.chaos.history import (
     between,
     gaps,
     last_sent,
+    merged,
 )
 from deploy.chaos.positions import LONGEST_PAUSE, PublishedValues, may_have_missed_values
 from interfaces import topics
@@ -44,24 +45,34 @@ STARTING = 2.0  # s within which a process has become an instance, or has ended 
 def engines_off_in_time(history: History) -> Finding:
     """S1: engines are off at most 10.5 s after the operator's last sign of life."""
     alive = [s.sent for s in history.signs_of_life()]
-    evidence, longest, cases = [], 0.0, 0
+    evidence, longest, cases, unknown = [], 0.0, 0, 0
     on = list(running(history))
+    overloads = history.overloads
     for begin, end in gaps(alive, -math.inf, history.end):
-        late = on[bisect_right(on, begin, key=itemgetter(1)) : bisect_left(on, end, key=itemgetter(0))]
+        late = _overlapping_part(on, begin, end)
         if not late:
             continue
-        if begin == -math.inf:
+        # The observer may have missed the last sign of life in an overload: then the silence began later.
+        observed = (
+            (min(part[-1][1], two) - one, one)
+            for one, two in _between(overloads, begin, end)
+            if (part := _overlapping_part(on, one, two))
+        )
+        lasted, since = max(observed, default=(0.0, begin))
+        if since == -math.inf:
             evidence.append(Evidence(late[0][0], "engines on before the operator's first sign of life"))
             continue
-        last = min(late[-1][1], end)
-        longest = max(longest, last - begin)
+        if lasted <= OFF_WITHIN < min(late[-1][1], end) - begin:
+            unknown += 1
+            continue
+        longest = max(longest, lasted)
         # The silence exercises the promise if it lasts until the engines are off.
         cases += late[-1][1] < end and end - begin > MAX_PRESENCE_AGE
-        if last - begin > OFF_WITHIN:
-            text = f"engines still on {last - begin:.2f} s after the operator's last sign of life"
-            evidence.append(Evidence(begin + OFF_WITHIN, text))
+        if lasted > OFF_WITHIN:
+            text = f"engines still on {lasted:.2f} s after the operator's last sign of life"
+            evidence.append(Evidence(since + OFF_WITHIN, text))
     measured = f"off within {longest:.2f} s, allowed {OFF_WITHIN} s"
-    return Finding("S1", cases, measured, evidence, worst=longest)
+    return Finding("S1", cases, measured, evidence, unknown, worst=longest)
 
 
 def engines_stay_on(history: History) -> Finding:
@@ -158,6 +169,26 @@ def running(history: History) -> Iterator[tuple[float, float]]:
             yield state.sent, min(following.sent if following else history.end, state.sent + DRIVE_TIMEOUT)
 
 
+def _overlapping_part(
+    intervals: Sequence[tuple[float, float]], begin: float, end: float
+) -> Sequence[tuple[float, float]]:
+    """Return the intervals, of those in order, that overlap the one from ``begin`` to ``end``."""
+    first = bisect_right(intervals, begin, key=itemgetter(1))
+    return intervals[first : bisect_left(intervals, end, key=itemgetter(0))]
+
+
+def _between(
+    intervals: Sequence[tuple[float, float]], begin: float, end: float
+) -> Iterator[tuple[float, float]]:
+    """Yield the parts of the time from ``begin`` to ``end`` that lie between the intervals."""
+    for one, two in _overlapping_part(intervals, begin, end):
+        if begin < one:
+            yield begin, one
+        begin = two
+    if begin < end:
+        yield begin, end
+
+
 def _starts(history: History) -> Iterator[tuple[float, Sample]]:
     """Yield each `on` that starts the engines, with the time since when they stood still."""
     stopped = -math.inf
@@ -213,19 +244,9 @@ def _strikes(history: History, time: float) -> float:
     begin = max((t for t in heartbeats if t <= since), default=0.0)
     # A suspended watchdog receives no heartbeat either; S2 does not cover that.
     deaf = [(max(one, begin), min(two, time)) for one, two in _deaf(history) if one < time and two > begin]
-    silences = _merged([*gaps(heartbeats, begin, time), *deaf])
+    # Intervals that only touch have a heartbeat in between.
+    silences = merged([*gaps(heartbeats, begin, time), *deaf])
     return sum((end - begin + SAMPLING) // STRIKE for begin, end in silences)
-
-
-def _merged(intervals: Iterable[tuple[float, float]]) -> list[tuple[float, float]]:
-    """Join intervals that overlap. Those that only touch stay apart: a heartbeat lies between them."""
-    merged: list[tuple[float, float]] = []
-    for begin, end in sorted(intervals):
-        if merged and begin < merged[-1][1]:
-            merged[-1] = (merged[-1][0], max(merged[-1][1], end))
-        else:
-            merged.append((begin, end))
-    return merged
 
 
 def _abandoned(history: History, off: Sample) -> bool:

@@ -24,7 +24,7 @@ from deploy.chaos.arm import Arm
 from deploy.chaos.babbler import BABBLER
 from deploy.chaos.faults import FAULT_KINDS, PARAMETERS, Undo
 from deploy.chaos.history import ALL, NO_TARGET, Life
-from deploy.chaos.process_monitor import ProcessMonitor
+from deploy.chaos.process_monitor import ProcessMonitor, Rounds
 from deploy.supervision import processes
 from deploy.supervision.system import ALL as ALL_NODES
 from deploy.supervision.system import KEY, NAMESPACE, System
@@ -234,6 +234,14 @@ def test_a_stall_while_an_end_is_reported_is_an_overload(
     monkeypatch.setattr(process_monitor, "time", SimpleNamespace(**vars(time)))
     monkeypatch.setattr(process_monitor.time, "monotonic", lambda: monotonic() + ahead)
     assert max(run_until_end(arm, velocity, stall), default=0.0) >= 60.0
+
+
+def test_a_late_round_is_an_overload() -> None:
+    late: list[tuple[float, float]] = []
+    rounds = Rounds(lambda begin, end: late.append((begin, end)))
+    for now in (1.0, 1.09, 1.2, 1.25, 4.0):
+        rounds.note(now)
+    assert late == [(1.09, 1.2), (1.25, 4.0)]
 
 
 def test_a_process_that_is_reaped_while_it_is_found_leaves_no_handle(

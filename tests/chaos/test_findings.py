@@ -111,6 +111,49 @@ def test_s1_evidence_has_the_moment_of_the_violation() -> None:
     )
 
 
+@pytest.mark.parametrize(
+    ("overloads", "off", "lasted"),
+    [
+        ([], 12.5, 10.5),
+        ([], 12.75, 10.75),
+        ([overload(2.0, 2.5)], 13.0, 10.5),  # in it, the last sign of life may have been missed
+        ([overload(2.0, 2.5)], 13.25, 10.75),
+        ([overload(2.25, 2.5)], 13.25, 10.75),
+        ([overload(6.0, 6.5), overload(6.25, 7.0)], 17.0, 10.0),
+        ([overload(6.0, 7.0)], 17.75, 10.75),
+        ([overload(12.0, 12.25)], 12.75, 10.0),
+        ([overload(12.5, 12.75)], 12.75, 10.5),
+        ([overload(12.625, 13.0)], 12.75, 10.625),
+    ],
+)
+def test_s1_silence_begins_after_an_overload_at_the_latest(
+    overloads: list[InjectedFault], off: float, lasted: float
+) -> None:
+    found = CHECKERS["S1"](
+        history(heartbeats=[(2.0, True)], states=engines((2.0, ON), (off, OFF)), faults=overloads)
+    )
+    is_late, is_known = lasted > 10.5, lasted > 10.5 or off <= 12.5
+    assert [each.text for each in found.evidence] == (
+        [f"engines still on {lasted:.2f} s after the operator's last sign of life"] if is_late else []
+    )
+    assert all(each.time == off - lasted + 10.5 for each in found.evidence if not overloads)
+    assert (found.cases, found.unknown) == ((1, 0) if is_known else (0, 1))
+    assert found.worst == (lasted if is_known else 0.0)
+
+
+def test_s1_first_sign_of_life_may_have_been_missed_in_an_overload() -> None:
+    states = engines((3.0, ON), (13.25, OFF))
+    found = [
+        CHECKERS["S1"](history(heartbeats=[(30.0, True)], states=states, faults=[each]))
+        for each in (overload(2.0, 2.75), overload(2.0, 2.5), overload(3.5, 4.0))
+    ]
+    assert [(each.cases, each.unknown) for each in found] == [(0, 1), (1, 0), (0, 0)]
+    assert found[1].evidence == [
+        Evidence(13.0, "engines still on 10.75 s after the operator's last sign of life")
+    ]
+    assert found[2].evidence == [Evidence(3.0, "engines on before the operator's first sign of life")]
+
+
 # S2
 
 PRESENT = {"heartbeats": steps(0, 40), "presences": steps(0, 40, 0.5)}
@@ -430,6 +473,13 @@ def test_l1_slow_median_is_evidence_of_no_moment() -> None:
     assert found.evidence == [Evidence(0.0, "config_l1: the median silence after SIGKILL is 1.50 s")]
 
 
+@pytest.mark.parametrize(("end", "unknown"), [(11.25, 0), (11.5, 1)])
+def test_l1_pause_of_the_machine_slows_no_median(end: float, unknown: int) -> None:
+    faults = [*kill("config_l1", 10.0), overload(11.0, end)]
+    found = CHECKERS["L1"](history(l1=back((10.0, 1.5)), faults=faults))
+    assert (found.cases, found.unknown) == (1 - unknown, unknown)
+
+
 def test_l1_slowest_of_a_hundred_is_not_in_p99() -> None:
     times = [4.0 * n for n in range(1, 101)]
     output = [(at - 0.5, 0.0) for at in times] + [(at + (1.5 if at == 4.0 else 0.375), 0.0) for at in times]
@@ -681,6 +731,13 @@ def test_l4_counts_hangs_that_last() -> None:
         {"config_l1": [5.0], "config_l2": [5.5]},
         5.5,
     )
+
+
+@pytest.mark.parametrize(("end", "unknown"), [(11.375, 0), (11.5, 1), (12.0, 1)])
+def test_l4_is_unknown_if_only_a_pause_of_the_machine_made_it_late(end: float, unknown: int) -> None:
+    faults = [stopped("config_l1", 10.0, 20.0), overload(11.0, end)]
+    found = CHECKERS["L4"](history(l1=back((10.0, 5.5)), faults=faults))
+    assert (found.cases, found.unknown, len(found.evidence)) == (1 - unknown, unknown, 1 - unknown)
 
 
 @pytest.mark.parametrize(

@@ -21,6 +21,7 @@ from deploy.chaos.history import (
     Sample,
     between,
     gaps,
+    merged,
     target_name,
 )
 from deploy.chaos.liveness import STREAMS
@@ -131,6 +132,19 @@ def test_observer_misses_messages_by_overload_and_loss() -> None:
     assert not history.may_have_missed(3.0, 5.0)
     assert history.may_have_missed(2.5, 4.0)
     assert history.injected == faults[2:]
+    assert history.overloads == [(1.0, 3.0)]
+    again = [InjectedFault("overload", NO_TARGET, 2.0, 4.0), InjectedFault("loss", NO_TARGET, 3.5, 4.5)]
+    history = History(10.0, faults=[*faults, *again])
+    assert history.missed(0.0, 4.75) == 3.5
+    assert history.overloads == [(1.0, 4.0)]
+
+
+def test_merged_intervals_that_touch_stay_apart() -> None:
+    assert merged([(4.0, 5.0), (1.0, 3.0), (2.0, 2.5), (2.9, 4.0), (5.0, 6.0)]) == [
+        (1.0, 4.0),
+        (4.0, 5.0),
+        (5.0, 6.0),
+    ]
 
 
 @pytest.mark.parametrize(

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.serialization import serialize_message
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
-from std_msgs.msg import Float64
+from std_msgs.msg import Bool, Float64, String
 
 from deploy.chaos.clock import STEP
 from deploy.chaos.history import NO_TARGET, InjectedFault, Life
@@ -126,6 +128,78 @@ def test_times_of_a_stepped_arm_are_those_of_the_machine(tmp_path: Path) -> None
     recorder.close()
     speeds = load(path).stream(topics.EFFECTOR_SPEED)
     assert [speed.sent for speed in speeds] == pytest.approx(range(10), abs=1e-6)
+
+
+def overloads_of(path: Path, lateness: float, *events: Life | InjectedFault) -> list[tuple[float, float]]:
+    """Record a speed each second, of which the one of second 10 is late [s]; return the overloads."""
+    recorder = Recorder(path, 0, 10**18)
+    for event in events:
+        topic = PROCESSES if isinstance(event, Life) else FAULTS
+        recorder.event(topic, 1, event._asdict() | {"namespace": "/"})
+    data = serialize_message(Float64(data=1.5))
+    for second in range(20):
+        sent = second * 10**9
+        received = sent + (int(lateness * 1e9) if second == 10 else 2_000_000)
+        recorder.message("/effector/speed", topics.EFFECTOR_SPEED.type_name, "", data, received, sent)
+    recorder.close()
+    return [(round(begin, 6), round(end, 6)) for begin, end in load(path).overloads]
+
+
+@pytest.mark.parametrize(
+    ("lateness", "overloads"), [(0.09, []), (0.11, [(10.0, 10.11)]), (3.0, [(10.0, 13.0)])]
+)
+def test_late_reception_is_an_overload(
+    lateness: float, overloads: list[tuple[float, float]], tmp_path: Path
+) -> None:
+    assert overloads_of(tmp_path / "record.mcap", lateness) == overloads
+
+
+@pytest.mark.parametrize(
+    ("event", "number"),
+    [
+        (Life("velocity", 7, 8.1, None), 0),  # the observer may not have known it yet
+        (Life("velocity", 7, 7.9, None), 1),
+        (Life("kinematics", 7, 9.0, None), 1),
+        (InjectedFault("partition", "operator", 5.0, 9.0), 0),
+        (InjectedFault("partition", "operator", 10.6, 11.0), 1),
+        (InjectedFault("bad_line", "operator", 5.0, 12.0), 0),
+        (InjectedFault("loss", NO_TARGET, 0.0, 30.0), 0),  # --loss
+        (InjectedFault("loss", NO_TARGET, 9.0, 11.0), 1),  # part of the overload
+        (InjectedFault("stop", "velocity", 9.0, 11.0), 1),
+    ],
+)
+def test_late_reception_by_discovery_or_network_is_no_overload(
+    event: Life | InjectedFault, number: int, tmp_path: Path
+) -> None:
+    assert len(overloads_of(tmp_path / "record.mcap", 0.5, event)) == number
+
+
+def test_observer_that_received_nothing_for_a_while_blames_nobody(tmp_path: Path) -> None:
+    path = tmp_path / "record.mcap"
+    recorder = Recorder(path, 0, 10**18)
+
+    def record(topic: topics.Topic, message: Any, sent: float, received: float) -> None:
+        name, times = topic.full_name("/"), (int(received * 1e9), int(sent * 1e9))
+        recorder.message(name, topic.type_name, "", serialize_message(message), *times)
+
+    recorder.event(PROCESSES, 1, ONE._asdict() | {"namespace": "/"})
+    record(topics.ENGINES, String(data=topics.TURN_ON), 0.95, 0.951)
+    for step in range(10, 60):
+        now = step / 10
+        is_deaf = 3.0 <= now < 3.8
+        if not is_deaf:  # during it, samples with a lifespan expire
+            record(topics.OPERATOR_HEARTBEAT, Bool(data=True), now, now + 0.001)
+            record(topics.ENGINES_STATE, String(data=topics.ON), now, now + 0.001)
+        record(topics.EFFECTOR_SPEED, Float64(data=1.0), now, 3.8 if is_deaf else now + 0.001)
+    recorder.close()
+    done = replay(path)
+    assert done.returncode == 0
+    assert done.stdout.startswith(
+        "\n1 overload of the machine or the observer, 0.8 s in all; weakened verdicts: S3\n\n"
+    )
+    (row,) = (line for line in done.stdout.splitlines() if line.startswith("S3"))
+    assert re.search(r"holds +1 +1 ", row)
+    assert "weakened verdicts: S3" in (tmp_path / "replay.html").read_text(encoding="utf-8")
 
 
 def test_violation_is_reported_with_evidence_and_exit_code_1(tmp_path: Path) -> None:

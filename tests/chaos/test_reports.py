@@ -11,7 +11,7 @@ from deploy.chaos.findings import Finding, count, how_often
 from deploy.chaos.history import ALL, NO_TARGET, History, InjectedFault
 from deploy.chaos.page import page
 from deploy.chaos.pictures import framed, timeline
-from deploy.chaos.promises import CHECKERS
+from deploy.chaos.promises import CHECKERS, overloads
 from deploy.chaos.report import text
 
 from .histories import END, faulty, good, killed, silent, with_value
@@ -60,6 +60,23 @@ def test_numbers_and_nouns_agree() -> None:
     history = with_value(killed(good(), "engine_controller", 30.0, 0.6), "engines/state", "off", 30.5)
     assert CHECKERS["S2"](history).measured == "0 kills while on; turned off once for a permitted reason"
     assert CHECKERS["S3"](history).measured.startswith("turned on once, ")
+
+
+def test_head_names_the_overloads_and_the_verdicts_that_they_weaken() -> None:
+    history = silent(killed(good(), "kinematics", 20.0, 2.4), "engines/state", 40.0, 41.5)
+    findings = [check(history) for check in CHECKERS.values()]
+    assert overloads(history, findings) == "No overload of the machine or the observer"
+    assert [each.promise for each in findings if each.evidence] == ["S3", "L1"]
+    for faults, head in (
+        ([(50.0, 50.5)], "1 overload of the machine or the observer, 0.5 s in all; weakened verdicts: none"),
+        (
+            [(21.0, 21.5), (21.25, 21.75), (40.25, 41.5)],
+            "2 overloads of the machine or the observer, 2.0 s in all; weakened verdicts: S3, L1",
+        ),
+    ):
+        overloaded = faulty(history, *(InjectedFault("overload", NO_TARGET, *each) for each in faults))
+        findings = [check(overloaded) for check in CHECKERS.values()]
+        assert overloads(overloaded, findings) == head
 
 
 def test_durations_have_a_title_and_percentiles() -> None:
