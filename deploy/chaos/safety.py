@@ -30,7 +30,7 @@ from deploy.chaos.history import (
 )
 from deploy.chaos.positions import LONGEST_PAUSE, PublishedValues, may_have_missed_values
 from interfaces import topics
-from interfaces.topics import DRIVE_TIMEOUT, OFF, ON, TURN_OFF, TURN_ON
+from interfaces.topics import DRIVE_TIMEOUT, INCAPACITATED, OFF, ON, TURN_OFF, TURN_ON
 
 OFF_WITHIN = 10.5  # s, S1
 MAX_PRESENCE_AGE = 1.0  # s, S3
@@ -222,11 +222,22 @@ def _was_present(history: History, time: float) -> bool:
 
 
 def _commanded(history: History, off: Sample) -> bool:
-    """Return whether the watchdog commanded `turn_off` just before, after as many strikes as that takes."""
+    """
+    Return whether `turn_off` was commanded just before.
+
+    The watchdog needs as many strikes for it as that takes; the other publishers of the contract need none.
+    """
     commands = [s for s in history.stream(topics.ENGINES) if s.value == TURN_OFF]
-    if not between(commands, off.sent - _transport(history, off.sent), off.sent + 0.01):
-        return False
-    return _strikes(history, off.sent) >= STRIKES
+    just_before = between(commands, off.sent - _transport(history, off.sent), off.sent + 0.01)
+    if not all(_is_of_watchdog(history, command) for command in just_before):
+        return True
+    return bool(just_before) and _strikes(history, off.sent) >= STRIKES
+
+
+def _is_of_watchdog(history: History, command: Sample) -> bool:
+    """Return whether the watchdog commanded `turn_off`: it publishes its conclusion before that."""
+    conclusion = last_sent(history.stream(topics.OPERATOR_ACTIVITY), command.sent)
+    return conclusion is None or conclusion.value == INCAPACITATED
 
 
 def _transport(history: History, time: float) -> float:
@@ -237,7 +248,11 @@ def _transport(history: History, time: float) -> float:
 
 def _strikes(history: History, time: float) -> float:
     """Return how many strikes the watchdog may have counted since its start or its last command."""
-    commands = (s.sent for s in history.stream(topics.ENGINES) if s.value == TURN_OFF and s.sent < time - 1.0)
+    commands = (
+        s.sent
+        for s in history.stream(topics.ENGINES)
+        if s.value == TURN_OFF and s.sent < time - 1.0 and _is_of_watchdog(history, s)
+    )
     starts = (life.began for life in history.lives_of(WATCHDOG) if life.began < time)
     since = max([*commands, *starts], default=0.0)
     heartbeats = [s.sent for s in history.signs_of_life()]

@@ -27,12 +27,13 @@ from deploy.chaos.history import (
 )
 from deploy.chaos.promises import CHECKERS
 from deploy.chaos.safety import PRESENCE_TIMEOUT, SAMPLING, TRANSPORT
-from interfaces.topics import DRIVE_TIMEOUT, OFF, ON, TURN_OFF, TURN_ON
+from interfaces.topics import ALIVE, DRIVE_TIMEOUT, INCAPACITATED, MISSED, OFF, ON, TURN_OFF, TURN_ON
 
 TOPICS = {
     "heartbeats": "operator_heartbeat",
     "presences": "operator_presence",
     "commands": "engines",
+    "conclusions": "operator_activity",
     "states": "engines/state",
     "positions": "effector/position",
     "speeds": "effector/speed",
@@ -253,6 +254,27 @@ def suspended_with_a_presence_at(time: float) -> dict[str, Any]:
                 "heartbeats": heard_but_in((8.0, 11.0), (12.0, 15.0), (15.0, 18.0)),
             },
             False,
+        ),
+        # another publisher commanded it: the watchdog has not concluded that the operator is away
+        ({"commands": [(20.0, TURN_OFF)], "conclusions": [(1.0, ALIVE), (19.0, MISSED)]}, True),
+        ({"commands": [(20.0, TURN_ON)], "conclusions": [(1.0, ALIVE)]}, False),
+        ({"commands": [(20.5, TURN_OFF)], "conclusions": [(1.0, ALIVE)]}, False),
+        ({"commands": [(20.0, TURN_OFF)], "conclusions": [(20.0, INCAPACITATED)]}, False),
+        ({"commands": [(20.0, TURN_OFF)], "conclusions": [(20.25, INCAPACITATED)]}, False),
+        (
+            {
+                "commands": [(19.875, TURN_OFF), (20.0, TURN_OFF)],
+                "conclusions": [(1.0, ALIVE), (20.0, INCAPACITATED)],
+            },
+            True,
+        ),
+        (
+            COMMANDED
+            | {
+                "commands": [(18.5, TURN_OFF), (20.0, TURN_OFF)],  # the first one ends no strikes
+                "conclusions": [(1.0, ALIVE), (20.0, INCAPACITATED)],
+            },
+            True,
         ),
         # a bad line delays the command
         (COMMANDED | {"commands": [(19.75, TURN_OFF)]}, False),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Callable, Sequence
@@ -14,7 +15,7 @@ from rclpy_simulation.host import BOOT, SECOND
 
 from deploy.chaos import schedule
 from deploy.chaos.history import ALL, NO_TARGET, OPERATOR
-from deploy.chaos.schedule import DAY, PlannedFault
+from deploy.chaos.schedule import AWAKE, DAY, PlannedFault
 from deploy.chaos.schedule_file import Shift
 from deploy.chaos.testbed import SCENARIO, sources
 from deploy.simulation import arm, people, plan
@@ -127,6 +128,25 @@ def test_a_bug_of_a_service_violates_a_promise(monkeypatch: pytest.MonkeyPatch) 
     with_a_bug(monkeypatch)
     kills = [PlannedFault(ASLEEP + 1.0 + n, "kill", "operator_watchdog") for n in range(11)]
     assert "S1" in violations(play(Shift("bug", ASLEEP + 12.0, BRIEF, kills)))
+
+
+def test_a_service_that_the_readme_teaches_violates_nothing(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    (code,) = re.findall(
+        r"```python\n([^`]*? too fast\.\"\"\".*?)```", (ROOT / "README.md").read_text(), re.DOTALL
+    )
+    (tmp_path / "speed_guard.py").write_text(code.replace("parameter(2.0", "parameter(0.5"))
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(arm, "PROGRAMS", (*arm.PROGRAMS, Program("speed_guard", "speed_guard", ())))
+    monkeypatch.setattr(arm, "NAMES", (*arm.NAMES, "speed_guard"))
+    outcome = play(Shift("guard", 40.0, {**SCENARIO, **sources(people.RATE)}, []))
+    offs = [each for each in outcome.history.stream(topics.ENGINES) if each.value == topics.TURN_OFF]
+    assert offs
+    assert offs[0].sent < AWAKE
+    assert not violations(outcome)
+    measured = next(finding.measured for finding in outcome.findings if finding.promise == "S2")
+    assert re.search(r"turned off ([2-9] times|once) for a permitted reason", measured)
 
 
 def is_stopped(simulated: arm.Arm) -> bool:
