@@ -2,6 +2,7 @@
 
 python -m deploy.chaos.babbler flood     10,000 heartbeats a second
 python -m deploy.chaos.babbler babble    NaN and random bytes on every topic
+python -m deploy.chaos.babbler pretend   presences of an operator who is not there
 """
 
 from __future__ import annotations
@@ -28,7 +29,8 @@ from interfaces import topics
 
 BABBLER = "babbler"
 """The program name of a babbler's process, which is neither a program of the arm nor supervisord."""
-RATES = {"flood": 10_000.0, "babble": 200.0}  # Hz; of babble, over all topics
+RATES = {"flood": 10_000.0, "babble": 200.0, "pretend": 2.0}  # Hz; of babble, over all topics
+PRETENDED_AGE = 2.0  # s of a presence: too old for `turn_on`, young enough to leave the engines on
 
 TEXT = "babble"
 _CDR_TEXT = struct.pack("<I", len(TEXT) + 1) + TEXT.encode() + b"\0"  # the whole string, not a part of one
@@ -93,6 +95,15 @@ def babble(node: Node, rate: float) -> None:
             publisher.publish(nonsense(topic, rng))
 
 
+def pretend(node: Node, rate: float) -> None:
+    """Report at a rate [Hz] that the operator was seen two seconds ago."""
+    topic = topics.OPERATOR_PRESENCE
+    publisher = node.create_publisher(topic.type, topic.name, topic.qos)
+    for _ in _ticks(rate):
+        sec, nanosec = divmod(time.time_ns() - int(PRETENDED_AGE * 1e9), 10**9)
+        publisher.publish(Header(stamp=Time(sec=sec, nanosec=nanosec), frame_id=TEXT))
+
+
 def _ticks(rate: float) -> Iterator[None]:
     """Yield at an average rate [Hz]."""
     begin, count = time.monotonic(), 0
@@ -104,10 +115,10 @@ def _ticks(rate: float) -> Iterator[None]:
 
 
 def run(mode: str, rate: float) -> None:
-    """Flood or babble at a rate [Hz] until killed."""
+    """Flood, babble or pretend at a rate [Hz] until killed."""
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)  # a signal ends it without clean-up
     node = Node(f"babbler_{os.getpid()}", namespace=namespace_of(os.environ))
-    {"flood": flood, "babble": babble}[mode](node, rate)
+    {"flood": flood, "babble": babble, "pretend": pretend}[mode](node, rate)
 
 
 if __name__ == "__main__":

@@ -34,6 +34,12 @@ PARTITION = "partition"
 """A fault of the network between the operator's host and the robot's."""
 BAD_LINE = "bad_line"
 """A fault of the same network: it delays messages, and DDS has to send some of them again."""
+FALSE_PRESENCE = "false_presence"
+"""A stranger reports the operator's presence, so the engine controller does not turn off by itself (F2)."""
+STUCK_DRIVE = "stuck_drive"
+"""The drive keeps its last command, whether it is repeated or not (F3)."""
+LATE = "late"
+"""The messages of a topic arrive late; the topic is the target."""
 REDISCOVERY = 10.0  # s after a partition until the hosts have discovered each other again
 
 SUSPENDING = ("stop", "hang", "hog", "slow")

@@ -14,9 +14,11 @@ from deploy.chaos.history import (
     ALL,
     BAD_LINE,
     CONTROLLER,
+    LATE,
     OVERLOAD,
     PARTITION,
     REDISCOVERY,
+    STUCK_DRIVE,
     SUSPENDING,
     SWITCH,
     WATCHDOG,
@@ -162,11 +164,14 @@ def single_instances(history: History) -> Finding:
 
 
 def running(history: History) -> Iterator[tuple[float, float]]:
-    """Yield when the engines run: from each `on` until the next state, at most for the drive's timeout."""
+    """Yield when the engines run: from each `on` until the next state, at most until the drive stops them."""
     states = history.stream(topics.ENGINES_STATE)
+    stuck = [(fault.begin, fault.end) for fault in history.faults if fault.kind == STUCK_DRIVE]
     for state, following in itertools.zip_longest(states, states[1:]):
         if state.value == ON:
-            yield state.sent, min(following.sent if following else history.end, state.sent + DRIVE_TIMEOUT)
+            stop = state.sent + DRIVE_TIMEOUT
+            stop = next((end for begin, end in stuck if begin <= stop < end), stop)
+            yield state.sent, min(following.sent if following else history.end, stop)
 
 
 def _overlapping_part(
@@ -278,12 +283,14 @@ def _abandoned(history: History, off: Sample) -> bool:
 
 
 def _deaf(history: History) -> Iterator[tuple[float, float]]:
-    """Yield when no heartbeat counted: the watchdog was suspended or cut off, or its clock differed."""
+    """Yield when no heartbeat counted: watchdog suspended or cut off, clocks that differ, late heartbeats."""
     for fault in history.faults:
         if fault.kind in SUSPENDING and fault.target in (WATCHDOG, ALL):
             yield fault.begin, history.effect_end(fault)
         elif fault.kind == PARTITION:
             yield fault.begin, fault.end + REDISCOVERY
+        elif (fault.kind, fault.target) == (LATE, topics.OPERATOR_HEARTBEAT.name):
+            yield fault.begin, fault.end
         elif fault.kind == STEP:
             yield fault.begin, fault.begin + SPREAD
 

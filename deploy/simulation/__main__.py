@@ -14,12 +14,14 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from deploy.chaos import schedule_file
-from deploy.chaos.findings import count
+from deploy.chaos.findings import count, how_often
+from deploy.chaos.history import STUCK_DRIVE
 from deploy.chaos.page import page, verdict
 from deploy.chaos.plan import names, number
 from deploy.chaos.report import text
 from deploy.chaos.schedule_file import Shift
 from deploy.simulation import plan, systematic
+from deploy.simulation.attacks import FAIL_SAFES
 from deploy.simulation.faults import FAULT_KINDS
 from deploy.simulation.shift import Outcome, play
 from deploy.simulation.shrink import shrink
@@ -54,7 +56,10 @@ def _parse(arguments: Sequence[str]) -> argparse.Namespace:
     add("--hours", type=number(0.01, 100_000), default=1.0, help="of the arm, default 1")
     add("--seed", help="the same seed gives the same record, byte for byte; default: a new one")
     add("--every", type=number(0.1, 3600), default=5.0, help="seconds between two faults, default 5")
-    of_kinds = f"separated by commas, of {', '.join(FAULT_KINDS)}"
+    of_kinds = (
+        "only these random faults, and no attacks on the fail-safes; separated by commas, "
+        f"of {', '.join(FAULT_KINDS)}"
+    )
     add("--faults", type=names(FAULT_KINDS), default=tuple(FAULT_KINDS), help=of_kinds)
     add("--schedule", type=Path, metavar="FILE", help="play this schedule instead")
     minutes = "for so many minutes, inject faults at every message and timer of an operator's day instead"
@@ -93,7 +98,7 @@ def _play(shifts: Sequence[Shift], title: str, limit: float) -> int:
         interrupted = True
     if not summary.shifts:
         raise interruption.Interrupted
-    print(_report(summary, time.monotonic() - began))
+    print(report(summary, time.monotonic() - began))
     if broken and not interrupted:
         return _explain(broken[0], title)
     return int(bool(broken)) or (130 if interrupted else 0)
@@ -110,17 +115,27 @@ def _show(summary: Summary, hours: float, seconds: float, broken: int) -> None:
     print(f"\r[{bar}] {summary.hours:.1f} of {hours:g} h, {speed:.0f} times real time, {state} ", end="")
 
 
-def _report(summary: Summary, seconds: float) -> str:
+def report(summary: Summary, seconds: float) -> str:
+    """Return what shifts have shown, in so many seconds of this machine."""
     kinds = ", ".join(f"{kind} {number}" for kind, number in sorted(summary.injected.items()))
     speed = 3600.0 * summary.hours / seconds
     return (
         f"\n{text(summary.total())}\n\n"
         f"{count(summary.injected.total(), 'fault')}: {kinds}\n"
+        f"{_alone(summary)}"
         f"{count(summary.restarts, 'restart')}, {count(summary.messages, 'message')}; "
         f"record {summary.digest}\n"
         f"{count(summary.shifts, 'run')}, {summary.hours:.2f} h in {seconds:.0f} s: "
         f"{speed:.0f} times real time"
     )
+
+
+def _alone(summary: Summary) -> str:
+    """Return how often each fail-safe stood alone, in a line; empty if no silence was attacked."""
+    if not summary.injected[STUCK_DRIVE]:
+        return ""
+    numbers = ", ".join(f"{each} {how_often(summary.alone[each])}" for each in FAIL_SAFES)
+    return f"Fail-safes that turned the engines off alone: {numbers}\n"
 
 
 def _explain(shift: Shift, title: str) -> int:
@@ -139,13 +154,13 @@ def _conclude(outcome: Outcome, title: str) -> int:
     """Report on one shift; return the exit code."""
     directory = processes.run_directory() / "simulation"
     name = "".join(each if each.isalnum() else "-" for each in outcome.shift.seed)
-    schedule, report = directory / f"{name}.yaml", directory / f"{name}.html"
+    schedule, html = directory / f"{name}.yaml", directory / f"{name}.html"
     make_directory(directory)
     schedule_file.save(outcome.shift, schedule)
     remarks = [f"{title} · {count(len(outcome.shift.faults), 'fault')} in {outcome.shift.length:.0f} s"]
-    report.write_text(page(title, remarks, outcome.findings, outcome.history), encoding="utf-8")
+    html.write_text(page(title, remarks, outcome.findings, outcome.history), encoding="utf-8")
     print(f"\n{text(outcome.findings)}\n\n{verdict(outcome.findings)}")
-    print(f"Report: {report}\nPlay it again: make simulate SCHEDULE={schedule}")
+    print(f"Report: {html}\nPlay it again: make simulate SCHEDULE={schedule}")
     return int(bool(outcome.violated()))
 
 

@@ -11,14 +11,17 @@ from rclpy_simulation import Delay, Process
 
 from deploy.chaos import clock
 from deploy.chaos.faults import PARAMETERS, Undo
-from deploy.chaos.history import ALL, NO_TARGET, OPERATOR, PARTITION
+from deploy.chaos.history import ALL, FALSE_PRESENCE, LATE, NO_TARGET, OPERATOR, PARTITION, STUCK_DRIVE
 from deploy.simulation import people
 from deploy.simulation.arm import CONTROL, NAMES, ROBOT, Arm
 from deploy.supervision.system import KEY
+from interfaces import topics
 
 CLOCK_TOLERANCE = 0.045  # s between the clocks of the hosts (deploy/SAFETY.md, A3)
 BAD_LINE = (0.2, Delay(0.05, 0.2))
 """Packet loss and latency of a bad line."""
+LATENESS = {topics.OPERATOR_HEARTBEAT.name: (2.0, 8.5), topics.OPERATOR_PRESENCE.name: (0.5, 3.0)}
+"""By how much the messages of a topic may be late [s]."""
 
 
 class FaultKind(NamedTuple):
@@ -136,6 +139,17 @@ def _bad_line(arm: Arm, target: str, duration: float) -> Undo:
     return arm.overlaps.begin("bad_line", heal)
 
 
+def _late(arm: Arm, topic: str, duration: float) -> Undo:
+    """Let the messages that are sent on a topic in this time arrive late."""
+    delays, name = arm.simulation.network.delays, f"rt/{topic}"
+    delays[name] = arm.simulation.random.uniform(*LATENESS[topic])
+
+    def end() -> None:
+        del delays[name]
+
+    return arm.overlaps.begin((LATE, topic), end)
+
+
 FAULT_KINDS: dict[str, FaultKind] = {
     "kill": FaultKind(_process(lambda it: it.kill()), NAMES),
     "terminate": FaultKind(_process(lambda it: it.send_signal(signal.SIGTERM)), NAMES),
@@ -156,4 +170,13 @@ FAULT_KINDS: dict[str, FaultKind] = {
     PARTITION: FaultKind(_partition, (OPERATOR,), (0.5, 20.0)),
     "bad_line": FaultKind(_bad_line, (ALL,), (1.0, 5.0)),
 }
-"""All faults of a simulated arm."""
+"""The random faults of a simulated arm."""
+
+ATTACK_KINDS: dict[str, FaultKind] = {
+    LATE: FaultKind(_late, tuple(LATENESS)),
+    FALSE_PRESENCE: FaultKind(_stranger(people.pretend), (NO_TARGET,)),
+    STUCK_DRIVE: FaultKind(
+        lambda arm, target, duration: None, (NO_TARGET,)
+    ),  # the checkers take it from the record
+}
+"""Faults that only an attack injects (:mod:`deploy.simulation.attacks`)."""

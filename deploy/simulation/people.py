@@ -14,6 +14,7 @@ from interfaces import topics
 RATE = 5.0  # Hz, of each source: the least with which L2 can be checked
 FLOOD_RATE = 500.0  # Hz; 25 times the rate of the switch
 BABBLE_RATE = 100.0  # Hz, over all topics
+PRETENCE_RATE = 2.0  # Hz; that of the watchdog
 FIRST_PRESS = 0.5  # s
 
 
@@ -52,7 +53,9 @@ def _hold(rng: random.Random, now: float) -> Iterator[tuple[float, float]]:
 
 def _away(rng: random.Random) -> float:
     """Return how long the operator leaves the switch alone: a moment, a strike, or asleep [s]."""
-    return rng.choice((rng.uniform(0.05, 1.0), rng.uniform(2.5, 4.0), rng.uniform(8.0, 30.0)))
+    moment, strike, asleep = (0.05, 1.0), (2.5, 4.0), (8.0, 30.0)
+    nap = 12.0, 15.0  # just long enough for an attack on the fail-safes
+    return rng.uniform(*rng.choice((moment, strike, asleep, nap, nap)))
 
 
 def silences(scenario: Mapping[str, Any], end: float) -> Iterator[tuple[float, float]]:
@@ -76,3 +79,8 @@ def flood() -> None:
 def babble() -> None:
     """Run a stranger's program that sends nonsense until it is killed."""
     babbler.run("babble", BABBLE_RATE)
+
+
+def pretend() -> None:
+    """Run a stranger's program that reports an operator who is not there until it is killed."""
+    babbler.run("pretend", PRETENCE_RATE)

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from deploy.chaos.schedule import random_faults
 from deploy.chaos.schedule_file import Shift
 from deploy.simulation import people
+from deploy.simulation.attacks import attacked
 from deploy.simulation.faults import FAULT_KINDS
 
 LENGTH = 600.0  # s of a shift; each one begins with an arm that starts, the last one may be longer or shorter
@@ -24,6 +25,7 @@ def shifts(seed: str, hours: float, every: float, kinds: Sequence[str]) -> list[
 
 
 def shift(seed: str, length: float, every: float, kinds: Sequence[str]) -> Shift:
-    """Return a shift with a random operator and random faults."""
+    """Return a shift with a random operator and random faults; with all kinds of them, also with attacks."""
     faults = random_faults(seed, length - QUIET, every=every, kinds=kinds, table=FAULT_KINDS)
-    return Shift(seed, length, people.operator(seed, length), faults)
+    quiet = Shift(seed, length, people.operator(seed, length), faults)
+    return attacked(quiet) if set(kinds) == set(FAULT_KINDS) else quiet

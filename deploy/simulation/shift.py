@@ -15,11 +15,14 @@ from deploy.chaos.schedule import PlannedFault
 from deploy.chaos.schedule_file import Shift
 from deploy.simulation import people
 from deploy.simulation.arm import NAMES, ROBOT, Arm, simulated_arm
+from deploy.simulation.attacks import alone
 from deploy.simulation.calibration import Calibration
-from deploy.simulation.faults import FAULT_KINDS
+from deploy.simulation.faults import ATTACK_KINDS, FAULT_KINDS
 from deploy.simulation.observer import Observer
 from deploy.simulation.viewer import view
 from deploy.supervision.system import DeploymentError
+
+KINDS = FAULT_KINDS | ATTACK_KINDS
 
 
 @dataclass(frozen=True)
@@ -38,6 +41,11 @@ class Outcome:
         """How often each kind of fault was injected."""
         return Counter(fault.kind for fault in self.history.injected)
 
+    @property
+    def alone(self) -> Counter[str]:
+        """How often each fail-safe turned the engines off while the two others could not."""
+        return alone(self.history)
+
     def violated(self) -> list[str]:
         """Return the violated promises."""
         return [finding.promise for finding in self.findings if finding.evidence]
@@ -51,7 +59,7 @@ def play(shift: Shift, durations: Calibration | None = None) -> Outcome:
     :raises DeploymentError: if the shift has a fault that cannot be simulated, or a bad scenario.
     """
     for planned in shift.faults:
-        if planned.kind not in FAULT_KINDS or planned.target not in FAULT_KINDS[planned.kind].targets:
+        if planned.kind not in KINDS or planned.target not in KINDS[planned.kind].targets:
             raise DeploymentError(f"a simulation has no fault {planned.kind} of {planned.target}")
     with tempfile.TemporaryDirectory(prefix="reactive-arm-") as directory:
         with simulated_arm(shift.seed, Path(directory), shift.scenario, durations) as arm:
@@ -79,7 +87,7 @@ def _injection(arm: Arm, planned: PlannedFault, injected: list[InjectedFault]) -
         _, kind, target, duration = planned
         process = arm.process(target) if target in NAMES else None
         now = arm.simulation.now - arm.origin
-        undo = FAULT_KINDS[kind].inject(arm, target, duration)
+        undo = KINDS[kind].inject(arm, target, duration)
         injected.append(InjectedFault(kind, target, now, now + duration, process.pid if process else 0))
         if undo is not None:
             arm.simulation.after(duration, undo)

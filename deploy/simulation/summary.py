@@ -22,6 +22,7 @@ class Summary:
     messages: int = 0
     restarts: int = 0
     injected: Counter[str] = field(default_factory=Counter)
+    alone: Counter[str] = field(default_factory=Counter)
     findings: dict[str, list[Finding]] = field(default_factory=lambda: {promise: [] for promise in CHECKERS})
     digests: list[str] = field(default_factory=list)
 
@@ -35,6 +36,7 @@ class Summary:
             outcome.messages,
             len(history.lives) - len({life.program for life in history.lives}),
             outcome.injected,
+            outcome.alone,
             {finding.promise: [_named(finding, outcome.shift.seed)] for finding in outcome.findings},
             [outcome.digest],
         )
@@ -46,6 +48,7 @@ class Summary:
         self.messages += other.messages
         self.restarts += other.restarts
         self.injected += other.injected
+        self.alone += other.alone
         self.digests += other.digests
         for promise, findings in other.findings.items():
             self.findings[promise] += findings

@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 import random
+import time
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import Point, PointStamped
 from rclpy.serialization import deserialize_message, serialize_message
+from std_msgs.msg import Header
 
+from deploy.chaos import babbler
 from deploy.chaos.babbler import TEXT, is_babble, nan, nonsense
 from interfaces import topics
+from services import engine_controller
 from services.kinematics import forward_kinematics
 
 
@@ -30,6 +36,19 @@ def test_babble_is_bad_and_marked(topic: topics.Topic) -> None:
 def test_messages_of_services_are_not_babble() -> None:
     for topic in topics.CONTRACT:
         assert not is_babble(topic, serialize_message(topic.type()))
+
+
+def test_pretended_presence_is_marked_and_too_old_for_turn_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    sent: list[Header] = []
+    publisher = SimpleNamespace(publish=sent.append)
+    node: Any = SimpleNamespace(create_publisher=lambda *_: publisher)
+    monkeypatch.setattr(babbler, "_ticks", lambda rate: [None])
+    monkeypatch.setattr(time, "time_ns", lambda: 12_500_000_000)
+    babbler.pretend(node, 2.0)
+    (presence,) = sent
+    assert (presence.stamp.sec, presence.stamp.nanosec) == (10, 500_000_000)
+    assert engine_controller.DEFAULTS.max_presence_age < babbler.PRETENDED_AGE < 10.0
+    assert is_babble(topics.OPERATOR_PRESENCE, serialize_message(presence))
 
 
 def test_position_computed_from_babble_is_not_babble() -> None:

@@ -15,9 +15,11 @@ from deploy.chaos.history import (
     BAD_LINE,
     CONTROLLER,
     KINEMATICS,
+    LATE,
     NO_TARGET,
     OPERATOR,
     PROGRAMS,
+    STUCK_DRIVE,
     SWITCH,
     WATCHDOG,
     History,
@@ -155,6 +157,24 @@ def test_s1_first_sign_of_life_may_have_been_missed_in_an_overload() -> None:
     assert found[2].evidence == [Evidence(3.0, "engines on before the operator's first sign of life")]
 
 
+@pytest.mark.parametrize(
+    ("begin", "end", "lasted"),
+    [
+        (2.0, 20.0, 12.0),  # until the next state
+        (2.0, 11.5, 9.5),  # until the drive works again
+        (6.375, 20.0, 12.0),
+        (6.5, 20.0, 4.375),  # too late: it has stopped
+        (2.0, 6.375, 4.375),
+    ],
+)
+def test_s1_stuck_drive_keeps_the_engines_on(begin: float, end: float, lasted: float) -> None:
+    states = [*steps(2, 6, value=ON), (14.0, OFF)]
+    stuck = InjectedFault(STUCK_DRIVE, NO_TARGET, begin, end)
+    found = CHECKERS["S1"](history(heartbeats=[(2.0, True)], states=states, faults=[stuck]))
+    assert found.worst == pytest.approx(min(lasted, end - 2.0) if lasted > 9.0 else 4.0 + DRIVE_TIMEOUT)
+    assert bool(found.evidence) is (lasted > 10.5)
+
+
 # S2
 
 PRESENT = {"heartbeats": steps(0, 40), "presences": steps(0, 40, 0.5)}
@@ -216,7 +236,7 @@ def heard_but_in(*silences: tuple[float, float]) -> list[tuple[float, bool]]:
 
 
 SILENCES = ((4.0, 7.0), (8.0, 11.0), (12.0, 15.0))  # a strike each
-LATE = [(at, state) for at, state in engines((0.0, ON), (20.0, OFF)) if not 19.0 < at < 20.0]
+AFTER_A_PAUSE = [(at, state) for at, state in engines((0.0, ON), (20.0, OFF)) if not 19.0 < at < 20.0]
 UNSEEN = {"presences": steps(0, 10), "heartbeats": steps(0, 40)}
 FIRST_UNSEEN = 20.0 - PRESENCE_TIMEOUT + SAMPLING + TRANSPORT
 SHORT = heard_but_in(*SILENCES[:2], (12.0, 14.25))  # the last silence lacks 0.75 s of a strike
@@ -235,9 +255,9 @@ def suspended_with_a_presence_at(time: float) -> dict[str, Any]:
         ({"lives": two_lives(CONTROLLER, 20.0)}, True),
         ({"lives": two_lives(CONTROLLER, 19.75)}, True),
         ({"lives": two_lives(CONTROLLER, 19.75 - 0.02)}, False),
-        ({"states": LATE, "faults": [stopped(CONTROLLER, 19.25, 19.75)]}, True),
-        ({"states": LATE, "faults": [stopped("velocity", 19.25, 19.75)]}, False),
-        ({"states": LATE, "faults": [stopped(CONTROLLER, 5.0, 6.0)]}, False),
+        ({"states": AFTER_A_PAUSE, "faults": [stopped(CONTROLLER, 19.25, 19.75)]}, True),
+        ({"states": AFTER_A_PAUSE, "faults": [stopped("velocity", 19.25, 19.75)]}, False),
+        ({"states": AFTER_A_PAUSE, "faults": [stopped(CONTROLLER, 5.0, 6.0)]}, False),
         ({"faults": [stopped(CONTROLLER, 19.75, 20.0)]}, False),
         ({"states": [(0.0, ON), (DRIVE_TIMEOUT, OFF)], "faults": [stopped(CONTROLLER, 0.125, 0.25)]}, False),
         # the watchdog commanded it
@@ -304,6 +324,19 @@ def suspended_with_a_presence_at(time: float) -> dict[str, Any]:
         (COMMANDED | {"heartbeats": SHORT, "faults": [stopped(NO_TARGET, 14.0, 14.0, STEP)]}, True),
         (COMMANDED | {"heartbeats": SHORT, "faults": [stopped(NO_TARGET, 13.25, 13.25, STEP)]}, False),
         (COMMANDED | {"heartbeats": SHORT, "faults": [stopped(NO_TARGET, 14.5, 14.5, STEP)]}, False),
+        # late heartbeats are no sign of life
+        (
+            COMMANDED | {"heartbeats": SHORT, "faults": [stopped("operator_heartbeat", 14.0, 15.0, LATE)]},
+            True,
+        ),
+        (
+            COMMANDED | {"heartbeats": SHORT, "faults": [stopped("operator_heartbeat", 14.5, 15.0, LATE)]},
+            False,
+        ),
+        (
+            COMMANDED | {"heartbeats": SHORT, "faults": [stopped("operator_presence", 14.0, 15.0, LATE)]},
+            False,
+        ),
         # no presence for ten seconds, for a reason
         (UNSEEN, False),
         (UNSEEN | {"heartbeats": steps(0, 40, 1.0)}, False),
