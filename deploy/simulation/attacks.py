@@ -104,8 +104,9 @@ def _only_controller(rng: random.Random) -> Iterator[PlannedFault]:
     """Leave F2 alone: the last presence is late, or those that send and receive it pause for a moment."""
     yield _without_watchdog(rng)
     yield PlannedFault(0.0, STUCK_DRIVE, NO_TARGET, JUDGED)
-    if rng.random() < 0.7:
-        yield PlannedFault(-rng.uniform(0.0, 0.2), "stop", WATCHDOG, rng.uniform(0.2, 0.48))
+    if rng.random() < 0.8:  # until the last heartbeat is nearly too old: the presence is as old as it may be
+        before = rng.uniform(0.05, 0.2)
+        yield PlannedFault(-before, "stop", WATCHDOG, before + rng.uniform(0.3, 0.44))
     if rng.random() < 0.5:
         yield PlannedFault(-0.4, LATE, topics.OPERATOR_PRESENCE.name, 1.4)
     if rng.random() < 0.5:  # for less than the drive's timeout, or it would turn off

@@ -126,6 +126,8 @@ def test_s1_evidence_has_the_moment_of_the_violation() -> None:
         ([overload(6.0, 7.0)], 17.75, 10.75),
         ([overload(12.0, 12.25)], 12.75, 10.0),
         ([overload(12.5, 12.75)], 12.75, 10.5),
+        ([overload(2.0, 13.0)], 12.0, 0.0),
+        ([overload(2.0, 15.0)], 14.0, 0.0),
         ([overload(12.625, 13.0)], 12.75, 10.625),
     ],
 )
@@ -162,7 +164,7 @@ def test_s1_first_sign_of_life_may_have_been_missed_in_an_overload() -> None:
     [
         (2.0, 20.0, 12.0),  # until the next state
         (2.0, 11.5, 9.5),  # until the drive works again
-        (6.375, 20.0, 12.0),
+        (6.0 + DRIVE_TIMEOUT, 20.0, 12.0),
         (6.5, 20.0, 4.375),  # too late: it has stopped
         (2.0, 6.375, 4.375),
     ],
