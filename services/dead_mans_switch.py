@@ -69,7 +69,7 @@ def wire(node: ServiceNode) -> None:
     node.declare(Parameters)
     source = VirtualSource(node)
     beats = heartbeats(
-        source.follow("pressed", source.scenario.pressed),
+        source.follow("pressed", source.scenario.pressed, if_lost=False),
         source.follow("rate"),
         source.until_set("pressed", source.play(source.scenario.heartbeats)),
     )

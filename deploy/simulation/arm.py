@@ -19,7 +19,7 @@ from deploy.simulation.machine import simulated_services
 from deploy.simulation.supervisor import Supervisor
 from deploy.supervision import manifest
 from deploy.supervision.processes import MARK
-from deploy.supervision.system import SERVICE_GRACE, DeploymentError, scenario_parameters
+from deploy.supervision.system import SERVICE_GRACE, SETTINGS, DeploymentError, scenario_parameters
 from interfaces.scenario import scenario_file
 from interfaces.service import UserError
 
@@ -65,7 +65,7 @@ class Arm:
         origin = (BOOT / SECOND) + simulation.now + LEAD
         self.origin = simulation.now + LEAD
         """The beginning of the scenario [s of the simulation]."""
-        self.parameters = scenario_parameters(file, origin)
+        self.parameters = scenario_parameters(file, origin, directory / SETTINGS)
         """The content of the parameter file."""
         self._programs = {each.name: each for each in PROGRAMS}
         self.write_parameters()

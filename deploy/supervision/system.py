@@ -344,12 +344,13 @@ def make_directory(path: Path, mode: int = 0o777) -> None:
         ) from None
 
 
-def scenario_parameters(scenario: Path, origin: float) -> dict[str, object]:
+def scenario_parameters(scenario: Path, origin: float, settings: str | Path = SETTINGS) -> dict[str, object]:
     """The parameters that all services share, as the content of a ROS parameter file.
 
     :param origin: of the scenario [s, monotonic clock], or NOT_YET.
+    :param settings: the folder of what is set by hand; by default in the run directory.
     """
-    shared = {"scenario": str(scenario), "scenario_epoch": origin, "settings": SETTINGS}
+    shared = {"scenario": str(scenario), "scenario_epoch": origin, "settings": str(settings)}
     return {ALL: {KEY: shared}}
 
 

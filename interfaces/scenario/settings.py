@@ -1,11 +1,14 @@
 """The settings of a service: parameters set by hand, which survive a restart.
 
-An operator who released the switch must not find it pressed because its process was restarted.
+An operator who released the switch must not find it pressed because its process was restarted. So a process
+has to know that nothing was set: the file exists from the first start on. If a later process finds no file,
+the settings are lost.
 """
 
 from __future__ import annotations
 
 import os
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -19,35 +22,36 @@ class Settings:
     """The settings of one service, in one file."""
 
     def __init__(self, directory: str, service: str) -> None:
-        """:param directory: the folder of the files; empty keeps nothing."""
+        """
+        Read the file.
+
+        :param directory: the folder of the files; empty keeps nothing.
+        :raises UserError: for a bad file: forgetting it would not be safe.
+        """
         self._path = Path(directory) / f"{service}.yaml" if directory else None
+        self.exist = self._path is None or self._path.exists()
+        """Whether a file tells what was set; nothing is lost where nothing is kept."""
+        self.values: dict[str, Any] = {}
+        """The settings by name; to be saved after a change."""
+        if self._path is not None and self.exist:
+            self.values = yaml_file.load(self._path)
+            if not isinstance(self.values, dict):
+                raise UserError(f"{self._path}: contains no settings; remove it to start afresh")
 
-    def read(self) -> dict[str, Any]:
-        """Return the settings by name. Raises UserError for a bad file: forgetting it would not be safe."""
-        if self._path is None or not self._path.exists():
-            return {}
-        settings = yaml_file.load(self._path)
-        if not isinstance(settings, dict):
-            raise UserError(f"{self._path}: contains no settings; remove it to start afresh")
-        return settings
+    def save(self) -> None:
+        """
+        Write the file atomically.
 
-    def keep(self, name: str, value: Any) -> None:
-        """Write a setting atomically. Raises UserError if that fails."""
-        if self._path is not None:
-            self._write(self.read() | {name: value})
-
-    def forget(self, name: str) -> None:
-        """Remove a setting. Raises UserError if that fails."""
-        if self._path is not None and name in (settings := self.read()):
-            del settings[name]
-            self._write(settings)
-
-    def _write(self, settings: dict[str, Any]) -> None:
-        assert self._path is not None
+        :raises UserError: if that fails; then no file is left, because what it says is not true any more.
+        """
+        if self._path is None:
+            return
         new = self._path.with_suffix(".new")
         try:
             self._path.parent.mkdir(exist_ok=True)
-            new.write_text(yaml.safe_dump(settings), encoding="utf-8")
+            new.write_text(yaml.safe_dump(self.values), encoding="utf-8")
             os.replace(new, self._path)
         except OSError as error:
+            with suppress(OSError):
+                self._path.unlink()
             raise UserError(f"{self._path}: {error.strerror}") from error

@@ -34,19 +34,29 @@ class VirtualSource:
         """
         Declare the parameters on a node and load the scenario that they name.
 
-        :raises UserError: if the scenario has an error.
+        :raises UserError: if the scenario or the settings have an error.
         """
         parameters = node.declare(_Parameters)
         self._node = node
         self._origin = Origin(node)
         self._settings = Settings(parameters.settings, node.get_name())
+        self._are_lost = self._origin.is_past and not self._settings.exist
+        if self._are_lost:
+            node.remark("settings", "they are lost, with what was set by hand")
+        elif not self._settings.exist:
+            self._save("settings")
         self._followed: dict[str, str] = {}  # with the parameter that gives it back, if it has one
         self._set_by_hand: Subject[str] = Subject()
         node.add_post_set_parameters_callback(self._keep)
         self.scenario = load(parameters.scenario) if parameters.scenario else Scenario()
 
     def follow(
-        self, name: str, timeline: Events[T] | Sweep | None = None, *, given_back: str = ""
+        self,
+        name: str,
+        timeline: Events[T] | Sweep | None = None,
+        *,
+        given_back: str = "",
+        if_lost: T | None = None,
     ) -> Observable[T]:
         """
         Return the values of a parameter, or those of a timeline until the parameter is set by hand.
@@ -56,12 +66,17 @@ class VirtualSource:
         :param given_back: a boolean parameter: whether the timeline is followed, or the first value of the
             parameter without a timeline. Setting the parameter by hand makes it false; setting it to true
             gives the source back.
+        :param if_lost: the value of a restarted process that does not know any more what was set by hand, as
+            if it was set; by default, such a process follows the timeline.
         :raises UserError: if the setting of the last process is bad.
         """
         first = self._node.get_parameter(name).value
-        settings = self._settings.read()
-        if name in settings:
-            self._declare_again(name, settings[name])
+        if self._are_lost and if_lost is not None:
+            self._settings.values[name] = if_lost
+            self._save(name)
+        is_set = name in self._settings.values
+        if is_set:
+            self._declare_again(name, self._settings.values[name])
             if given_back:
                 self._declare_again(given_back, False)
         self._followed[name] = given_back
@@ -73,7 +88,7 @@ class VirtualSource:
                 rx.defer(lambda _: playback.state(timeline, self._origin.elapsed()))
             )
         if not given_back:
-            return values if name in settings else playback.follow(values, played)
+            return values if is_set else playback.follow(values, played)
         follows = self._node.create_parameter_observable(given_back).distinct_until_changed()
         return follows.switch_map(lambda follows: (played or rx.just(first)) if follows else values)
 
@@ -88,7 +103,7 @@ class VirtualSource:
 
     def until_set(self, name: str, items: Observable[T]) -> Observable[T]:
         """Return items until a parameter is set by hand; none if a process before this one kept it."""
-        if name in self._settings.read():
+        if name in self._settings.values:
             return rx.never()
         return items.take_until(self._set_by_hand.filter(lambda it: it == name))
 
@@ -106,14 +121,19 @@ class VirtualSource:
     def _keep(self, parameters: list[Parameter]) -> None:
         values = {each.name: each.value for each in parameters}
         for name, given_back in self._followed.items():
-            try:
-                if values.get(given_back):
-                    self._settings.forget(name)
-                elif name in values or given_back in values:
-                    self._settings.keep(name, self._node.get_parameter(name).value)
-            except UserError as error:
-                self._node.remark(name, f"a restart would forget the setting: {error}")
+            if values.get(given_back):
+                self._settings.values.pop(name, None)
+                self._save(name)
+            elif name in values or given_back in values:
+                self._settings.values[name] = self._node.get_parameter(name).value
+                self._save(name)
             if name in values:
                 if given_back:
                     self._node.set_parameters([Parameter(given_back, value=False)])
                 self._set_by_hand.on_next(name)
+
+    def _save(self, name: str) -> None:
+        try:
+            self._settings.save()
+        except UserError as error:
+            self._node.remark(name, f"a restart would forget the setting: {error}")

@@ -123,3 +123,24 @@ def test_person_who_turns_the_engines_off_ends_the_repetition_of_the_scenario(
     spin_for(1.5)  # in which the first would have been repeated
 
     assert commands_of(switch) == [TURN_ON, TURN_OFF]
+
+
+def test_restart_without_its_settings_presses_nothing(
+    make_node: MakeNode, spin_until: SpinUntil, spin_for: SpinFor, tmp_path: Path
+) -> None:
+    scenario = tmp_path / "scenario.yaml"
+    scenario.write_text("operator: {pressed: [{from: 0.0}], heartbeats: [1.2]}\n")
+    switch = Wired(
+        make_node,
+        spin_until,
+        wire,
+        inputs=[],
+        outputs=[OPERATOR_HEARTBEAT],
+        scenario=str(scenario),
+        scenario_epoch=time.monotonic() - 1.0,
+        settings=str(tmp_path / "settings"),
+    )
+
+    spin_for(0.5)
+
+    assert switch.heard[OPERATOR_HEARTBEAT.name] == []

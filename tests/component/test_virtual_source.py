@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -343,6 +345,72 @@ def test_setting_that_cannot_be_kept_is_reported(
     assert values == [1.0, 5.0]
     spin_until(lambda: messages[-1].startswith("value: a restart would forget the setting: "))
     assert messages[-1].endswith("settings/source.yaml: Not a directory")
+
+
+@pytest.fixture
+def restart(make_source: Make, tmp_path: Path, spin_for: SpinFor) -> Callable[[], list[bool]]:
+    """Starts a switch that its scenario presses, in the place of a process that died; what it emits."""
+
+    def start() -> list[bool]:
+        node = make_source(settings=str(tmp_path / "settings"), scenario_epoch=time.monotonic() - 1.0)
+        source = VirtualSource(node)
+        emits = emitted(node, source.follow("pressed", Events(((0.0, True),)), if_lost=False))
+        emitted(node, source.until_set("pressed", source.play(Events(((SHORT / 2, True),)))))
+        spin_for(SHORT)
+        node.destroy_node()
+        return emits
+
+    return start
+
+
+def test_restart_presses_a_switch_that_nobody_has_set(
+    make_source: Make, restart: Callable[[], list[bool]], tmp_path: Path
+) -> None:
+    first = make_source(settings=str(tmp_path / "settings"), scenario_epoch=time.monotonic() + 100.0)
+    VirtualSource(first).follow("pressed", if_lost=False)
+    first.destroy_node()
+
+    assert [restart(), restart()] == [[True], [True]]
+
+
+def test_restart_without_its_settings_presses_no_switch(
+    restart: Callable[[], list[bool]], tmp_path: Path
+) -> None:
+    assert [restart(), restart()] == [[False], [False]]
+    assert (tmp_path / "settings" / "source.yaml").read_text() == "pressed: false\n"
+
+
+def test_setting_that_cannot_be_kept_leaves_no_old_one(
+    make_source: Make, restart: Callable[[], list[bool]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    node = make_source(settings=str(tmp_path / "settings"))
+    emitted(node, VirtualSource(node).follow("pressed"))
+    set_to(node, "pressed", True)
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "replace", full_disk)
+        set_to(node, "pressed", False)
+    node.destroy_node()
+
+    assert restart() == [False]
+
+
+def full_disk(*arguments: Any) -> None:
+    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+def test_lost_settings_are_reported(
+    make_source: Make, make_node: Make, spin_until: SpinUntil, tmp_path: Path
+) -> None:
+    messages: list[str] = []
+    topic = topics.DIAGNOSTICS
+    make_node("peer", kind=Node).create_subscription(
+        topic.type, topic.name, lambda it: messages.append(it.status[0].message), topic.qos
+    )
+    node = make_source(settings=str(tmp_path), scenario_epoch=time.monotonic() - 1.0)
+
+    VirtualSource(node)
+
+    spin_until(lambda: "settings: they are lost, with what was set by hand" in messages)
 
 
 @pytest.mark.parametrize("text", ["", "- 1", "value: [", "value: -1.0", "value: long"])
