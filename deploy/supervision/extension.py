@@ -5,6 +5,7 @@
 - It survives a full disk and a log that cannot be opened: only the affected lines are lost.
 - It looks after its children at each signal, at once after each change, and every 100 ms while one of them
   starts, stops or waits: a killed service would start again only after 1-2 s otherwise. It sleeps in between.
+- It locks the run directory, so that no cleaner of /tmp empties it.
 - It removes the parameter file at an orderly shutdown, so no terminal starts the system again.
 
 It runs inside supervisord, so it must not fail: it does nothing else.
@@ -12,6 +13,7 @@ It runs inside supervisord, so it must not fail: it does nothing else.
 
 from __future__ import annotations
 
+import fcntl
 import json
 import os
 import signal
@@ -171,12 +173,23 @@ class ArmInterface:
         return readable, writable
 
 
+def lock_directory() -> None:
+    """
+    Hold a shared lock on the run directory until supervisord ends.
+
+    systemd-tmpfiles leaves a locked directory alone, with everything below it (tmpfiles.d(5), "Age").
+    """
+    with suppress(OSError):  # a file system without locks
+        fcntl.flock(os.open(os.curdir, os.O_RDONLY), fcntl.LOCK_SH)
+
+
 def make_interface(supervisord: Any, **config: str) -> ArmInterface:
     """The factory of the RPC interface (plugin.py)."""
     loggers.RotatingFileHandler = LossyLog  # for the programs: each start opens its log
     for handler in supervisord.options.logger.handlers:
         if isinstance(handler, RotatingFileHandler):  # in the foreground, there is the terminal, too
             handler.__class__ = LossyLog  # supervisord's own log is open already
+    lock_directory()
     warm.import_libraries()
     supervisord.options.execve = warm.executor(os.execve)
     arm = ArmInterface(supervisord)

@@ -163,7 +163,7 @@ class System:
         :param tell: is called with their number before they are ended
         :return: their number
         """
-        if not self.run.exists() and not self.members():
+        if not self.logs.exists() and not self.members():
             tell(0)
             return 0
         with self._alone():
@@ -246,7 +246,6 @@ class System:
         if pid := self.supervisor():
             where = f"supervisord has pid {pid} and works in {self.run}"
             raise DeploymentError(f"Already running: {where}. make console shows it, make stop ends it")
-        self.logs.mkdir(exist_ok=True)
         shutil.rmtree(self.run / SETTINGS, ignore_errors=True)
         self.write_parameters(parameters)
 
@@ -317,9 +316,10 @@ class System:
 
     @contextmanager
     def _alone(self) -> Iterator[None]:
-        """Hold the run directory: only one start or stop at a time."""
+        """Hold the logs: only one start or stop at a time. supervisord holds the run directory."""
         make_directory(self.run, 0o700)
-        directory = os.open(self.run, os.O_RDONLY)
+        make_directory(self.logs)
+        directory = os.open(self.logs, os.O_RDONLY)
         try:
             try:
                 fcntl.flock(directory, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -15,8 +15,9 @@ from tests.system.sites import Command, Site
 @contextmanager
 def another_at_work(site: Site) -> Iterator[None]:
     """Hold the lock of a start or stop."""
-    site.run.mkdir(exist_ok=True)
-    directory = os.open(site.run, os.O_RDONLY)
+    logs = site.run / "logs"
+    logs.mkdir(parents=True, exist_ok=True)
+    directory = os.open(logs, os.O_RDONLY)
     try:
         fcntl.flock(directory, fcntl.LOCK_EX)
         yield

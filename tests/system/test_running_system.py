@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import math
 import os
 import re
@@ -87,6 +88,16 @@ def test_only_its_user_reaches_supervisord(module_site: Site) -> None:
             sockets.add(os.readlink(link))
     tables = [Path(f"/proc/net/{family}").read_text().splitlines()[1:] for family in ("tcp", "tcp6")]
     assert not [line for table in tables for line in table if f"socket:[{line.split()[9]}]" in sockets]
+
+
+def test_a_cleaner_of_tmp_leaves_the_run_directory_alone(module_site: Site) -> None:
+    directory = os.open(module_site.run, os.O_RDONLY)
+    try:
+        # systemd-tmpfiles needs this lock to clean a directory and what is below it.
+        with pytest.raises(BlockingIOError):
+            fcntl.flock(directory, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    finally:
+        os.close(directory)
 
 
 def test_no_shell_stands_between_supervisord_and_a_service(module_site: Site) -> None:
