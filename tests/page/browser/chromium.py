@@ -59,6 +59,17 @@ window.WebSocket = class extends WebSocket {
 """
 """Makes the page go on to beat with the newest nonce whatever happens, and never release."""
 
+PAD = """
+window.pad = {
+    index: 0, connected: true, mapping: "standard", axes: [0, 0, 0, 0],
+    buttons: Array.from({ length: 17 }, () => ({ value: 0, pressed: false })),
+    get timestamp() { return this.frozen ?? performance.now(); },
+};
+navigator.getGamepads = () => [pad];
+window.tell = (type) => dispatchEvent(Object.assign(new Event(type), { gamepad: pad }));
+"""
+"""A gamepad, until it has `frozen`."""
+
 DECIDED = "#hold[data-state=held], #hold[data-state=other_page], #hold-why:not(:empty)"
 """What the page has when a press has led to a hold or to a refusal."""
 

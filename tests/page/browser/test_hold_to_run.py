@@ -16,7 +16,7 @@ import pytest
 from tests.page.browser import pauses
 
 from .arm import GONE, Arm, hold_with_engines_on, undisturbed
-from .chromium import HandOnPage
+from .chromium import PAD, HandOnPage
 
 pytestmark = pytest.mark.timed
 
@@ -32,14 +32,6 @@ new Promise((done) => {
 """
 """When the page shows the switch released [ms since 1970]."""
 
-PAD = """
-window.pad = {
-    index: 0, connected: true, mapping: "standard",
-    buttons: Array.from({ length: 17 }, () => ({ value: 0, pressed: false })),
-};
-navigator.getGamepads = () => [pad];
-window.tell = (type) => dispatchEvent(Object.assign(new Event(type), { gamepad: pad }));
-"""
 ONE_HOUR_OFF = """
 window.Date = class extends Date {
     constructor(...when) { when.length ? super(...when) : super(Date.now()); }
@@ -104,18 +96,6 @@ def quantile(values: list[float], q: float) -> float:
     return values[max(0, -int(-q * len(values) // 1) - 1)]
 
 
-@pytest.mark.parametrize("key", [" ", "Enter"])
-@undisturbed
-def test_lifted_key_releases(arm: Arm, hand: HandOnPage, key: str) -> None:
-    hand.page.focus("#hold")
-    keyboard = hand.page.keyboard
-    hold_with_engines_on(arm, hand, lambda: keyboard.down(key), lambda: keyboard.up(key))
-    keyboard.up(key)
-    hand.await_state("released")
-    arm.record.silence_after(time.time())
-    assert not hand.stalled
-
-
 @pytest.mark.parametrize("hand", [PAD], indirect=True, ids=["pad"])
 @undisturbed
 def test_released_trigger_of_a_gamepad_releases(arm: Arm, hand: HandOnPage) -> None:
@@ -164,7 +144,7 @@ Object.defineProperty(document, "visibilityState", { value: "hidden", configurab
 document.dispatchEvent(new Event("visibilitychange"));
 """
 LOST = {
-    "hidden tab": (HIDDEN, "the page was hidden"),
+    "hidden page": (HIDDEN, "the page was hidden"),
     "context menu": ("hold.dispatchEvent(new MouseEvent('contextmenu', {bubbles: true}))", "context menu"),
     "pointer cancelled": ("hold.dispatchEvent(new PointerEvent('pointercancel', {pointerId: 1}))", ""),
     "lost capture": ("hold.releasePointerCapture(1)", ""),
@@ -185,20 +165,6 @@ def test_page_that_loses_the_hand_releases(arm: Arm, hand: HandOnPage, way: str)
     arm.record.silence_after(lost + GONE)
     assert hand.state in ("released", "offline")  # although the hand is still down
     assert why in hand.why
-
-
-@undisturbed
-def test_blurred_window_releases(arm: Arm, hand: HandOnPage) -> None:
-    session = hand.context.new_cdp_session(hand.page)
-    session.send("Emulation.setFocusEmulationEnabled", {"enabled": False})  # Playwright's default is true
-    hold_with_engines_on(arm, hand)
-    other = hand.context.new_page()
-    other.bring_to_front()
-    arm.record.silence_after(time.time() + GONE)
-    other.close()
-    hand.page.bring_to_front()
-    arm.record.silence_after(time.time())
-    assert hand.why == "Released: the window lost focus."
 
 
 @undisturbed

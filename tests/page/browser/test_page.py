@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import time
 from contextlib import closing
 from typing import Any
 
 import pytest
 
 from deploy.supervision import manifest
-from interfaces import topics
 from tests.system.sites import LIMIT
 
-from .arm import LINK, Arm, hold_with_engines_on, undisturbed
+from .arm import LINK, Arm, hold_with_engines_on
 from .chromium import HandOnPage
 from .link import Link
 
@@ -136,23 +134,6 @@ def test_address_without_its_token_shows_nothing(arm: Arm, browser: Any) -> None
         page.wait_for_selector("html[data-connection=closed]")
         assert page.get_attribute("#hold", "data-state") == "offline"
         assert page.get_attribute("#engines", "data-state") == "unknown"
-
-
-@undisturbed
-def test_keyboard_alone_holds_and_turns_the_engines_on(arm: Arm, hand: HandOnPage) -> None:
-    keyboard = hand.page.keyboard
-    tab_to(hand, "#hold")
-    hand.hold(lambda: keyboard.down(" "), lambda: keyboard.up(" "))
-    arm.record.await_beats(time.time(), 12)  # the watchdog samples every 500 ms
-    hand.page.wait_for_selector("#operator[data-state=seen]", timeout=5000)  # the controller needs a presence
-    tab_to(hand, "#turn-on")
-    keyboard.press("Enter")
-    hand.page.wait_for_selector("#engines[data-state=on]", timeout=5000)
-    assert arm.record.states[-1].engines == topics.ON
-    keyboard.up(" ")
-    hand.await_state("released")
-    arm.record.silence_after(time.time())
-    assert not hand.stalled
 
 
 def test_keyboard_alone_moves_the_arm_and_kills_a_process(arm: Arm, hand: HandOnPage) -> None:
