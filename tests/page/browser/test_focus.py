@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager
 
 import pytest
 
@@ -11,11 +12,12 @@ from interfaces import topics
 
 from .arm import GONE, Arm, hold_with_engines_on, undisturbed
 from .chromium import PAD
-from .desktop import RETURN, SPACE, HandAtDesktop, hand_at_desktop
+from .desktop import RETURN, SPACE, Desktop, HandAtDesktop, hand_at_desktop
 
 pytestmark = pytest.mark.timed
 
 LONGER = 4.0  # s: a key without repeats is released after 3 s
+UNSEEN = 2.0  # s within which the page notices that a key repeats no more
 KEYS = pytest.mark.parametrize("key", [SPACE, RETURN], ids=["space", "return"])
 
 
@@ -51,6 +53,22 @@ def test_key_holds_while_it_repeats_and_releases_when_lifted(arm: Arm, hand: Han
     hand.await_state("released")
     arm.record.silence_after(time.time())
     assert hand.why == ""
+
+
+@KEYS
+@pytest.mark.parametrize("thief", [Desktop.hotkey, Desktop.grab], ids=["hotkey", "grab"])
+@undisturbed
+def test_key_that_is_lifted_unseen_is_released(
+    arm: Arm, hand: HandAtDesktop, thief: Callable[[Desktop], AbstractContextManager[None]], key: int
+) -> None:
+    down, up = key_of(hand, key)
+    hand.hold(down, up)
+    time.sleep(1.0)  # it repeats
+    with thief(hand.desktop):
+        up()
+        lifted = time.time()
+    arm.record.silence_after(lifted + UNSEEN)
+    assert hand.why == "Released: the key does not repeat any more."
 
 
 @undisturbed

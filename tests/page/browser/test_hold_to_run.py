@@ -10,6 +10,7 @@ anew.
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 
 import pytest
 
@@ -99,12 +100,7 @@ def quantile(values: list[float], q: float) -> float:
 @pytest.mark.parametrize("hand", [PAD], indirect=True, ids=["pad"])
 @undisturbed
 def test_released_trigger_of_a_gamepad_releases(arm: Arm, hand: HandOnPage) -> None:
-    def trigger(way: float) -> None:
-        hand.page.evaluate("way => { pad.buttons[7].value = way; }", way)
-        hand.page.wait_for_timeout(100)
-
-    hand.page.evaluate("tell('gamepadconnected')")
-    trigger(0)
+    trigger = connected_trigger(hand)
     hold_with_engines_on(arm, hand, lambda: trigger(1), lambda: trigger(0))
     trigger(0)
     hand.await_state("released")
@@ -116,6 +112,66 @@ def test_released_trigger_of_a_gamepad_releases(arm: Arm, hand: HandOnPage) -> N
     hand.await_state("released")
     arm.record.silence_after(time.time())
     assert hand.why == "Released: the gamepad was disconnected."
+
+
+@pytest.mark.parametrize("hand", [PAD], indirect=True, ids=["pad"])
+@undisturbed
+def test_gamepad_that_has_frozen_releases(arm: Arm, hand: HandOnPage) -> None:
+    trigger = connected_trigger(hand)
+    hand.hold(lambda: trigger(1), lambda: trigger(0))
+    time.sleep(6.0)
+    assert hand.state == "held", "a gamepad that tells something new holds on"
+    hand.page.evaluate("pad.frozen = 1")
+    hand.await_state("released")
+    arm.record.silence_after(time.time())
+    assert hand.why == "Released: the gamepad has not moved for 5 s."
+    hand.page.evaluate("delete pad.frozen")
+    time.sleep(0.5)
+    assert hand.state == "released", "the trigger has to be let go first"
+
+
+@pytest.mark.parametrize("hand", [PAD], indirect=True, ids=["pad"])
+@undisturbed
+def test_gamepad_without_triggers_holds_up_nothing(arm: Arm, hand: HandOnPage) -> None:
+    hand.page.evaluate("pad.buttons.length = 2; tell('gamepadconnected')")
+    hand.page.wait_for_timeout(200)
+    assert hand.errors == []
+    hold_with_engines_on(arm, hand)
+
+
+def connected_trigger(hand: HandOnPage) -> Callable[[float], None]:
+    """A gamepad that is connected, as a function that moves its trigger."""
+
+    def trigger(way: float) -> None:
+        hand.page.evaluate("way => { pad.buttons[7].value = way; }", way)
+        hand.page.wait_for_timeout(100)
+
+    hand.page.evaluate("tell('gamepadconnected')")
+    trigger(0)
+    return trigger
+
+
+PEN = """
+hold.setPointerCapture = () => {};
+window.pen = (type, buttons) => hold.dispatchEvent(
+    new PointerEvent(type, { pointerId: 7, pointerType: "pen", button: 0, buttons })
+);
+"""
+
+
+@undisturbed
+def test_pen_that_hovers_after_a_lost_release_releases(arm: Arm, hand: HandOnPage) -> None:
+    hand.page.evaluate(PEN)
+    hand.hold(
+        lambda: hand.page.evaluate("pen('pointerdown', 1)"), lambda: hand.page.evaluate("pen('pointerup', 0)")
+    )
+    hand.page.evaluate("pen('pointermove', 1)")
+    hand.await_drawing()
+    assert hand.state == "held"
+    hand.page.evaluate("pen('pointermove', 0)")
+    hand.await_state("released")
+    arm.record.silence_after(time.time())
+    assert not hand.stalled
 
 
 @undisturbed

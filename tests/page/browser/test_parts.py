@@ -87,6 +87,24 @@ async () => {
 }
 """
 
+SIGNS = """
+async (script) => {
+    const { RELEASED, step } = await import("/static/hold.js");
+    let state = RELEASED;
+    const seen = [];
+    let now = 0;
+    const feed = (event) => { state = step(state, { at: now, ...event }).state; };
+    for (; now <= 12000; now += 50) {
+        feed({ type: "update", nonce: "n" });
+        for (const [at, event] of script) if (at === now) feed(event);
+        const before = state.held;
+        feed({ type: "tick", wall: now });
+        if (state.held !== before) seen.push([now, state.why]);
+    }
+    return [seen, state.held];
+}
+"""
+
 
 @pytest.fixture
 def page(browser: Any) -> Iterator[Any]:
@@ -118,3 +136,26 @@ def test_strikes_are_told_as_strikes_that_are_left(page: Any) -> None:
 
 def test_first_state_of_the_operator_is_no_alarm(page: Any) -> None:
     assert page.evaluate(ALERTS) == ["", "", "", "Operator not seen."]
+
+
+DOWN = {"type": "down", "hand": "key", "lasts": 3000, "lack": "no sign"}
+SIGN = {"type": "sign", "hand": "key", "lasts": 500, "lack": "no sign"}
+NO_SIGN = "Released: no sign"
+
+
+@pytest.mark.parametrize(
+    ("script", "expected"),
+    [
+        ([(100, {"type": "down", "hand": "mouse"})], [[], True]),
+        ([(100, DOWN)], [[[3150, NO_SIGN]], False]),
+        ([(100, DOWN), (700, SIGN)], [[[1250, NO_SIGN]], False]),
+        ([(100, DOWN), *((at, SIGN) for at in range(700, 12000, 500))], [[], True]),
+        ([(100, DOWN), (700, SIGN), (750, SIGN | {"lasts": 9000})], [[[9800, NO_SIGN]], False]),
+        ([(100, DOWN), (700, SIGN | {"hand": "other"})], [[[3150, NO_SIGN]], False]),
+        ([(100, DOWN), (3200, SIGN)], [[[3150, NO_SIGN]], False]),
+        ([(100, DOWN), (200, DOWN)], [[], False]),
+        ([(100, DOWN), (200, DOWN | {"hand": "other"})], [[[3150, NO_SIGN]], False]),
+    ],
+)
+def test_hand_counts_as_long_as_its_last_sign_of_life(page: Any, script: Any, expected: Any) -> None:
+    assert page.evaluate(SIGNS, script) == expected

@@ -6,6 +6,13 @@ const RELEASED = 0.4;
 /** Keys after which some systems do not tell that another key is let go. */
 const THIEVES = new Set(["Meta", "Alt", "F10"]);
 
+// How long a hand counts without another sign of life [ms], where its release may be lost: on X11, a hotkey or a
+// keyboard grab (screen lock, password prompt, launcher) takes the key-up, and the window keeps its focus.
+const FIRST_REPEAT = 3000; // from a key to its first repeat: desktops allow a delay of 2 s
+const REPEAT = 500; // and two intervals, from one repeat to the next
+const OTHER_KEY = 10_000; // after another key, because only the last key repeats
+const STILL = 5000; // of a gamepad, which keeps its last state when its radio link is lost
+
 /**
  * Listen to everything that holds or releases.
  *
@@ -32,29 +39,32 @@ function listenToPointers(button, feed) {
   });
   for (const type of ["pointerup", "pointercancel", "lostpointercapture"]) button.addEventListener(type, up);
   button.addEventListener("pointermove", (event) => {
-    if (event.pointerType === "mouse" && !(event.buttons & 1)) up(event); // its pointerup was lost
+    if (!(event.buttons & 1)) up(event); // its pointerup was lost: a mouse moves, or a pen hovers
   });
   // Keeps a long touch from becoming a gesture: selection, context menu, scrolling.
   button.addEventListener("touchstart", (event) => event.preventDefault(), { passive: false });
 }
 
 function listenToKeys(button, feed) {
-  const down = new Set(); // keys that pressed, as long as they are down
+  const down = new Map(); // keys that pressed, as long as they are down, with the time of their last event
   const hand = (event) => `key ${event.code}`;
+  const lack = "the key does not repeat any more";
 
   button.addEventListener("keydown", (event) => {
     if (event.key !== " " && event.key !== "Enter") return;
     event.preventDefault();
     if (event.repeat || event.ctrlKey || event.altKey || event.metaKey) return;
-    down.add(event.code);
-    feed({ type: "down", hand: hand(event) });
+    down.set(event.code, event.timeStamp);
+    feed({ type: "down", hand: hand(event), lasts: FIRST_REPEAT, lack });
   });
   // At the window, because focus may move on while the key is down: hold Space, Tab to "Turn on", Enter.
   window.addEventListener(
     "keydown",
     (event) => {
       if (THIEVES.has(event.key)) feed({ type: "lost", why: "another key took over the keyboard" });
-      if (down.has(event.code) && event.target !== button) swallow(event);
+      if (event.repeat) repeat(event);
+      else if (!down.has(event.code)) others();
+      else if (event.target !== button) lose(event);
     },
     true,
   );
@@ -68,6 +78,23 @@ function listenToKeys(button, feed) {
     true,
   );
   window.addEventListener("blur", () => down.clear());
+
+  function repeat(event) {
+    if (!down.has(event.code)) return;
+    const interval = event.timeStamp - down.get(event.code);
+    down.set(event.code, event.timeStamp);
+    feed({ type: "sign", hand: hand(event), lasts: REPEAT + 2 * interval, lack });
+    if (event.target !== button) swallow(event);
+  }
+
+  function others() {
+    for (const code of down.keys()) feed({ type: "sign", hand: `key ${code}`, lasts: OTHER_KEY, lack });
+  }
+
+  function lose(event) {
+    down.delete(event.code);
+    feed({ type: "up", hand: hand(event), why: "the key was let go unnoticed" });
+  }
 }
 
 function swallow(event) {
@@ -93,23 +120,27 @@ function listenToPage(button, feed, isHeld) {
 }
 
 function gamepads(feed) {
-  const pressed = new Map(); // by index; a trigger that is found pressed has to be let go first
+  const pads = new Map(); // by index
   const hand = (index) => `gamepad ${index}`;
+  const lasting = { lasts: STILL, lack: `the gamepad has not moved for ${STILL / 1000} s` };
 
-  window.addEventListener("gamepadconnected", ({ gamepad }) => pressed.set(gamepad.index, true));
+  // A trigger that is found pressed has to be let go first.
+  window.addEventListener("gamepadconnected", ({ gamepad }) => pads.set(gamepad.index, { isDown: true, shown: "" }));
   window.addEventListener("gamepaddisconnected", ({ gamepad }) => {
-    pressed.delete(gamepad.index);
+    pads.delete(gamepad.index);
     feed({ type: "up", hand: hand(gamepad.index), why: "the gamepad was disconnected" });
   });
 
   return () => {
-    if (!pressed.size) return;
-    const pads = navigator.getGamepads();
-    for (const [index, before] of pressed) {
-      const now = way(pads[index]) > (before ? RELEASED : PRESSED);
-      pressed.set(index, now);
-      if (now && !before && document.hasFocus()) feed({ type: "down", hand: hand(index) });
-      if (!now && before) feed({ type: "up", hand: hand(index) });
+    if (!pads.size) return;
+    const found = navigator.getGamepads();
+    for (const [index, before] of pads) {
+      const shown = values(found[index]);
+      const isDown = way(found[index]) > (before.isDown ? RELEASED : PRESSED);
+      pads.set(index, { isDown, shown });
+      if (isDown && !before.isDown && document.hasFocus()) feed({ type: "down", hand: hand(index), ...lasting });
+      else if (isDown && shown !== before.shown) feed({ type: "sign", hand: hand(index), ...lasting });
+      if (!isDown && before.isDown) feed({ type: "up", hand: hand(index) });
     }
   };
 }
@@ -117,5 +148,10 @@ function gamepads(feed) {
 /** How far a trigger of a gamepad is pressed; 0 for a gamepad that is gone or has none. */
 function way(pad) {
   if (!pad?.connected || pad.mapping !== "standard") return 0;
-  return Math.max(...TRIGGERS.map((index) => pad.buttons[index].value));
+  return Math.max(...TRIGGERS.map((index) => pad.buttons[index]?.value ?? 0));
+}
+
+/** All that a gamepad says: a hand that holds it is never quite still. */
+function values(pad) {
+  return pad ? [pad.timestamp, ...pad.axes, ...pad.buttons.map((button) => button.value)].join() : "";
 }

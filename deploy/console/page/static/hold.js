@@ -7,6 +7,8 @@
  * Events have `type`, `at` (monotonic time) and
  * - `update`: `nonce`, the newest one of the server;
  * - `down`, `up`: `hand`, which names the pointer, key or gamepad; `up` may have a `why`;
+ * - `sign`: `hand`, which is still there. `down` and `sign` may have `lasts`: how long the hand counts without another
+ *   sign, where its release may be lost; and `lack`: why it counts no more after that;
  * - `lost`: `why`, such as a window that lost focus;
  * - `tick`: `wall`, the time of the wall clock; every PERIOD;
  * - `refused`, `released`: `why`, by the server;
@@ -21,6 +23,8 @@ export const GAP = 250;
  * @typedef {object} State
  * @property {boolean} held whether this page claims that a hand holds
  * @property {string|null} hand the hand that holds
+ * @property {number} until time until which this hand counts without another sign of life
+ * @property {string} lack why it counts no more after that
  * @property {string|null} nonce the newest nonce
  * @property {number} heard time of the newest nonce
  * @property {number} ticked time of the last tick
@@ -32,6 +36,8 @@ export const GAP = 250;
 export const RELEASED = Object.freeze({
   held: false,
   hand: null,
+  until: Infinity,
+  lack: "",
   nonce: null,
   heard: -Infinity,
   ticked: -Infinity,
@@ -56,6 +62,8 @@ export function step(state, event) {
       return { state: noted(state, event), send: [] };
     case "down":
       return press(state, event);
+    case "sign":
+      return { state: state.held && state.hand === event.hand ? lively(state, event) : state, send: [] };
     case "up":
       if (!state.held || state.hand !== event.hand) return { state, send: [] };
       return release(state, event.why ?? "");
@@ -75,12 +83,13 @@ export function step(state, event) {
 }
 
 function press(state, event) {
+  if (state.held && state.hand === event.hand) return release(state, "it was let go unnoticed, and pressed again");
   if (state.held) return { state, send: [] }; // a second hand changes nothing
   if (isLate(state, event.at) || !isFresh(state, event.at)) {
     return { state: { ...state, why: "Not held: no fresh word from the server. Press again" }, send: [] };
   }
   return {
-    state: { ...state, held: true, hand: event.hand, why: "" },
+    state: lively({ ...state, held: true, hand: event.hand, why: "" }, event),
     send: [{ type: "press", nonce: state.nonce }],
   };
 }
@@ -90,6 +99,7 @@ function tick(state, event) {
   if (!state.held) return { state: now, send: [] };
   // The monotonic clock may stand still while a machine sleeps; the wall clock does not.
   if (now.offset - state.offset > GAP) return release(now, "this device slept");
+  if (event.at > state.until) return release(now, state.lack);
   if (!isFresh(state, event.at)) return release(now, "no word from the server in time");
   return { state: now, send: [{ type: "beat", nonce: state.nonce }] };
 }
@@ -103,6 +113,11 @@ function disconnect(state) {
 function release(state, why) {
   const words = why && `Released: ${why}`;
   return { state: { ...state, held: false, hand: null, why: words }, send: [{ type: "release" }] };
+}
+
+/** The state with a hand that has just given a sign of life. */
+function lively(state, { at, lasts = Infinity, lack = "" }) {
+  return { ...state, until: at + lasts, lack };
 }
 
 /** The state with what an event tells about nonces and clocks. */
