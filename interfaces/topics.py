@@ -156,7 +156,7 @@ OPERATOR_HEARTBEAT = Topic(
     Bool,
     _qos(1, reliable=False, lifespan=0.5),
     "",
-    ("dead_mans_switch", "operator_console"),
+    ("dead_mans_switch", "console", "operator_console"),
     "`true` while the switch is pressed, at 20 Hz or much faster. Neither `false` nor a heartbeat that "
     "waited in a queue is a sign of life",
     _not_pressed,

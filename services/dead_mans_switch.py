@@ -1,8 +1,8 @@
 """The dead man's switch, held by a virtual operator (thesis 5.2.3).
 
-User story (ours): as a developer, I am able to press and release the switch by hand
-(``ros2 param set /dead_mans_switch pressed true``) or by a scenario, which may also command the engines until
-a person takes the switch.
+User story (ours): as a developer, I am able to press and release the switch by a parameter
+(``ros2 param set /dead_mans_switch pressed true``: it stays pressed without a hand) or by a scenario, which
+may also command the engines until a person takes the switch.
 """
 
 from __future__ import annotations
@@ -61,7 +61,13 @@ class Parameters:
     """The parameters of the service."""
 
     rate: float = parameter(20.0, (1.0, 10_000.0), "Hz", "heartbeats while pressed", settable=True)
-    pressed: bool = parameter(False, None, "", "whether the switch is pressed", settable=True)
+    pressed: bool = parameter(
+        False,
+        None,
+        "",
+        "whether the switch is pressed: it stays so without a hand, for developers",
+        settable=True,
+    )
 
 
 def wire(node: ServiceNode) -> None:

@@ -14,10 +14,9 @@ from reactivex import Observable
 from reactivex.subject import Subject
 from std_msgs.msg import String
 
+from deploy.console.hand import BEAT_PERIOD, Hand
 from deploy.console.lines import Line, Span, line_batches
 from deploy.console.output import say
-from deploy.console.page.remote import RemoteParameters
-from deploy.console.page.switch import PRESSED, VIRTUAL_SWITCH
 from deploy.console.terminal import open_terminal
 from interfaces import topics
 from reactive_node import ReactiveNode, stamps
@@ -47,12 +46,10 @@ class Console:
         self.has_quit = False
         self._node = node
         self._engines = node.create_publisher(String, topics.ENGINES.name, topics.ENGINES.qos)
-        self._switch = RemoteParameters(node, VIRTUAL_SWITCH)
-        self._holds: Subject[bool] = Subject()
-        self._holds.switch_map(self._held).filter(bool).subscribe(say, scheduler=node.scheduler)
+        self._hand = Hand(node)
         self._commands: dict[str, Callable[[], None]] = {
-            "press": lambda: self._holds.on_next(True),
-            "release": lambda: self._holds.on_next(False),
+            "press": self._hand.press,
+            "release": self._hand.release,
             "turn_on": lambda: self._command_engines(topics.TURN_ON),
             "turn_off": lambda: self._command_engines(topics.TURN_OFF),
             "quit": self._quit,
@@ -78,12 +75,17 @@ class Console:
     def refresh(self) -> None:
         """Show the lines that have come, and obey what is typed until the next batch is due."""
         self._ticks.on_next(None)
+        due = time.monotonic() + PERIOD
+        typed: list[str] = []
         try:
-            for line in self._terminal.read(PERIOD):
-                if word := line.strip().lower():
-                    self._obey(word)
+            while not typed and (left := due - time.monotonic()) > 0.0:
+                self._hand.beat()
+                typed = self._terminal.read(min(left, BEAT_PERIOD) if self._hand.holds else left)
         except EOFError:
             self._quit()
+        for line in typed:
+            if word := line.strip().lower():
+                self._obey(word)
 
     def _observed(self, topic: topics.Topic) -> Observable[Any]:
         # A service wants the last message, the operator all of them.
@@ -105,20 +107,6 @@ class Console:
             self._commands[meant[0]]()
         else:
             say(f"{word}? Commands: {', '.join(self._commands)}")
-
-    def _held(self, pressed: bool) -> Observable[str]:
-        """
-        Press or release the switch until it answers: a process that is killed loses the request.
-
-        Emits why the switch refuses, or an empty string.
-        """
-        attempt = self._switch.set(PRESSED, pressed)
-
-        def insist(error: Exception, _: Any) -> Observable[str]:
-            say(f"{VIRTUAL_SWITCH} does not answer: trying again until it does")
-            return attempt.retry()
-
-        return attempt.catch(insist)
 
     def _settled(self, sent: Span) -> Observable[Any]:
         """Emit when the engines are off after a `turn_off`, or somebody wants them on again."""

@@ -22,7 +22,7 @@ from deploy.console.lines import Span, line_batches
 from deploy.console.page import address, hold, protocol, requests, server, state
 from deploy.console.page.remote import parameter_changes
 from deploy.console.page.site import Site
-from deploy.console.page.switch import Switch
+from deploy.console.page.switch import VIRTUAL_SWITCH, Switch
 from deploy.supervision import manifest
 from interfaces import service, topics
 from interfaces.scenario.origin import Origin
@@ -33,6 +33,7 @@ from services import engine_controller, operator_watchdog
 
 LINGER = 5.0  # s after the last page has left until its topics are given up: a reload is faster
 LINES_PERIOD = 0.5  # s
+TERMINALS_PERIOD = 0.5  # s
 BEST_EFFORT = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 UNSEEN = replace(topics.ENGINES_STATE, qos=BEST_EFFORT)
 """The engines' state while no page shows it. To read and acknowledge it ten times a second would cost more
@@ -114,7 +115,8 @@ def wire(node: ServiceNode) -> None:
         state.always(always_seen, new_watchdogs(node, origin), controllers(node), clock),
         is_open.switch_map(lambda it: session if it else rx.never()),
         switch.holds.map(state.held),
-        switch.pressed.map(state.held_by_terminal),
+        switch.pressed.map(state.pressed),
+        terminal_holds(node, is_open).map(state.held_at_terminal),
         turn_offs.map(lambda _: state.turned_off(clock.now())),
         configuration.followers(parameter_events, is_open),
         configuration.outcomes(asked),
@@ -150,6 +152,18 @@ def new_watchdogs(node: ServiceNode, origin: Origin) -> Observable[bool]:
     matches = node.create_event_observable(topic.type, topic.name, topic.qos, "matched")
     appeared = matches.filter(lambda it: it.current_count_change > 0)
     return appeared.map_indexed(lambda _, index: index > 0 or not origin.is_past)
+
+
+def terminal_holds(node: ServiceNode, is_open: Observable[bool]) -> Observable[bool]:
+    """Emit while a page is open whether a hand at a terminal sends heartbeats: it has a publisher then."""
+    name = node.resolve_topic_name(topics.OPERATOR_HEARTBEAT.name)
+    services = (VIRTUAL_SWITCH, manifest.PAGE)
+
+    def look(_: Any) -> bool:
+        return any(each.node_name not in services for each in node.get_publishers_info_by_topic(name))
+
+    looks = is_open.switch_map(lambda it: rx.timer(0.0, TERMINALS_PERIOD) if it else rx.never())
+    return looks.map(look).distinct_until_changed()
 
 
 def controllers(node: ServiceNode) -> Callable[[], frozenset[tuple[int, ...]]]:

@@ -17,12 +17,15 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
 from deploy.console import operator_console
+from deploy.console.hand import Hand
 from deploy.console.page import remote
 from deploy.console.page.state import RESTARTED
+from deploy.console.page.switch import ECHO
 from deploy.supervision.system import PAGE_FILE
 from interfaces import topics
 from interfaces.service import ServiceNode
 from interfaces.topics import CONFIGURATION
+from reactive_node import ReactiveNode
 from services import config_publisher, dead_mans_switch
 
 pytestmark = pytest.mark.timed  # a held page answers within 250 ms
@@ -95,6 +98,7 @@ class World:
             String, "engines", lambda it: self.commands.append(it.data), topics.ENGINES.qos
         )
         self._pages: list[Page] = []
+        self._others: list[Callable[[], None]] = []
         self._spin_until = spin_until
 
     @staticmethod
@@ -111,11 +115,15 @@ class World:
 
     def until(self, condition: Callable[[], object]) -> None:
         def lives() -> bool:
-            for page in self._pages:
-                page.live()
+            for live in (*(page.live for page in self._pages), *self._others):
+                live()
             return bool(condition())
 
         self._spin_until(lives)
+
+    def also_live(self, live: Callable[[], None]) -> None:
+        """Call this all the time, as for the pages."""
+        self._others.append(live)
 
     def for_seconds(self, seconds: float) -> None:
         end = time.monotonic() + seconds
@@ -135,7 +143,7 @@ class World:
             finally:
                 self._pages.remove(page)
 
-    def set_at_terminal(self, pressed: bool) -> None:
+    def set_pressed(self, pressed: bool) -> None:
         self.switch.set_parameters([Parameter("pressed", value=pressed)])
 
 
@@ -213,8 +221,8 @@ def test_second_page_is_refused_while_the_first_holds(world: World) -> None:
         world.until(lambda: one.shown["switch"] == {"held": True, "by": "other_page"})
 
 
-def test_press_on_a_page_takes_the_switch_from_the_terminal(world: World) -> None:
-    world.set_at_terminal(True)
+def test_press_on_a_page_takes_the_switch_from_the_parameter(world: World) -> None:
+    world.set_pressed(True)
     with world.page() as page:
         world.until(lambda: page.shown["switch"] == {"held": True, "by": "terminal"})
         page.press()
@@ -227,36 +235,84 @@ def test_press_on_a_page_takes_the_switch_from_the_terminal(world: World) -> Non
         assert len(world.heartbeats) == count
 
 
-def test_press_at_the_terminal_takes_the_switch_from_a_page(world: World) -> None:
+def test_pressed_parameter_takes_the_switch_from_a_page(world: World) -> None:
     with world.page() as page:
         page.press()
         world.until(lambda: page.shown["switch"] == {"held": True, "by": "this_page"})
         world.for_seconds(0.2)
-        world.set_at_terminal(True)
+        world.set_pressed(True)
         world.until(lambda: page.shown["switch"] == {"held": True, "by": "terminal"})
         page.is_held = False
         world.for_seconds(0.5)
         assert page.shown["switch"] == {"held": True, "by": "terminal"}
-        world.set_at_terminal(False)
+        world.set_pressed(False)
         world.until(lambda: page.shown["switch"] == {"held": False, "by": None})
 
 
-def test_release_at_the_terminal_releases_a_page(world: World) -> None:
+def test_released_parameter_releases_a_page(world: World) -> None:
     with world.page() as page:
         page.press()
         world.until(lambda: len(world.heartbeats) > 5)
         world.for_seconds(0.2)
-        world.set_at_terminal(False)
+        world.set_pressed(False)
         world.until(lambda: page.shown["switch"] == {"held": False, "by": None})
         count = len(world.heartbeats)
         world.for_seconds(0.4)  # in which the page goes on to beat
         assert len(world.heartbeats) == count
 
 
+@pytest.fixture
+def terminal(world: World, make_node: Callable[..., Any]) -> Hand:
+    """The hand at a terminal that lives."""
+    hand = Hand(make_node("console_7", kind=ReactiveNode))
+    world.also_live(hand.beat)
+    world.for_seconds(0.5)  # it meets the switch
+    return hand
+
+
+def test_hand_at_a_terminal_takes_the_switch_from_a_page(world: World, terminal: Hand) -> None:
+    with world.page() as page:
+        page.press()
+        world.until(lambda: page.shown["switch"] == {"held": True, "by": "this_page"})
+        world.for_seconds(ECHO)
+        terminal.press()
+        world.until(lambda: page.shown["switch"] == {"held": True, "by": "terminal"})
+        assert terminal.holds
+        assert world.switch.get_parameter("pressed").value is False
+
+        page.is_held = False
+        terminal.release()
+        world.until(lambda: page.shown["switch"] == {"held": False, "by": None})
+
+
+def test_page_takes_the_switch_from_a_hand_at_a_terminal(world: World, terminal: Hand) -> None:
+    terminal.press()
+    with world.page() as page:
+        world.until(lambda: page.shown["switch"] == {"held": True, "by": "terminal"})
+        world.for_seconds(ECHO)
+        page.press()
+        world.until(lambda: page.shown["switch"] == {"held": True, "by": "this_page"})
+        world.until(lambda: not terminal.holds)
+        page.release()
+        world.until(lambda: page.shown["switch"] == {"held": False, "by": None})
+        count = len(world.heartbeats)
+        world.for_seconds(0.5)
+        assert len(world.heartbeats) == count
+
+
+def test_release_of_a_hand_at_a_terminal_releases_a_page(world: World, terminal: Hand) -> None:
+    with world.page() as page:
+        page.press()
+        world.until(lambda: page.shown["switch"] == {"held": True, "by": "this_page"})
+        world.for_seconds(ECHO)
+        terminal.release()
+        world.until(lambda: page.shown["switch"] == {"held": False, "by": None})
+
+
 def test_switch_that_is_not_there_is_taken_when_it_comes_back(
     make_node: Callable[..., Any], world: World
 ) -> None:
-    world.set_at_terminal(True)
+    world.set_pressed(True)
     with world.page() as page:
         world.until(lambda: page.shown["switch"]["by"] == "terminal")
         world.switch.destroy_node()

@@ -238,7 +238,8 @@ def test_heartbeat_of_scenario_and_terminal_is_shown(play: Play) -> None:
     found = play.run(211)
 
     assert switch(found, "one", 210.2) == {"held": True, "by": "scenario"}
-    assert switch(state.held_by_terminal(True)(found), "one", 210.2) == {"held": True, "by": "terminal"}
+    for change in (state.pressed(True), state.held_at_terminal(True)):
+        assert switch(change(found), "one", 210.2) == {"held": True, "by": "terminal"}
     assert switch(found, "one", 210.3) == {"held": False, "by": None}
 
 

@@ -228,6 +228,35 @@ def test_what_is_typed_just_before_quit_is_obeyed(module_site: Site) -> None:
     module_site.begin_command(*launcher).await_line("Not received signal from operator")
 
 
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
+def test_terminal_that_is_killed_or_stopped_is_a_silent_operator(
+    module_site: Site, peer: Peer, number: signal.Signals
+) -> None:
+    console = module_site.begin_command(sys.executable, "-m", "deploy.commands.launcher", "console")
+    console.await_line("Engines are off")
+    console.insist("press\n", "Operator is alive")
+    heartbeats = peer.collect(topics.OPERATOR_HEARTBEAT)
+    peer.spin_until(lambda: len(heartbeats) > 5)
+
+    os.kill(console.pid, number)
+    spin_for(peer, 0.5)
+    heartbeats.clear()
+    spin_for(peer, 1.5)
+    assert heartbeats == []
+
+    if number == signal.SIGSTOP:
+        os.kill(console.pid, signal.SIGCONT)
+        console.await_line("Released, because this terminal stood still: press again.")
+        heartbeats.clear()
+        spin_for(peer, 0.5)
+        assert heartbeats == []
+
+
+def spin_for(peer: Peer, seconds: float) -> None:
+    end = time.monotonic() + seconds
+    peer.spin_until(lambda: time.monotonic() > end)
+
+
 def test_another_terminal_may_have_sourced_another_rclpy(
     module_site: Site, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -91,7 +91,9 @@ class PageState(NamedTuple):
     heartbeat: float = -math.inf
     """When a heartbeat came that is not of a page."""
     pressed: bool = False
-    """Whether the terminal holds the switch."""
+    """Whether the virtual switch was pressed by hand."""
+    at_terminal: bool = False
+    """Whether a hand at a terminal sends heartbeats."""
     engines: str | None = None
     reported: float = -math.inf
     """When the engines' state was published."""
@@ -356,9 +358,14 @@ def turned_off(now: float) -> Change:
     return lambda state: state._replace(own_turn_off=now)
 
 
-def held_by_terminal(pressed: bool) -> Change:
-    """The terminal presses or releases the switch."""
+def pressed(pressed: bool) -> Change:
+    """The virtual switch is pressed or released by hand."""
     return lambda state: state._replace(pressed=pressed)
+
+
+def held_at_terminal(at_terminal: bool) -> Change:
+    """A hand at a terminal begins or ends to send heartbeats."""
+    return lambda state: state._replace(at_terminal=at_terminal)
 
 
 def follows_scenario(name: str, follows: bool) -> Change:

@@ -1,7 +1,10 @@
 """The one switch of the operator: on the pages, at the terminal and in the scenario.
 
-A press takes the switch, on a page or at the terminal; a release at either of them releases it. Of two pages
-the first one keeps it. From the first press on, the scenario does not hold the switch any more.
+A press takes the switch, on a page or at the terminal; a release at the terminal releases it everywhere. Of
+two pages the first one keeps it. From the first press on, the scenario does not hold the switch any more.
+
+Each hand sends its own heartbeats while it lives. It takes the switch by setting the parameter ``pressed`` of
+the dead man's switch to false, and lets go when another hand sets it.
 """
 
 from __future__ import annotations
@@ -35,7 +38,7 @@ class Switch:
         now: Callable[[], float],
     ) -> None:
         """
-        Connect pages and terminal.
+        Connect the pages with the other hands.
 
         :param events: what hands do on pages.
         :param changes: the parameters that are set while a page is open.
@@ -43,19 +46,21 @@ class Switch:
         :param now: the clock of the nonces [s].
         """
         virtual = VirtualSwitch(node, now)
-        at_terminal = virtual.by_terminal(changes).share()
-        releases = at_terminal.map(lambda _: hold.Release())
+        by_others = virtual.by_others(changes).share()
+        releases = by_others.map(lambda _: hold.Release())
         self.holds: Observable[hold.Hold] = hold.holds(rx.merge(events, releases), now=now).share()
         """The switch of the pages, after each event."""
-        presses = rx.merge(self.holds.filter(lambda it: it.pressed), at_terminal.filter(bool))
-        taken = presses.switch_map(lambda it: virtual.take() if isinstance(it, hold.Hold) else rx.never())
+        presses = rx.merge(self.holds.filter(lambda it: it.pressed), by_others.filter(bool))
+        taken = presses.switch_map(
+            lambda it: virtual.take().retry() if isinstance(it, hold.Hold) else rx.never()
+        )
         asked = is_open.filter(bool).switch_map(lambda _: virtual.is_pressed())
-        self.pressed: Observable[bool] = rx.merge(asked, at_terminal, taken)
-        """Whether the terminal holds the switch."""
+        self.pressed: Observable[bool] = rx.merge(asked, by_others, taken)
+        """Whether the virtual switch was pressed by hand."""
 
 
 class VirtualSwitch:
-    """The switch that scenario and terminal hold: the parameter ``pressed`` of the dead man's switch."""
+    """The dead man's switch, which the scenario holds, and whose parameter ``pressed`` all hands set."""
 
     def __init__(self, node: ReactiveNode, now: Callable[[], float]) -> None:
         """:param now: a clock that nobody sets [s]."""
@@ -64,11 +69,11 @@ class VirtualSwitch:
         self._echo_until = -math.inf
 
     def is_pressed(self) -> Observable[bool]:
-        """Emit whether the terminal holds the switch now; nothing without an answer."""
+        """Emit whether it was pressed by hand; nothing without an answer."""
         return self._parameters.get(PRESSED).map(bool).catch(rx.empty())
 
-    def by_terminal(self, changes: Observable[ParameterChange]) -> Observable[bool]:
-        """Emit each press and release at the terminal, without the changes by :meth:`take`."""
+    def by_others(self, changes: Observable[ParameterChange]) -> Observable[bool]:
+        """Emit what other hands set, without the changes by :meth:`take`."""
         values = changes.filter(lambda it: (it.program, it.name) == (VIRTUAL_SWITCH, PRESSED)).map(
             lambda it: it.value
         )
@@ -80,7 +85,11 @@ class VirtualSwitch:
         return is_echo
 
     def take(self) -> Observable[bool]:
-        """Release the switch by hand, so that it follows no scenario any more; emits ``False`` when done."""
+        """
+        Release the switch by hand, so that it follows no scenario any more; emits ``False`` when done.
+
+        Without an answer it ends in a TimeoutError: a dead man's switch that is killed comes back.
+        """
 
         def begin(_: Any) -> Observable[bool]:
             self._echo_until = math.inf
@@ -90,4 +99,4 @@ class VirtualSwitch:
             self._echo_until = min(self._echo_until, self._now() + ECHO)
             return False
 
-        return rx.defer(begin).retry()  # a dead man's switch that is killed comes back
+        return rx.defer(begin)

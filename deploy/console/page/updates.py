@@ -22,7 +22,7 @@ def view(state: PageState, page: str, now: float) -> dict[str, Any]:
     """Return what a page shows of a state at a time [s], by keys of an update."""
     holder = state.hold.holder(now)
     is_beating = now - state.heartbeat <= HEARTBEAT_VISIBLE
-    by = "terminal" if state.pressed else "scenario"
+    by = "terminal" if state.pressed or state.at_terminal else "scenario"
     age = now - state.seen
     is_reported = now - state.reported <= RENEWED
     refused = state.refused[1] if state.refused and now - state.refused[0] <= REFUSAL_VISIBLE else None
