@@ -17,6 +17,8 @@ from typing import Any
 
 import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.sync.client import connect
+from websockets.typing import Origin
 
 from deploy.console.page import address, connection, hold, protocol, server
 from deploy.console.page.state import PageState, refuse
@@ -86,11 +88,14 @@ def test_other_methods_are_refused(arm: Arm, method: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "host", ["", "evil.example", "127.0.0.1", "127.0.0.1:1", "127.0.0.1.evil.example:80"]
+    "host",
+    ["", "evil.example", "evil.example:80", "127.0.0.1.evil.example:80", "127.0.0.1:x", "evil:1@localhost:1"],
 )
 @pytest.mark.parametrize("path", ["/", "/socket"])
 def test_other_host_names_are_refused(arm: Arm, host: str, path: str) -> None:
-    assert arm.get(path, Host=host, Origin=arm.origin)[0] == 403
+    status, _, body = arm.get(path, Host=host, Origin=f"http://{host}")
+    assert status == 403
+    assert b"Open the one that the terminal shows" in body
     assert "host" in arm.next(server.Violation).reason
 
 
@@ -104,11 +109,23 @@ def test_localhost_is_a_name_of_the_host(arm: Arm) -> None:
     assert arm.get("/", Host=f"localhost:{arm.port}")[0] == 200
 
 
+@pytest.mark.parametrize("host", ["localhost:9000", "127.0.0.1:9000", "localhost"])
+def test_page_is_reached_by_a_tunnel_on_another_port(arm: Arm, host: str) -> None:
+    assert arm.get("/", Host=host)[0] == 200
+    tunnel = socket.create_connection(("127.0.0.1", arm.port))
+    with connect(
+        f"ws://{host}/socket", sock=tunnel, origin=Origin(f"http://{host}"), compression=None
+    ) as page:
+        page.send(json.dumps({"type": "hello", "token": TOKEN}))
+        assert message(page)["type"] == "welcome"
+
+
 # The token
 
 
 @pytest.mark.parametrize(
-    "origin", [None, "null", "http://evil.example", "https://127.0.0.1", "http://localhost"]
+    "origin",
+    [None, "null", "http://evil.example", "https://127.0.0.1", "http://localhost", "http://localhost:9000"],
 )
 def test_other_origins_open_no_socket(arm: Arm, origin: Any) -> None:
     with pytest.raises(InvalidStatus) as refused, arm.connect(origin=origin):

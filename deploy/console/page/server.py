@@ -184,7 +184,7 @@ class PageServer:
         """Answer a request; ``None`` lets a WebSocket begin."""
         if refusal := self._site.refusal(request):
             self._receive(Violation(refusal.reason))
-            return respond(refusal.status)
+            return respond(refusal.status, body=refusal.answer)
         return None if request.path == SOCKET else self._site.file(request.path)
 
     def _take(self, client: _Client, text: str | bytes) -> None:

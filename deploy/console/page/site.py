@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import hmac
 import http
+import ipaddress
+import re
 from email.utils import formatdate
 from pathlib import Path
 from typing import NamedTuple
@@ -30,11 +32,20 @@ SECURITY_HEADERS = {
 }
 
 
+WRONG_HOST = (
+    b"This is no address of the page. Open the one that the terminal shows.\n"
+    b"The parameter `names` of operator_console adds names of this machine.\n"
+)
+_HOST = re.compile(r"([^:]+)(:[0-9]+)?")
+
+
 class Refusal(NamedTuple):
     """Why a request is outside the protocol."""
 
     status: http.HTTPStatus
     reason: str
+    answer: bytes = b""
+    """What its sender is told; empty for the words of the status."""
 
 
 class Site:
@@ -46,12 +57,14 @@ class Site:
         """
         Read the files: there are no others.
 
-        :param names: the accepted ``Host`` headers, port included.
+        :param names: the accepted ``Host`` headers, port included. A name of loopback is accepted with any
+            port: it is that of a tunnel. A page of somebody else that resolves to loopback has another name.
         :param scheme: ``http`` or ``https``.
         """
         self._token = token.encode()
         self._names = names
-        self._origins = tuple(f"{scheme}://{name}" for name in names)
+        self._loopback = {name for name in map(_without_port, names) if _is_loopback(name)}
+        self._scheme = scheme
         files = {f"/static/{path.name}": (TYPES[path.suffix], path.read_bytes()) for path in folder.iterdir()}
         self._files = {"/": files[f"/static/{INDEX}"], **files}
 
@@ -61,14 +74,17 @@ class Site:
 
     def refusal(self, request: Request) -> Refusal | None:
         """Return why a request is refused, ``None`` if it is not."""
-        origins = request.headers.get_all("Origin")
-        if not _is_one_of(request.headers.get_all("Host"), self._names):
-            return Refusal(http.HTTPStatus.FORBIDDEN, "a request names another host")
-        if (origins or request.path == SOCKET) and not _is_one_of(origins, self._origins):
+        hosts, origins = (request.headers.get_all(name) for name in ("Host", "Origin"))
+        if len(hosts) != 1 or not self._is_ours(hosts[0]):
+            return Refusal(http.HTTPStatus.FORBIDDEN, "a request names another host", WRONG_HOST)
+        if (origins or request.path == SOCKET) and origins != [f"{self._scheme}://{hosts[0]}"]:
             return Refusal(http.HTTPStatus.FORBIDDEN, "a request has another origin")
         if request.method != "GET":
             return Refusal(http.HTTPStatus.METHOD_NOT_ALLOWED, "a request is no GET")
         return None
+
+    def _is_ours(self, host: str) -> bool:
+        return host in self._names or _without_port(host) in self._loopback
 
     def file(self, path: str) -> Response:
         """Return the response to a request for a path."""
@@ -94,5 +110,14 @@ def respond(status: http.HTTPStatus, kind: str = "text/plain; charset=utf-8", bo
     return Response(status.value, status.phrase, headers, body)
 
 
-def _is_one_of(values: list[str], known: tuple[str, ...]) -> bool:
-    return len(values) == 1 and values[0] in known
+def _without_port(host: str) -> str:
+    """Return the name in a ``Host`` header; empty if there is none."""
+    found = _HOST.fullmatch(host)
+    return found[1] if found else ""
+
+
+def _is_loopback(name: str) -> bool:
+    try:
+        return name == "localhost" or ipaddress.ip_address(name).is_loopback
+    except ValueError:
+        return False

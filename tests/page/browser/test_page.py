@@ -134,6 +134,10 @@ def test_address_without_its_token_shows_nothing(arm: Arm, browser: Any) -> None
         page.wait_for_selector("html[data-connection=closed]")
         assert page.get_attribute("#hold", "data-state") == "offline"
         assert page.get_attribute("#engines", "data-state") == "unknown"
+        page.goto("about:blank")
+        page.goto(arm.url.partition("#")[0])  # the tab keeps the wrong token
+        page.wait_for_selector("#banner-text:not(:empty)")
+        assert "no token of the present start" in page.text_content("#banner-text")
 
 
 def test_keyboard_alone_moves_the_arm_and_kills_a_process(arm: Arm, hand: HandOnPage) -> None:

@@ -7,7 +7,7 @@ const MOST_UNSENT = 4096; // bytes; more wait only where the link stands still
 
 /** Close codes after which another attempt is of no use. */
 const FINAL = {
-  4401: "This address belongs to another start. Open the address that the terminal shows now.",
+  4401: "This page has no token of the present start. Open the address that the terminal shows now.",
   4403: "The server does not accept this address. Open the address that the terminal shows.",
 };
 const NO_TOKEN = "This address has no token. Open the address that the terminal shows.";
