@@ -13,12 +13,12 @@ from enum import Enum
 from pathlib import Path
 from types import ModuleType
 
-import pytest
-
 import message_filters
-import rclpy
+import pytest
 import tf2_py
 import tf2_ros
+
+import rclpy
 
 RCLPY = json.loads((Path(__file__).parents[1] / "facts" / "private_names.json").read_text())
 """Private names of each class of rclpy 7.1.6 and of its bases, read from its source."""
