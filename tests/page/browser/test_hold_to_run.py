@@ -69,6 +69,7 @@ def test_hand_is_released_within_150_ms_at_p99(arm: Arm, hand: HandOnPage) -> No
     lateness: list[tuple[float, float]] = []  # of the last heartbeat; of a sleeping thread
     shown: list[float] = []
     hold_with_engines_on(arm, hand)
+    hand.up()
     with pauses.watched() as paused:
         for _ in range(SAMPLES):
             hand.hold()
