@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import time
 from collections.abc import Iterator
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -190,7 +191,7 @@ class _Player:
         ends = [self._start + int(duration * 1e9)] if duration >= 0 else []
         ends += [until] if until >= 0 else []
         self._end = max(ends, default=metadata.start + metadata.duration)
-        self._began = time.monotonic()
+        self._began: float | None = None
 
     def publish_clock(self, frequency: float) -> None:
         """Publish the time of the record on ``/clock``, at a frequency [Hz] of real time."""
@@ -201,6 +202,8 @@ class _Player:
         publisher = self._node.create_publisher(ClockMessage, "/clock", 1)
 
         def publish() -> None:
+            if self._began is None:
+                return
             now = self._start + int((time.monotonic() - self._began) * self._rate * 1e9)
             publisher.publish(ClockMessage(clock=Time(nanoseconds=min(now, self._end)).to_msg()))
 
@@ -208,17 +211,19 @@ class _Player:
 
     def play(self) -> bool:
         """Play once; return whether there was a message to play."""
-        self._began = time.monotonic()
-        played = False
-        for topic, message in self._messages():
-            due = self._began + (message.log_time - self._start) / (self._rate * 1e9)
+        messages = self._messages()
+        first = next(messages, None)  # to open a file takes its time
+        if first is None:
+            return False
+        began = self._began = time.monotonic()
+        for topic, message in chain([first], messages):
+            due = began + (message.log_time - self._start) / (self._rate * 1e9)
             time.sleep(max(0.0, due - time.monotonic()))
-            played = True
             try:
                 self._publishers[topic].publish(message.data)
             except Exception as error:  # of any type, by the runtime: the message is unreadable
                 self._node.get_logger().error(f"Failed to publish a message on '{topic}': {error}")
-        return played
+        return True
 
     def _messages(self) -> Iterator[tuple[str, Message]]:
         from mcap_files import McapFile, UnreadableError
