@@ -56,6 +56,6 @@ def _run() -> int:
         error.show()
         return error.exit_code
     except (click.ClickException, RuntimeError) as error:
-        print(error, file=sys.stderr)
+        print(*str(error).split(), file=sys.stderr)  # in one line
         return 1
     return 0

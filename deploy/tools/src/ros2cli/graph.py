@@ -65,7 +65,9 @@ def node(
         discover(node, spin_time, until)
         yield node
     except NameValidationException as error:
-        raise click.ClickException(str(error)) from None
+        raise click.ClickException(
+            str(error).rpartition("\n")[0]
+        ) from None  # without the mark below the name
     finally:
         rclpy.try_shutdown()
 

@@ -17,10 +17,6 @@ if TYPE_CHECKING:
 
 _Verb = TypeVar("_Verb", bound=Callable[..., Any])
 
-POSITIVE_FLOAT = click.FloatRange(min=0, min_open=True)
-POSITIVE_INT = click.IntRange(min=1)
-NON_NEGATIVE_INT = click.IntRange(min=0)
-
 
 class FiniteFloat(click.FloatRange):
     """A number that is neither infinite nor NaN."""
@@ -33,11 +29,18 @@ class FiniteFloat(click.FloatRange):
         return number
 
 
+# The limit of times in seconds and of rates, 31 years, fits every clock.
+FINITE_FLOAT = FiniteFloat(max=1e9)
+POSITIVE_FLOAT = FiniteFloat(min=1e-9, max=1e9)
+POSITIVE_INT = click.IntRange(min=1)
+NON_NEGATIVE_INT = click.IntRange(min=0)
+
+
 def direct_options(verb: _Verb) -> _Verb:
     """Add the options ``spin_time`` and ``use_sim_time``."""
     verb = click.option(
         "--spin-time",
-        type=float,
+        type=FINITE_FLOAT,
         callback=lambda context, parameter, value: default_spin_time() if value is None else value,
         show_default="0.5, or 3.2 with Fast DDS",
         help="Time in seconds to look for nodes. It looks longer while it still finds more.",
@@ -86,7 +89,7 @@ def qos_options(action: str, default: str) -> Callable[[_Verb], _Verb]:
             )(verb)
         verb = click.option(
             "--qos-liveliness-lease-duration-seconds",
-            type=float,
+            type=FINITE_FLOAT,
             help=f"Quality of service liveliness lease duration to {action} with.",
         )(verb)
         verb = click.option("--qos-depth", metavar="N", type=int, help=f"Queue size to {action} with.")(verb)
@@ -188,6 +191,33 @@ def parsed_yaml(text: str) -> Any:
         return yaml.safe_load(text)
     except yaml.YAMLError as error:
         raise click.ClickException(f"The value is no valid YAML: {' '.join(str(error).split())}") from None
+
+
+def fill(message: Any, values: str, **options: Any) -> list[Callable[[Any], None]]:
+    """
+    Set the fields of a message from YAML, and check their values.
+
+    :param options: those of `set_message_fields`, whose result is returned.
+    :raises ClickException: if a value does not fit its field.
+    """
+    from rosidl_runtime_py import set_message_fields
+
+    try:
+        later = set_message_fields(message, parsed_yaml(values), **options)
+        check(message)
+    except Exception as error:
+        raise click.ClickException(f"Failed to populate field: {error}") from None
+    return later
+
+
+def check(message: Any) -> None:
+    """Raise an exception if a field has a value that it cannot hold; ROS 2 notices it when it serializes."""
+    from rclpy.serialization import serialize_message
+
+    try:
+        serialize_message(message)
+    except SystemError as error:
+        raise ValueError(error.__cause__) from None  # the error of the C code
 
 
 def regular_expression(context: click.Context, parameter: click.Parameter, value: str | None) -> str | None:

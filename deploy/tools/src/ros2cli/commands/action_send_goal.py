@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ros2cli import graph
-from ros2cli.options import parsed_yaml, values_argument
+from ros2cli.options import check, parsed_yaml, values_argument
 
 if TYPE_CHECKING:
     from rclpy.action.client import ClientGoalHandle
@@ -38,6 +38,7 @@ def send_goal(action_name: str, action_type: str, goal: str, feedback: bool) -> 
     message = class_.Goal()
     try:
         set_message_fields(message, parsed_yaml(goal))
+        check(message)
     except Exception as error:
         raise click.ClickException(f"Failed to populate message fields: {error!r}") from None
 
@@ -46,7 +47,7 @@ def send_goal(action_name: str, action_type: str, goal: str, feedback: bool) -> 
 
     name = f"{graph.NODE_NAME_PREFIX}_send_goal_{action_type.replace('/', '_')}"
     with graph.node(name=name) as node:
-        client = ActionClient(node, class_, action_name)
+        client = ActionClient(node, class_, graph.full_topic_name(node, action_name))
         click.echo("Waiting for an action server to become available...")
         while not client.wait_for_server(timeout_sec=1.0):
             pass
@@ -54,10 +55,7 @@ def send_goal(action_name: str, action_type: str, goal: str, feedback: bool) -> 
         sent: list[Future] = []
 
         def send() -> None:
-            try:
-                sent.append(client.send_goal_async(message, report if feedback else None))
-            except (TypeError, ValueError) as error:
-                raise click.ClickException(f"Failed to populate message fields: {error!r}") from None
+            sent.append(client.send_goal_async(message, report if feedback else None))
 
         try:
             _uninterrupted(send)

@@ -7,7 +7,7 @@ from typing import Any
 import click
 
 from ros2cli import parameters
-from ros2cli.options import node_options
+from ros2cli.options import check, node_options
 
 _LABELS = {
     "BOOL": "Boolean value is:",
@@ -55,7 +55,11 @@ def set_parameter(node_name: str, parameter_name: str, value: str, **options: An
     from rcl_interfaces.msg import Parameter
     from rclpy.parameter import get_parameter_value
 
-    parameter = Parameter(name=parameter_name, value=get_parameter_value(value))
+    try:
+        parameter = Parameter(name=parameter_name, value=get_parameter_value(value))
+        check(parameter)
+    except Exception as error:
+        raise click.ClickException(f"'{value}' cannot be the value of a parameter: {error}") from None
     with parameters.client(node_name, **options) as client:
         (result,) = parameters.response(client, client.set_parameters([parameter])).results
     outcome = "Set parameter successful" if result.successful else "Setting parameter failed"

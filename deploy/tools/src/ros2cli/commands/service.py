@@ -7,7 +7,7 @@ import time
 import click
 
 from ros2cli import graph
-from ros2cli.options import POSITIVE_FLOAT, parsed_yaml, strategy_options, values_argument
+from ros2cli.options import POSITIVE_FLOAT, fill, strategy_options, values_argument
 
 
 @click.command("list")
@@ -66,14 +66,9 @@ def call(service_name: str, service_type: str, values: str, rate: float | None) 
     VALUES fill the request, in YAML ("{a: 1, b: 2}"); other fields keep their defaults. It waits until the
     service is available.
     """
-    from rosidl_runtime_py import set_message_fields
-
     class_ = graph.interface_class("service", service_type, "The passed service type is invalid")
     request = class_.Request()
-    try:
-        set_message_fields(request, parsed_yaml(values))
-    except Exception as error:
-        raise click.ClickException(f"Failed to populate field: {error}") from None
+    fill(request, values)
     package, *_, name = service_type.split("/")
     with graph.node(name=f"{graph.NODE_NAME_PREFIX}_requester_{package}_{name}") as node:
         client = node.create_client(class_, service_name)
@@ -84,10 +79,7 @@ def call(service_name: str, service_type: str, values: str, rate: float | None) 
         while True:
             click.echo(f"requester: making request: {request!r}\n")
             began = time.monotonic()
-            try:
-                future = client.call_async(request)
-            except (TypeError, ValueError) as error:
-                raise click.ClickException(f"Failed to populate field: {error}") from None
+            future = client.call_async(request)
             graph.spin(node, future)
             click.echo(f"response:\n{future.result()!r}\n")
             if rate is None:

@@ -13,6 +13,7 @@ from ros2cli.options import (
     NON_NEGATIVE_INT,
     POSITIVE_FLOAT,
     direct_options,
+    fill,
     parsed_yaml,
     qos_options,
     qos_profile,
@@ -89,14 +90,12 @@ def pub(
     auto and a Time may be now: they become the time of publishing.
     """
     from rclpy.task import Future
-    from rosidl_runtime_py import set_message_fields
 
     if once and times:
         raise click.UsageError("argument -t/--times: not allowed with argument -1/--once")
     times = 1 if once else times
     class_ = graph.interface_class("message", message_type, "The passed message type is invalid")
-    fields = parsed_yaml(values)
-    if not isinstance(fields, dict):
+    if not isinstance(parsed_yaml(values), dict):
         raise click.ClickException("The passed value needs to be a dictionary in YAML format")
     wanted = wait_matching_subscriptions
     wanted = int(times > 0) if wanted is None else wanted
@@ -106,10 +105,7 @@ def pub(
             " with --wait-matching-subscriptions, --once or --times"
         )
     message = class_()
-    try:
-        stamps = set_message_fields(message, fields, expand_header_auto=True, expand_time_now=True)
-    except Exception as error:
-        raise click.ClickException(f"Failed to populate field: {error}") from None
+    stamps = fill(message, values, expand_header_auto=True, expand_time_now=True)
 
     # Matching subscriptions are awaited below, without a fixed time.
     with graph.node(0.0 if wanted else spin_time, name=node_name, use_sim_time=use_sim_time) as node:
@@ -127,10 +123,7 @@ def pub(
             count += 1
             if print_nth and count % print_nth == 0:
                 click.echo(f"publishing #{count}: {message!r}\n")
-            try:
-                publisher.publish(message)
-            except (TypeError, ValueError) as error:
-                raise click.ClickException(f"Failed to populate field: {error}") from None
+            publisher.publish(message)
             if count == times:
                 done.set_result(None)
 
