@@ -59,6 +59,8 @@ print(rtps, multicast, flush=True)
 """
 
 
+ONE_NODE = "import rclpy; rclpy.init(); rclpy.create_node('node')"
+
 # Takes the ports of the first participant indices until its standard input ends.
 PORTS = """
 import socket, sys
@@ -208,6 +210,19 @@ def assert_meet(first: Process, second: Process) -> None:
     """Both nodes get messages of the other."""
     wait_until(lambda: "second" in first.lines())
     wait_until(lambda: "first" in second.lines())
+
+
+@pytest.mark.parametrize("discovery_range", ["LOCALHOST", "SUBNET", "OFF", "SYSTEM_DEFAULT"])
+def test_a_node_without_any_interface_names_the_loopback(discovery_range: str, host: Host) -> None:
+    host.ip("link set lo down")
+    with pytest.raises(OSError, match=r"RCLError: the loopback interface is down.*`ip link set lo up`"):
+        host.run("env", f"{RANGE}={discovery_range}", sys.executable, "-c", ONE_NODE)
+
+
+def test_a_node_in_localhost_needs_the_loopback(host_with_network: Host) -> None:
+    host_with_network.ip("link set lo down")
+    with pytest.raises(OSError, match="RCLError: the loopback interface is down"):
+        host_with_network.run("env", f"{RANGE}=LOCALHOST", sys.executable, "-c", ONE_NODE)
 
 
 @pytest.mark.parametrize("ranges", [("LOCALHOST", "SUBNET"), ("SUBNET", "LOCALHOST")])

@@ -96,9 +96,17 @@ def test_localhost_without_other_interface_uses_loopback(interfaces: list[tuple[
     assert '<Interfaces><NetworkInterface name="lo" allow_multicast="false"/></Interfaces>' in configuration
 
 
-def test_localhost_without_loopback_leaves_choice_to_cyclone(interfaces: list[tuple[str, int]]) -> None:
+def test_localhost_without_loopback_is_an_error(interfaces: list[tuple[str, int]]) -> None:
     interfaces[:] = [("eth0", UP)]
-    configuration = domain.configuration({RANGE: "LOCALHOST"})
+    with pytest.raises(RCLError, match=r"^the loopback interface is down"):
+        domain.configuration({RANGE: "LOCALHOST"})
+
+
+def test_localhost_without_loopback_but_with_peers_leaves_choice_to_cyclone(
+    interfaces: list[tuple[str, int]],
+) -> None:
+    interfaces[:] = [("eth0", UP)]
+    configuration = domain.configuration({RANGE: "LOCALHOST", "ROS_STATIC_PEERS": "10.0.0.7"})
     assert "<NetworkInterface" not in configuration
     assert "<ExtendedPacketInfo>false</ExtendedPacketInfo>" in configuration
 

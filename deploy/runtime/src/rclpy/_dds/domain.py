@@ -37,6 +37,9 @@ _LARGE_BURSTS = '<SocketReceiveBufferSize max="16 MiB"/><NackDelay>10 ms</NackDe
 _AS_MUCH_AS_FITS = "<BurstSize><MaxInitTransmit>90</MaxInitTransmit></BurstSize>"
 _LARGE_SOCKET = 1_000_000  # octets
 _LARGEST_SOCKET = Path("/proc/sys/net/core/rmem_max")
+_LOOPBACK_IS_DOWN = (
+    "the loopback interface is down, but nodes of one host meet through it: run `ip link set lo up`"
+)
 _AF_INET = 2
 _IFF_UP, _IFF_LOOPBACK = 0x1, 0x8
 
@@ -178,8 +181,8 @@ def _loopback_and_default() -> str:
     """
     interfaces = _ipv4_interfaces()
     loopback = next((name for name, flags in interfaces if flags & _IFF_LOOPBACK), None)
-    if loopback is None:
-        return ""
+    if loopback is None:  # Cyclone would use another interface and find no node
+        raise RCLError(_LOOPBACK_IS_DOWN)
     chosen = [f'name="{loopback}"']
     if any(not flags & _IFF_LOOPBACK for _, flags in interfaces):
         chosen.append('autodetermine="true"')
@@ -205,12 +208,14 @@ def _ipv4_interfaces() -> list[tuple[str, int]]:
 
 
 def enter(domain_id: int) -> None:
-    """Configure a domain before the first participant of this process."""
+    """Configure a domain before the first participant of this process. Raises RCLError if that fails."""
     with _lock:
         if not _users.get(domain_id):
             handle = blocking.dds_create_domain(domain_id, configuration(domain_id=domain_id).encode())
             # If other code in this process has created the domain, its configuration applies.
             if handle != PRECONDITION_NOT_MET:
+                if handle < 0 and not _ipv4_interfaces():
+                    raise RCLError(_LOOPBACK_IS_DOWN)
                 _handles[domain_id] = checked(handle, f"cannot configure DDS domain {domain_id}")
         _users[domain_id] = _users.get(domain_id, 0) + 1
 
