@@ -7,11 +7,16 @@ from typing import Any
 
 def check_for_type_support(msg_or_srv_type: Any) -> None:
     """
-    Check that a class is a message or service type.
+    Check that a class is a message, service or action type of this runtime.
 
-    :raises AttributeError: if it is neither.
+    :raises AttributeError: if it is not.
     """
     if not hasattr(msg_or_srv_type, "_TYPE_NAME"):
+        if hasattr(msg_or_srv_type.__class__, "_TYPE_SUPPORT"):
+            raise AttributeError(
+                f"{msg_or_srv_type!r} was generated for ROS 2's own rclpy: this rclpy needs the definitions"
+                " of its package in AMENT_PREFIX_PATH, and no generated package of that name in sys.path"
+            )
         raise AttributeError(f"{msg_or_srv_type!r} is not a ROS 2 message or service type")
 
 
