@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import ast
 import importlib
+import importlib.util
 import inspect
 import json
 import textwrap
@@ -28,6 +29,38 @@ ABSTRACT = {
     "Waitable": ("add_to_wait_set", "execute", "get_num_entities", "is_ready", "take_data"),
 }
 """Methods that raise NotImplementedError in rclpy, too: tests/conformance shows it on both."""
+
+TOOLS = {
+    "ros2topic.api": ("get_msg_class", "get_topic_names", "get_topic_names_and_types"),
+    "ros2node.api": (
+        "get_absolute_node_name",
+        "get_action_client_info",
+        "get_action_server_info",
+        "get_node_names",
+        "get_publisher_info",
+        "get_service_client_info",
+        "get_service_server_info",
+        "get_subscriber_info",
+        "parse_node_name",
+    ),
+    "ros2service.api": ("get_service_class", "get_service_names", "get_service_names_and_types"),
+    "ros2param.api": (
+        "call_describe_parameters",
+        "call_get_parameters",
+        "call_list_parameters",
+        "call_set_parameters",
+        "get_parameter_type_string",
+        "get_value",
+        "load_parameter_file",
+    ),
+    "ros2action.api": ("get_action_clients_and_servers", "get_action_names", "get_action_names_and_types"),
+    "ros2interface.api": ("interface_to_yaml", "package_name_completer", "type_completer"),
+    "ros2pkg.api": ("get_executable_paths", "get_package_names", "get_prefix_path"),
+    "rosidl_adapter.parser": ("parse_message_file", "parse_message_string", "parse_service_string"),
+    "rosidl_parser.parser": ("parse_idl_file",),
+    "tf2_ros.buffer_server": ("BufferServer",),
+}
+"""Functions and classes of ROS 2's tools that public programs import, by module."""
 
 _OPENING, _CLOSING = "([{<", ")]}>"
 _ANY_POSITIONAL = Parameter("args", Parameter.VAR_POSITIONAL)
@@ -48,6 +81,20 @@ class Module:
 def modules() -> list[Module]:
     """Compare every recorded module with the module of this runtime."""
     return [_module(name, entries) for name, entries in API.items()]
+
+
+def tools() -> list[Module]:
+    """Look for what public programs import from ROS 2's tools."""
+    rows = []
+    for name, wanted in TOOLS.items():
+        rows.append(row := Module(name))
+        if importlib.util.find_spec(name.partition(".")[0]) is None or not importlib.util.find_spec(name):
+            row.missing.append("the module")
+            continue
+        for entry in wanted:
+            found = hasattr(importlib.import_module(name), entry)
+            (row.supported if found else row.missing).append(entry)
+    return rows
 
 
 def surplus() -> list[str]:
@@ -263,4 +310,4 @@ def _has_default(text: str) -> bool:
 
 
 if __name__ == "__main__":
-    print(table(modules()))
+    print(table(modules()), table(tools()), sep="\n\n")

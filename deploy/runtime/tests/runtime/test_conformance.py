@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
+import pytest
 from deploy.runtime.tests.runtime import conformance
 
 README = Path(__file__).parents[2] / "README.md"
@@ -19,8 +21,9 @@ def test_no_class_has_more_members_than_in_rclpy() -> None:
     assert conformance.surplus() == []
 
 
-def test_readme_has_the_current_table() -> None:
-    assert conformance.table(conformance.modules()) in README.read_text(), (
-        "the table in README.md is out of date: replace it with the output of"
+@pytest.mark.parametrize("rows", [conformance.modules, conformance.tools])
+def test_readme_has_the_current_tables(rows: Callable[[], list[conformance.Module]]) -> None:
+    assert conformance.table(rows()) in README.read_text(), (
+        "a table in README.md is out of date: replace it with the output of"
         " python -m deploy.runtime.tests.runtime.conformance"
     )

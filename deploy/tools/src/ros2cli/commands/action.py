@@ -32,18 +32,10 @@ def list_actions(spin_time: float, use_sim_time: bool, show_types: bool, count_a
 @click.option("-c", "--count", is_flag=True, help="Only display the number of action clients and servers.")
 def info(spin_time: float, use_sim_time: bool, action_name: str, show_types: bool, count: bool) -> None:
     """Print information about an action."""
-    from rclpy import action
+    from ros2action.api import get_action_clients_and_servers
 
-    clients: list[tuple[str, list[str]]] = []
-    servers: list[tuple[str, list[str]]] = []
     with graph.node(spin_time, use_sim_time=use_sim_time) as node:
-        expanded = graph.full_topic_name(node, action_name)
-        for one in graph.node_names(node, include_hidden=True):
-            whose = one.name, one.namespace
-            client_types = dict(action.get_action_client_names_and_types_by_node(node, *whose)).get(expanded)
-            server_types = dict(action.get_action_server_names_and_types_by_node(node, *whose)).get(expanded)
-            clients += [(one.full_name, client_types)] if client_types else []
-            servers += [(one.full_name, server_types)] if server_types else []
+        clients, servers = get_action_clients_and_servers(node=node, action_name=action_name)
     click.echo(f"Action: {action_name}")
     for title, owners in (("Action clients", clients), ("Action servers", servers)):
         click.echo(f"{title}: {len(owners)}")

@@ -1,0 +1,1 @@
+"""What tools ask about packages, with the names of ROS 2's `ros2pkg`."""
