@@ -6,7 +6,6 @@ from collections import deque
 from typing import TYPE_CHECKING
 
 from rclpy._dds import INFINITY, Sample
-from rclpy_simulation.host import SECOND
 from rclpy_simulation.kernel import Kernel, running
 from rclpy_simulation.watchdog import Watchdog
 
@@ -70,8 +69,8 @@ class Link:
             self._unsent.append(sample)
             return
         arrival = kernel.now + network.latency.draw(kernel)
-        if network.delays:
-            arrival += int(network.delays.get(self.writer.topic, 0.0) * SECOND)
+        if network.held:
+            arrival = max(arrival, network.held.get(self.writer.topic, 0))
         if network.loss and kernel.random.random() < network.loss:
             if self.is_reliable:
                 self._send_again(sample, arrival)

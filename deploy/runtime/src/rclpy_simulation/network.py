@@ -68,8 +68,8 @@ class Network:
     """Time after which a silent participant is forgotten [s]."""
     announcement: float = 8.0
     """Period at which a participant announces itself, so forgotten ones meet again [s]."""
-    delays: dict[str, float] = field(default_factory=dict)
-    """By how much longer the samples of a DDS topic take, such as ``rt/chatter`` [s]."""
+    held: dict[str, int] = field(default_factory=dict)
+    """DDS topics whose samples wait, with the time until when [ns]."""
     cuts: dict[frozenset[str], int] = field(default_factory=dict)
     """Pairs of hosts between which no packet passes, with the time since when [ns]."""
 

@@ -219,6 +219,15 @@ class Simulation:
         """Let packets pass between two hosts again."""
         self._domains.heal(one, other)
 
+    def hold(self, topic: str, seconds: float) -> None:
+        """
+        Let the samples arrive together at the end of a time that are sent in it: their path stalls.
+
+        :param topic: as DDS names it, for example ``rt/chatter``.
+        """
+        until = self._kernel.now + int(seconds * SECOND)
+        self.network.held[topic] = max(until, self.network.held.get(topic, 0))
+
     def listen(self, listener: Callable[[Process], Any]) -> None:
         """Call a function with a process each time before it runs: at each message, timer and other event."""
         self._kernel.listeners.append(listener)
