@@ -38,8 +38,8 @@ FALSE_PRESENCE = "false_presence"
 """A stranger reports the operator's presence, so the engine controller does not turn off by itself (F2)."""
 STUCK_DRIVE = "stuck_drive"
 """The drive keeps its last command, whether it is repeated or not (F3)."""
-LATE = "late"
-"""The messages of a topic arrive late; the topic is the target."""
+HOLD = "hold"
+"""The messages that are sent on a topic in this time arrive together at its end; the topic is the target."""
 REDISCOVERY = 10.0  # s after a partition until the hosts have discovered each other again
 
 SUSPENDING = ("stop", "hang", "hog", "slow")

@@ -14,7 +14,7 @@ from deploy.chaos.history import (
     ALL,
     BAD_LINE,
     CONTROLLER,
-    LATE,
+    HOLD,
     OVERLOAD,
     PARTITION,
     REDISCOVERY,
@@ -289,8 +289,8 @@ def _deaf(history: History) -> Iterator[tuple[float, float]]:
             yield fault.begin, history.effect_end(fault)
         elif fault.kind == PARTITION:
             yield fault.begin, fault.end + REDISCOVERY
-        elif (fault.kind, fault.target) == (LATE, topics.OPERATOR_HEARTBEAT.name):
-            yield fault.begin, fault.end
+        elif (fault.kind, fault.target) == (HOLD, topics.OPERATOR_HEARTBEAT.name):
+            yield fault.begin, fault.end + SAMPLING  # until then, the watchdog may report one of them
         elif fault.kind == STEP:
             yield fault.begin, fault.begin + SPREAD
 

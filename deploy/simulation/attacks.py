@@ -25,7 +25,7 @@ from deploy.chaos.history import (
     BAD_LINE,
     CONTROLLER,
     FALSE_PRESENCE,
-    LATE,
+    HOLD,
     NO_TARGET,
     OPERATOR,
     PARTITION,
@@ -70,9 +70,11 @@ def attacked(shift: Shift) -> Shift:
 
 def attack(fail_safe: str, release: float, rng: random.Random) -> list[PlannedFault]:
     """Return the faults that leave a fail-safe alone in the silence after a release [s]."""
+    # The watchdog loses the strikes of earlier silences, so F1 does not act early.
+    without_strikes = PlannedFault(-rng.uniform(4.0, 5.0), "kill", WATCHDOG)
     return [
         PlannedFault(round(release + at, 3), kind, target, round(duration, 3))
-        for at, kind, target, duration in _ATTACKS[fail_safe](rng)
+        for at, kind, target, duration in (without_strikes, *_ATTACKS[fail_safe](rng))
     ]
 
 
@@ -91,24 +93,27 @@ def _harms(fault: PlannedFault, release: float) -> bool:
 
 
 def _only_watchdog(rng: random.Random) -> Iterator[PlannedFault]:
-    """Leave F1 alone: without strikes of earlier silences, while the last heartbeats arrive too late."""
-    yield PlannedFault(-rng.uniform(4.0, 5.0), "kill", WATCHDOG)
+    """Leave F1 alone, while heartbeats are late or released."""
     yield PlannedFault(2.0, FALSE_PRESENCE, NO_TARGET, JUDGED - 2.0)
     yield PlannedFault(0.0, STUCK_DRIVE, NO_TARGET, JUDGED)
-    if rng.random() < 0.6:
-        yield PlannedFault(-0.4, LATE, topics.OPERATOR_HEARTBEAT.name, 1.0)
+    if rng.random() < 0.6:  # they come just before a strike
+        late = rng.randrange(STRIKES) * STRIKE + rng.uniform(1.5, 1.9)
+        yield PlannedFault(-0.3, HOLD, topics.OPERATOR_HEARTBEAT.name, 0.3 + late)
+    else:  # not both: of what arrives together, the newest is read, which may be nonsense
+        yield _nonsense()
     yield from _disturbances(rng)
 
 
 def _only_controller(rng: random.Random) -> Iterator[PlannedFault]:
-    """Leave F2 alone: the last presence is late, or those that send and receive it pause for a moment."""
+    """Leave F2 alone: the last heartbeat is nearly too old, and its presence late or received in a pause."""
     yield _without_watchdog(rng)
     yield PlannedFault(0.0, STUCK_DRIVE, NO_TARGET, JUDGED)
-    if rng.random() < 0.8:  # until the last heartbeat is nearly too old: the presence is as old as it may be
-        before = rng.uniform(0.05, 0.2)
-        yield PlannedFault(-before, "stop", WATCHDOG, before + rng.uniform(0.3, 0.44))
+    if rng.random() < 0.8:
+        yield PlannedFault(-0.3, HOLD, topics.OPERATOR_HEARTBEAT.name, rng.uniform(0.62, 0.68))
     if rng.random() < 0.5:
-        yield PlannedFault(-0.4, LATE, topics.OPERATOR_PRESENCE.name, 1.4)
+        yield PlannedFault(-0.3, HOLD, topics.OPERATOR_PRESENCE.name, rng.uniform(1.0, 3.0))
+    else:
+        yield _nonsense()
     if rng.random() < 0.5:  # for less than the drive's timeout, or it would turn off
         yield PlannedFault(rng.uniform(0.2, 0.4), "stop", CONTROLLER, rng.uniform(0.2, 0.28))
     yield from _disturbances(rng)
@@ -120,6 +125,7 @@ def _only_drive(rng: random.Random) -> Iterator[PlannedFault]:
     kind = rng.choice(("stop", "stop", "hang", "slow", "slow", "kill"))
     duration = {"stop": 3.0, "hang": 15.0, "slow": 3.0}.get(kind, 0.0)
     yield PlannedFault(rng.uniform(8.6, 9.9), kind, CONTROLLER, duration)
+    yield _nonsense()
     yield from _disturbances(rng)
 
 
@@ -132,12 +138,14 @@ def _without_watchdog(rng: random.Random) -> PlannedFault:
     return PlannedFault(rng.uniform(2.0, 8.5), kind, WATCHDOG, {"stop": 4.0, "hang": 15.0}.get(kind, 0.0))
 
 
+def _nonsense() -> PlannedFault:
+    return PlannedFault(0.2, "babble", NO_TARGET, JUDGED)
+
+
 def _disturbances(rng: random.Random) -> Iterator[PlannedFault]:
     """Yield faults that no fail-safe may mind."""
     if rng.random() < 0.4:
         yield PlannedFault(-0.5, BAD_LINE, ALL, 1.5)
-    if rng.random() < 0.4:
-        yield PlannedFault(0.2, "babble", NO_TARGET, JUDGED)
     if rng.random() < 0.3:
         yield PlannedFault(rng.uniform(3.0, 9.0), STEP, NO_TARGET)
 

@@ -11,7 +11,7 @@ from rclpy_simulation import Delay, Process
 
 from deploy.chaos import clock
 from deploy.chaos.faults import PARAMETERS, Undo
-from deploy.chaos.history import ALL, FALSE_PRESENCE, LATE, NO_TARGET, OPERATOR, PARTITION, STUCK_DRIVE
+from deploy.chaos.history import ALL, FALSE_PRESENCE, HOLD, NO_TARGET, OPERATOR, PARTITION, STUCK_DRIVE
 from deploy.simulation import people
 from deploy.simulation.arm import CONTROL, NAMES, ROBOT, Arm
 from deploy.supervision.system import KEY
@@ -20,8 +20,8 @@ from interfaces import topics
 CLOCK_TOLERANCE = 0.045  # s between the clocks of the hosts (deploy/SAFETY.md, A3)
 BAD_LINE = (0.2, Delay(0.05, 0.2))
 """Packet loss and latency of a bad line."""
-LATENESS = {topics.OPERATOR_HEARTBEAT.name: (2.0, 8.5), topics.OPERATOR_PRESENCE.name: (0.5, 3.0)}
-"""By how much the messages of a topic may be late [s]."""
+HELD = (topics.OPERATOR_HEARTBEAT.name, topics.OPERATOR_PRESENCE.name)
+"""The topics whose messages may be held."""
 
 
 class FaultKind(NamedTuple):
@@ -139,15 +139,8 @@ def _bad_line(arm: Arm, target: str, duration: float) -> Undo:
     return arm.overlaps.begin("bad_line", heal)
 
 
-def _late(arm: Arm, topic: str, duration: float) -> Undo:
-    """Let the messages that are sent on a topic in this time arrive late."""
-    delays, name = arm.simulation.network.delays, f"rt/{topic}"
-    delays[name] = arm.simulation.random.uniform(*LATENESS[topic])
-
-    def end() -> None:
-        del delays[name]
-
-    return arm.overlaps.begin((LATE, topic), end)
+def _hold(arm: Arm, topic: str, duration: float) -> None:
+    arm.simulation.hold(f"rt/{topic}", duration)
 
 
 FAULT_KINDS: dict[str, FaultKind] = {
@@ -173,7 +166,7 @@ FAULT_KINDS: dict[str, FaultKind] = {
 """The random faults of a simulated arm."""
 
 ATTACK_KINDS: dict[str, FaultKind] = {
-    LATE: FaultKind(_late, tuple(LATENESS)),
+    HOLD: FaultKind(_hold, HELD),
     FALSE_PRESENCE: FaultKind(_stranger(people.pretend), (NO_TARGET,)),
     STUCK_DRIVE: FaultKind(
         lambda arm, target, duration: None, (NO_TARGET,)

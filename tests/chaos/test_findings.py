@@ -14,8 +14,8 @@ from deploy.chaos.history import (
     ALL,
     BAD_LINE,
     CONTROLLER,
+    HOLD,
     KINEMATICS,
-    LATE,
     NO_TARGET,
     OPERATOR,
     PROGRAMS,
@@ -328,15 +328,15 @@ def suspended_with_a_presence_at(time: float) -> dict[str, Any]:
         (COMMANDED | {"heartbeats": SHORT, "faults": [stopped(NO_TARGET, 14.5, 14.5, STEP)]}, False),
         # late heartbeats are no sign of life
         (
-            COMMANDED | {"heartbeats": SHORT, "faults": [stopped("operator_heartbeat", 14.0, 15.0, LATE)]},
+            COMMANDED | {"heartbeats": SHORT, "faults": [stopped("operator_heartbeat", 14.0, 15.0, HOLD)]},
             True,
         ),
         (
-            COMMANDED | {"heartbeats": SHORT, "faults": [stopped("operator_heartbeat", 14.5, 15.0, LATE)]},
+            COMMANDED | {"heartbeats": SHORT, "faults": [stopped("operator_heartbeat", 14.5, 15.0, HOLD)]},
             False,
         ),
         (
-            COMMANDED | {"heartbeats": SHORT, "faults": [stopped("operator_presence", 14.0, 15.0, LATE)]},
+            COMMANDED | {"heartbeats": SHORT, "faults": [stopped("operator_presence", 14.0, 15.0, HOLD)]},
             False,
         ),
         # no presence for ten seconds, for a reason
