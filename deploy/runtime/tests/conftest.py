@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import os
+import shutil
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
+from pathlib import Path
 from typing import Any
 
 import pytest
+from deploy.runtime.tests.host import ADDRESS, Host
 
 from geometry_msgs.msg import PointStamped
 from rclpy.clock import ROSClock
@@ -107,3 +111,33 @@ def clock() -> ROSClock:
     simulator.attach_clock(clock)
     clock.set_ros_time_override(Time(nanoseconds=1000, clock_type=clock.clock_type))
     return clock
+
+
+@pytest.fixture
+def host(tmp_path: Path) -> Iterator[Host]:
+    """A host with the loopback interface only."""
+    for program, package in (("ip", "iproute2"), ("unshare", "util-linux"), ("nsenter", "util-linux")):
+        if shutil.which(program) is None:
+            pytest.skip(f"no {program} here: apt-get install {package}")
+    namespaces = [["--net"]] if os.geteuid() == 0 else []
+    with ExitStack() as stack:
+        for namespace in (*namespaces, ["--user", "--map-root-user", "--net"]):
+            try:
+                host = Host(namespace, tmp_path)
+                stack.callback(host.close)
+                host.add_interface("probe")
+                host.ip("link delete probe")
+            except OSError as error:
+                reason = error
+            else:
+                break
+        else:
+            pytest.skip(f"platform: no network namespaces here: {reason}")
+        yield host
+
+
+@pytest.fixture
+def host_with_network(host: Host) -> Host:
+    """A host with another interface, eth0."""
+    host.add_interface("eth0", ADDRESS)
+    return host
