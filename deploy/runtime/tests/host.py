@@ -34,10 +34,11 @@ while rclpy.ok():
 """
 
 
-def wait_until(condition: Callable[[], object]) -> None:
-    deadline = time.monotonic() + TIMEOUT
+def wait_until(condition: Callable[[], object], seconds: float = TIMEOUT) -> None:
+    """Wait for a condition. Raises AssertionError if it does not come in time."""
+    deadline = time.monotonic() + seconds
     while not condition():
-        assert time.monotonic() < deadline, f"not within {TIMEOUT} s"
+        assert time.monotonic() < deadline, f"not within {seconds} s"
         time.sleep(0.02)
 
 

@@ -1,4 +1,4 @@
-"""A DDS peer on Fast DDS, built on first use, and nodes on loopback to talk to it."""
+"""Peers of the tests: ROS 2 nodes, and a program on Fast DDS that is built on first use."""
 
 from __future__ import annotations
 
@@ -8,11 +8,18 @@ import queue
 import shutil
 import subprocess
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from functools import cache
+from itertools import count
 from pathlib import Path
 
 import pytest
+from deploy.runtime.tests.interop.processes import PeerProcess
 
+StartPeer = Callable[..., PeerProcess]
+PeerOn = Callable[[str], PeerProcess]
+NUMBERS = count()
 SOURCE = Path(__file__).with_name("peer.cpp")
 LIBRARIES = ("-lfastrtps", "-lfastcdr")
 
@@ -124,3 +131,23 @@ def peer(peer_program: Path, domain_id: int) -> Iterator[FastPeer]:
     peer = FastPeer(peer_program, domain_id)
     yield peer
     peer.close()
+
+
+@pytest.fixture(scope="module")
+def start_peer(module_domain_id: int) -> Iterator[StartPeer]:
+    """Starts processes in a domain of the module; they end after the module."""
+    domain = {"ROS_DOMAIN_ID": str(module_domain_id)}
+    with ExitStack() as stack:
+        yield lambda rclpy, name="": stack.enter_context(PeerProcess(rclpy, domain, name))
+
+
+@pytest.fixture(scope="module")
+def peer_on(start_peer: StartPeer) -> PeerOn:
+    """One process of the module for each rclpy, started on first use."""
+    return cache(start_peer)
+
+
+@pytest.fixture
+def topic() -> str:
+    """The name of a topic that no other test uses."""
+    return f"/interop/topic_{next(NUMBERS)}"
