@@ -3,6 +3,10 @@
 A service is two DDS topics. Every message starts with a header of 16 octets, which the reply repeats: the
 requesting writer's handle and a sequence number. 16 is a multiple of CDR's largest alignment, so the header
 does not change the layout of the message behind it. Source: facts/wire_samples.json, facts/discovery.txt.
+
+That is the form of ROS 2's middleware for Cyclone DDS. Those of other DDS have no header, but a field of RTPS
+that Cyclone DDS cannot set. They take the header for the message, and may allocate all memory for an array
+that they find there (ros2/rmw_cyclonedds#184, #577). Endpoints of our form have an identifier in USER_DATA.
 """
 
 from __future__ import annotations
@@ -40,10 +44,22 @@ def unwrap(data: bytes) -> tuple[RequestId, bytes]:
 
 
 def server_is_matched(requests: Writer, replies: Reader) -> bool:
-    """Whether a single server both reads our requests and writes our replies."""
+    """Whether a single server both reads our requests and writes our replies, and no reader needs others."""
     readers = {user_data_value(data, "serviceid") for data in requests.matched_user_data()}
     writers = {user_data_value(data, "serviceid") for data in replies.matched_user_data()}
-    return bool(readers & writers)
+    return "" not in readers and bool(readers & writers)
+
+
+def has_other_servers(requests: Writer) -> bool:
+    """Whether a server of another form of requests, without our header, would read a request."""
+    return any(not user_data_value(data, "serviceid") for data in requests.matched_user_data())
+
+
+def check_client(requests: Reader, publication_handle: int) -> None:
+    """Raise ValueError if the client of a request is not one of ours."""
+    data = requests.user_data_of(publication_handle)
+    if data is not None and not user_data_value(data, "clientid"):
+        raise ValueError("its client is on another DDS, whose requests have no header of Cyclone DDS")
 
 
 def client_is_matched(requests: Reader, replies: Writer, publication_handle: int) -> bool | None:
@@ -52,7 +68,4 @@ def client_is_matched(requests: Reader, replies: Writer, publication_handle: int
     if data is None:
         return None
     client = user_data_value(data, "clientid")
-    # A client without an identifier cannot be waited for.
-    return not client or any(
-        user_data_value(reader, "clientid") == client for reader in replies.matched_user_data()
-    )
+    return any(user_data_value(reader, "clientid") == client for reader in replies.matched_user_data())

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from rclpy._dds import Writer
 from rclpy._endpoint import ServiceEndpoint
 from rclpy._service_side import ServiceSide
-from rclpy._service_wire import RequestId, server_is_matched, unwrap, wrap
+from rclpy._service_wire import RequestId, has_other_servers, server_is_matched, unwrap, wrap
 from rclpy._type_variables import SrvType, SrvTypeRequest, SrvTypeResponse  # noqa: F401 (re-export)
 from rclpy.callback_groups import CallbackGroup
 from rclpy.exceptions import RCLError
@@ -68,6 +68,8 @@ class Client(ServiceSide):
         """
         Call the service; the future gets the reply. To stop waiting, cancel it or remove the request.
 
+        A server on another DDS than Cyclone would misread the request: then it is logged, and not sent.
+
         :raises TypeError: if ``request`` is not of the service's request type.
         """
         if not isinstance(request, self.srv_type.Request):
@@ -80,7 +82,13 @@ class Client(ServiceSide):
             self._pending_requests[number] = future
         # Not a done callback, which only runs on an executor.
         future._rclpy_call_when_complete(lambda: self.remove_pending_request(future))
-        self.handle.write(wrap(RequestId(self._rclpy_requests.instance_handle, number), data))
+        if has_other_servers(self.handle):
+            self._rclpy_node.get_logger().error(
+                f"did not call {self._rclpy_name}: a server is on another DDS, and ROS 2 has no common form of"
+                " requests; use the same middleware for both"
+            )
+            return future
+        self._rclpy_requests.write(wrap(RequestId(self._rclpy_requests.instance_handle, number), data))
         self._rclpy_publish_event(
             ServiceEventInfo.REQUEST_SENT, self._rclpy_identifier, number, request=request
         )
@@ -99,7 +107,11 @@ class Client(ServiceSide):
                     del self._pending_requests[number]
 
     def service_is_ready(self) -> bool:
-        """Whether a server is matched in both directions. Raises RCLError after the shutdown."""
+        """
+        Whether a server is matched in both directions, and none on another DDS.
+
+        :raises RCLError: after the shutdown.
+        """
         if not self.context.ok():
             raise RCLError(f"cannot look for a server of {self._rclpy_name}: the context was shut down")
         return server_is_matched(self.handle, self._rclpy_replies)

@@ -12,7 +12,7 @@ from typing import Any
 from rclpy._dds import Reader
 from rclpy._endpoint import ServiceEndpoint
 from rclpy._service_side import ServiceSide
-from rclpy._service_wire import RequestId, client_is_matched, unwrap, wrap
+from rclpy._service_wire import RequestId, check_client, client_is_matched, unwrap, wrap
 from rclpy._type_variables import SrvType, SrvTypeRequest, SrvTypeResponse  # noqa: F401 (re-export)
 from rclpy.callback_groups import CallbackGroup
 from rclpy.exceptions import InvalidHandle
@@ -89,6 +89,7 @@ class Service(ServiceSide):
     def _rclpy_take(self) -> tuple[Any, RequestId] | None:
         while not self._rclpy_destroyed and (sample := self._rclpy_requests.take()) is not None:
             try:
+                check_client(self._rclpy_requests, sample.publication_handle)
                 request_id, data = unwrap(sample.data)
                 request = self.srv_type.Request._deserialize(data)
             except ValueError as error:

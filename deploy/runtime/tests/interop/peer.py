@@ -16,6 +16,9 @@ import traceback
 from typing import Any
 
 import rclpy
+from rclpy.action import ActionClient, ActionServer, get_action_names_and_types
+from rclpy.action.server import ServerGoalHandle
+from rclpy.client import Client
 from rclpy.duration import Duration
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -29,7 +32,7 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 from std_srvs.srv import SetBool
 
 PACKAGES = ("builtin_interfaces", "diagnostic_msgs", "geometry_msgs", "sensor_msgs", "std_msgs")
-NAMES = {"inf": math.inf, "nan": math.nan}
+NAMES: dict[str, Any] = {"inf": math.inf, "nan": math.nan}
 for package in PACKAGES:
     importlib.import_module(f"{package}.msg")
     NAMES[package] = importlib.import_module(package)
@@ -43,6 +46,7 @@ class Peer:
         self._publishers: dict[str, Publisher] = {}
         self._subscriptions: dict[str, Subscription] = {}
         self._received: dict[str, list[str]] = {}
+        self._clients: dict[str, Client] = {}
         self._calls: list[bool] = []
 
     def advertise(self, topic: str, type_name: str, qos: dict[str, Any]) -> None:
@@ -113,25 +117,39 @@ class Peer:
         """Return the requests that the services of this node have got."""
         return self._calls
 
-    def has_service(self, service: str) -> bool:
-        """Create a client of a service (SetBool) for the moment; return whether it finds a server."""
-        client = self._node.create_client(SetBool, service)
-        try:
-            return client.wait_for_service(timeout_sec=1.0)
-        finally:
-            self._node.destroy_client(client)
+    def find(self, service: str) -> bool:
+        """Create the client of a service (SetBool) on first use; return whether it has found a server."""
+        if service not in self._clients:
+            self._clients[service] = self._node.create_client(SetBool, service)
+        return self._clients[service].service_is_ready()
 
     async def call(self, service: str, data: bool) -> str:
-        """Call a service (SetBool); return its response."""
-        client = self._node.create_client(SetBool, service)
-        client.wait_for_service(timeout_sec=10.0)
-        return repr(await client.call_async(SetBool.Request(data=data)))
+        """Call a service; return its response."""
+        return repr(await self._clients[service].call_async(SetBool.Request(data=data)))
+
+    def actions(self) -> dict[str, list[str]]:
+        """Return the types of the actions of the domain."""
+        return dict(get_action_names_and_types(self._node))
+
+    async def act(self, action: str) -> None:
+        """Serve an action (Fibonacci), which ROS 2's wheels do not have, and reach a goal of it."""
+        from example_interfaces.action import Fibonacci
+
+        def execute(goal_handle: ServerGoalHandle) -> Any:
+            goal_handle.succeed()
+            return Fibonacci.Result()
+
+        ActionServer(self._node, Fibonacci, action, execute)
+        client = ActionClient(self._node, Fibonacci, action)
+        client.wait_for_server(timeout_sec=10.0)
+        goal_handle = await client.send_goal_async(Fibonacci.Goal())
+        await goal_handle.get_result_async()
 
     def declare(self, parameter: str, value: Any) -> None:
         """Declare a parameter."""
         self._node.declare_parameter(parameter, value)
 
-    async def parameter(self, node: str, name: str, value: Any) -> dict[str, Any]:
+    async def set(self, node: str, name: str, value: Any) -> dict[str, Any]:
         """Set a parameter of another node; return what lists and descriptions say of it, and its value."""
         client = AsyncParameterClient(self._node, node)
         client.wait_for_services(timeout_sec=10.0)

@@ -34,8 +34,8 @@ LATCHED = QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 def writer_for(participant: Participant, topic: str, type_name: str, spin_until: SpinUntil) -> Writer:
-    """A writer that is matched with its reader."""
-    writer = participant.create_writer(topic, type_name, LATCHED, "")
+    """A writer that is matched with its reader, and looks like that of a client."""
+    writer = participant.create_writer(topic, type_name, LATCHED, "clientid=1;")
     spin_until(writer.matched)
     return writer
 
