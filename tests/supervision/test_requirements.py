@@ -51,8 +51,9 @@ def test_a_package_has_the_same_version_in_every_file() -> None:
         assert pins(name).items() <= everything.items()
 
 
-def test_each_wheel_of_ros_has_the_hashes_of_all_supported_pythons() -> None:
-    for line in lines("ros"):
+@pytest.mark.parametrize("name", ["ros", "kilted"])
+def test_each_wheel_of_ros_has_the_hashes_of_all_supported_pythons(name: str) -> None:
+    for line in lines(name):
         hashes = [word for word in line.split() if word.startswith("--hash=sha256:")]
         assert len(hashes) == len(set(hashes)), line
         assert len(hashes) in (1, 3), line  # one for each Python, or one for all

@@ -31,6 +31,11 @@ from rclpy.task import Future
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 from std_srvs.srv import SetBool
 
+try:
+    from example_interfaces.action import Fibonacci
+except ModuleNotFoundError:  # ROS 2's wheels
+    from test_msgs.action import Fibonacci
+
 PACKAGES = ("builtin_interfaces", "diagnostic_msgs", "geometry_msgs", "sensor_msgs", "std_msgs")
 NAMES: dict[str, Any] = {"inf": math.inf, "nan": math.nan}
 for package in PACKAGES:
@@ -131,19 +136,21 @@ class Peer:
         """Return the types of the actions of the domain."""
         return dict(get_action_names_and_types(self._node))
 
-    async def act(self, action: str) -> None:
-        """Serve an action (Fibonacci), which ROS 2's wheels do not have, and reach a goal of it."""
-        from example_interfaces.action import Fibonacci
+    def serve_action(self, action: str) -> None:
+        """Serve an action (Fibonacci); the result has the order of the goal."""
 
         def execute(goal_handle: ServerGoalHandle) -> Any:
             goal_handle.succeed()
-            return Fibonacci.Result()
+            return Fibonacci.Result(sequence=[goal_handle.request.order])
 
         ActionServer(self._node, Fibonacci, action, execute)
+
+    async def reach(self, action: str, order: int) -> list[int]:
+        """Send a goal to an action (Fibonacci); return its result."""
         client = ActionClient(self._node, Fibonacci, action)
         client.wait_for_server(timeout_sec=10.0)
-        goal_handle = await client.send_goal_async(Fibonacci.Goal())
-        await goal_handle.get_result_async()
+        goal_handle = await client.send_goal_async(Fibonacci.Goal(order=order))
+        return list((await goal_handle.get_result_async()).result.sequence)
 
     def declare(self, parameter: str, value: Any) -> None:
         """Declare a parameter."""

@@ -45,8 +45,9 @@ def test_embedded_client_finds_no_server_of_ros(peer_on: PeerOn) -> None:
 
 def test_node_of_ros_sees_an_embedded_action_and_its_goals(peer_on: PeerOn) -> None:
     watching, acting = peer_on("jazzy"), peer_on("embedded")
+    acting("serve_action", "/fibonacci")
+    assert acting("reach", "/fibonacci", 7) == [7]
     status = {"depth": 1, "durability": "TRANSIENT_LOCAL"}
-    acting("act", "/fibonacci")
     watching("subscribe", "/fibonacci/_action/status", "action_msgs/msg/GoalStatusArray", status)
     wait_until(lambda: watching("received", "/fibonacci/_action/status"))
     assert f"status={GoalStatus.STATUS_SUCCEEDED})" in watching("received", "/fibonacci/_action/status")[-1]
