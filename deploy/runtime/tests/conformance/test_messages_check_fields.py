@@ -88,6 +88,7 @@ def assert_assignment_is_refused(cls: Any, field: str, value: Any) -> None:
     assert message == cls()
 
 
+@pytest.mark.filterwarnings("ignore:.*ByteString")  # of ROS 2's messages on Python 3.12 and newer
 @pytest.mark.parametrize(("cls", "field", "value"), WRONG)
 def test_a_message_that_checks_fields_refuses_a_wrong_value(cls: Any, field: str, value: Any) -> None:
     with pytest.raises(AssertionError, match=f"'{field}"):
