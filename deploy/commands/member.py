@@ -8,7 +8,6 @@ from types import TracebackType
 
 import rclpy
 from rcl_interfaces.srv import SetParameters
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
@@ -16,6 +15,7 @@ from rclpy.task import Future
 from deploy.supervision import interruption, manifest
 from deploy.supervision.system import DeploymentError, namespace_of
 from reactive_node import ReactiveNode
+from reactive_node.executor import create_executor
 
 SPIN_TIME = 0.01  # s
 
@@ -31,7 +31,7 @@ class Member:
         except RuntimeError as error:
             rclpy.try_shutdown()
             raise DeploymentError(f"Cannot join the ROS graph: {error}") from None
-        self._executor = SingleThreadedExecutor()
+        self._executor = create_executor()
         self._executor.add_node(self.node)
 
     def spin_once(self) -> None:

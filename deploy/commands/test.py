@@ -31,11 +31,10 @@ EMBEDDED_ONLY = (
     "tests/simulation",
 )
 """Tests of the embedded rclpy, and of what runs only on it."""
-TRANSFORMS = (
-    "interfaces/reactive_node/tests/test_readme.py",
-    "interfaces/reactive_node/tests/test_transforms.py",
-)
+TRANSFORMS = ("interfaces/reactive_node/tests/test_transforms.py",)
 """Tests that need tf2_msgs, which ROS 2's wheels do not have."""
+EVENTS = ("interfaces/reactive_node/tests/test_events_executor.py",)
+"""Tests of an executor that ROS 2 has, but the embedded rclpy has not."""
 
 
 class Part(NamedTuple):
@@ -100,7 +99,7 @@ def parts(arguments: Sequence[str]) -> list[Part]:
 def left_out_here() -> tuple[str, ...]:
     """Return the files and folders whose tests cannot run on the rclpy of this process."""
     if importlib.util.find_spec("rosidl_runtime_embedded"):
-        return ()
+        return EVENTS
     return EMBEDDED_ONLY if importlib.util.find_spec("tf2_msgs") else EMBEDDED_ONLY + TRANSFORMS
 
 
@@ -143,7 +142,8 @@ def uncollected(arguments: Sequence[str], tests: Iterable[str]) -> list[str]:
     names = "\n".join(f".{test}." for test in tests)
     files = {file for path in given for file in Path(path).rglob("test_*.py")}
     unseen = (str(file) for file in files if f".{'.'.join(file.with_suffix('').parts)}." not in names)
-    not_here = (*left_out_here(), *ignored(arguments)) if sourced_rclpy() else ignored(arguments)
+    has_one = sourced_rclpy() or importlib.util.find_spec("rosidl_runtime_embedded")
+    not_here = (*left_out_here(), *ignored(arguments)) if has_one else ignored(arguments)
     return sorted(file for file in unseen if not _is_in(file, not_here))
 
 

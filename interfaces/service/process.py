@@ -19,11 +19,12 @@ from typing import NoReturn
 
 import rclpy
 from rclpy.exceptions import NameValidationException, ParameterException
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.executors import ExternalShutdownException
 
 from interfaces.service import instance, overrides
 from interfaces.service.errors import UserError
 from interfaces.service.node import ServiceNode
+from reactive_node.executor import create_executor
 
 NAMESPACE = "REACTIVE_ARM_NAMESPACE"
 """Environment variable: the default namespace of every service; ``--ros-args -r __ns:=…`` wins."""
@@ -74,7 +75,7 @@ def _run(name: str, wire: Callable[[ServiceNode], None]) -> int:
 
 def _spin(node: ServiceNode, wire: Callable[[ServiceNode], None]) -> int:
     global _spins
-    with instance.claim(node), SingleThreadedExecutor() as executor:
+    with instance.claim(node), create_executor() as executor:
         try:
             wire(node)
             overrides.check(node, sys.argv[1:])

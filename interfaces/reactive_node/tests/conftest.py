@@ -1,12 +1,28 @@
-"""A reactive node and a peer."""
+"""A reactive node and a peer, on each executor that services may have."""
 
 from __future__ import annotations
 
+import importlib.util
+from collections.abc import Iterator
+
 import pytest
+from rclpy.context import Context
+from rclpy.executors import Executor, SingleThreadedExecutor
 from rclpy.node import Node
 
 from reactive_node import ReactiveNode
+from reactive_node.executor import create_executor
 from reactive_node.testing import MakeNode
+
+EXECUTORS = [lambda context: SingleThreadedExecutor(context=context)]
+if importlib.util.find_spec("rclpy.experimental"):
+    EXECUTORS.append(create_executor)
+
+
+@pytest.fixture(params=EXECUTORS, ids=["default", "events"][: len(EXECUTORS)])
+def executor(request: pytest.FixtureRequest, context: Context) -> Iterator[Executor]:
+    with request.param(context) as executor:
+        yield executor
 
 
 @pytest.fixture

@@ -18,6 +18,7 @@ from rclpy.time import Time
 from reactivex.disposable import BooleanDisposable
 from reactivex.subject import Subject
 from rosgraph_msgs.msg import Clock as ClockMessage
+from std_msgs.msg import Empty
 
 from reactive_node import ReactiveNode
 from reactive_node.scheduler import NodeScheduler
@@ -281,13 +282,15 @@ def test_action_that_reschedules_itself_leaves_executor_other_work(
     simulation.set(100.0)
     scheduler, most = simulation.node.scheduler, 10_000
     ran, others = 0, []
-    other = simulation.node.create_guard_condition(lambda: others.append(ran))
+    other = simulation.clock.create_publisher(Empty, "other", 10)
+    simulation.node.create_subscription(Empty, "other", lambda _: others.append(ran), 10)
+    spin_until(lambda: other.get_subscription_count() == 1)
 
     def again(*_: Any) -> None:
         nonlocal ran
         ran += 1
         if ran == 1:
-            other.trigger()
+            other.publish(Empty())
         if ran < most and not others:
             scheduler.schedule(again)
 

@@ -15,7 +15,7 @@ from typing import Any, Generic, TypeVar
 import pytest
 import rclpy
 from rclpy.context import Context
-from rclpy.executors import SingleThreadedExecutor
+from rclpy.executors import Executor
 from rclpy.node import Node
 from reactivex import Observable
 from reactivex.abc import DisposableBase
@@ -24,6 +24,7 @@ from reactivex.scheduler.scheduler import Scheduler
 from reactivex.testing import Recorded, TestScheduler
 
 from reactive_node.domains import reserved_domain
+from reactive_node.executor import create_executor
 from reactive_node.node import ReactiveNode
 
 _T = TypeVar("_T")
@@ -138,14 +139,14 @@ def context(domain_id: int) -> Iterator[Context]:
 
 
 @pytest.fixture
-def executor(context: Context) -> Iterator[SingleThreadedExecutor]:
-    """A single-threaded executor of the test's context."""
-    with SingleThreadedExecutor(context=context) as executor:
+def executor(context: Context) -> Iterator[Executor]:
+    """The executor of the test's context, as services have it."""
+    with create_executor(context) as executor:
         yield executor
 
 
 @pytest.fixture
-def make_node(context: Context, executor: SingleThreadedExecutor) -> Iterator[MakeNode]:
+def make_node(context: Context, executor: Executor) -> Iterator[MakeNode]:
     """Makes nodes that the test's executor spins; they end with the test."""
     with ExitStack() as stack:
 
@@ -159,7 +160,7 @@ def make_node(context: Context, executor: SingleThreadedExecutor) -> Iterator[Ma
 
 
 @pytest.fixture
-def spin_until(executor: SingleThreadedExecutor) -> SpinUntil:
+def spin_until(executor: Executor) -> SpinUntil:
     """Spins the test's executor until a condition is true; fails after ``seconds``."""
 
     def spin(condition: Callable[[], object], seconds: float = 10.0) -> None:
@@ -172,7 +173,7 @@ def spin_until(executor: SingleThreadedExecutor) -> SpinUntil:
 
 
 @pytest.fixture
-def spin_for(executor: SingleThreadedExecutor) -> SpinFor:
+def spin_for(executor: Executor) -> SpinFor:
     """Spins the test's executor for so many seconds, to show that something does not happen."""
 
     def spin(seconds: float) -> None:

@@ -1,0 +1,227 @@
+"""What EventsExecutor sees instead of a node and its entities: they hide its faults from their callbacks.
+
+It reads attributes by their names, calls a callback although its entity was destroyed while the call waited,
+hands the info of a message over in one argument with the message, and awaits no coroutine.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Iterable
+from typing import Any
+
+from rclpy.event_handler import EventHandler
+from rclpy.exceptions import InvalidHandle
+from rclpy.node import Node
+from rclpy.service import Service
+from rclpy.subscription import Subscription
+from rclpy.timer import Timer
+from rclpy.waitable import Waitable
+
+CreateTask = Callable[..., Any]
+"""Runs a coroutine by the executor."""
+
+
+class _NoNode:
+    """A node without entities."""
+
+    subscriptions = timers = clients = services = waitables = guards = ()
+
+    @property
+    def executor(self) -> None:
+        """None: EventsExecutor sets itself, and nothing would break that cycle of references."""
+
+    @executor.setter
+    def executor(self, executor: Any) -> None:
+        pass
+
+
+NO_NODE = _NoNode()
+
+
+class Window(_NoNode):
+    """The entities of a node that its callback groups let the executor run."""
+
+    def __init__(self, node: Node, create_task: CreateTask) -> None:
+        self._node = node
+        self._create_task = create_task
+        self._stand_ins: dict[type, dict[Any, Any]] = {}
+
+    def take_events(self) -> None:
+        """
+        Call the callbacks of QoS events that have come.
+
+        EventsExecutor must not see them: an event that is on its way while its endpoint is destroyed is a
+        segmentation fault (ros2/rclpy#1644).
+        """
+        for event in self._seen(_Event, [e for e in self._node.waitables if isinstance(e, EventHandler)]):
+            event.take()
+
+    @property
+    def subscriptions(self) -> list[Any]:  # type: ignore[override]
+        return self._seen(_Reader, self._node.subscriptions)
+
+    @property
+    def timers(self) -> list[Any]:  # type: ignore[override]
+        return self._seen(_Timer, self._node.timers)
+
+    @property
+    def clients(self) -> list[Any]:  # type: ignore[override]
+        return [*self._node.clients]
+
+    @property
+    def services(self) -> list[Any]:  # type: ignore[override]
+        return self._seen(_Server, self._node.services)
+
+    @property
+    def waitables(self) -> list[Any]:  # type: ignore[override]
+        waitables = [each for each in self._node.waitables if not isinstance(each, EventHandler)]
+        return self._seen(_Waitable, waitables)
+
+    @property
+    def guards(self) -> list[Any]:  # type: ignore[override]
+        return [*self._node.guards]
+
+    def get_logger(self) -> _Mute:
+        """Return a logger that logs nothing: an error of a callback comes out of spinning."""
+        return _Mute()
+
+    def _seen(self, kind: type, entities: Iterable[Any]) -> list[Any]:
+        """Return one stand-in for the whole life of each entity: EventsExecutor holds no reference to it."""
+        known = self._stand_ins.get(kind, {})
+        self._stand_ins[kind] = {
+            entity: known.get(entity) or kind(entity, self._create_task)
+            for entity in entities
+            if entity.callback_group.can_execute(entity)
+        }
+        return [*self._stand_ins[kind].values()]
+
+
+class _Mute:
+    def fatal(self, text: str) -> None:
+        pass
+
+    warn = fatal
+
+
+def _lives(entity: Any) -> bool:
+    try:
+        with entity.handle:
+            return True
+    except InvalidHandle:
+        return False
+
+
+class _Reader:
+    """A subscription that always asks for the info of a message: its callback may be replaced."""
+
+    CallbackType = Subscription.CallbackType
+
+    def __init__(self, subscription: Subscription, create_task: CreateTask) -> None:
+        self.handle = subscription.handle
+        self.msg_type = subscription.msg_type
+        self.raw = subscription.raw
+        self._callback_type = self.CallbackType.WithMessageInfo
+        only = self.CallbackType.MessageOnly
+
+        def callback(*taken: Any) -> None:
+            if not _lives(subscription):
+                return
+            message, info = taken if len(taken) == 2 else taken[0]
+            if subscription._callback_type is only:
+                result = subscription.callback(message)
+            else:
+                result = subscription.callback(message, info)
+            if result is not None and inspect.iscoroutine(result):
+                create_task(result)
+
+        self.callback = callback
+
+
+class _Timer:
+    """A timer."""
+
+    def __init__(self, timer: Timer, create_task: CreateTask) -> None:
+        self.handle = timer.handle
+        self._timer = timer
+
+    def callback(self) -> Any:
+        """Call back, and return a coroutine if the callback is one."""
+        return self._timer.callback() if _lives(self._timer) else None
+
+
+class _Server:
+    """A service."""
+
+    def __init__(self, service: Service, create_task: CreateTask) -> None:
+        self.handle = service.handle
+        self.srv_type = service.srv_type
+        self._service = service
+        self._create_task = create_task
+        self.callback = self._call  # an attribute of the object: EventsExecutor holds no reference to it
+
+    def _call(self, request: Any, response: Any) -> Any:
+        return self._service.callback(request, response) if _lives(self._service) else None
+
+    def send_response(self, response: Any, header: Any) -> None:
+        """Send the response, at once or when the coroutine returns it."""
+        if inspect.iscoroutine(response):
+            self._create_task(self._send_later(response, header))
+        elif response is not None or _lives(self._service):
+            self._service.send_response(response, header)
+
+    async def _send_later(self, response: Any, header: Any) -> None:
+        self._service.send_response(await response, header)
+
+
+class _Event:
+    """A kind of QoS events of an endpoint. It plays the wait set in which they are always ready."""
+
+    def __init__(self, handler: EventHandler, create_task: CreateTask) -> None:
+        self._handler = handler
+        self._create_task = create_task
+        self._changes: list[str] | None = None  # the names of the numbers that tell of a change
+
+    def take(self) -> None:
+        """Call back if there was an event."""
+        try:
+            if self._changes is None:
+                self._handler.add_to_wait_set(self)
+            self._handler.is_ready(self)
+            status = self._handler.take_data()
+        except InvalidHandle:
+            return
+        if self._changes is None:
+            self._changes = [name for name in dir(status) if name.endswith("_change")]
+        if any(getattr(status, name) for name in self._changes):
+            self._create_task(self._handler.execute(status))
+
+    def add_event(self, event: Any) -> int:
+        """Return the index of the event."""
+        return 0
+
+    def is_ready(self, kind: str, index: int) -> bool:
+        """Return True."""
+        return True
+
+
+class _Waitable:
+    """A part of an action."""
+
+    def __init__(self, waitable: Waitable, create_task: CreateTask) -> None:
+        self._waitable = waitable
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._waitable, name)
+
+    def take_data(self) -> Any:
+        """Take what has come; None if the waitable was destroyed since."""
+        try:
+            return self._waitable.take_data()
+        except InvalidHandle:
+            return None
+
+    async def execute(self, taken_data: Any) -> None:
+        """Call back with what has come."""
+        if taken_data is not None:
+            await self._waitable.execute(taken_data)
