@@ -35,6 +35,7 @@ from deploy.supervision import processes
 LIBRARIES = (
     "json",
     "reactive_node",
+    "reactive_node.executor",
     "reactivex.operators",
     "rclpy.executors",
     "rclpy.serialization",
