@@ -21,7 +21,7 @@ import rclpy
 from rclpy.exceptions import NameValidationException, ParameterException
 from rclpy.executors import ExternalShutdownException
 
-from interfaces.service import instance, overrides
+from interfaces.service import instance, middleware, overrides
 from interfaces.service.errors import UserError
 from interfaces.service.node import ServiceNode
 from reactive_node.executor import create_executor
@@ -57,6 +57,7 @@ def refuse(name: str, reason: str) -> NoReturn:
 def _run(name: str, wire: Callable[[ServiceNode], None]) -> int:
     """Return the exit code."""
     try:
+        middleware.avoid_shared_memory()
         rclpy.init()
         node = ServiceNode(name, namespace=os.environ.get(NAMESPACE, ""))
     except (*USER_ERRORS, RuntimeError) as error:  # RuntimeError: of domain, discovery or DDS

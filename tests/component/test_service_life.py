@@ -13,9 +13,11 @@ from contextlib import ExitStack, suppress
 from pathlib import Path
 
 import pytest
+from rclpy.node import Node
 from rclpy.utilities import get_rmw_implementation_identifier
 
 from interfaces.service import process
+from reactive_node.testing import MakeNode, SpinUntil
 
 CYCLONE = get_rmw_implementation_identifier() == "rmw_cyclonedds_cpp"
 ROOT = Path(__file__).parents[2]
@@ -326,3 +328,14 @@ def test_signal_ends_a_service_at_every_moment(start: Start, number: signal.Sign
     time.sleep(delay)
 
     assert process.end(by=number) == (0, "")
+
+
+def test_service_has_no_shared_memory_and_is_seen_by_others(
+    start: Start, make_node: MakeNode, spin_until: SpinUntil
+) -> None:
+    process = start("-c", READY)
+    assert process.wait_for_line() == "ready"
+    maps = Path(f"/proc/{process.popen.pid}/maps").read_text()
+    assert "/dev/shm/fastrtps" not in maps
+    node = make_node(kind=Node)
+    spin_until(lambda: "ready" in node.get_node_names())
