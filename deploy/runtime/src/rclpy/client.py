@@ -84,8 +84,8 @@ class Client(ServiceSide):
         future._rclpy_call_when_complete(lambda: self.remove_pending_request(future))
         if has_other_servers(self.handle):
             self._rclpy_node.get_logger().error(
-                f"did not call {self._rclpy_name}: a server is on another DDS, and ROS 2 has no common form of"
-                " requests; use the same middleware for both"
+                f"did not call {self._rclpy_name}: a server is on another DDS, and ROS 2 has no common form"
+                " of requests; use the same middleware for both"
             )
             return future
         self._rclpy_requests.write(wrap(RequestId(self._rclpy_requests.instance_handle, number), data))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 
 import pytest
-from deploy.runtime.tests.host import ADDRESS, Host, Process, wait_until
+from deploy.runtime.tests.host import ADDRESS, RANGE, Host, Process, wait_until
 
 # Counts the RTPS packets of the loopback interface, and those that contain RTPS's multicast group, to which
 # packets go or which a locator announces.
