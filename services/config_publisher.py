@@ -13,8 +13,8 @@ import sys
 from dataclasses import dataclass
 
 from interfaces import service
-from interfaces.scenario.source import VirtualSource
 from interfaces.service import ServiceNode, parameter
+from interfaces.sources.source import VirtualSource
 from interfaces.topics import CONFIGURATION, L1, L2, THETA1, THETA2, Topic
 
 

@@ -15,8 +15,8 @@ from reactivex import Observable
 from std_msgs.msg import Bool, String
 
 from interfaces import service
-from interfaces.scenario.source import VirtualSource
 from interfaces.service import ServiceNode, parameter
+from interfaces.sources.source import VirtualSource
 from interfaces.topics import ENGINES, ENGINES_STATE, OFF, ON, OPERATOR_HEARTBEAT, TURN_ON
 
 

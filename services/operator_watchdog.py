@@ -16,8 +16,8 @@ from reactivex import Observable
 from std_msgs.msg import Header, String
 
 from interfaces import service, topics
-from interfaces.scenario.origin import Origin
 from interfaces.service import ServiceNode, UserError, parameter
+from interfaces.service.epoch import Origin
 from interfaces.topics import ALIVE, INCAPACITATED, MISSED, TURN_OFF
 from reactive_node import stamps
 from reactive_node.stamps import Timestamp

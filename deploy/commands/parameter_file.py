@@ -16,9 +16,9 @@ from typing import Any
 
 from deploy.supervision import interruption, manifest
 from deploy.supervision.system import ALL, KEY
-from interfaces.scenario import yaml_file
 from interfaces.service import UserError
 from interfaces.service.parameters import Declaration, declarations
+from interfaces.sources import yaml_file
 
 USE_SIM_TIME = Declaration("use_sim_time", False, None, "", "whether time is simulated", False)
 

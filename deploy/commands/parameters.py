@@ -24,8 +24,8 @@ from deploy.supervision.system import (
     namespace_of,
     scenario_parameters,
 )
-from interfaces.scenario import scenario_file
 from interfaces.service import UserError, instance
+from interfaces.sources import scenario_file
 
 SCENARIOS = ROOT / "deploy" / "scenarios"
 DISCOVERY_RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"  # environment variable

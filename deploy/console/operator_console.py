@@ -25,8 +25,8 @@ from deploy.console.page.site import Site
 from deploy.console.page.switch import VIRTUAL_SWITCH, Switch
 from deploy.supervision import manifest
 from interfaces import service, topics
-from interfaces.scenario.origin import Origin
 from interfaces.service import ServiceNode, UserError, parameter
+from interfaces.service.epoch import Origin
 from interfaces.topics import TURN_OFF
 from reactive_node import stamps
 from services import engine_controller, operator_watchdog

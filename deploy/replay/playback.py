@@ -27,7 +27,7 @@ from deploy.simulation.machine import simulated_services
 from deploy.simulation.viewer import view
 from deploy.supervision import manifest
 from deploy.supervision.system import NAMESPACE
-from interfaces.scenario.origin import EPOCH
+from interfaces.service.epoch import EPOCH
 from interfaces.topics import DIAGNOSTICS, Topic
 
 LEAD = 2 * SECOND  # ns from the beginning of the simulation to that of the record or of a process

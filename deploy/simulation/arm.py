@@ -20,8 +20,8 @@ from deploy.simulation.supervisor import Supervisor
 from deploy.supervision import manifest
 from deploy.supervision.processes import MARK
 from deploy.supervision.system import SERVICE_GRACE, SETTINGS, DeploymentError, scenario_parameters
-from interfaces.scenario import scenario_file
 from interfaces.service import UserError
+from interfaces.sources import scenario_file
 
 PROGRAMS = tuple(each for each in manifest.programs() if each.name != manifest.PAGE)
 """All but the page, which serves HTTP on threads of its own."""

@@ -18,9 +18,9 @@ from rclpy_simulation.kernel import running
 from deploy.supervision import processes
 from deploy.supervision.processes import MARK
 from deploy.supervision.system import DeploymentError, Program, System
-from interfaces.scenario import scenario_file
 from interfaces.service import instance
 from interfaces.service import process as service_process
+from interfaces.sources import scenario_file
 
 
 @contextmanager
@@ -58,7 +58,7 @@ class Machine:
         with (
             mock.patch.object(instance, "socket", sockets),
             # Restarted sources read a file of many events again and again.
-            mock.patch("interfaces.scenario.source.load", cache(scenario_file.load)),
+            mock.patch("interfaces.sources.source.load", cache(scenario_file.load)),
             mock.patch.multiple(
                 processes,
                 stat_of=self._stat_of,

@@ -17,7 +17,7 @@ from std_msgs.msg import Bool, Float64, Header, String
 
 from deploy.console.lines import Line, line_batches
 from interfaces import topics
-from interfaces.scenario import playback, scenario_file
+from interfaces.sources import playback, scenario_file
 from reactive_node import stamps
 from services.engine_controller import Event, engine_state
 from services.kinematics import effector_position

@@ -13,8 +13,8 @@ import reactivex as rx
 from reactivex import Observable
 from reactivex.testing import ReactiveTest, TestScheduler
 
-from interfaces.scenario import playback, scenario_file
-from interfaces.scenario.timeline import Events, Sweep
+from interfaces.sources import playback, scenario_file
+from interfaces.sources.timeline import Events, Sweep
 from services.kinematics import effector_position, forward_kinematics
 from services.velocity import Position, effector_speed
 

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from interfaces.scenario.scenario_file import Scenario, load
-from interfaces.scenario.timeline import Events, Sweep
 from interfaces.service import UserError
+from interfaces.sources.scenario_file import Scenario, load
+from interfaces.sources.timeline import Events, Sweep
 from interfaces.topics import TURN_ON
 
 SCENARIOS = Path(__file__).parents[2] / "deploy" / "scenarios"

@@ -19,10 +19,10 @@ from rclpy.qos import qos_profile_parameter_events
 from reactivex import Observable
 
 from interfaces import topics
-from interfaces.scenario.origin import EPOCH, Origin
-from interfaces.scenario.source import VirtualSource
-from interfaces.scenario.timeline import Events, Sweep
 from interfaces.service import ServiceNode, UserError, parameter
+from interfaces.service.epoch import EPOCH, Origin
+from interfaces.sources.source import VirtualSource
+from interfaces.sources.timeline import Events, Sweep
 
 Make = Callable[..., Any]
 SpinUntil = Callable[..., None]

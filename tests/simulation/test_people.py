@@ -9,7 +9,7 @@ import yaml
 
 from deploy.simulation import people
 from interfaces import topics
-from interfaces.scenario.scenario_file import load
+from interfaces.sources.scenario_file import load
 
 
 def test_the_operator_of_a_seed_is_always_the_same() -> None:

@@ -11,7 +11,7 @@ import reactivex as rx
 from reactivex import Observable, abc
 from reactivex.scheduler import ImmediateScheduler
 
-from interfaces.scenario.timeline import Events, Sweep
+from interfaces.sources.timeline import Events, Sweep
 
 T = TypeVar("T")
 

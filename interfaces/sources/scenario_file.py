@@ -38,9 +38,9 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from interfaces import topics
-from interfaces.scenario import yaml_file
-from interfaces.scenario.timeline import Events, Sweep
 from interfaces.service.errors import UserError
+from interfaces.sources import yaml_file
+from interfaces.sources.timeline import Events, Sweep
 
 T = TypeVar("T")
 

@@ -14,8 +14,8 @@ from typing import Any
 
 import yaml
 
-from interfaces.scenario import yaml_file
 from interfaces.service.errors import UserError
+from interfaces.sources import yaml_file
 
 
 class Settings:

@@ -11,12 +11,12 @@ from rclpy.parameter import Parameter
 from reactivex import Observable
 from reactivex.subject import Subject
 
-from interfaces.scenario import playback
-from interfaces.scenario.origin import Origin
-from interfaces.scenario.scenario_file import Scenario, load
-from interfaces.scenario.settings import Settings
-from interfaces.scenario.timeline import Events, Sweep
 from interfaces.service import ServiceNode, UserError, parameter
+from interfaces.service.epoch import Origin
+from interfaces.sources import playback
+from interfaces.sources.scenario_file import Scenario, load
+from interfaces.sources.settings import Settings
+from interfaces.sources.timeline import Events, Sweep
 
 T = TypeVar("T")
 
