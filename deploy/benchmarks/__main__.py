@@ -36,8 +36,8 @@ from deploy.benchmarks.measurement import (
 )
 from deploy.benchmarks.table import chain_tables, image_tables, tables
 from deploy.commands.setup import sourced_rclpy
-from deploy.supervision import interruption
-from deploy.supervision.processes import ROOT, run_directory
+from deploy.running import interruption
+from deploy.running.processes import ROOT, run_directory
 
 COMPARISON, CHAIN, IMAGE, SCALE = "comparison", "chain", "images", "scale"
 TABLES: dict[str, Callable[[Any], str]] = {

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from deploy.benchmarks import c_program
 from deploy.benchmarks.link import FIRST, HEARTBEATS, LAST, MIDDLE, SINK, SOURCE, Job
-from deploy.supervision.processes import ROOT
+from deploy.running.processes import ROOT
 
 BENCH_PYTHON = ROOT / ".venv-bench" / "bin" / "python"
 SYSTEM_PYTHON = ROOT / ".venv" / "bin" / "python"

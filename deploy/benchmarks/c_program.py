@@ -7,7 +7,7 @@ import subprocess
 from pathlib import Path
 
 from deploy.benchmarks.link import HEARTBEATS, Job
-from deploy.supervision.processes import run_directory
+from deploy.running.processes import run_directory
 
 PIPELINE, SERVICES = "pipeline", "services"
 LOOPBACK, LOCALHOST, DEFAULTS = "loopback.xml", "localhost.xml", "defaults.xml"

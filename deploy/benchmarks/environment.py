@@ -9,8 +9,8 @@ from collections.abc import Collection
 from pathlib import Path
 
 from deploy.benchmarks.alternatives import BENCH_PYTHON
-from deploy.supervision import interruption
-from deploy.supervision.processes import ROOT
+from deploy.running import interruption
+from deploy.running.processes import ROOT
 
 CHART = "chart.txt"
 _REQUIREMENTS = Path(__file__).with_name("requirements")

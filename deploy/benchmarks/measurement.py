@@ -29,7 +29,7 @@ from deploy.benchmarks.link import (
     Job,
 )
 from deploy.chaos.cost import proportional_set_size
-from deploy.supervision import interruption
+from deploy.running import interruption
 from reactive_node.domains import reserved_domain
 
 _SILENCE = 20.0  # s without a report that an alternative may take

@@ -21,9 +21,9 @@ from deploy.benchmarks.table import Results, table
 from deploy.chaos.arm import Arm
 from deploy.chaos.cost import Cost
 from deploy.commands.setup import sourced_rclpy
-from deploy.supervision import interruption
-from deploy.supervision.processes import ROOT
-from deploy.supervision.system import NAMESPACE, System
+from deploy.running import interruption
+from deploy.running.processes import ROOT
+from deploy.running.system import NAMESPACE, System
 from reactive_node.domains import reserved_domain
 
 SIZES = (1, 2, 5, 10, 20, 30)

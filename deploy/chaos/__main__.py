@@ -24,8 +24,8 @@ from deploy.chaos.page import page, verdict
 from deploy.chaos.pictures import framed, timeline
 from deploy.chaos.promises import CHECKERS, overloads
 from deploy.chaos.report import text
-from deploy.supervision import interruption, processes
-from deploy.supervision.system import DeploymentError, System, make_directory, set_middleware
+from deploy.running import interruption, processes
+from deploy.running.system import DeploymentError, System, make_directory, set_middleware
 
 KEPT = 10  # records
 

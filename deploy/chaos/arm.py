@@ -10,8 +10,8 @@ from contextlib import suppress
 from deploy.chaos.babbler import BABBLER
 from deploy.chaos.clock import Clock
 from deploy.chaos.overlaps import Overlaps
-from deploy.supervision import processes
-from deploy.supervision.system import DeploymentError, System
+from deploy.running import processes
+from deploy.running.system import DeploymentError, System
 
 PID_TIMEOUT = 2.0  # s to wait for a program that is being restarted
 

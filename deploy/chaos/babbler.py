@@ -24,7 +24,7 @@ from rclpy.serialization import serialize_message
 from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import Bool, Float64, Header, String
 
-from deploy.supervision.system import namespace_of
+from deploy.running.system import namespace_of
 from interfaces import topics
 
 BABBLER = "babbler"

@@ -18,9 +18,8 @@ from deploy.chaos import clock
 from deploy.chaos.arm import Arm
 from deploy.chaos.babbler import BABBLER
 from deploy.chaos.history import ALL, NO_TARGET, PROGRAMS
-from deploy.commands import parameter_file
-from deploy.supervision import processes
-from deploy.supervision.system import KEY
+from deploy.running import parameter_file, processes
+from deploy.running.system import KEY
 
 INJECTED = Path(__file__).parent / "inject"
 """On the PYTHONPATH of an arm under test; the faults `hang`, `raise` and `hog` need it."""

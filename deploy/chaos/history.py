@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
-from deploy.supervision import manifest
+from deploy.running import manifest
 from interfaces import topics
 
 PROGRAMS = tuple(program.name for program in manifest.programs())

@@ -29,7 +29,7 @@ from rclpy.signals import SignalHandlerOptions
 from deploy.chaos.history import LOSS, NO_TARGET, OVERLOAD, InjectedFault, Life
 from deploy.chaos.process_monitor import SCAN_PERIOD, ProcessMonitor, Rounds
 from deploy.chaos.record import FAULTS, PROCESSES
-from deploy.recording.recorder import Recorder, clocks, record
+from deploy.running.recorder import Recorder, clocks, record
 from reactive_node import ReactiveNode
 
 

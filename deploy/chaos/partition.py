@@ -22,8 +22,8 @@ from deploy.chaos.history import OPERATOR
 from deploy.chaos.history import SWITCH as PROGRAM
 from deploy.chaos.schedule import PlannedFault
 from deploy.chaos.testbed import SCENARIO, Testbed
-from deploy.supervision import manifest, processes
-from deploy.supervision.system import System
+from deploy.running import manifest, processes
+from deploy.running.system import System
 
 ROBOT, CONTROL, BRIDGE = "robot", "operator", "switch"
 NETWORK = "10.86.86"  # of the namespaces only

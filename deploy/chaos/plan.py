@@ -14,7 +14,7 @@ from deploy.chaos.faults import FAULT_KINDS
 from deploy.chaos.history import PROGRAMS
 from deploy.chaos.schedule import Schedule
 from deploy.chaos.testbed import SCENARIO, Testbed, sources
-from deploy.supervision.system import DeploymentError
+from deploy.running.system import DeploymentError
 from reactive_node.domains import DOMAINS
 
 RANDOM = "monkey"  # the scenario of random faults

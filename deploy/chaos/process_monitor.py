@@ -12,7 +12,7 @@ from pathlib import Path
 
 from deploy.chaos.babbler import BABBLER
 from deploy.chaos.history import Life
-from deploy.supervision import processes
+from deploy.running import processes
 
 STALL = 0.1  # s; a round that takes longer shows that the machine is overloaded
 SCAN_PERIOD = 0.02  # s

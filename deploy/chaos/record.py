@@ -27,8 +27,8 @@ from deploy.chaos.history import (
     Sample,
     merged,
 )
-from deploy.recording.recorder import METADATA
-from deploy.supervision.system import DeploymentError
+from deploy.running.recorder import METADATA
+from deploy.running.system import DeploymentError
 from interfaces import topics
 
 PROCESSES, FAULTS = "/chaos/processes", "/chaos/faults"  # topics

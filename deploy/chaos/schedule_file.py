@@ -21,7 +21,7 @@ from typing import Any
 import yaml
 
 from deploy.chaos.schedule import PlannedFault, Schedule
-from deploy.supervision.system import DeploymentError
+from deploy.running.system import DeploymentError
 
 
 @dataclass(frozen=True)

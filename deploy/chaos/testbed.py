@@ -42,8 +42,8 @@ from deploy.chaos.history import (
     target_name,
 )
 from deploy.chaos.schedule import AWAKE, DAY, FIRST_FAULT, PlannedFault, Schedule
-from deploy.supervision import interruption, processes
-from deploy.supervision.system import NAMESPACE, DeploymentError, System, scenario_parameters
+from deploy.running import interruption, processes
+from deploy.running.system import NAMESPACE, DeploymentError, System, scenario_parameters
 from interfaces import topics
 from reactive_node.domains import reserved_domain
 

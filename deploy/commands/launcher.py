@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 
 from deploy.commands.stop import stop
 from deploy.console.output import say
-from deploy.supervision import interruption
-from deploy.supervision.system import NAMESPACE, DeploymentError, Program, System, set_middleware
+from deploy.running import interruption
+from deploy.running.system import NAMESPACE, DeploymentError, Program, System, set_middleware
 
 if TYPE_CHECKING:
     from deploy.commands.member import Member

@@ -12,8 +12,8 @@ from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
-from deploy.supervision import interruption, manifest
-from deploy.supervision.system import DeploymentError, namespace_of
+from deploy.running import interruption, manifest
+from deploy.running.system import DeploymentError, namespace_of
 from reactive_node import ReactiveNode
 from reactive_node.executor import create_executor
 

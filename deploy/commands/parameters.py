@@ -10,11 +10,10 @@ from typing import Any
 from rclpy.exceptions import InvalidNamespaceException
 from rclpy.validate_namespace import validate_namespace
 
-from deploy.commands import parameter_file
 from deploy.console.page.address import DEFAULT_PORT, host_names, tls
-from deploy.supervision import manifest, processes
-from deploy.supervision.processes import ROOT
-from deploy.supervision.system import (
+from deploy.running import manifest, parameter_file, processes
+from deploy.running.processes import ROOT
+from deploy.running.system import (
     ALL,
     KEY,
     NAMESPACE,

@@ -10,9 +10,9 @@ from mcap_files import SAVE_PERIOD
 from rclpy.clock import Clock, ClockType
 
 from deploy.commands.member import Member
-from deploy.recording.recorder import Recorder, clocks, record
-from deploy.supervision import interruption
-from deploy.supervision.system import DeploymentError, System
+from deploy.running import interruption
+from deploy.running.recorder import Recorder, clocks, record
+from deploy.running.system import DeploymentError, System
 
 
 def write(directory: Path, member: Member, system: System) -> None:

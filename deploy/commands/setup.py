@@ -29,7 +29,7 @@ from functools import partial
 from pathlib import Path
 from types import FrameType
 
-from deploy.supervision.processes import ROOT, run_directory, using
+from deploy.running.processes import ROOT, run_directory, using
 
 VENV = ROOT / ".venv"
 PYTHON = VENV / "bin" / "python"

@@ -6,8 +6,8 @@ import sys
 from contextlib import suppress
 
 from deploy.console.output import say
-from deploy.supervision import interruption
-from deploy.supervision.system import DeploymentError, System
+from deploy.running import interruption
+from deploy.running.system import DeploymentError, System
 
 
 def stop(system: System) -> None:

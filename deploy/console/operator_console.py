@@ -23,7 +23,7 @@ from deploy.console.page import address, hold, protocol, requests, server, state
 from deploy.console.page.remote import parameter_changes
 from deploy.console.page.site import Site
 from deploy.console.page.switch import VIRTUAL_SWITCH, Switch
-from deploy.supervision import manifest
+from deploy.running import manifest
 from interfaces import service, topics
 from interfaces.service import ServiceNode, UserError, parameter
 from interfaces.service.epoch import Origin

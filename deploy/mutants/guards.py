@@ -31,7 +31,7 @@ GUARDS: dict[str, tuple[str, ...]] = {
     "interfaces/service/parameters.py": (
         "tests/component/test_readme.py",
         "tests/component/test_service_node.py",
-        "tests/supervision/test_parameter_file.py",
+        "tests/running/test_parameter_file.py",
     ),
     "interfaces/service/process.py": ("tests/component/test_service_life.py",),
     f"{REACTIVE_NODE}/scheduler.py": (
@@ -66,13 +66,13 @@ GUARDS: dict[str, tuple[str, ...]] = {
         f"{_NODE_TESTS}/test_events.py",
         f"{_NODE_TESTS}/test_end.py",
     ),
-    "deploy/supervision/policy.py": (
-        "tests/supervision/test_policy.py",
-        "tests/supervision/test_sentinel.py",
+    "deploy/running/policy.py": (
+        "tests/running/test_policy.py",
+        "tests/running/test_sentinel.py",
     ),
-    "deploy/supervision/sentinel.py": (
-        "tests/supervision/test_sentinel.py",
-        "tests/supervision/test_sentinel_wiring.py",
+    "deploy/running/sentinel.py": (
+        "tests/running/test_sentinel.py",
+        "tests/running/test_sentinel_wiring.py",
         "tests/component/test_readme.py",
     ),
     "deploy/chaos/history.py": ("tests/chaos/test_history.py", *_CHECKERS),

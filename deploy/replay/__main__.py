@@ -16,14 +16,13 @@ from pathlib import Path
 
 import yaml
 
-from deploy.commands import parameter_file
-from deploy.recording.recorder import Recorder, qos_profiles
 from deploy.replay import chains
 from deploy.replay.job import Job, Outcome, run_all
 from deploy.replay.record import Record, load
 from deploy.replay.report import report
-from deploy.supervision import interruption
-from deploy.supervision.system import DeploymentError
+from deploy.running import interruption, parameter_file
+from deploy.running.recorder import Recorder, qos_profiles
+from deploy.running.system import DeploymentError
 from interfaces import topics
 from interfaces.service import UserError
 

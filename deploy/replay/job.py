@@ -16,7 +16,7 @@ from deploy.replay.chains import Chain
 from deploy.replay.comparison import BOUNDS, Comparison, Interval, compare
 from deploy.replay.playback import Playback, play
 from deploy.replay.record import Message, Record
-from deploy.supervision import interruption
+from deploy.running import interruption
 from interfaces.topics import ENGINES, Topic
 
 START = 2 * SECOND

@@ -22,11 +22,11 @@ from deploy.replay import chains
 from deploy.replay.chains import WATCHDOG, Chain
 from deploy.replay.lives import AHEAD, ReplayedLife, Suspension, lives, origin
 from deploy.replay.record import Message, Record
+from deploy.running import manifest
+from deploy.running.system import NAMESPACE
 from deploy.simulation.arm import ROBOT
 from deploy.simulation.machine import simulated_services
 from deploy.simulation.viewer import view
-from deploy.supervision import manifest
-from deploy.supervision.system import NAMESPACE
 from interfaces.service.epoch import EPOCH
 from interfaces.topics import DIAGNOSTICS, Topic
 

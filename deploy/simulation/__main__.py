@@ -20,6 +20,8 @@ from deploy.chaos.page import page, verdict
 from deploy.chaos.plan import names, number
 from deploy.chaos.report import text
 from deploy.chaos.schedule_file import Shift
+from deploy.running import interruption, processes
+from deploy.running.system import DeploymentError, make_directory
 from deploy.simulation import plan, systematic
 from deploy.simulation.attacks import FAIL_SAFES
 from deploy.simulation.faults import FAULT_KINDS
@@ -27,8 +29,6 @@ from deploy.simulation.shift import Outcome, play
 from deploy.simulation.shrink import shrink
 from deploy.simulation.summary import Summary
 from deploy.simulation.workers import summaries
-from deploy.supervision import interruption, processes
-from deploy.supervision.system import DeploymentError, make_directory
 
 BAR = 40  # characters
 

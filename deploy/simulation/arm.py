@@ -14,12 +14,12 @@ from rclpy_simulation.host import BOOT, SECOND
 
 from deploy.chaos.history import SWITCH, Life
 from deploy.chaos.overlaps import Overlaps
+from deploy.running import manifest
+from deploy.running.processes import MARK
+from deploy.running.system import SERVICE_GRACE, SETTINGS, DeploymentError, scenario_parameters
 from deploy.simulation.calibration import Calibration, load
 from deploy.simulation.machine import simulated_services
 from deploy.simulation.supervisor import Supervisor
-from deploy.supervision import manifest
-from deploy.supervision.processes import MARK
-from deploy.supervision.system import SERVICE_GRACE, SETTINGS, DeploymentError, scenario_parameters
 from interfaces.service import UserError
 from interfaces.sources import scenario_file
 

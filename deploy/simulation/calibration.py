@@ -26,7 +26,7 @@ from deploy.chaos import record
 from deploy.chaos.findings import percentile
 from deploy.chaos.history import SOURCES, History, Life
 from deploy.chaos.promises import CHECKERS
-from deploy.supervision.system import DeploymentError
+from deploy.running.system import DeploymentError
 
 PATH = Path(__file__).with_name("calibration.json")
 

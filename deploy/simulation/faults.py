@@ -12,9 +12,9 @@ from rclpy_simulation import Delay, Process
 from deploy.chaos import clock
 from deploy.chaos.faults import PARAMETERS, Undo
 from deploy.chaos.history import ALL, FALSE_PRESENCE, HOLD, NO_TARGET, OPERATOR, PARTITION, STUCK_DRIVE
+from deploy.running.system import KEY
 from deploy.simulation import people
 from deploy.simulation.arm import CONTROL, NAMES, ROBOT, Arm
-from deploy.supervision.system import KEY
 from interfaces import topics
 
 CLOCK_TOLERANCE = 0.045  # s between the clocks of the hosts (deploy/SAFETY.md, A3)

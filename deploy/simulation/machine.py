@@ -15,9 +15,9 @@ from unittest import mock
 from rclpy_simulation import Network, Process, Simulation
 from rclpy_simulation.kernel import running
 
-from deploy.supervision import processes
-from deploy.supervision.processes import MARK
-from deploy.supervision.system import DeploymentError, Program, System
+from deploy.running import processes
+from deploy.running.processes import MARK
+from deploy.running.system import DeploymentError, Program, System
 from interfaces.service import instance
 from interfaces.service import process as service_process
 from interfaces.sources import scenario_file

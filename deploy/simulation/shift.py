@@ -13,6 +13,7 @@ from deploy.chaos.history import OPERATOR, PROGRAMS, SILENCE, History, InjectedF
 from deploy.chaos.promises import CHECKERS
 from deploy.chaos.schedule import PlannedFault
 from deploy.chaos.schedule_file import Shift
+from deploy.running.system import DeploymentError
 from deploy.simulation import people
 from deploy.simulation.arm import NAMES, ROBOT, Arm, simulated_arm
 from deploy.simulation.attacks import alone
@@ -20,7 +21,6 @@ from deploy.simulation.calibration import Calibration
 from deploy.simulation.faults import ATTACK_KINDS, FAULT_KINDS
 from deploy.simulation.observer import Observer
 from deploy.simulation.viewer import view
-from deploy.supervision.system import DeploymentError
 
 KINDS = FAULT_KINDS | ATTACK_KINDS
 

@@ -11,9 +11,9 @@ from collections.abc import Iterator, Sequence
 from multiprocessing.pool import IMapIterator
 
 from deploy.chaos.schedule_file import Shift
+from deploy.running import interruption
 from deploy.simulation.shift import play
 from deploy.simulation.summary import Summary
-from deploy.supervision import interruption
 
 POLL = 0.2  # s between two looks for Ctrl-C
 

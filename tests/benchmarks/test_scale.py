@@ -15,7 +15,7 @@ from deploy.benchmarks.measurement import MeasurementFailed
 from deploy.chaos.arm import Arm
 from deploy.chaos.cost import Cost
 from deploy.commands.setup import sourced_rclpy
-from deploy.supervision.system import System
+from deploy.running.system import System
 
 pytestmark = pytest.mark.timeout(120)
 

@@ -12,7 +12,7 @@ from deploy.chaos.arm import file_suffix
 from deploy.chaos.findings import Finding
 from deploy.chaos.history import History
 from deploy.chaos.promises import CHECKERS
-from deploy.supervision import processes
+from deploy.running import processes
 
 TIMEOUT = 150.0  # s
 

@@ -14,8 +14,8 @@ from deploy.chaos.arm import Arm
 from deploy.chaos.cost import Cost
 from deploy.chaos.faults import FAULT_KINDS
 from deploy.chaos.history import ALL
-from deploy.supervision import processes
-from deploy.supervision.system import System
+from deploy.running import processes
+from deploy.running.system import System
 
 BUSY = 0.5  # s
 ERROR = 0.1  # s of the kernel's count, of starting and of ending

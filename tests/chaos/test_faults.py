@@ -25,9 +25,9 @@ from deploy.chaos.babbler import BABBLER
 from deploy.chaos.faults import FAULT_KINDS, PARAMETERS, Undo
 from deploy.chaos.history import ALL, NO_TARGET, Life
 from deploy.chaos.process_monitor import ProcessMonitor, Rounds
-from deploy.supervision import processes
-from deploy.supervision.system import ALL as ALL_NODES
-from deploy.supervision.system import KEY, NAMESPACE, System
+from deploy.running import processes
+from deploy.running.system import ALL as ALL_NODES
+from deploy.running.system import KEY, NAMESPACE, System
 from interfaces import topics
 
 

@@ -25,7 +25,7 @@ from deploy.chaos.history import (
     target_name,
 )
 from deploy.chaos.liveness import STREAMS
-from deploy.supervision import processes
+from deploy.running import processes
 from interfaces import topics
 
 EXPECTED = {
@@ -61,7 +61,7 @@ def test_dependents_follow_the_contract() -> None:
 NEW_SERVICES = """
 import math
 from dataclasses import replace
-from deploy.supervision import manifest
+from deploy.running import manifest
 from interfaces import topics
 
 guard = replace(topics.ENGINES, name="guard/alarm", publishers=("guard",))

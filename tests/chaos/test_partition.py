@@ -12,7 +12,7 @@ from deploy.chaos.findings import HOLDS
 from deploy.chaos.history import History, InjectedFault, between
 from deploy.chaos.partition import missing, namespaces
 from deploy.chaos.promises import CHECKERS
-from deploy.supervision import processes
+from deploy.running import processes
 from interfaces.topics import ENGINES_STATE, OFF, ON, OPERATOR_HEARTBEAT
 
 from .experiments import experiment

@@ -10,7 +10,7 @@ from deploy.chaos import clock, plan
 from deploy.chaos.schedule import PlannedFault
 from deploy.chaos.schedule_file import Shift, save
 from deploy.chaos.testbed import SCENARIO, Testbed
-from deploy.supervision.system import DeploymentError
+from deploy.running.system import DeploymentError
 
 
 def schedule(path: Path, kind: str = "kill", target: str = "velocity") -> str:

@@ -20,8 +20,8 @@ from std_msgs.msg import Bool, Float64, String
 from deploy.chaos.clock import STEP
 from deploy.chaos.history import NO_TARGET, InjectedFault, Life
 from deploy.chaos.record import FAULTS, PROCESSES, load, values
-from deploy.recording.recorder import Recorder, qos_profiles
-from deploy.supervision import processes
+from deploy.running import processes
+from deploy.running.recorder import Recorder, qos_profiles
 from interfaces import topics
 
 

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 from reactivex.testing import TestScheduler
 
-from deploy.recording import recorder
+from deploy.running import recorder
 from interfaces import topics
 
 

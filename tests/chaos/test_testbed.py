@@ -11,7 +11,7 @@ import pytest
 
 from deploy.chaos.history import OUTPUTS
 from deploy.chaos.testbed import START_TIMEOUT, Testbed
-from deploy.supervision.system import DeploymentError
+from deploy.running.system import DeploymentError
 
 ARMS = tuple(f"/arm{number}" for number in range(1, 31))
 

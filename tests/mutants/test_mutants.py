@@ -80,7 +80,7 @@ def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Bench]:
     (checkout / "deploy" / "mutants").mkdir(parents=True)
     for name in ("conftest.py", "pyproject.toml", "deploy/mutants/runner.py"):
         shutil.copy(ROOT / name, checkout / name)
-    for name in ("commands", "supervision"):  # conftest.py imports them
+    for name in ("commands", "running"):  # conftest.py imports them
         shutil.copytree(ROOT / "deploy" / name, checkout / "deploy" / name)
     (checkout / "clamp.py").write_text(CLAMP)
     (checkout / "test_clamp.py").write_text(

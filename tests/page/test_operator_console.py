@@ -21,7 +21,7 @@ from deploy.console.hand import Hand
 from deploy.console.page import remote
 from deploy.console.page.state import RESTARTED
 from deploy.console.page.switch import ECHO
-from deploy.supervision.system import PAGE_FILE
+from deploy.running.system import PAGE_FILE
 from interfaces import topics
 from interfaces.service import ServiceNode
 from interfaces.topics import CONFIGURATION

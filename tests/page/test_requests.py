@@ -12,7 +12,7 @@ from deploy.console.page import requests
 from deploy.console.page.protocol import Process
 from deploy.console.page.server import Request
 from deploy.console.page.state import Change, PageState, Program
-from deploy.supervision import processes
+from deploy.running import processes
 
 KILL = Request("page", Process("velocity", "kill"), is_local=True)
 PROGRAMS = {"velocity": Program(pid=7)}

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from deploy.commands import parameters
-from deploy.supervision.system import KEY, NAMESPACE, DeploymentError
+from deploy.running.system import KEY, NAMESPACE, DeploymentError
 
 
 def port_of(web: str, namespace: str = "", user_file: str = "") -> Any:

@@ -19,11 +19,11 @@ from typing import NamedTuple
 from unittest import mock
 
 from deploy.chaos.history import CONTROLLER, WATCHDOG
+from deploy.running.manifest import Program
+from deploy.running.processes import ROOT
 from deploy.simulation import arm, plan
 from deploy.simulation.faults import FAULT_KINDS
 from deploy.simulation.shift import play
-from deploy.supervision.manifest import Program
-from deploy.supervision.processes import ROOT
 
 SEEDS = ("1", "2", "3")
 EVERY = 5.0  # s between two random faults, as by default

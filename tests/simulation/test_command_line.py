@@ -15,11 +15,11 @@ import pytest
 from deploy.chaos.schedule import PlannedFault
 from deploy.chaos.schedule_file import Shift, save
 from deploy.chaos.testbed import SCENARIO
+from deploy.running.processes import ROOT
 from deploy.simulation import plan
 from deploy.simulation.faults import FAULT_KINDS
 from deploy.simulation.shift import play
 from deploy.simulation.summary import Summary
-from deploy.supervision.processes import ROOT
 
 
 def simulate(run: Path, *arguments: str, **environment: str) -> subprocess.Popen[str]:

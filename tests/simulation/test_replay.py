@@ -27,11 +27,11 @@ from tf2_msgs.msg import TFMessage
 from deploy.chaos.clock import STEP
 from deploy.chaos.history import NO_TARGET, InjectedFault
 from deploy.chaos.record import FAULTS
-from deploy.recording.recorder import Recorder
 from deploy.replay import chains
 from deploy.replay.comparison import compare
 from deploy.replay.record import Message, Record, load
-from deploy.supervision.system import DeploymentError
+from deploy.running.recorder import Recorder
+from deploy.running.system import DeploymentError
 from interfaces import topics
 from interfaces.robot_model import BASE, LINK1, frame_id
 

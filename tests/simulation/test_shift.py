@@ -18,11 +18,11 @@ from deploy.chaos.history import ALL, NO_TARGET, OPERATOR
 from deploy.chaos.schedule import AWAKE, DAY, PlannedFault
 from deploy.chaos.schedule_file import Shift
 from deploy.chaos.testbed import SCENARIO, sources
+from deploy.running.manifest import Program
+from deploy.running.processes import ROOT
 from deploy.simulation import arm, people, plan
 from deploy.simulation.faults import BAD_LINE, FAULT_KINDS
 from deploy.simulation.shift import Outcome, play
-from deploy.supervision.manifest import Program
-from deploy.supervision.processes import ROOT
 from interfaces import topics
 
 LENGTH = 30.0  # s: four faults, and the time in which the arm recovers from the last one

@@ -11,9 +11,9 @@ from deploy.chaos import schedule_file
 from deploy.chaos.schedule import PlannedFault
 from deploy.chaos.schedule_file import Shift
 from deploy.chaos.testbed import SCENARIO
+from deploy.running.system import DeploymentError
 from deploy.simulation.shift import play
 from deploy.simulation.shrink import minimal, shrink
-from deploy.supervision.system import DeploymentError
 from tests.simulation.test_shift import ASLEEP, BRIEF, with_a_bug
 
 

@@ -19,7 +19,7 @@ import pytest
 from geometry_msgs.msg import Point, PointStamped
 from std_msgs.msg import Bool, Float64, String
 
-from deploy.supervision import processes
+from deploy.running import processes
 from interfaces import topics
 from tests.system.sites import LIMIT, ROOT, STEADY, Peer, Site
 

@@ -15,7 +15,7 @@ from deploy.console.page import protocol
 from deploy.console.page.remote import ParameterChange, RemoteParameters
 from deploy.console.page.server import Request
 from deploy.console.page.state import Change, Program, follows_scenario, refuse
-from deploy.supervision import processes
+from deploy.running import processes
 from interfaces import topics
 from reactive_node import ReactiveNode
 

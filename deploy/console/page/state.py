@@ -12,7 +12,7 @@ import reactivex as rx
 from reactivex import Observable
 
 from deploy.console.page.hold import ENDED, Hold
-from deploy.supervision import manifest
+from deploy.running import manifest
 from interfaces import topics
 from interfaces.service.health import healths
 from interfaces.topics import ALIVE, INCAPACITATED, MISSED, OFF, ON, TURN_OFF

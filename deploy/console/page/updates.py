@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from deploy.console.page.state import BEAT, PROGRAMS, RENEWED, Clock, PageState, Program
-from deploy.supervision import sentinel
+from deploy.running import sentinel
 from interfaces import topics
 from interfaces.topics import ON
 from services import engine_controller

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from deploy.supervision import manifest
+from deploy.running import manifest
 from tests.system.sites import LIMIT
 
 from .arm import LINK, Arm, hold_with_engines_on

@@ -8,8 +8,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from deploy.commands import parameter_file
-from deploy.supervision import manifest
+from deploy.running import manifest, parameter_file
 from interfaces.service import UserError
 
 PARAMETERS = {

@@ -17,10 +17,10 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.time import Time
 
-from deploy.supervision import processes, sentinel
-from deploy.supervision.manifest import SENTINEL
-from deploy.supervision.policy import Action, Observation, Timeouts
-from deploy.supervision.system import DeploymentError, Program, System
+from deploy.running import processes, sentinel
+from deploy.running.manifest import SENTINEL
+from deploy.running.policy import Action, Observation, Timeouts
+from deploy.running.system import DeploymentError, Program, System
 from interfaces.topics import DIAGNOSTICS
 from reactive_node.testing import MakeNode, SpinFor, SpinUntil
 from tests.component.wiring import Wired

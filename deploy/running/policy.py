@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
-from deploy.supervision import processes
-from deploy.supervision.manifest import SENTINEL
-from deploy.supervision.system import Program
+from deploy.running import processes
+from deploy.running.manifest import SENTINEL
+from deploy.running.system import Program
 
 RECENT = 60.0  # s for which a restart counts as recent
 

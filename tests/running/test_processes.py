@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from deploy.supervision import processes
+from deploy.running import processes
 
 Spawn = Callable[..., "subprocess.Popen[bytes]"]
 READY = "print(flush=True); "

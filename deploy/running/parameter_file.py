@@ -14,8 +14,8 @@ import importlib
 from collections.abc import Iterator
 from typing import Any
 
-from deploy.supervision import interruption, manifest
-from deploy.supervision.system import ALL, KEY
+from deploy.running import interruption, manifest
+from deploy.running.system import ALL, KEY
 from interfaces.service import UserError
 from interfaces.service.parameters import Declaration, declarations
 from interfaces.sources import yaml_file

@@ -106,7 +106,7 @@ def test_file_without_a_collected_test_is_named(monkeypatch: pytest.MonkeyPatch,
     ("words", "missing"),
     [
         ("tests interfaces/reactive_node --ignore=tests/page -x", ""),
-        ("tests/supervision/test_test_command.py::test_workers -k word -x", ""),
+        ("tests/commands/test_test_command.py::test_workers -k word -x", ""),
         ("nix", "nix"),
         ("tests --ignore=tests/page nix/test_it.py::test tests/nix", "nix/test_it.py::test, tests/nix"),
     ],

@@ -9,13 +9,13 @@ from pathlib import Path
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
 
-from deploy.supervision import processes, rpc
-from deploy.supervision.manifest import SENTINEL
-from deploy.supervision.policy import Action, Observation, Policy, Timeouts
-from deploy.supervision.probe import Probe
-from deploy.supervision.processes import Process
-from deploy.supervision.sentinel import states
-from deploy.supervision.system import DeploymentError, Program, System
+from deploy.running import processes, rpc
+from deploy.running.manifest import SENTINEL
+from deploy.running.policy import Action, Observation, Policy, Timeouts
+from deploy.running.probe import Probe
+from deploy.running.processes import Process
+from deploy.running.sentinel import states
+from deploy.running.system import DeploymentError, Program, System
 
 SERVICES = ("engine_controller", "kinematics", "operator_watchdog", "velocity", SENTINEL)
 PIDS = {name: 100 + index for index, name in enumerate(SERVICES)}

@@ -30,7 +30,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, NoReturn
 
-from deploy.supervision import processes
+from deploy.running import processes
 
 LIBRARIES = (
     "json",

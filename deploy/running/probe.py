@@ -6,9 +6,9 @@ import os
 import time
 from collections.abc import Mapping
 
-from deploy.supervision import processes
-from deploy.supervision.policy import Observation
-from deploy.supervision.system import DeploymentError, Program, System
+from deploy.running import processes
+from deploy.running.policy import Observation
+from deploy.running.system import DeploymentError, Program, System
 from interfaces.service.health import Health
 
 ASKING_PERIOD = 1.0  # s between two questions to supervisord, of which each costs both of us a millisecond

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from deploy.supervision import manifest
+from deploy.running import manifest
 
 ROOT = Path(__file__).parents[2]
 CONF = configparser.RawConfigParser(inline_comment_prefixes=(" ;",))
@@ -27,7 +27,7 @@ def test_all_programs_stop_at_the_same_time_as_one_group() -> None:
 def test_a_program_has_its_module_and_arguments() -> None:
     first, *_, last = manifest.programs()
     assert first == ("config_l1", "services.config_publisher", ("l1",))
-    assert last == ("sentinel", "deploy.supervision.sentinel", ())
+    assert last == ("sentinel", "deploy.running.sentinel", ())
 
 
 @pytest.mark.parametrize("name", SECTIONS)

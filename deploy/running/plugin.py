@@ -11,9 +11,9 @@ import sys
 import time
 from pathlib import Path
 
-from deploy.supervision import manifest, processes
-from deploy.supervision.extension import make_interface
-from deploy.supervision.system import DeploymentError, System, scenario_parameters
+from deploy.running import manifest, processes
+from deploy.running.extension import make_interface
+from deploy.running.system import DeploymentError, System, scenario_parameters
 
 __all__ = ["make_interface"]
 

@@ -23,11 +23,11 @@ from pathlib import Path
 import reactivex as rx
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
-from deploy.supervision import processes
-from deploy.supervision.manifest import SENTINEL
-from deploy.supervision.policy import Action, Observation, Policy, Timeouts
-from deploy.supervision.probe import Probe
-from deploy.supervision.system import DeploymentError, Program, System
+from deploy.running import processes
+from deploy.running.manifest import SENTINEL
+from deploy.running.policy import Action, Observation, Policy, Timeouts
+from deploy.running.probe import Probe
+from deploy.running.system import DeploymentError, Program, System
 from interfaces import service
 from interfaces.service import ServiceNode, parameter
 from interfaces.service.health import healths

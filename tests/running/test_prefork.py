@@ -13,18 +13,18 @@ from pathlib import Path
 
 import pytest
 
-from deploy.supervision import manifest, warm
-from deploy.supervision.processes import ROOT
+from deploy.running import manifest, prefork
+from deploy.running.processes import ROOT
 from reactive_node.domains import reserved_domain
 
 PYTHON = str(Path(sys.executable).with_name("python3"))
 WARM = """
 import os, signal, sys
-from deploy.supervision import warm
+from deploy.running import prefork
 sys.is_supervisord = True
 signal.signal(signal.SIGTERM, lambda number, frame: print("supervisord's handler"))
 {more}
-warm.executor(os.execve)(sys.argv[1], sys.argv[1:], {{**os.environ, "SUPERVISOR_PROCESS_NAME": "probe"}})
+prefork.executor(os.execve)(sys.argv[1], sys.argv[1:], {{**os.environ, "SUPERVISOR_PROCESS_NAME": "probe"}})
 """
 WORDS = ("Zürich", "", "--ros-args")
 
@@ -101,7 +101,7 @@ def test_customization_of_the_site_runs_for_each_program(tmp_path: Path) -> None
 
 @pytest.mark.parametrize(
     ("more", "python"),
-    [("warm.rename = lambda *_: os.stat('/no/such/kernel')", PYTHON), ("", os.path.realpath(PYTHON))],
+    [("prefork.rename = lambda *_: os.stat('/no/such/kernel')", PYTHON), ("", os.path.realpath(PYTHON))],
     ids=["a kernel that cannot rename", "a Python elsewhere"],
 )
 def test_new_interpreter_runs_where_a_fork_cannot(tmp_path: Path, more: str, python: str) -> None:
@@ -111,7 +111,7 @@ def test_new_interpreter_runs_where_a_fork_cannot(tmp_path: Path, more: str, pyt
 
 def test_library_that_fails_does_not_end_supervisord(tmp_path: Path) -> None:
     (tmp_path / "yaml.py").write_text("raise RuntimeError('broken')")
-    done = run(tmp_path, FORKED, more="warm.import_libraries()")
+    done = run(tmp_path, FORKED, more="prefork.import_libraries()")
     assert (done.returncode, done.stdout) == (0, "True\n")
 
 
@@ -122,19 +122,19 @@ def test_signals_of_a_program_do_not_wake_supervisord(tmp_path: Path) -> None:
 
 
 def test_edited_module_of_the_checkout_counts_at_the_next_start(tmp_path: Path) -> None:
-    shutil.copytree(ROOT / "deploy" / "supervision", tmp_path / "deploy" / "supervision")
+    shutil.copytree(ROOT / "deploy" / "running", tmp_path / "deploy" / "supervision")
     (tmp_path / "deploy" / "__init__.py").touch()
-    edit = "from deploy.supervision import rpc; open('deploy/supervision/rpc.py', 'a').write('EDITED = True')"
-    done = run(tmp_path, f"from deploy.supervision import rpc; print(rpc.EDITED); {FORKED}", more=edit)
+    edit = "from deploy.running import rpc; open('deploy/running/rpc.py', 'a').write('EDITED = True')"
+    done = run(tmp_path, f"from deploy.running import rpc; print(rpc.EDITED); {FORKED}", more=edit)
     assert (done.stdout, done.stderr) == ("True\nTrue\n", "")
 
 
-@pytest.mark.parametrize("name", warm.libraries())
+@pytest.mark.parametrize("name", prefork.libraries())
 def test_prepared_library_exists(name: str) -> None:
     importlib.import_module(name)
 
 
-@pytest.mark.parametrize("name", warm.types())
+@pytest.mark.parametrize("name", prefork.types())
 def test_prepared_type_exists(name: str) -> None:
     assert isinstance(pkgutil.resolve_name(name), type)
 
@@ -147,7 +147,7 @@ OURS = ("deploy", "interfaces", "services", "probe")
 def test_programs_of_the_manifest_import_no_library_again(tmp_path: Path) -> None:
     modules = {program.module for program in manifest.programs()}
     use = f"OURS = {OURS}\nbefore = set(sys.modules)\nimport {', '.join(modules)}\nprint({NEW})\n"
-    done = run(tmp_path, f"{use}{FORKED}", more="import supervisor.supervisord; warm.import_libraries()")
+    done = run(tmp_path, f"{use}{FORKED}", more="import supervisor.supervisord; prefork.import_libraries()")
     assert (done.stdout, done.stderr) == ("[]\nTrue\n", "")
 
 
@@ -164,7 +164,7 @@ def test_supervisord_has_no_dds_and_no_thread_but_those_of_tracing(
         "    if os.path.exists(f'/proc/self/fd/{number}')]\n"
         "print(threads - expected, [link for link in links if 'socket' in link])\n"
     )
-    done = run(tmp_path, f"{count}{FORKED}", more="warm.import_libraries()")
+    done = run(tmp_path, f"{count}{FORKED}", more="prefork.import_libraries()")
     assert (done.stdout, done.stderr) == ("0 []\nTrue\n", "")
 
 
@@ -198,5 +198,5 @@ def test_service_prepares_no_type_and_no_pattern_again(
     )
     with reserved_domain() as domain_id:
         monkeypatch.setenv("ROS_DOMAIN_ID", str(domain_id))
-        done = run(tmp_path, f"{use}{FORKED}", more="warm.import_libraries()")
+        done = run(tmp_path, f"{use}{FORKED}", more="prefork.import_libraries()")
     assert done.stdout == "[] []\nTrue\n"

@@ -27,9 +27,9 @@ from supervisor import events, loggers
 from supervisor.loggers import RotatingFileHandler
 from supervisor.states import ProcessStates, SupervisorStates, getProcessStateDescription
 
-from deploy.supervision import warm
-from deploy.supervision.manifest import SENTINEL
-from deploy.supervision.system import PARAMETERS
+from deploy.running import prefork
+from deploy.running.manifest import SENTINEL
+from deploy.running.system import PARAMETERS
 
 LONGEST_WAIT = 0.1  # s, while the state of a program changes with time
 _CHANGING = (ProcessStates.STARTING, ProcessStates.BACKOFF, ProcessStates.STOPPING)
@@ -190,8 +190,8 @@ def make_interface(supervisord: Any, **config: str) -> ArmInterface:
         if isinstance(handler, RotatingFileHandler):  # in the foreground, there is the terminal, too
             handler.__class__ = LossyLog  # supervisord's own log is open already
     lock_directory()
-    warm.import_libraries()
-    supervisord.options.execve = warm.executor(os.execve)
+    prefork.import_libraries()
+    supervisord.options.execve = prefork.executor(os.execve)
     arm = ArmInterface(supervisord)
     arm.wake_at_signals()
     return arm

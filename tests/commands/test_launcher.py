@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from deploy.commands.launcher import place
-from deploy.supervision.system import DeploymentError, System
+from deploy.running.system import DeploymentError, System
 
 
 @pytest.mark.parametrize(

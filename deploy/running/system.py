@@ -14,7 +14,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, NamedTuple, NoReturn
 
-from deploy.supervision import interruption, manifest, processes, rpc
+from deploy.running import interruption, manifest, processes, rpc
 
 # `make stop` runs without .venv: PyYAML is imported where it is needed.
 

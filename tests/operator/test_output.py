@@ -14,7 +14,7 @@ import pytest
 
 from deploy.console import output
 from deploy.console.output import say
-from deploy.supervision.processes import ROOT
+from deploy.running.processes import ROOT
 
 LINES = 5000  # of 100 characters, more than a pipe holds
 FLOOD = f"from deploy.console.output import say\nfor _ in range({LINES}): say('#' * 99)"

@@ -1,0 +1,1 @@
+"""The running system: the manifest, supervision, processes, forks, records, parameter files."""

@@ -1,1 +1,0 @@
-"""Supervision: the manifest, the running system, its processes, and the sentinel."""
