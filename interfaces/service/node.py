@@ -67,7 +67,8 @@ class ServiceNode(ReactiveNode):
         elif within is not None:
             descriptor.integer_range = [IntegerRange(from_value=within[0], to_value=within[1])]
         value = self.declare_parameter(name, default, descriptor).value
-        if value != default and not settable:  # a record tells the parameters of a process by its health
+        # A record tells the parameters of a process by its health. Paths differ from machine to machine.
+        if within is not None and value != default and not settable:
             self.health.note_parameter(name, value)
         return value
 

@@ -24,6 +24,7 @@ from deploy.simulation import arm, people, plan
 from deploy.simulation.faults import BAD_LINE, FAULT_KINDS
 from deploy.simulation.shift import Outcome, play
 from interfaces import topics
+from services.examples import speed_guard
 
 LENGTH = 30.0  # s: four faults, and the time in which the arm recovers from the last one
 EVERY = 2.5  # s between two faults
@@ -130,15 +131,9 @@ def test_a_bug_of_a_service_violates_a_promise(monkeypatch: pytest.MonkeyPatch) 
     assert "S1" in violations(play(Shift("bug", ASLEEP + 12.0, BRIEF, kills)))
 
 
-def test_a_service_that_the_readme_teaches_violates_nothing(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    (code,) = re.findall(
-        r"```python\n([^`]*? too fast\.\"\"\".*?)```", (ROOT / "README.md").read_text(), re.DOTALL
-    )
-    (tmp_path / "speed_guard.py").write_text(code.replace("parameter(2.0", "parameter(0.5"))
-    monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.setattr(arm, "PROGRAMS", (*arm.PROGRAMS, Program("speed_guard", "speed_guard", ())))
+def test_the_example_of_a_service_violates_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    guard = Program("speed_guard", speed_guard.__name__, ())
+    monkeypatch.setattr(arm, "PROGRAMS", (*arm.PROGRAMS, guard))
     monkeypatch.setattr(arm, "NAMES", (*arm.NAMES, "speed_guard"))
     outcome = play(Shift("guard", 40.0, {**SCENARIO, **sources(people.RATE)}, []))
     offs = [each for each in outcome.history.stream(topics.ENGINES) if each.value == topics.TURN_OFF]
