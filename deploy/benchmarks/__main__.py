@@ -35,7 +35,6 @@ from deploy.benchmarks.measurement import (
     measure,
 )
 from deploy.benchmarks.table import chain_tables, image_tables, tables
-from deploy.commands.setup import sourced_rclpy
 from deploy.running import interruption
 from deploy.running.processes import ROOT, run_directory
 
@@ -59,11 +58,7 @@ def present(alternatives: Iterable[Alternative], refused: dict[str, str]) -> lis
     found = []
     for each in alternatives:
         interruption.check()
-        if each.ros and not sourced_rclpy():
-            reason = "ROS 2 is not sourced in this shell"
-        else:
-            reason = refused.get(each.requirements) or each.missing()
-        if reason:
+        if reason := refused.get(each.requirements) or each.missing():
             print(f"absent: {each.title}: {reason}", flush=True)
         else:
             found.append(each)

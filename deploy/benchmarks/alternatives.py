@@ -11,11 +11,16 @@ from pathlib import Path
 
 from deploy.benchmarks import c_program
 from deploy.benchmarks.link import FIRST, HEARTBEATS, LAST, MIDDLE, SINK, SOURCE, Job
+from deploy.commands.setup import RUNTIME
 from deploy.running.processes import ROOT
 
 BENCH_PYTHON = ROOT / ".venv-bench" / "bin" / "python"
-SYSTEM_PYTHON = ROOT / ".venv" / "bin" / "python"
+SYSTEM_PYTHON = ROOT / "deploy" / "commands" / "venv.sh"
 _EMBEDDED = [ROOT, ROOT / "interfaces/reactive_node/src", ROOT / "deploy/runtime/src"]
+_NEEDS_ROS = (
+    "import importlib.util, sys; "
+    "importlib.util.find_spec('rosidl_runtime_embedded') and sys.exit('.venv has no rclpy of ROS 2')"
+)
 
 Commands = Callable[["Alternative", Sequence[Job]], list[list[str]]]
 
@@ -79,7 +84,7 @@ class Alternative:
     requirements: str = ""
     """The file with what PyPI has of it; '' if it needs nothing but the runtime."""
     ros: bool = False
-    """Whether it runs on the rclpy of a sourced ROS 2."""
+    """Whether it runs on ROS 2's rclpy: of .venv, or of a sourced ROS 2."""
     commands: Commands = processes
     build: Callable[[], str] | None = None
     """Compiles its program, and returns why that is not possible here; none if it is in Python."""
@@ -92,15 +97,23 @@ class Alternative:
     @property
     def environment(self) -> dict[str, str]:
         """The environment of its processes; what is not ROS 2 must not see it."""
-        inherited = [path for path in [os.environ.get("PYTHONPATH")] if path] if self.ros else []
-        paths = [ROOT] if self.ros else _EMBEDDED
-        return os.environ | {"PYTHONPATH": os.pathsep.join([*map(str, paths), *inherited])}
+        if not self.ros:
+            return os.environ | {"PYTHONPATH": os.pathsep.join(map(str, _EMBEDDED))}
+        embedded = set(map(str, _EMBEDDED))
+        inherited = [
+            path for path in os.environ.get("PYTHONPATH", "").split(os.pathsep) if path not in embedded
+        ]
+        paths = os.pathsep.join([str(ROOT), *filter(None, inherited)])
+        return os.environ | {"PYTHONPATH": paths, RUNTIME: ""}
 
     def missing(self) -> str:
         """Return why it cannot be measured here; '' if it can."""
         if self.build:
             return self.build()
-        command = [str(self.python), "-c", f"import deploy.benchmarks.links.{self.link}"]
+        check = f"import deploy.benchmarks.links.{self.link}"
+        if self.ros:
+            check = f"{_NEEDS_ROS}; {check}"
+        command = [str(self.python), "-c", check]
         done = subprocess.run(
             command, env=self.environment, capture_output=True, text=True, start_new_session=True
         )
@@ -113,6 +126,7 @@ ALTERNATIVES = (
     Alternative("rxros2 style, same rclpy", "rxros2"),
     Alternative("ROS 2, ReactiveNode", "reactive", ros=True),
     Alternative("ROS 2, callbacks", "callbacks", ros=True),
+    Alternative("ROS 2, callbacks on EventsExecutor", "callbacks_events", ros=True),
     Alternative("ROS 2, rxros2 style", "rxros2", ros=True),
     Alternative("cyclonedds-python", "cyclone"),
     Alternative("Cyclone DDS, C program", c_program.PIPELINE, commands=c_processes, build=c_program.build),
@@ -128,6 +142,7 @@ CHAINS = (
     Alternative("RxPY operators, without rclpy", "chain_dds", commands=services),
     Alternative("ROS 2, services", "chain_services", ros=True, commands=services),
     Alternative("ROS 2, callbacks", "chain", ros=True, commands=services),
+    Alternative("ROS 2, callbacks on EventsExecutor", "chain_events", ros=True, commands=services),
     Alternative("Cyclone DDS, C program", c_program.SERVICES, commands=c_processes, build=c_program.build),
 )
 """The arm's own chain, from an angle to a speed, and its operator watchdog."""

@@ -57,15 +57,10 @@ def test_a_comparison_without_a_round_is_refused(rounds: str, capsys: pytest.Cap
     assert capsys.readouterr().err.splitlines()[-1] == "make bench: error: --rounds must be at least 1"
 
 
-def test_absent_alternatives_are_named_with_the_reason(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_absent_alternatives_are_named_with_the_reason(capsys: pytest.CaptureFixture[str]) -> None:
     on_ros = bool(sourced_rclpy())
     here = Alternative("here", "callbacks", ros=on_ros)
-    answers = iter(["/opt/ros"] * on_ros + [""])
-    monkeypatch.setattr(command, "sourced_rclpy", lambda: next(answers))
     others = (
-        Alternative("sourced", "callbacks", ros=True),
         Alternative("refused", "zeromq", "zeromq.txt"),
         Alternative("unknown", "nothing"),
     )
@@ -73,10 +68,15 @@ def test_absent_alternatives_are_named_with_the_reason(
     assert command.present((here, *others), {"zeromq.txt": "no matching distribution"}) == [here]
 
     assert capsys.readouterr().out.splitlines() == [
-        "absent: sourced: ROS 2 is not sourced in this shell",
         "absent: refused: no matching distribution",
         "absent: unknown: ModuleNotFoundError: No module named 'deploy.benchmarks.links.nothing'",
     ]
+
+
+def test_embedded_rclpy_is_not_measured_as_that_of_ros(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(alternatives, "SYSTEM_PYTHON", Path(sys.executable))
+    monkeypatch.setattr(Alternative, "environment", Alternative("embedded", "callbacks").environment)
+    assert Alternative("ROS 2", "callbacks", ros=True).missing() == ".venv has no rclpy of ROS 2"
 
 
 def test_failed_measurement_leaves_the_others_their_figures(

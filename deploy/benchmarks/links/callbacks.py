@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 import rclpy
-from rclpy.executors import SingleThreadedExecutor
+from rclpy.executors import Executor, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.task import Future
@@ -20,13 +20,14 @@ class Connection(Link):
     """A node with publishers and subscriptions."""
 
     make_node: Callable[[str], Node] = Node
+    make_executor: Callable[[], Executor] = SingleThreadedExecutor
     message_type: Any = UInt8MultiArray
 
     def __init__(self, job: Job) -> None:
         super().__init__(job)
         rclpy.init(args=[])
         self.node = type(self).make_node(job.role)
-        self.executor = SingleThreadedExecutor()
+        self.executor = type(self).make_executor()
         self.executor.add_node(self.node)
         self.qos = QoSProfile(depth=job.depth)
 

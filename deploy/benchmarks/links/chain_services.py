@@ -7,6 +7,7 @@ from collections.abc import Callable
 from deploy.benchmarks.link import KINEMATICS, VELOCITY, WATCHDOG
 from deploy.benchmarks.links import chain
 from interfaces.service import ServiceNode
+from reactive_node.executor import create_executor
 from services import kinematics, operator_watchdog, velocity
 
 _SERVICES = {KINEMATICS: kinematics, VELOCITY: velocity, WATCHDOG: operator_watchdog}
@@ -16,6 +17,7 @@ class Connection(chain.Connection):
     """A service in the middle; source and sink are those of the chain in callbacks."""
 
     make_service: Callable[[str], ServiceNode] = ServiceNode
+    make_executor = staticmethod(create_executor)
 
     def forward(self, source: str, target: str) -> None:
         node = type(self).make_service(self.job.role)

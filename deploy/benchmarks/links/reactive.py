@@ -7,12 +7,14 @@ from typing import Any
 
 from deploy.benchmarks.links import callbacks
 from reactive_node import ReactiveNode
+from reactive_node.executor import create_executor
 
 
 class Connection(callbacks.Connection):
     """A reactive node: its topics are observables, its middle process is one recipe."""
 
     make_node = ReactiveNode
+    make_executor = staticmethod(create_executor)
     node: ReactiveNode
 
     def subscribe(self, topic: str, on_item: Callable[[Any], object]) -> None:

@@ -1,0 +1,11 @@
+"""The arm's own chain in plain callbacks on ROS 2's EventsExecutor."""
+
+from __future__ import annotations
+
+from deploy.benchmarks.links import callbacks_events, chain
+
+
+class Connection(chain.Connection):
+    """A node of the chain."""
+
+    make_executor = callbacks_events.Connection.make_executor
