@@ -122,10 +122,13 @@ class _Reader:
         self.msg_type = subscription.msg_type
         self.raw = subscription.raw
         self._callback_type = self.CallbackType.WithMessageInfo
-        only = self.CallbackType.MessageOnly
+        handle, only = self.handle, self.CallbackType.MessageOnly
 
-        def callback(*taken: Any) -> None:
-            if not _lives(subscription):
+        def callback(*taken: Any) -> None:  # every message takes this path
+            try:
+                with handle:
+                    pass
+            except InvalidHandle:
                 return
             message, info = taken if len(taken) == 2 else taken[0]
             if subscription._callback_type is only:
