@@ -30,7 +30,8 @@ def pytest_configure() -> None:
     """Set what the tests' processes inherit: the mark, the middleware's settings, default signal handling."""
     os.environ[MARK] = str(uuid.uuid4())
     os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
-    os.environ["FASTRTPS_DEFAULT_PROFILES_FILE"] = str(Path(__file__).with_name("deploy") / "fastdds.xml")
+    if "FASTDDS_DEFAULT_PROFILES_FILE" not in os.environ:  # ROS 2 Kilted warns of the older name
+        os.environ["FASTRTPS_DEFAULT_PROFILES_FILE"] = str(Path(__file__).with_name("deploy") / "fastdds.xml")
     signal.signal(signal.SIGHUP, signal.SIG_DFL)  # nohup ignores it
     signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs ignore it
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # fixtures clean up
