@@ -4,7 +4,7 @@ PYTHON ?=
 SCENARIO ?= demo
 PARAMETERS ?=
 WEB ?=
-TESTS ?= tests interfaces/reactive_node --ignore=tests/page
+TESTS ?= tests interfaces/reactive_node --ignore=tests/operator/page
 MINUTES ?= 5
 SEED ?=
 HOURS ?= 1
@@ -57,7 +57,7 @@ help:
 	@echo "make simulate the same in virtual time, hours in minutes  (HOURS=1 SEED= SCHEDULE=file SIMULATE=--help for more)"
 	@echo "make replay   feed a record through today's services and show what differs  (RECORD= REPLAY=--help for more)"
 	@echo "make test     test the arm                        (TESTS=tests/component for a part, TESTS=deploy/runtime"
-	@echo "                                                  for its rclpy, TESTS=tests/page for its page)"
+	@echo "                                                  for its rclpy, TESTS=tests/operator/page for its page)"
 	@echo "make mutants  change the safety path in every small way: do the tests notice?  (MODULES= for a part)"
 	@echo "make bench    compare the costs with those of the alternatives  (BENCH=\"--rounds 5\", minutes each)"
 	@echo "make tables   write the tables of interfaces/README.md from the code"

@@ -13,7 +13,7 @@ from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING
 
 from deploy.commands.stop import stop
-from deploy.console.output import say
+from deploy.operator.output import say
 from deploy.running import interruption
 from deploy.running.system import NAMESPACE, DeploymentError, Program, System, set_middleware
 
@@ -201,7 +201,7 @@ def _reports(program: Program, health: Mapping[str, Health]) -> bool:
 
 def _show(system: System, member: Member, *, owner: bool = False) -> None:
     """Be the operator's terminal until the end; the owner of the system revives a killed supervisord."""
-    from deploy.console.console import HELP, Console
+    from deploy.operator.terminal.terminal import HELP, Console
 
     # In the background, reading the terminal fails and does not stop the process.
     signal.signal(signal.SIGTTIN, signal.SIG_IGN)

@@ -10,7 +10,7 @@ from typing import Any
 from rclpy.exceptions import InvalidNamespaceException
 from rclpy.validate_namespace import validate_namespace
 
-from deploy.console.page.address import DEFAULT_PORT, host_names, tls
+from deploy.operator.page.address import DEFAULT_PORT, host_names, tls
 from deploy.running import manifest, parameter_file, processes
 from deploy.running.processes import ROOT
 from deploy.running.system import (

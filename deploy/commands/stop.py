@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from contextlib import suppress
 
-from deploy.console.output import say
+from deploy.operator.output import say
 from deploy.running import interruption
 from deploy.running.system import DeploymentError, System
 

@@ -96,7 +96,10 @@ def test_file_without_a_collected_test_is_named(monkeypatch: pytest.MonkeyPatch,
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).touch()
     seen = ["tests.a.test_one.TestIt.test_passes", ".tests.a.test_twofold"]
-    assert command.uncollected(["tests"], seen) == ["tests/a/test_two.py", "tests/page/test_three.py"]
+    assert command.uncollected(["tests"], seen) == [
+        "tests/a/test_two.py",
+        "tests/page/test_three.py",
+    ]
     assert command.uncollected(["tests", "--ignore=tests/page"], seen) == ["tests/a/test_two.py"]
     assert command.uncollected(["tests", "-k", "word"], seen) == []
     assert command.uncollected(["tests/a/test_two.py::test"], seen) == []
@@ -108,7 +111,10 @@ def test_file_without_a_collected_test_is_named(monkeypatch: pytest.MonkeyPatch,
         ("tests interfaces/reactive_node --ignore=tests/page -x", ""),
         ("tests/commands/test_test_command.py::test_workers -k word -x", ""),
         ("nix", "nix"),
-        ("tests --ignore=tests/page nix/test_it.py::test tests/nix", "nix/test_it.py::test, tests/nix"),
+        (
+            "tests --ignore=tests/page nix/test_it.py::test tests/nix",
+            "nix/test_it.py::test, tests/nix",
+        ),
     ],
 )
 def test_a_missing_path_is_named_and_nothing_runs(

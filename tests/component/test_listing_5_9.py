@@ -15,7 +15,7 @@ from reactivex.subject import Subject
 from reactivex.testing import TestScheduler
 from std_msgs.msg import Bool, Float64, Header, String
 
-from deploy.console.lines import Line, line_batches
+from deploy.operator.lines import Line, line_batches
 from interfaces import topics
 from interfaces.sources import playback, scenario_file
 from reactive_node import stamps

@@ -12,12 +12,12 @@ from typing import Any
 
 import pytest
 
-from deploy.console import output
-from deploy.console.output import say
+from deploy.operator import output
+from deploy.operator.output import say
 from deploy.running.processes import ROOT
 
 LINES = 5000  # of 100 characters, more than a pipe holds
-FLOOD = f"from deploy.console.output import say\nfor _ in range({LINES}): say('#' * 99)"
+FLOOD = f"from deploy.operator.output import say\nfor _ in range({LINES}): say('#' * 99)"
 
 
 def test_line_is_printed(capfd: pytest.CaptureFixture[str]) -> None:
@@ -66,7 +66,7 @@ def test_reader_that_is_late_for_a_moment_gets_the_line(monkeypatch: pytest.Monk
 
 
 def test_closed_standard_output_gets_nothing() -> None:
-    command = f'exec "{sys.executable}" -c "from deploy.console.output import say; say(0)" >&-'
+    command = f'exec "{sys.executable}" -c "from deploy.operator.output import say; say(0)" >&-'
     done = subprocess.run(["sh", "-c", command], cwd=ROOT, stderr=subprocess.PIPE)
     assert (done.returncode, done.stderr) == (0, b"")
 

@@ -16,7 +16,7 @@ from contextlib import suppress
 
 import pytest
 
-from deploy.console.plain import PlainTerminal
+from deploy.operator.terminal.plain import PlainTerminal
 from deploy.running.processes import ROOT
 
 LIMIT = 20.0  # s for each awaited text
@@ -25,7 +25,7 @@ ERASE = rb"\x1b\[J"  # from the cursor on
 # Shows a line every 50 ms, and each typed line in upper case, until Ctrl-D or SIGINT.
 PROGRAM = """
 import itertools, signal
-from deploy.console.terminal import open_terminal
+from deploy.operator.terminal.display import open_terminal
 signal.signal(signal.SIGTTIN, signal.SIG_IGN)
 terminal = open_terminal(["press", "turn_off"])
 try:
@@ -42,7 +42,7 @@ finally:
 # Shows one line only, and reads until the input ends.
 SILENT_PROGRAM = """
 from contextlib import suppress
-from deploy.console.terminal import open_terminal
+from deploy.operator.terminal.display import open_terminal
 terminal = open_terminal([])
 terminal.show(["line 0"])
 with suppress(EOFError):

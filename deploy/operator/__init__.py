@@ -1,0 +1,1 @@
+"""The faces of the operator: terminal and page, and what both share."""

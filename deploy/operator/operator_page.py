@@ -1,0 +1,241 @@
+"""The operator's page: shows the arm in a browser, and is a hold-to-run switch.
+
+User story (ours): as a robot operator, I see in a browser what the arm does and why its engines are off.
+While my hand holds the page, I count as alive; when hand, page, browser or network go away, the engines stop.
+"""
+
+from __future__ import annotations
+
+import ssl
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from datetime import timedelta
+from typing import Any
+
+import reactivex as rx
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from reactivex import Observable
+from reactivex.subject import BehaviorSubject, Subject
+from std_msgs.msg import Bool, String
+
+from deploy.operator import hold
+from deploy.operator.lines import Span, line_batches
+from deploy.operator.page import address, protocol, requests, server, state
+from deploy.operator.page.site import Site
+from deploy.operator.remote import parameter_changes
+from deploy.operator.switch import VIRTUAL_SWITCH, Switch
+from deploy.running import manifest
+from interfaces import service, topics
+from interfaces.service import ServiceNode, UserError, parameter
+from interfaces.service.epoch import Origin
+from interfaces.topics import TURN_OFF
+from reactive_node import stamps
+from services import engine_controller, operator_watchdog
+
+LINGER = 5.0  # s after the last page has left until its topics are given up: a reload is faster
+LINES_PERIOD = 0.5  # s
+TERMINALS_PERIOD = 0.5  # s
+BEST_EFFORT = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+UNSEEN = replace(topics.ENGINES_STATE, qos=BEST_EFFORT)
+"""The engines' state while no page shows it. To read and acknowledge it ten times a second would cost more
+than the rest of this process."""
+UNSEEN_PERIOD = 0.3  # s
+PUBLISHED_WITHIN = timedelta(milliseconds=50)
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """What a user may set."""
+
+    port: int = parameter(
+        address.DEFAULT_PORT,
+        (0, 65535),
+        "",
+        "TCP port of the page; one of the next if this default is taken; 0 for no page",
+    )
+    address: str = parameter(
+        "127.0.0.1", None, "", "IPv4 address to listen on; others than loopback need TLS"
+    )
+    names: str = parameter("", None, "", "names of the host in browsers, separated by spaces")
+    certificate: str = parameter("", None, "", "file of the TLS certificate")
+    key: str = parameter("", None, "", "file of the key of the certificate")
+
+
+@dataclass(frozen=True)
+class _Parameters:
+    settings: str = parameter("", None, "", "folder that keeps the address of the page, or empty")
+    silence: float = parameter(operator_watchdog.DEFAULTS.silence, None, "s", "of the operator watchdog")
+    strikes: int = parameter(operator_watchdog.DEFAULTS.strikes, None, "", "of the operator watchdog")
+    presence_timeout: float = parameter(
+        engine_controller.DEFAULTS.presence_timeout, None, "s", "of the engine controller"
+    )
+
+
+def wire(node: ServiceNode) -> None:
+    """Connect the pages with topics, parameters and processes."""
+    parameters, given = node.declare(Parameters), node.declare(_Parameters)
+    tls = address.tls(parameters.address, parameters.certificate, parameters.key)
+    origin = Origin(node)
+    clock = state.Clock(hold.monotonic, node.age, lambda: origin.elapsed() if origin.is_known else 0.0)
+    initial = state.PageState(
+        since_when=state.OLDER if origin.is_past else state.NOT_YET,
+        strikes=given.strikes,
+        presence_timeout=given.presence_timeout,
+    )
+    newest = BehaviorSubject(initial)
+
+    events: Subject[server.Event] = Subject()
+    is_open = pages_are_open(events).share()
+    parameter_events = is_open.switch_map(lambda it: parameter_changes(node) if it else rx.never()).share()
+    hands = only(events, hold.Press, hold.Beat, hold.Release)
+    switch = Switch(node, hands, parameter_events, is_open, clock.now)
+    node.publish(topics.OPERATOR_HEARTBEAT, hold.heartbeats(switch.holds), lambda beat: Bool(data=beat))
+
+    asked = only(events, server.Request).share()
+    configuration = requests.Configuration(node)
+    commands = requests.engine_commands(asked).share()
+    turn_offs = commands.filter(lambda command: command == TURN_OFF).share()
+    signals = asked.filter(lambda it: isinstance(it.message, protocol.Process))
+    node.publish(topics.ENGINES, commands, lambda command: String(data=command))
+
+    # One reader of each topic for state and lines, while they observe it.
+    observed = {topic.name: node.observe(topic, timestamped=True).share() for topic in topics.CONTRACT}
+
+    def seen(topic: topics.Topic) -> Observable[Any]:
+        return observed[topic.name]
+
+    unseen = node.observe(UNSEEN, timestamped=True, sampled=UNSEEN_PERIOD)
+    engines = is_open.start_with(False).switch_map(lambda it: seen(topics.ENGINES_STATE) if it else unseen)
+
+    def always_seen(topic: topics.Topic) -> Observable[Any]:
+        return engines if topic is topics.ENGINES_STATE else seen(topic)
+
+    lines = line_batches(seen, turn_offs.map(just_now), rx.interval(LINES_PERIOD), node.get_namespace())
+    session = state.while_open(seen, lines, node.get_namespace(), clock)
+    changes = rx.merge(
+        state.always(always_seen, new_watchdogs(node, origin), controllers(node), clock),
+        is_open.switch_map(lambda it: session if it else rx.never()),
+        switch.holds.map(state.held),
+        switch.pressed.map(state.pressed),
+        terminal_holds(node, is_open).map(state.held_at_terminal),
+        turn_offs.map(lambda _: state.turned_off(clock.now())),
+        configuration.followers(parameter_events, is_open),
+        configuration.outcomes(asked),
+        signals.flat_map(lambda it: requests.send_signal(it, newest.value.programs)),
+    )
+    states = state.page_states(changes, newest.value)
+    states.subscribe(newest.on_next, node.fail, scheduler=node.scheduler)
+    only(events, server.Violation).subscribe(lambda it: node.health.drop("page", it.reason))
+
+    def receive(event: server.Event) -> None:
+        node.scheduler.schedule(lambda *_: events.on_next(event))
+
+    serve(node, parameters, given, tls, receive, lambda: newest.value, clock)
+
+
+def only(events: Observable[Any], *kinds: type) -> Observable[Any]:
+    """Emit the events of some kinds."""
+    return events.filter(lambda event: isinstance(event, kinds))
+
+
+def pages_are_open(events: Observable[server.Event]) -> Observable[bool]:
+    """Emit ``True`` when the first page opens, ``False`` ``LINGER`` [s] after the last page has closed."""
+    opened = only(events, server.Opened, server.Closed).map(lambda it: isinstance(it, server.Opened))
+    are_open = opened.scan(lambda count, opens: count + (1 if opens else -1), 0).map(bool)
+    closed = rx.timer(LINGER).map(lambda _: False)
+    present = are_open.distinct_until_changed().switch_map(lambda it: rx.of(True) if it else closed)
+    return present.distinct_until_changed()
+
+
+def new_watchdogs(node: ServiceNode, origin: Origin) -> Observable[bool]:
+    """Emit for each operator watchdog that appears whether it is new; the first may be older than us."""
+    topic = topics.OPERATOR_ACTIVITY
+    matches = node.create_event_observable(topic.type, topic.name, topic.qos, "matched")
+    appeared = matches.filter(lambda it: it.current_count_change > 0)
+    return appeared.map_indexed(lambda _, index: index > 0 or not origin.is_past)
+
+
+def terminal_holds(node: ServiceNode, is_open: Observable[bool]) -> Observable[bool]:
+    """Emit while a page is open whether a hand at a terminal sends heartbeats: it has a publisher then."""
+    name = node.resolve_topic_name(topics.OPERATOR_HEARTBEAT.name)
+    services = (VIRTUAL_SWITCH, manifest.PAGE)
+
+    def look(_: Any) -> bool:
+        return any(each.node_name not in services for each in node.get_publishers_info_by_topic(name))
+
+    looks = is_open.switch_map(lambda it: rx.timer(0.0, TERMINALS_PERIOD) if it else rx.never())
+    return looks.map(look).distinct_until_changed()
+
+
+def controllers(node: ServiceNode) -> Callable[[], frozenset[tuple[int, ...]]]:
+    """Return what returns the identifiers of the publishers of the engines' state."""
+    name = node.resolve_topic_name(topics.ENGINES_STATE.name)
+    return lambda: frozenset(tuple(each.endpoint_gid) for each in node.get_publishers_info_by_topic(name))
+
+
+def just_now(_: Any) -> Span:
+    """Return the time within which the command of a page was published, which has just happened."""
+    now = stamps.now()
+    return now - PUBLISHED_WITHIN, now
+
+
+def serve(
+    node: ServiceNode,
+    parameters: Parameters,
+    given: _Parameters,
+    tls: ssl.SSLContext | None,
+    receive: Callable[[server.Event], None],
+    newest: Callable[[], state.PageState],
+    clock: state.Clock,
+) -> None:
+    """Serve the page until the node ends, and note its address; say so if that is not possible."""
+    if not parameters.port:
+        return
+    file = address.AddressFile(given.settings)
+    last_port, token = file.read()
+    try:
+        listener = address.listen(parameters.address, parameters.port, last_port)
+    except OSError as error:
+        note(node, file, f"No page: {error}")
+        node.remark("page", str(error))
+        return
+    port = listener.getsockname()[1]
+    names = address.host_names(parameters.address, port, parameters.names.split())
+    scheme = "https" if tls else "http"
+    pages = server.PageServer(
+        listener,
+        Site(token, names, scheme),
+        welcome=welcome(given),
+        receive=receive,
+        newest=newest,
+        clock=clock,
+        fail=node.fail,
+        tls=tls,
+    )
+    node.context.on_shutdown(pages.close)
+    note(node, file, f"The page: {scheme}://{names[0]}/#{token}")
+
+
+def note(node: ServiceNode, file: address.AddressFile, line: str) -> None:
+    """Write the line for the user; a full disk is no reason to end."""
+    try:
+        file.write(line)
+    except UserError as error:
+        node.remark("page", str(error))
+
+
+def welcome(given: _Parameters) -> dict[str, Any]:
+    """Return what each page is told first."""
+    return {
+        "programs": protocol.PROGRAMS,
+        "limits": protocol.LIMITS,
+        "strikes": given.strikes,
+        "silence": given.silence,
+        "presence_timeout": given.presence_timeout,
+        "beat": server.UPDATE_PERIOD,
+        "max_nonce_age": hold.MAX_NONCE_AGE,
+    }
+
+
+if __name__ == "__main__":
+    service.run(manifest.PAGE, wire)

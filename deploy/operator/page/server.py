@@ -1,0 +1,279 @@
+"""The web server of the page: HTTP for its files, a WebSocket for each page that is open.
+
+One thread serves all clients and never blocks. It shares two calls with the node: ``receive`` hands over
+what a page did, and ``newest`` returns the newest state, an immutable value. A slow page holds nothing up,
+and nothing queues for it: it gets no updates while it does not answer, and then one with the newest state.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import secrets
+import selectors
+import socket
+import ssl
+import threading
+import time
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+from websockets.http11 import Request as HttpRequest
+from websockets.http11 import Response
+
+from deploy.operator import hold
+from deploy.operator.page import protocol
+from deploy.operator.page.connection import BAD_REQUEST, TOO_LATE, TOO_MANY, Allowance, Connection
+from deploy.operator.page.site import SOCKET, Site, respond
+from deploy.operator.page.state import Clock, PageState
+from deploy.operator.page.updates import Updates
+
+MAX_CONNECTIONS = 32  # a browser opens six to load the page
+MAX_PAGES = 8
+MAX_MESSAGES = 100  # of a page within a second; a page that is held sends 20
+UPDATE_PERIOD = 0.05  # s
+PING_PERIOD = 0.25  # s
+SLOW = 0.5  # s without an answer to a ping: the page gets no updates until it answers
+DEAD = 10.0  # s without an answer: the connection is closed
+ACCEPT_RETRY = 0.02  # s after an error, such as too many open files
+UNAUTHORIZED, GOING_AWAY = 4401, 1001  # codes of a close
+
+
+class Opened(NamedTuple):
+    """A page has presented the token."""
+
+    page: str
+
+
+class Closed(NamedTuple):
+    """A page has left, however that happened."""
+
+    page: str
+
+
+class Request(NamedTuple):
+    """A page asks for something beside the switch."""
+
+    page: str
+    message: protocol.Engines | protocol.Set | protocol.FollowScenario | protocol.Process
+    is_local: bool
+    """Whether the page is on this machine."""
+
+
+class Violation(NamedTuple):
+    """A connection was closed because of input outside the protocol."""
+
+    reason: str
+
+
+Event = Opened | Closed | hold.Event | Request | Violation
+
+
+class _Client:
+    """A connection, and the page at its other end once that has presented the token."""
+
+    def __init__(self, connection: Connection) -> None:
+        self.connection = connection
+        self.page = ""
+        self.nonces = hold.Nonces()
+        self.messages = Allowance(MAX_MESSAGES)
+        self.updates: Updates | None = None
+        self.pinged = 0.0
+
+
+class PageServer:
+    """Serves one site until it is closed."""
+
+    def __init__(
+        self,
+        listener: socket.socket,
+        site: Site,
+        *,
+        welcome: Mapping[str, Any],
+        receive: Callable[[Event], None],
+        newest: Callable[[], PageState],
+        clock: Clock,
+        fail: Callable[[Exception], None],
+        tls: ssl.SSLContext | None = None,
+    ) -> None:
+        """
+        Start to serve, on a thread of its own.
+
+        :param listener: a listening TCP socket; the server closes it.
+        :param welcome: what every page is told first.
+        :param receive: called on the thread of the server for each event of a page.
+        :param newest: returns the newest state; called on the thread of the server.
+        :param fail: called on the thread of the server if that ends in an error.
+        """
+        self._listener = listener
+        self._site = site
+        self._welcome = welcome
+        self._receive = receive
+        self._newest = newest
+        self._clock = clock
+        self._fail = fail
+        self._tls = tls
+        self._clients: list[_Client] = []
+        self._due = 0.0
+        self._selector = selectors.DefaultSelector()
+        listener.setblocking(False)
+        self._selector.register(listener, selectors.EVENT_READ)
+        self._wake, self._woken = socket.socketpair()
+        self._selector.register(self._woken, selectors.EVENT_READ)
+        self._is_closing = False
+        self._thread = threading.Thread(target=self._serve, name="page", daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """Stop to listen, and end all connections."""
+        self._is_closing = True
+        self._wake.close()  # which the other end notices
+        self._thread.join()
+
+    def _serve(self) -> None:
+        try:
+            while not self._is_closing:
+                self._serve_once()
+        except Exception as error:
+            self._fail(error)
+        finally:
+            for client in list(self._clients):
+                client.connection.close()
+                self._settle(client)
+            self._selector.close()
+            self._listener.close()
+            self._woken.close()
+
+    def _serve_once(self) -> None:
+        """Wait for the next bytes or the next update, and handle them."""
+        # Without clients there is nothing to do.
+        wait = max(0.0, self._due - self._clock.now()) if self._clients else None
+        for key, _ in self._selector.select(wait):
+            if key.fileobj is self._listener:
+                self._accept()
+            elif key.data is not None:
+                for text in key.data.connection.receive(self._clock.now()):
+                    self._take(key.data, text)
+                self._settle(key.data)
+        now = self._clock.now()
+        if now >= self._due:
+            self._due = max(self._due + UPDATE_PERIOD, now)
+            for client in list(self._clients):
+                self._tick(client, now)
+                self._settle(client)
+
+    def _accept(self) -> None:
+        try:
+            socket_, _ = self._listener.accept()
+        except OSError:
+            time.sleep(ACCEPT_RETRY)
+            return
+        if len(self._clients) >= MAX_CONNECTIONS:
+            socket_.close()
+            self._receive(Violation("too many connections"))
+            return
+        try:
+            connection = Connection(socket_, self._tls, self._answer, self._clock.now())
+        except OSError:
+            socket_.close()
+            return
+        client = _Client(connection)
+        self._clients.append(client)
+        self._selector.register(connection.socket, connection.events, client)
+
+    def _answer(self, request: HttpRequest) -> Response | None:
+        """Answer a request; ``None`` lets a WebSocket begin."""
+        if refusal := self._site.refusal(request):
+            self._receive(Violation(refusal.reason))
+            return respond(refusal.status, body=refusal.answer)
+        return None if request.path == SOCKET else self._site.file(request.path)
+
+    def _take(self, client: _Client, text: str | bytes) -> None:
+        """Handle a message of a client."""
+        now = self._clock.now()
+        if not client.connection.is_open:
+            return  # an earlier message has ended it
+        try:
+            message = protocol.parse(text)
+        except protocol.ProtocolError as error:
+            client.connection.fail(BAD_REQUEST, str(error), now)
+            return
+        if not client.page:
+            self._admit(client, message, now)
+        elif client.messages.is_exceeded(now):
+            client.connection.fail(TOO_MANY, "a page sends too much", now)
+        elif isinstance(message, protocol.Hello):
+            client.connection.fail(BAD_REQUEST, "a page says hello twice", now)
+        else:
+            self._receive(_event(client, message))
+
+    def _admit(self, client: _Client, message: protocol.Message, now: float) -> None:
+        connection = client.connection
+        if not isinstance(message, protocol.Hello):
+            connection.fail(BAD_REQUEST, "a page does not begin with hello", now)
+        elif not self._site.is_token(message.token):
+            connection.fail(UNAUTHORIZED, "a page has a wrong token", now)
+        elif sum(bool(each.page) for each in self._clients) >= MAX_PAGES:
+            connection.fail(TOO_MANY, "too many pages are open", now)
+        else:
+            client.page = secrets.token_hex(8)
+            client.updates = Updates(client.page, self._clock)
+            client.pinged = now
+            connection.deadline = math.inf
+            self._receive(Opened(client.page))
+            welcome = {"type": "welcome", "page": client.page, "local": connection.is_local}
+            connection.send(_text({**welcome, **self._welcome}), now)
+            connection.ping(now)
+
+    def _tick(self, client: _Client, now: float) -> None:
+        """Send an update to a page that keeps up; end a connection that gets no further."""
+        connection = client.connection
+        if now > connection.deadline:
+            if connection.is_open:
+                connection.fail(TOO_LATE, "a page says no hello", now)
+            else:
+                connection.close()
+        if client.updates is None or not connection.is_open:
+            return
+        if connection.has_answered and now - client.pinged >= PING_PERIOD:
+            client.pinged = now
+            connection.ping(now)
+        if now - client.pinged > DEAD:
+            connection.fail(GOING_AWAY, "the page does not answer", now, by_client=False)
+        elif now - client.pinged < SLOW and connection.is_idle:
+            state = self._newest()
+            update = client.updates.update(state, client.nonces.issue(now), now)
+            for message in (*client.updates.refusals(state), update):
+                connection.send(_text(message), now)
+
+    def _settle(self, client: _Client) -> None:
+        """Tell what has become of a client, and wait for what it waits for."""
+        connection = client.connection
+        if client.page and not connection.is_open:
+            self._receive(hold.Release(client.page))
+            self._receive(Closed(client.page))
+            client.page, client.updates = "", None
+        if connection.problem:
+            self._receive(Violation(connection.problem))
+            connection.problem = ""
+        if connection.has_ended:
+            self._clients.remove(client)
+            self._selector.unregister(connection.socket)
+        elif connection.events != self._selector.get_key(connection.socket).events:
+            self._selector.modify(connection.socket, connection.events, client)
+
+
+def _event(client: _Client, message: protocol.Message) -> Event:
+    match message:
+        case protocol.Press(nonce):
+            return hold.Press(client.page, client.nonces.sent(nonce))
+        case protocol.Beat(nonce):
+            return hold.Beat(client.page, client.nonces.sent(nonce))
+        case protocol.Release() | protocol.Hello():
+            return hold.Release(client.page)
+        case _:
+            return Request(client.page, message, client.connection.is_local)
+
+
+def _text(message: Mapping[str, Any]) -> str:
+    return json.dumps(message, separators=(",", ":"), allow_nan=False)

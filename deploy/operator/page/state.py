@@ -1,0 +1,373 @@
+"""What the pages show: from the topics of an arm to a state."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Mapping, Sequence
+from datetime import datetime
+from typing import Any, NamedTuple
+
+import reactivex as rx
+from reactivex import Observable
+
+from deploy.operator.hold import ENDED, Hold
+from deploy.running import manifest
+from interfaces import topics
+from interfaces.service.health import healths
+from interfaces.topics import ALIVE, INCAPACITATED, MISSED, OFF, ON, TURN_OFF
+from reactive_node import stamps
+from reactive_node.stamps import Timestamp
+from services import engine_controller, operator_watchdog
+
+PROGRAMS = tuple(program.name for program in manifest.programs())
+ENGINE_CONTROLLER = topics.ENGINES_STATE.publishers[0]
+ECHO = 0.15  # s after a beat of a page for which a heartbeat on the topic is taken for that beat
+TOGETHER = 1.0  # s within which a command or a conclusion explains that the engines are off
+RENEWED = 0.5  # s: the drive's 0.4 s and the way of the message
+SAMPLE_PERIOD = 1 / 30  # s between two samples of the trace
+BEAT = "beat"  # the request of a page that is held
+MAX_SAMPLES, MAX_LINES, MAX_REFUSALS = 90, 200, 20  # that are kept for a page that is slow
+
+BY_WATCHDOG = "turned off by the operator watchdog: operator incapacitated"
+BY_PAGE = "turned off on a page"
+BY_COMMAND = "turned off by a command of another node, such as the terminal"
+BY_CONTROLLER = "turned off by the engine controller: no operator seen for {:g} s"
+RESTARTED = "turned off as the engine controller was killed or stopped"
+NOT_YET = "not turned on yet"
+OLDER = "off since before the page was served"
+_REFUSED = re.compile(r"turn_on refused: ([^;]*)")
+
+Seen = Callable[[topics.Topic], Observable[Timestamp[Any]]]
+"""Gives the messages of a topic with their source times."""
+
+
+class Clock(NamedTuple):
+    """The times by which a page is drawn."""
+
+    now: Callable[[], float]
+    """The clock of the nonces [s]."""
+    age: Callable[[datetime], float]
+    """The age of a stamp [s]."""
+    elapsed: Callable[[], float]
+    """The time since the origin of the scenario [s]."""
+
+
+class Program(NamedTuple):
+    """A program, as the sentinel sees its process and as it reports its health."""
+
+    state: str = ""
+    pid: int = 0
+    restarts: int = 0
+    observed: float = -math.inf
+    """When the sentinel has published this [s]."""
+    heard: float = -math.inf
+    """When the program has reported its health [s]."""
+    ok: bool = False
+    reason: str = ""
+    since_output: float | None = None
+    """The age of its last output at that time [s]."""
+
+
+class PageState(NamedTuple):
+    """All that a page may show; times are those of :attr:`Clock.now` [s]."""
+
+    strikes: int = operator_watchdog.DEFAULTS.strikes
+    """The strike that turns the engines off."""
+    presence_timeout: float = engine_controller.DEFAULTS.presence_timeout
+    """How long the engines stay on without an operator [s]."""
+    configuration: Mapping[str, float] = {}
+    by_hand: frozenset[str] = frozenset()
+    """The sources that were set by hand."""
+    position: tuple[float, float] | None = None
+    speed: float | None = None
+    seen: float = -math.inf
+    """When the operator watchdog has seen the operator."""
+    activity: str | None = None
+    strikes_left: int | None = None
+    hold: Hold = Hold()
+    beaten: float = -math.inf
+    """When the last beat of a page counted; a release does not change it."""
+    heartbeat: float = -math.inf
+    """When a heartbeat came that is not of a page."""
+    pressed: bool = False
+    """Whether the virtual switch was pressed by hand."""
+    at_terminal: bool = False
+    """Whether a hand at a terminal sends heartbeats."""
+    engines: str | None = None
+    reported: float = -math.inf
+    """When the engines' state was published."""
+    controllers: frozenset[Any] = frozenset()
+    """The publishers of the engines' state when they went on."""
+    off_since: float = -math.inf
+    since_when: str = NOT_YET
+    """Why the engines are off, if no command explains it."""
+    cause: str = ""
+    """The command or conclusion that has turned the engines off."""
+    caused: float = -math.inf
+    own_turn_off: float = -math.inf
+    """When a page has turned the engines off."""
+    refused: tuple[float, str] | None = None
+    """When and why a `turn_on` was refused."""
+    programs: Mapping[str, Program] = {}
+    samples: tuple[tuple[float, float, float, float | None], ...] = ()
+    sample_count: int = 0
+    sampled: float = -math.inf
+    lines: tuple[dict[str, Any], ...] = ()
+    line_count: int = 0
+    refusals: tuple[tuple[str, str, str], ...] = ()
+    """Page, request and reason of the last requests that were refused."""
+    refusal_count: int = 0
+
+
+Change = Callable[[PageState], PageState]
+
+
+def page_states(changes: Observable[Change], initial: PageState) -> Observable[PageState]:
+    """Emit the state after each change."""
+    return changes.scan(lambda state, change: change(state), initial)
+
+
+def always(
+    seen: Seen, watchdogs: Observable[bool], controllers: Callable[[], frozenset[Any]], clock: Clock
+) -> Observable[Change]:
+    """
+    The changes that count even while no page is open: a page that opens later shows strikes and reasons.
+
+    :param watchdogs: emits for each operator watchdog that appears, whether its strikes are known to begin.
+    :param controllers: returns the present publishers of the engines' state.
+    """
+    return rx.merge(
+        watchdogs.map(lambda begins: lambda state: _new_watchdog(state, begins)),
+        _changes(seen(topics.OPERATOR_ACTIVITY), _activity, clock),
+        _changes(seen(topics.ENGINES), _command, clock),
+        _changes(seen(topics.ENGINES_STATE), _engines(controllers), clock),
+    )
+
+
+def while_open(seen: Seen, lines: Observable[Any], namespace: str, clock: Clock) -> Observable[Change]:
+    """
+    The changes that count while a page is open; what was known before is out of date.
+
+    :param lines: the batches of lines that the terminal shows.
+    :param namespace: that of the arm; ``/diagnostics`` carries the health of all arms.
+    """
+    return rx.merge(
+        rx.of(_forget),
+        *(_changes(seen(topic), _configuration(name), clock) for name, topic in topics.CONFIGURATION.items()),
+        _changes(seen(topics.EFFECTOR_POSITION), _position, clock),
+        _changes(seen(topics.EFFECTOR_SPEED), _speed, clock),
+        _changes(seen(topics.OPERATOR_HEARTBEAT), _heartbeat, clock),
+        _changes(seen(topics.OPERATOR_PRESENCE), _presence, clock),
+        _changes(seen(topics.DIAGNOSTICS), _diagnostics(namespace.rstrip("/")), clock),
+        lines.map(lambda batch: lambda state: _lines(state, batch, clock)),
+    )
+
+
+def _changes(
+    messages: Observable[Timestamp[Any]], change: Callable[[PageState, Any, Clock], PageState], clock: Clock
+) -> Observable[Change]:
+    return messages.map(lambda message: lambda state: change(state, message, clock))
+
+
+def _forget(state: PageState) -> PageState:
+    fresh = PageState()
+    return state._replace(
+        configuration=fresh.configuration,
+        position=None,
+        speed=None,
+        seen=fresh.seen,
+        heartbeat=fresh.heartbeat,
+        refused=None,
+        programs=fresh.programs,
+        samples=(),
+        lines=(),
+    )
+
+
+# The arm
+
+
+def _configuration(name: str) -> Callable[[PageState, Any, Clock], PageState]:
+    def change(state: PageState, message: Timestamp[Any], clock: Clock) -> PageState:
+        return state._replace(configuration={**state.configuration, name: message.value.data})
+
+    return change
+
+
+def _position(state: PageState, message: Timestamp[Any], clock: Clock) -> PageState:
+    position, now = (message.value.point.x, message.value.point.y), clock.now()
+    if now - state.sampled < SAMPLE_PERIOD:
+        return state._replace(position=position)
+    at = clock.elapsed() - clock.age(stamps.from_message(message.value.header.stamp))
+    sample = (round(at, 3), *position, state.speed)
+    return state._replace(
+        position=position,
+        samples=(*state.samples, sample)[-MAX_SAMPLES:],
+        sample_count=state.sample_count + 1,
+        sampled=now,
+    )
+
+
+def _speed(state: PageState, message: Timestamp[Any], clock: Clock) -> PageState:
+    return state._replace(speed=message.value.data)
+
+
+# The operator
+
+
+def _heartbeat(state: PageState, message: Timestamp[Any], clock: Clock) -> PageState:
+    now = clock.now()
+    return state if now - state.beaten < ECHO else state._replace(heartbeat=now)
+
+
+def _presence(state: PageState, message: Timestamp[Any], clock: Clock) -> PageState:
+    age = clock.age(stamps.from_message(message.value.stamp))
+    return state._replace(seen=clock.now() - max(age, 0.0))
+
+
+def _new_watchdog(state: PageState, begins: bool) -> PageState:
+    return state._replace(activity=None, strikes_left=state.strikes if begins else None)
+
+
+def _activity(state: PageState, message: Timestamp[Any], clock: Clock) -> PageState:
+    activity, left, now = message.value.data, state.strikes_left, clock.now()
+    if activity == MISSED and left is not None:
+        left = max(0, left - 1)
+    elif activity == INCAPACITATED:
+        left = 0
+    elif activity == ALIVE and state.activity == INCAPACITATED:
+        left = state.strikes
+    state = state._replace(activity=activity, strikes_left=left)
+    return _explain(state, BY_WATCHDOG, now) if activity == INCAPACITATED else state
+
+
+# The engines
+
+
+def _command(state: PageState, message: Timestamp[Any], clock: Clock) -> PageState:
+    now = clock.now()
+    if message.value.data != TURN_OFF:
+        return state
+    if now - state.own_turn_off < TOGETHER:
+        return _explain(state, BY_PAGE, now)
+    if state.activity is None and state.since_when == OLDER:
+        # A watchdog that is older than this process repeats the command of an earlier conclusion.
+        state = state._replace(activity=INCAPACITATED, strikes_left=0)
+    return _explain(state, BY_WATCHDOG if state.activity == INCAPACITATED else BY_COMMAND, now)
+
+
+def _explain(state: PageState, cause: str, now: float) -> PageState:
+    """Note why the engines go off: messages of other topics may come a little before or after that."""
+    goes_off = state.engines == ON or now - state.off_since < TOGETHER
+    is_older = state.off_since == -math.inf and state.since_when == OLDER
+    # The command of the watchdog may overtake its conclusion.
+    is_first = not state.cause or (state.cause == BY_COMMAND and now - state.caused < TOGETHER)
+    return state._replace(cause=cause, caused=now) if (goes_off or is_older) and is_first else state
+
+
+def _engines(controllers: Callable[[], frozenset[Any]]) -> Callable[[PageState, Any, Clock], PageState]:
+    def change(state: PageState, message: Timestamp[Any], clock: Clock) -> PageState:
+        engines, now = message.value.data, clock.now()
+        if engines == ON:
+            # A repeated `on` may come after the command that ends it.
+            cause = state.cause if state.engines == ON and now - state.caused < TOGETHER else ""
+            known = state.controllers if state.engines == ON else controllers()
+            return state._replace(engines=ON, reported=now, controllers=known, cause=cause, refused=None)
+        if state.engines == ON:
+            is_new = not controllers() <= state.controllers
+            is_restarted = is_new or now - state.reported >= RENEWED
+            fallback = RESTARTED if is_restarted else BY_CONTROLLER.format(state.presence_timeout)
+            return state._replace(engines=OFF, reported=now, off_since=now, since_when=fallback)
+        return state._replace(engines=OFF, reported=now)
+
+    return change
+
+
+# The processes
+
+
+def _diagnostics(namespace: str) -> Callable[[PageState, Any, Clock], PageState]:
+    by_sentinel = f"{namespace}/{manifest.SENTINEL}: "
+
+    def change(state: PageState, message: Timestamp[Any], clock: Clock) -> PageState:
+        programs, now, refused = dict(state.programs), clock.now(), state.refused
+        for name, health in healths(message.value, namespace).items():
+            if name in PROGRAMS:
+                programs[name] = programs.get(name, Program())._replace(
+                    heard=now, ok=health.ok, reason=health.reason, since_output=health.since_output
+                )
+            if name == ENGINE_CONTROLLER and (refusal := _REFUSED.search(health.reason)):
+                refused = now, refusal[1].strip()
+        for status in message.value.status:
+            name = status.name.removeprefix(by_sentinel)
+            if name != status.name and name in PROGRAMS:
+                values = {pair.key: pair.value for pair in status.values}
+                programs[name] = programs.get(name, Program())._replace(
+                    state=values.get("state", ""),
+                    pid=_integer(values.get("pid", "")),
+                    restarts=_integer(values.get("restarts", "")),
+                    observed=now,
+                )
+        return state._replace(programs=programs, refused=refused)
+
+    return change
+
+
+def _integer(text: str) -> int:
+    return int(text) if text.isdecimal() else 0
+
+
+def _lines(state: PageState, batch: Sequence[Any], clock: Clock) -> PageState:
+    new = tuple(
+        {
+            "time": round(1000 * (clock.elapsed() - clock.age(line.time))),
+            "kind": line.kind.name.lower(),
+            "text": line.text,
+        }
+        for line in batch
+    )
+    return state._replace(lines=(*state.lines, *new)[-MAX_LINES:], line_count=state.line_count + len(new))
+
+
+# What the wiring notes
+
+
+def held(hold: Hold) -> Change:
+    """The switch after an event of a page."""
+
+    def change(state: PageState) -> PageState:
+        state = state._replace(hold=hold, beaten=max(state.beaten, hold.seen))
+        if hold.ended:
+            return refuse(hold.ended, BEAT, ENDED)(state)
+        return refuse(hold.refused[0], "press", hold.refused[1])(state) if hold.refused else state
+
+    return change
+
+
+def refuse(page: str, request: str, reason: str) -> Change:
+    """A request of a page is refused."""
+    return lambda state: state._replace(
+        refusals=(*state.refusals, (page, request, reason))[-MAX_REFUSALS:],
+        refusal_count=state.refusal_count + 1,
+    )
+
+
+def turned_off(now: float) -> Change:
+    """A page turns the engines off."""
+    return lambda state: state._replace(own_turn_off=now)
+
+
+def pressed(pressed: bool) -> Change:
+    """The virtual switch is pressed or released by hand."""
+    return lambda state: state._replace(pressed=pressed)
+
+
+def held_at_terminal(at_terminal: bool) -> Change:
+    """A hand at a terminal begins or ends to send heartbeats."""
+    return lambda state: state._replace(at_terminal=at_terminal)
+
+
+def follows_scenario(name: str, follows: bool) -> Change:
+    """A source of the configuration follows the scenario, or was set by hand."""
+    return lambda state: state._replace(by_hand=state.by_hand - {name} if follows else state.by_hand | {name})

@@ -1,0 +1,114 @@
+"""The messages to one page: what it shows of a state, and what has changed since the last message."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from deploy.operator.page.state import BEAT, PROGRAMS, RENEWED, Clock, PageState, Program
+from deploy.running import sentinel
+from interfaces import topics
+from interfaces.topics import ON
+from services import engine_controller
+
+HEARTBEAT_VISIBLE = 0.25  # s for which a heartbeat shows that the switch is held
+PRESENCE_VISIBLE = engine_controller.Parameters().max_presence_age
+REFUSAL_VISIBLE = 10.0  # s
+HEALTH_TIMEOUT = sentinel.Parameters().health_timeout
+SILENT_CONTROLLER = "the engine controller is silent, so the drive stops the engines"
+
+
+def view(state: PageState, page: str, now: float) -> dict[str, Any]:
+    """Return what a page shows of a state at a time [s], by keys of an update."""
+    holder = state.hold.holder(now)
+    is_beating = now - state.heartbeat <= HEARTBEAT_VISIBLE
+    by = "terminal" if state.pressed or state.at_terminal else "scenario"
+    age = now - state.seen
+    is_reported = now - state.reported <= RENEWED
+    refused = state.refused[1] if state.refused and now - state.refused[0] <= REFUSAL_VISIBLE else None
+    return {
+        "arm": {name: state.configuration.get(name) for name in topics.CONFIGURATION},
+        "position": {"x": state.position[0], "y": state.position[1]} if state.position else None,
+        "speed": state.speed,
+        "operator": {
+            "seen": age <= PRESENCE_VISIBLE,
+            "age": round(age, 1) if math.isfinite(age) else None,
+            "activity": state.activity,
+            "strikes_left": state.strikes_left,
+        },
+        "switch": {
+            "held": bool(holder) or is_beating,
+            "by": ("this_page" if holder == page else "other_page") if holder else by if is_beating else None,
+        },
+        "engines": {
+            "state": state.engines if is_reported else None,
+            "why": _why(state, is_reported),
+            "refused": refused,
+        },
+        "sources": {name: "hand" if name in state.by_hand else "scenario" for name in topics.CONFIGURATION},
+        "processes": [_row(name, state.programs.get(name, Program()), now) for name in PROGRAMS],
+    }
+
+
+def _why(state: PageState, is_reported: bool) -> str:
+    if not is_reported:
+        return SILENT_CONTROLLER
+    return "" if state.engines == ON else state.cause or state.since_when
+
+
+def _row(name: str, program: Program, now: float) -> dict[str, Any]:
+    silence = now - program.heard
+    since_output = program.since_output
+    if silence > HEALTH_TIMEOUT and since_output is not None:
+        since_output = math.floor(since_output + silence)
+    return {
+        "name": name,
+        "state": program.state if now - program.observed <= HEALTH_TIMEOUT else "UNKNOWN",
+        "pid": program.pid,
+        "restarts": program.restarts,
+        "since_output": since_output,
+        "ok": program.ok and silence <= HEALTH_TIMEOUT,
+        "health": _health(program, silence),
+    }
+
+
+def _health(program: Program, silence: float) -> str:
+    if silence <= HEALTH_TIMEOUT:
+        return program.reason
+    return f"no health for {math.floor(silence)} s" if math.isfinite(silence) else "no health yet"
+
+
+class Updates:
+    """The messages to one page: each tells what has changed since the last one."""
+
+    def __init__(self, page: str, clock: Clock) -> None:
+        """:param page: the name of the page."""
+        self._page = page
+        self._clock = clock
+        self._shown: dict[str, Any] = {}
+        self._samples = self._lines = self._refusals = 0
+
+    def update(self, state: PageState, nonce: str, now: float) -> dict[str, Any]:
+        """Return the next update of a page: what has changed, and the newest lines and samples."""
+        shown = view(state, self._page, now)
+        changes = {key: value for key, value in shown.items() if self._shown.get(key, self) != value}
+        self._shown = shown
+        samples, self._samples = state.sample_count - self._samples, state.sample_count
+        lines, self._lines = state.line_count - self._lines, state.line_count
+        if samples:
+            changes["trace"] = state.samples[-samples:]
+        if lines:
+            changes["lines"] = state.lines[-lines:]
+        return {"type": "update", "nonce": nonce, "time": round(self._clock.elapsed(), 3), **changes}
+
+    def refusals(self, state: PageState) -> list[dict[str, str]]:
+        """Return the new refusals of requests of the page, and once that its hold has ended."""
+        new, self._refusals = state.refusal_count - self._refusals, state.refusal_count
+        latest = state.refusals[-new:] if new else ()
+        ours = dict.fromkeys((request, reason) for page, request, reason in latest if page == self._page)
+        return [
+            {"type": "released", "why": reason}
+            if request == BEAT
+            else {"type": "refused", "request": request, "why": reason}
+            for request, reason in ours
+        ]

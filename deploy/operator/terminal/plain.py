@@ -1,0 +1,49 @@
+"""Plain lines for pipes, files and terminals without a movable cursor."""
+
+from __future__ import annotations
+
+import os
+import select
+import sys
+import time
+from collections.abc import Iterable
+
+from deploy.operator.output import say
+
+
+class PlainTerminal:
+    """Standard output and input, line by line."""
+
+    def __init__(self) -> None:
+        """Read standard input, unless it is closed."""
+        self._input = None if sys.stdin is None else sys.stdin.fileno()
+        self._is_terminal = self._input is not None and os.isatty(self._input)  # after a hang-up, no
+        self._typed = b""
+
+    def show(self, lines: Iterable[str]) -> None:
+        """Print lines; drop those for which a pipe or terminal has no room."""
+        for line in lines:
+            say(line)
+
+    def read(self, seconds: float) -> list[str]:
+        """Return typed lines as soon as there are any; wait at most so long [s]. EOFError after Ctrl-D."""
+        if self._input is None:
+            time.sleep(seconds)
+            return []
+        if not select.select([self._input], [], [], seconds)[0]:
+            return []
+        try:
+            typed = os.read(self._input, 1024)
+        except OSError:  # the terminal belongs to another job now
+            time.sleep(seconds)
+            return []
+        if not typed:
+            self._input = None
+            if self._is_terminal:  # the end of a file or a pipe means nothing
+                raise EOFError
+            typed = b"\n" if self._typed else b""  # which the last line may lack
+        *lines, self._typed = (self._typed + typed).split(b"\n")
+        return [line.decode(errors="replace") for line in lines]
+
+    def close(self) -> None:
+        """Leave the terminal as it was."""

@@ -1,0 +1,161 @@
+"""Parts of the page in a browser, driven by states that the tests choose."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import closing
+from typing import Any
+
+import pytest
+
+from deploy.operator.page.site import STATIC
+from tests.operator.page.clients import Arm
+
+pytestmark = pytest.mark.timed
+
+RECOVERIES = """
+async () => {
+    const { Processes } = await import("/static/processes.js");
+    const table = new Processes(() => true);
+    const welcome = () => ({ programs: ["velocity"], local: true });
+    const row = () => document.querySelector("tr[data-process=velocity]");
+    const health = () => row().querySelector("[data-column=health]").textContent;
+    const show = (welcome, time, state, pid) => {
+        const ok = state === "RUNNING";
+        const process = { name: "velocity", state, pid, restarts: 0, ok, since_output: 0, health: "good" };
+        table.render({ processes: [process], welcome, time }, true);
+        return row().dataset.back ? health() : "";
+    };
+    const first = welcome(), second = welcome();
+    return [
+        show(first, 100, "UNKNOWN", 0),
+        show(first, 101, "RUNNING", 7), // since long ago: nobody saw it
+        show(first, 102, "STARTING", 8),
+        show(first, 103, "RUNNING", 8),
+        show(first, 200, "RUNNING", 9), // between two states
+        show(second, 300, "UNKNOWN", 0), // a new connection
+        show(second, 301, "RUNNING", 10),
+    ];
+}
+"""
+
+OVERLAPS = """
+async () => {
+    const { labelPlaces } = await import("/static/arm.js");
+    const label = document.querySelector("#arm .angle-label");
+    label.textContent = "θ₁ 0180.0°";
+    label.parentNode.setAttribute("visibility", "visible");
+    const { width, height } = label.getBBox();
+    const found = [];
+    for (let one = -180; one <= 180; one += 5) {
+        for (let two = -180; two <= 180; two += 5) {
+            for (const link of [0, 30, 54, 108]) {
+                const angle = one * Math.PI / 180;
+                const elbow = [link * Math.cos(angle), -link * Math.sin(angle)];
+                const [a, b] = labelPlaces(angle, two * Math.PI / 180, elbow);
+                const overlap = Math.abs(a[0] - b[0]) < width && Math.abs(a[1] - b[1]) < height;
+                if (overlap) found.push([one, two, link]);
+            }
+        }
+    }
+    return [width, found];
+}
+"""
+
+STRIKES = """
+async () => {
+    const { Operator } = await import("/static/operator.js");
+    const operator = new Operator();
+    const welcome = { strikes: 3, silence: 3, presence_timeout: 10 };
+    return [3, 1, 0].map((left) => {
+        operator.render({ operator: { seen: true, age: 0, activity: "alive", strikes_left: left }, welcome });
+        return ["strikes-text", "mini-strikes"].map((id) => document.getElementById(id).textContent);
+    });
+}
+"""
+
+ALERTS = """
+async () => {
+    const { Operator } = await import("/static/operator.js");
+    const operator = new Operator();
+    const alert = document.getElementById("alert");
+    return [null, false, true, false].map((seen) => {
+        alert.replaceChildren();
+        operator.render({ operator: { seen, age: 0, activity: null, strikes_left: null } });
+        return alert.textContent;
+    });
+}
+"""
+
+SIGNS = """
+async (script) => {
+    const { RELEASED, step } = await import("/static/hold.js");
+    let state = RELEASED;
+    const seen = [];
+    let now = 0;
+    const feed = (event) => { state = step(state, { at: now, ...event }).state; };
+    for (; now <= 12000; now += 50) {
+        feed({ type: "update", nonce: "n" });
+        for (const [at, event] of script) if (at === now) feed(event);
+        const before = state.held;
+        feed({ type: "tick", wall: now });
+        if (state.held !== before) seen.push([now, state.why]);
+    }
+    return [seen, state.held];
+}
+"""
+
+
+@pytest.fixture
+def page(browser: Any) -> Iterator[Any]:
+    """A page that is connected to nothing."""
+    with closing(Arm(STATIC)) as arm, closing(browser.new_context()) as context:
+        page = context.new_page()
+        page.goto(f"http://{arm.host}/")
+        page.wait_for_selector("html[data-connection=closed]")
+        yield page
+
+
+def test_only_recoveries_that_the_page_has_seen_are_told(page: Any) -> None:
+    assert page.evaluate(RECOVERIES) == ["", "", "", "back after 2.0 s", "back after 1 min 37 s", "", ""]
+
+
+def test_labels_of_the_angles_never_overlap(page: Any) -> None:
+    width, overlaps = page.evaluate(OVERLAPS)
+    assert width > 20
+    assert overlaps == []
+
+
+def test_strikes_are_told_as_strikes_that_are_left(page: Any) -> None:
+    assert page.evaluate(STRIKES) == [
+        ["3 of 3 strikes left", "3 strikes left"],
+        ["1 of 3 strikes left", "1 strike left"],
+        ["0 of 3 strikes left", "0 strikes left"],
+    ]
+
+
+def test_first_state_of_the_operator_is_no_alarm(page: Any) -> None:
+    assert page.evaluate(ALERTS) == ["", "", "", "Operator not seen."]
+
+
+DOWN = {"type": "down", "hand": "key", "lasts": 3000, "lack": "no sign"}
+SIGN = {"type": "sign", "hand": "key", "lasts": 500, "lack": "no sign"}
+NO_SIGN = "Released: no sign"
+
+
+@pytest.mark.parametrize(
+    ("script", "expected"),
+    [
+        ([(100, {"type": "down", "hand": "mouse"})], [[], True]),
+        ([(100, DOWN)], [[[3150, NO_SIGN]], False]),
+        ([(100, DOWN), (700, SIGN)], [[[1250, NO_SIGN]], False]),
+        ([(100, DOWN), *((at, SIGN) for at in range(700, 12000, 500))], [[], True]),
+        ([(100, DOWN), (700, SIGN), (750, SIGN | {"lasts": 9000})], [[[9800, NO_SIGN]], False]),
+        ([(100, DOWN), (700, SIGN | {"hand": "other"})], [[[3150, NO_SIGN]], False]),
+        ([(100, DOWN), (3200, SIGN)], [[[3150, NO_SIGN]], False]),
+        ([(100, DOWN), (200, DOWN)], [[], False]),
+        ([(100, DOWN), (200, DOWN | {"hand": "other"})], [[[3150, NO_SIGN]], False]),
+    ],
+)
+def test_hand_counts_as_long_as_its_last_sign_of_life(page: Any, script: Any, expected: Any) -> None:
+    assert page.evaluate(SIGNS, script) == expected

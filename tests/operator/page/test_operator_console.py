@@ -1,0 +1,448 @@
+"""The wiring of the page: a page that holds the switch, beside a terminal and a virtual operator."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import socket
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from rclpy.parameter import Parameter
+from std_msgs.msg import Bool, String
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import ClientConnection, connect
+
+from deploy.operator import operator_page as operator_console
+from deploy.operator import remote
+from deploy.operator.hand import Hand
+from deploy.operator.page.state import RESTARTED
+from deploy.operator.switch import ECHO
+from deploy.running.system import PAGE_FILE
+from interfaces import topics
+from interfaces.service import ServiceNode
+from interfaces.topics import CONFIGURATION
+from reactive_node import ReactiveNode
+from services import config_publisher, dead_mans_switch
+
+pytestmark = pytest.mark.timed  # a held page answers within 250 ms
+
+SpinUntil = Callable[..., None]
+
+
+class Page:
+    """A page in a test: it beats while it is held, and knows what it was told last."""
+
+    def __init__(self, connection: ClientConnection) -> None:
+        self.welcome: dict[str, Any] = {}
+        self.shown: dict[str, Any] = {}
+        self.refused: list[dict[str, str]] = []
+        self.is_held = False
+        self.nonce = ""
+        self._connection = connection
+        self._beat_due = 0.0
+
+    def say(self, kind: str, **fields: Any) -> None:
+        self._connection.send(json.dumps({"type": kind, **fields}))
+
+    def press(self) -> None:
+        self.say("press", nonce=self.nonce)
+        self.is_held = True
+
+    def release(self) -> None:
+        self.is_held = False
+        self.say("release")
+
+    def live(self) -> None:
+        """Take what has come, and beat when it is time."""
+        with contextlib.suppress(TimeoutError):
+            while True:
+                message = json.loads(self._connection.recv(timeout=0.0))
+                if message["type"] == "refused":
+                    self.refused.append(message)
+                elif message["type"] == "welcome":
+                    self.welcome = message
+                elif message["type"] == "update":
+                    self.nonce = message["nonce"]
+                    self.shown |= message
+        if self.is_held and time.monotonic() >= self._beat_due:
+            self._beat_due = time.monotonic() + 0.05
+            self.say("beat", nonce=self.nonce)
+
+
+class World:
+    """The operator console beside a dead man's switch and two sources, and an observer of the topics."""
+
+    def __init__(
+        self, make_node: Callable[..., Any], spin_until: SpinUntil, folder: Path, **options: Any
+    ) -> None:
+        with socket.create_server(("127.0.0.1", 0)) as free:
+            port = free.getsockname()[1]
+        overrides = {"port": port, "settings": str(folder)} | options
+        self.console = self._service(make_node, "operator_console", operator_console.wire, **overrides)
+        self.switch = self._service(make_node, "dead_mans_switch", dead_mans_switch.wire, rate=20.0)
+        self.l1 = self._service(
+            make_node, "config_l1", lambda node: config_publisher.wire(node, CONFIGURATION["l1"])
+        )
+        self.folder = folder
+        self.heartbeats: list[float] = []
+        self.commands: list[str] = []
+        observer = make_node("observer")
+        observer.create_subscription(
+            Bool, "operator_heartbeat", self._on_heartbeat, topics.OPERATOR_HEARTBEAT.qos
+        )
+        observer.create_subscription(
+            String, "engines", lambda it: self.commands.append(it.data), topics.ENGINES.qos
+        )
+        self._pages: list[Page] = []
+        self._others: list[Callable[[], None]] = []
+        self._spin_until = spin_until
+
+    @staticmethod
+    def _service(
+        make_node: Callable[..., Any], name: str, wire: Callable[[Any], None], **values: Any
+    ) -> ServiceNode:
+        overrides = [Parameter(key, value=value) for key, value in values.items()]
+        node: ServiceNode = make_node(name, kind=ServiceNode, parameter_overrides=overrides)
+        wire(node)
+        return node
+
+    def _on_heartbeat(self, message: Bool) -> None:
+        self.heartbeats.append(time.monotonic())
+
+    def until(self, condition: Callable[[], object]) -> None:
+        def lives() -> bool:
+            for live in (*(page.live for page in self._pages), *self._others):
+                live()
+            return bool(condition())
+
+        self._spin_until(lives)
+
+    def also_live(self, live: Callable[[], None]) -> None:
+        """Call this all the time, as for the pages."""
+        self._others.append(live)
+
+    def for_seconds(self, seconds: float) -> None:
+        end = time.monotonic() + seconds
+        self.until(lambda: time.monotonic() >= end)
+
+    @contextlib.contextmanager
+    def page(self) -> Iterator[Page]:
+        line = (self.folder / PAGE_FILE).read_text().strip().removeprefix("The page: http://")
+        host, _, token = line.partition("/#")
+        with connect(f"ws://{host}/socket", origin=f"http://{host}", compression=None) as connection:
+            connection.send(json.dumps({"type": "hello", "token": token}))
+            page = Page(connection)
+            self._pages.append(page)
+            self.until(lambda: "processes" in page.shown)
+            try:
+                yield page
+            finally:
+                self._pages.remove(page)
+
+    def set_pressed(self, pressed: bool) -> None:
+        self.switch.set_parameters([Parameter("pressed", value=pressed)])
+
+
+@pytest.fixture
+def world(make_node: Callable[..., Any], spin_until: SpinUntil, tmp_path: Path) -> World:
+    return World(make_node, spin_until, tmp_path)
+
+
+def test_held_page_is_a_hand_on_the_switch(world: World) -> None:
+    with world.page() as page:
+        page.press()
+        world.until(lambda: len(world.heartbeats) > 20)
+        world.until(lambda: page.shown["switch"] == {"held": True, "by": "this_page"})
+        assert world.switch.get_parameter("pressed").value is False
+
+        page.release()
+        world.until(lambda: page.shown["switch"] == {"held": False, "by": None})
+        count = len(world.heartbeats)
+        world.for_seconds(0.5)
+        assert len(world.heartbeats) == count
+
+
+def test_closed_page_is_no_hand(world: World) -> None:
+    with world.page() as page:
+        page.press()
+        world.until(lambda: len(world.heartbeats) > 5)
+    world.for_seconds(0.1)
+    count = len(world.heartbeats)
+    world.for_seconds(0.5)
+    assert len(world.heartbeats) == count
+
+
+def test_silent_page_is_released_until_the_next_press(world: World) -> None:
+    with world.page() as page:
+        page.press()
+        world.until(lambda: len(world.heartbeats) > 5)
+        page.is_held = False
+        world.for_seconds(0.4)
+        count = len(world.heartbeats)
+        page.is_held = True
+        world.for_seconds(0.5)
+        assert len(world.heartbeats) == count
+        assert page.shown["switch"]["held"] is False
+
+        page.press()
+        world.until(lambda: len(world.heartbeats) > count + 5)
+
+
+def test_beats_that_were_queued_are_no_sign_of_life(world: World) -> None:
+    with world.page() as page:
+        page.press()
+        world.until(lambda: len(world.heartbeats) > 5)
+        page.is_held = False
+        for _ in range(40):
+            page.say("beat", nonce=page.nonce)
+            time.sleep(0.02)  # the console's executor does not run meanwhile
+        count = len(world.heartbeats)
+        world.for_seconds(0.5)
+        assert len(world.heartbeats) <= count + 1, "but for a heartbeat on its way"
+
+
+def test_second_page_is_refused_while_the_first_holds(world: World) -> None:
+    with world.page() as one, world.page() as two:
+        one.press()
+        world.until(lambda: two.shown["switch"] == {"held": True, "by": "other_page"})
+        two.press()
+        world.until(lambda: two.refused)
+        assert two.refused == [
+            {"type": "refused", "request": "press", "why": "another page holds the switch"}
+        ]
+        two.is_held = False
+        one.release()
+        world.until(lambda: two.shown["switch"]["held"] is False)
+        two.press()
+        world.until(lambda: one.shown["switch"] == {"held": True, "by": "other_page"})
+
+
+def test_press_on_a_page_takes_the_switch_from_the_parameter(world: World) -> None:
+    world.set_pressed(True)
+    with world.page() as page:
+        world.until(lambda: page.shown["switch"] == {"held": True, "by": "terminal"})
+        page.press()
+        world.until(lambda: world.switch.get_parameter("pressed").value is False)
+        world.until(lambda: page.shown["switch"] == {"held": True, "by": "this_page"})
+        page.release()
+        world.until(lambda: page.shown["switch"] == {"held": False, "by": None})
+        count = len(world.heartbeats)
+        world.for_seconds(0.5)
+        assert len(world.heartbeats) == count
+
+
+def test_pressed_parameter_takes_the_switch_from_a_page(world: World) -> None:
+    with world.page() as page:
+        page.press()
+        world.until(lambda: page.shown["switch"] == {"held": True, "by": "this_page"})
+        world.for_seconds(0.2)
+        world.set_pressed(True)
+        world.until(lambda: page.shown["switch"] == {"held": True, "by": "terminal"})
+        page.is_held = False
+        world.for_seconds(0.5)
+        assert page.shown["switch"] == {"held": True, "by": "terminal"}
+        world.set_pressed(False)
+        world.until(lambda: page.shown["switch"] == {"held": False, "by": None})
+
+
+def test_released_parameter_releases_a_page(world: World) -> None:
+    with world.page() as page:
+        page.press()
+        world.until(lambda: len(world.heartbeats) > 5)
+        world.for_seconds(0.2)
+        world.set_pressed(False)
+        world.until(lambda: page.shown["switch"] == {"held": False, "by": None})
+        count = len(world.heartbeats)
+        world.for_seconds(0.4)  # in which the page goes on to beat
+        assert len(world.heartbeats) == count
+
+
+@pytest.fixture
+def terminal(world: World, make_node: Callable[..., Any]) -> Hand:
+    """The hand at a terminal that lives."""
+    hand = Hand(make_node("console_7", kind=ReactiveNode))
+    world.also_live(hand.beat)
+    world.for_seconds(0.5)  # it meets the switch
+    return hand
+
+
+def test_hand_at_a_terminal_takes_the_switch_from_a_page(world: World, terminal: Hand) -> None:
+    with world.page() as page:
+        page.press()
+        world.until(lambda: page.shown["switch"] == {"held": True, "by": "this_page"})
+        world.for_seconds(ECHO)
+        terminal.press()
+        world.until(lambda: page.shown["switch"] == {"held": True, "by": "terminal"})
+        assert terminal.holds
+        assert world.switch.get_parameter("pressed").value is False
+
+        page.is_held = False
+        terminal.release()
+        world.until(lambda: page.shown["switch"] == {"held": False, "by": None})
+
+
+def test_page_takes_the_switch_from_a_hand_at_a_terminal(world: World, terminal: Hand) -> None:
+    terminal.press()
+    with world.page() as page:
+        world.until(lambda: page.shown["switch"] == {"held": True, "by": "terminal"})
+        world.for_seconds(ECHO)
+        page.press()
+        world.until(lambda: page.shown["switch"] == {"held": True, "by": "this_page"})
+        world.until(lambda: not terminal.holds)
+        page.release()
+        world.until(lambda: page.shown["switch"] == {"held": False, "by": None})
+        count = len(world.heartbeats)
+        world.for_seconds(0.5)
+        assert len(world.heartbeats) == count
+
+
+def test_release_of_a_hand_at_a_terminal_releases_a_page(world: World, terminal: Hand) -> None:
+    with world.page() as page:
+        page.press()
+        world.until(lambda: page.shown["switch"] == {"held": True, "by": "this_page"})
+        world.for_seconds(ECHO)
+        terminal.release()
+        world.until(lambda: page.shown["switch"] == {"held": False, "by": None})
+
+
+def test_switch_that_is_not_there_is_taken_when_it_comes_back(
+    make_node: Callable[..., Any], world: World
+) -> None:
+    world.set_pressed(True)
+    with world.page() as page:
+        world.until(lambda: page.shown["switch"]["by"] == "terminal")
+        world.switch.destroy_node()
+        page.press()
+        world.until(lambda: page.shown["switch"]["by"] == "this_page")
+        world.for_seconds(remote.TIMEOUT + 0.5)
+        world.switch = World._service(make_node, "dead_mans_switch", dead_mans_switch.wire, pressed=True)
+        world.until(lambda: world.switch.get_parameter("pressed").value is False)
+
+
+def test_engines_are_commanded(world: World) -> None:
+    with world.page() as page:
+        page.say("engines", command="turn_on")
+        page.say("engines", command="turn_off")
+        world.until(lambda: world.commands == ["turn_on", "turn_off"])
+
+
+def test_line_tells_that_a_page_has_turned_the_engines_off(world: World) -> None:
+    with world.page() as page:
+        page.say("engines", command="turn_off")
+        world.until(lambda: page.shown.get("lines"))
+    assert [line["text"] for line in page.shown["lines"]] == ["Turning off engines, as you asked..."]
+
+
+def test_page_shows_the_limits_of_this_arm(
+    make_node: Callable[..., Any], spin_until: SpinUntil, tmp_path: Path
+) -> None:
+    limits = {"silence": 2.0, "strikes": 5, "presence_timeout": 4.0}
+    with World(make_node, spin_until, tmp_path, **limits).page() as page:
+        assert {name: page.welcome[name] for name in limits} == limits
+
+
+def test_slider_sets_its_source(world: World) -> None:
+    with world.page() as page:
+        assert page.shown["sources"]["l1"] == "scenario"
+        for value in (2.1, 2.2, 7):
+            page.say("set", name="l1", value=value)
+        world.until(lambda: world.l1.get_parameter("value").value == 7.0)
+        world.until(lambda: page.shown["arm"]["l1"] == 7.0)
+        world.until(lambda: page.shown["sources"]["l1"] == "hand")
+
+
+def test_sources_are_given_back_to_the_scenario(world: World) -> None:
+    world.l1.set_parameters([Parameter("value", value=5.0)])
+    with world.page() as page:
+        world.until(lambda: page.shown["sources"]["l1"] == "hand")
+        page.say("follow_scenario")
+        world.until(lambda: page.shown["sources"]["l1"] == "scenario")
+        world.until(lambda: page.shown["arm"]["l1"] == 2.0)
+        world.until(lambda: page.refused)
+    assert page.refused[0]["request"] == "follow_scenario", "of the sources that are not there"
+
+
+def test_source_that_is_not_there_is_told(world: World, monkeypatch: pytest.MonkeyPatch) -> None:
+    with world.page() as page:
+        page.say("set", name="l2", value=1.0)
+        world.until(lambda: page.refused)
+        assert page.refused[0]["request"] == "set"
+        assert "config_l2" in page.refused[0]["why"]
+
+
+def test_processes_are_left_alone_where_none_are_supervised(
+    world: World, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("REACTIVE_ARM_SYSTEM", raising=False)
+    with world.page() as page:
+        page.say("process", name="kinematics", action="kill")
+        world.until(lambda: page.refused)
+        assert page.refused[0]["request"] == "process"
+
+
+def test_input_outside_the_protocol_is_counted_in_the_health(
+    world: World, make_node: Callable[..., Any]
+) -> None:
+    reports: list[Any] = []
+    make_node("listener").create_subscription(
+        topics.DIAGNOSTICS.type, topics.DIAGNOSTICS.name, reports.append, topics.DIAGNOSTICS.qos
+    )
+    with contextlib.suppress(ConnectionClosed), world.page() as page:
+        page.say("nonsense")
+        world.until(
+            lambda: False if not reports else any("a message has no known type" in str(it) for it in reports)
+        )
+
+
+def test_topics_are_observed_only_while_a_page_is_open(world: World, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(operator_console, "LINGER", 0.2)
+
+    def observed() -> set[str]:
+        return {each.topic_name for each in world.console.subscriptions}
+
+    always = {"/operator_activity", "/engines", "/engines/state"}
+    world.until(lambda: observed() == always)
+    with world.page():
+        world.until(lambda: observed() > always | {"/effector/position", "/diagnostics", "/parameter_events"})
+    world.until(lambda: observed() == always)
+
+
+def test_page_tells_why_the_engines_went_off_while_none_was_open(
+    world: World, make_node: Callable[..., Any]
+) -> None:
+    def controller(name: str, engines: str) -> Any:
+        node = make_node(name)
+        publisher = node.create_publisher(String, "engines/state", topics.ENGINES_STATE.qos)
+        node.create_timer(0.1, lambda: publisher.publish(String(data=engines)))
+        return node
+
+    killed = controller("killed", topics.ON)
+    world.for_seconds(1.0)
+    killed.destroy_node()
+    controller("successor", topics.OFF)
+    world.for_seconds(1.0)
+
+    with world.page() as page:
+        assert page.shown["engines"]["why"] == RESTARTED
+
+
+def test_taken_port_disables_the_page_and_nothing_else(
+    make_node: Callable[..., Any], spin_until: SpinUntil, tmp_path: Path
+) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as other:
+        port = other.getsockname()[1]
+        World(make_node, spin_until, tmp_path, port=port)
+    line = (tmp_path / PAGE_FILE).read_text()
+    assert line == f"No page: port {port} of 127.0.0.1 is taken: choose another one with WEB=<port>\n"
+
+
+def test_port_0_disables_the_page(
+    make_node: Callable[..., Any], spin_until: SpinUntil, tmp_path: Path
+) -> None:
+    World(make_node, spin_until, tmp_path, port=0)
+
+    assert not (tmp_path / PAGE_FILE).exists()

@@ -1,0 +1,62 @@
+"""What pages ask for beside the switch: who may kill and stop processes."""
+
+from __future__ import annotations
+
+from functools import reduce
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from deploy.operator.page import requests
+from deploy.operator.page.protocol import Process
+from deploy.operator.page.server import Request
+from deploy.operator.page.state import Change, PageState, Program
+from deploy.running import processes
+
+KILL = Request("page", Process("velocity", "kill"), is_local=True)
+PROGRAMS = {"velocity": Program(pid=7)}
+
+
+@pytest.fixture
+def sent(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[Any]:
+    """The signals that are sent."""
+    signals: list[Any] = []
+
+    def send_signal(*arguments: Any) -> bool:
+        signals.append(arguments)
+        return True
+
+    monkeypatch.setattr(processes, "send_signal", send_signal)
+    monkeypatch.setenv(processes.MARK, str(tmp_path))
+    return signals
+
+
+def refusals(request: Request, programs: dict[str, Program]) -> list[tuple[str, str, str]]:
+    changes: list[Change] = []
+    requests.send_signal(request, programs).subscribe(changes.append)
+    return list(reduce(lambda state, change: change(state), changes, PageState()).refusals)
+
+
+def test_page_on_the_machine_may_kill_a_process(sent: list[Any], tmp_path: Path) -> None:
+    assert refusals(KILL, PROGRAMS) == []
+    assert sent == [(tmp_path, "velocity", 7, 9)]
+
+
+def test_page_elsewhere_may_not(sent: list[Any]) -> None:
+    reason = "only pages on the machine of the arm may do this"
+    assert refusals(KILL._replace(is_local=False), PROGRAMS) == [("page", "process", reason)]
+    assert sent == []
+
+
+def test_without_supervisord_there_is_nothing_to_kill(
+    sent: list[Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv(processes.MARK)
+    assert len(refusals(KILL, PROGRAMS)) == 1
+    assert sent == []
+
+
+def test_process_that_has_ended_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(processes.MARK, str(tmp_path))
+    assert refusals(KILL, {}) == [("page", "process", "velocity has no process now")]

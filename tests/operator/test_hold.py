@@ -1,0 +1,160 @@
+"""The hold-to-run switch of the pages, in virtual time."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from reactivex.testing import ReactiveTest, TestScheduler
+
+from deploy.operator.hold import (
+    MAX_NONCE_AGE,
+    OTHER_PAGE,
+    TOO_LATE,
+    Beat,
+    Event,
+    Hold,
+    Nonces,
+    Press,
+    Release,
+    heartbeats,
+    holds,
+    step,
+)
+
+on_next = ReactiveTest.on_next
+A, B = "page a", "page b"
+HELD = Hold(A, 100.0)
+
+
+@pytest.mark.parametrize(
+    ("hold", "event", "now", "expected"),
+    [
+        (Hold(), Press(A, 100.0), 100.1, Hold(A, 100.1, alive=True, pressed=True)),
+        (Hold(), Press(A, 100.0), 100.25, Hold(A, 100.25, alive=True, pressed=True)),
+        (Hold(), Press(A, 100.0), 100.26, Hold(refused=(A, TOO_LATE))),
+        (Hold(), Press(A, -math.inf), 100.0, Hold(refused=(A, TOO_LATE))),
+        (Hold(), Beat(A, 100.0), 100.0, Hold(ended=A)),
+        (Hold(), Release(A), 100.0, Hold()),
+        (HELD, Press(A, 100.0), 100.1, Hold(A, 100.1, alive=True)),
+        (HELD, Press(A, 99.0), 100.1, Hold(refused=(A, TOO_LATE))),
+        (HELD, Press(B, 100.0), 100.1, Hold(A, 100.0, refused=(B, OTHER_PAGE))),
+        (HELD, Press(B, 100.2), 100.26, Hold(B, 100.26, alive=True, pressed=True)),
+        (HELD, Beat(A, 100.0), 100.25, Hold(A, 100.25, alive=True)),
+        (HELD, Beat(A, 99.9), 100.2, Hold(ended=A)),
+        (HELD, Beat(A, -math.inf), 100.2, Hold(ended=A)),
+        (HELD, Beat(A, 100.2), 100.26, Hold(ended=A)),
+        (HELD, Beat(B, 100.0), 100.1, Hold(A, 100.0, ended=B)),
+        (HELD, Release(A), 100.1, Hold()),
+        (HELD, Release(B), 100.1, Hold(A, 100.0)),
+        (HELD, Release(), 100.1, Hold()),
+    ],
+)
+def test_each_step_of_the_switch(hold: Hold, event: Event, now: float, expected: Hold) -> None:
+    assert step(hold, event, now) == expected
+
+
+def test_beats_of_a_held_page_are_heartbeats(scheduler: TestScheduler) -> None:
+    events = scheduler.create_hot_observable(
+        on_next(210, Press(A, 205)),
+        *(on_next(time, Beat(A, time - 5)) for time in (220, 230, 240)),
+        on_next(250, Release(A)),
+        on_next(260, Beat(A, 255)),
+    )
+
+    results = scheduler.start(lambda: heartbeats(holds(events, max_age=25, now=lambda: scheduler.clock)))
+
+    assert results.messages == [on_next(time, True) for time in (210, 220, 230, 240)]
+
+
+def test_queued_beats_are_no_heartbeats(scheduler: TestScheduler) -> None:
+    events = scheduler.create_hot_observable(
+        on_next(210, Press(A, 205)),
+        *(on_next(300, Beat(A, time)) for time in range(215, 300, 5)),
+        on_next(305, Beat(A, 304)),
+        on_next(310, Press(A, 309)),
+    )
+
+    results = scheduler.start(lambda: heartbeats(holds(events, max_age=25, now=lambda: scheduler.clock)))
+
+    assert results.messages == [on_next(210, True), on_next(310, True)]
+
+
+def test_one_stale_beat_latches_released(scheduler: TestScheduler) -> None:
+    events = scheduler.create_hot_observable(
+        on_next(210, Press(A, 205)),
+        on_next(230, Beat(A, 204)),
+        *(on_next(time, Beat(A, time)) for time in range(231, 300, 10)),
+    )
+
+    results = scheduler.start(lambda: heartbeats(holds(events, max_age=25, now=lambda: scheduler.clock)))
+
+    assert results.messages == [on_next(210, True)]
+
+
+def test_gap_between_beats_latches_released(scheduler: TestScheduler) -> None:
+    events = scheduler.create_hot_observable(
+        on_next(210, Press(A, 210)),
+        on_next(235, Beat(A, 235)),
+        *(on_next(time, Beat(A, time)) for time in range(261, 400, 10)),
+    )
+
+    results = scheduler.start(lambda: heartbeats(holds(events, max_age=25, now=lambda: scheduler.clock)))
+
+    assert results.messages == [on_next(210, True), on_next(235, True)]
+
+
+_events = st.one_of(
+    st.builds(Press, st.sampled_from([A, B]), st.floats(-1.0, 0.0)),
+    st.builds(Beat, st.sampled_from([A, B]), st.floats(-1.0, 0.0)),
+    st.builds(Release, st.sampled_from([A, B, ""])),
+)
+
+
+@given(st.lists(st.tuples(st.floats(0.0, 0.3), _events)))
+def test_every_heartbeat_is_a_young_answer_of_one_held_page(history: list[tuple[float, Event]]) -> None:
+    hold, now = Hold(), 100.0
+    holder, last = "", -math.inf  # the page whose press counted, and its last heartbeat
+    for passed, event in history:
+        now += passed
+        if isinstance(event, Press | Beat):
+            event = event._replace(sent=now + event.sent)  # the strategy draws ages
+        hold = step(hold, event, now)
+        if isinstance(event, Release):
+            ends = event.page in ("", holder)
+        else:
+            ends = event.page == holder and now - event.sent > MAX_NONCE_AGE
+        if ends:
+            holder = ""
+        if not hold.alive:
+            continue
+        assert isinstance(event, Press | Beat)
+        assert now - event.sent <= MAX_NONCE_AGE
+        if event.page != holder or now - last > MAX_NONCE_AGE:
+            assert isinstance(event, Press), "only a press begins to hold"
+            assert not holder or now - last > MAX_NONCE_AGE, "another page held"
+        holder, last = event.page, now
+        assert hold.holder(now) == holder
+
+
+def test_nonce_is_known_while_it_is_young() -> None:
+    nonces = Nonces()
+    old, young = nonces.issue(10.0), nonces.issue(10.2)
+    newest = nonces.issue(10.3)
+
+    assert [nonces.sent(nonce) for nonce in (old, young, newest, "guess")] == [
+        -math.inf,
+        10.2,
+        10.3,
+        -math.inf,
+    ]
+
+
+def test_nonces_take_no_more_room_with_time() -> None:
+    nonces = Nonces()
+    known = [nonces.issue(0.05 * tick) for tick in range(1000)]
+
+    assert len({*known}) == 1000
+    assert sum(nonces.sent(nonce) > -math.inf for nonce in known) <= 6

@@ -1,0 +1,210 @@
+"""The lines of the operator's terminal, in virtual time: a tick is a second."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from datetime import UTC, datetime, timedelta
+from itertools import pairwise
+from typing import Any
+
+import pytest
+import reactivex as rx
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from geometry_msgs.msg import Point, PointStamped
+from reactivex import Observable
+from reactivex.testing import ReactiveTest, TestScheduler
+from std_msgs.msg import Bool, Float64, String
+
+from deploy.operator.lines import Allowance, Line, line_batches
+from interfaces import topics
+from reactive_node.stamps import Timestamp
+
+Message = tuple[float, topics.Topic, Any]
+"""When it arrives [s], on which topic, and the message."""
+Play = Callable[..., list[Line]]
+
+ORIGIN = datetime(1970, 1, 1, tzinfo=UTC)
+PERIOD = 0.1  # s between two batches
+AGE = 0.02  # s of a message that arrives late
+
+
+@pytest.fixture
+def play(scheduler: TestScheduler) -> Play:
+    """
+    Plays messages until 60 s; returns the lines that the terminal shows.
+
+    `late` is a message that was sent `AGE` before it arrives; `own` are the times of own turn_offs.
+    """
+
+    def play(script: Iterable[Message], *, late: Any = None, own: Iterable[float] = ()) -> list[Line]:
+        def sent(message: Any) -> Timestamp[Any]:
+            return Timestamp(message, scheduler.now - timedelta(seconds=AGE if message is late else 0))
+
+        def seen(topic: topics.Topic) -> Observable[Any]:
+            arrivals = [ReactiveTest.on_next(at, message) for at, on, message in script if on is topic]
+            return scheduler.create_hot_observable(arrivals).map(sent)
+
+        def batches() -> Observable[list[Line]]:
+            spans = [
+                ReactiveTest.on_next(at, (scheduler.to_datetime(at), scheduler.to_datetime(at))) for at in own
+            ]
+            return line_batches(seen, scheduler.create_hot_observable(spans), rx.interval(PERIOD))
+
+        # RxPY takes 0 for none.
+        shown = scheduler.start(batches, created=1e-9, subscribed=1e-9, disposed=60.0)
+        assert all(batch.value.value for batch in shown.messages)
+        return [line for batch in shown.messages for line in batch.value.value]
+
+    return play
+
+
+def activity(conclusion: str, *times: float) -> list[Message]:
+    return [(time, topics.OPERATOR_ACTIVITY, String(data=conclusion)) for time in times]
+
+
+def commands(command: str, *times: float) -> list[Message]:
+    return [(time, topics.ENGINES, String(data=command)) for time in times]
+
+
+def values(*changes: tuple[float, topics.Topic, float]) -> list[Message]:
+    return [(time, topic, Float64(data=value)) for time, topic, value in changes]
+
+
+def texts(lines: Iterable[Line]) -> list[str]:
+    return [line.text for line in lines]
+
+
+def times(lines: Iterable[Line]) -> list[float]:
+    return [round((line.time - ORIGIN).total_seconds(), 3) for line in lines]
+
+
+def test_data_appear_when_all_four_values_are_known_and_at_each_change(play: Play) -> None:
+    script = values((1, topics.L1, 2), (1, topics.L2, 3), (1, topics.THETA1, 0.785398))
+    script += values((2, topics.THETA2, 0.5), (3, topics.THETA2, 1.785398))
+    assert texts(play(script)) == [
+        "### Received new data: {2, 3, 0.785398, 0.5}",
+        "### Received new data: {2, 3, 0.785398, 1.7854}",
+    ]
+
+
+def test_lines_of_a_batch_are_in_the_order_of_their_source_times(play: Play) -> None:
+    sent_first = PointStamped(point=Point(x=-3.4029603, y=3.1472500))
+    script = [
+        (1.01, topics.EFFECTOR_SPEED, Float64(data=3.318452)),
+        (1.02, topics.EFFECTOR_POSITION, sent_first),
+    ]
+    assert texts(play(script, late=sent_first)) == [
+        "Position x: -3.40296 and y: 3.14725",
+        "Speed: 3.31845 [m/s]",
+    ]
+
+
+def test_each_heartbeat_of_a_pressed_switch_is_shown(play: Play) -> None:
+    script = [
+        (at, topics.OPERATOR_HEARTBEAT, Bool(data=pressed))
+        for at, pressed in ((1, True), (2, False), (3, True))
+    ]
+    assert texts(play(script)) == ["### Received signal from operator"] * 2
+
+
+MISSED = "Not received signal from operator..."
+ASLEEP = ["Operator is sleeping !!!", "Turning off engines..."]
+
+
+def test_conclusions_of_the_watchdog_are_shown_with_their_times(play: Play) -> None:
+    script = activity(topics.ALIVE, 1.5, 4.5) + activity(topics.MISSED, 7.5, 10.5, 13.5)
+    shown = play(script + activity(topics.INCAPACITATED, 13.5))
+    assert texts(shown) == ["Operator is alive"] * 2 + [MISSED] * 3 + ASLEEP
+    assert times(shown) == [1.5, 4.5, 7.5, 10.5, 13.5, 13.5, 13.5]
+
+
+@pytest.mark.parametrize("first", [13.5, 13.6])
+def test_repeated_commands_of_the_watchdog_are_hidden(play: Play, first: float) -> None:
+    script = activity(topics.ALIVE, 4.5) + activity(topics.INCAPACITATED, 13.5)
+    shown = play(script + commands(topics.TURN_OFF, *(first + 0.5 * n for n in range(20))))
+    assert texts(shown[1:]) == ASLEEP
+
+
+def test_operator_who_returned_can_fall_asleep_again(play: Play) -> None:
+    script = activity(topics.INCAPACITATED, 10, 30) + activity(topics.ALIVE, 20)
+    shown = play(script + commands(topics.TURN_OFF, 10, 10.5, 30, 30.5))
+    assert texts(shown) == [*ASLEEP, "Operator is alive", *ASLEEP]
+
+
+def test_every_sleep_of_an_operator_is_shown(play: Play) -> None:
+    assert texts(play(activity(topics.INCAPACITATED, *range(10, 50, 5)))) == ASLEEP * 8
+
+
+def test_turn_off_of_another_node_is_attributed_to_it(play: Play) -> None:
+    script = (
+        activity(topics.ALIVE, 1, 1.5, 2) + commands(topics.TURN_ON, 1.2) + commands(topics.TURN_OFF, 1.7)
+    )
+    assert texts(play(script)) == [
+        "Operator is alive",
+        "Turning on engines...",
+        "Operator is alive",
+        "Turning off engines, as another node asked...",
+        "Operator is alive",
+    ]
+
+
+@pytest.mark.parametrize("conclusion", [topics.ALIVE, topics.INCAPACITATED])
+def test_own_turn_off_is_attributed_to_the_user(play: Play, conclusion: str) -> None:
+    script = activity(conclusion, 1) + commands(topics.TURN_OFF, 2, 3)
+    asked = "Turning off engines, as you asked..."
+    assert texts(play(script, own=[2, 3]))[-2:] == [asked, asked]
+
+
+def test_turn_offs_without_any_conclusion_of_the_watchdog_are_one_line(play: Play) -> None:
+    assert texts(play(commands(topics.TURN_OFF, 1, 1.5, 2))) == ["Turning off engines..."]
+
+
+def test_engines_are_shown_when_they_change(play: Play) -> None:
+    states = {1: "off", 2: "off", 3: "on"}
+    script = [(time, topics.ENGINES_STATE, String(data=state)) for time, state in states.items()]
+    assert texts(play(script)) == ["Engines are off", "Engines are on"]
+
+
+def test_new_complaint_of_a_service_is_shown_once(play: Play) -> None:
+    def health(time: float, complaint: str) -> Message:
+        level = DiagnosticStatus.WARN if complaint else DiagnosticStatus.OK
+        mine = DiagnosticStatus(name="/velocity", level=level, message=complaint or "running")
+        fine = DiagnosticStatus(name="/kinematics", level=DiagnosticStatus.OK, message="running")
+        others = DiagnosticStatus(name="/arm2/velocity", level=DiagnosticStatus.WARN, message=f"at {time} s")
+        return time, topics.DIAGNOSTICS, DiagnosticArray(status=[mine, fine, others])
+
+    script = [
+        health(time, complaint) for time, complaint in enumerate(["", "bad", "bad", "worse", "", "worse"], 1)
+    ]
+    assert texts(play(script)) == ["velocity: bad", "velocity: worse", "velocity: worse"]
+
+
+def test_fast_lines_are_thinned_to_one_a_second(play: Play) -> None:
+    speeds = values(*((n / 20, topics.EFFECTOR_SPEED, n) for n in range(1, 20 * 20)))
+    shown = times(play(speeds))
+    assert len([time for time in shown if time < 1.0]) == 6
+    assert [later - sooner for sooner, later in pairwise(shown[6:])] == pytest.approx([1.0] * 18, abs=0.06)
+
+
+def test_thinned_lines_of_different_kinds_are_of_the_same_moment(play: Play) -> None:
+    speeds = values(*((n / 20, topics.EFFECTOR_SPEED, n) for n in range(1, 20 * 20)))
+    positions = [(n / 20, topics.EFFECTOR_POSITION, PointStamped()) for n in range(7, 20 * 20)]
+    shown = [time for time in times(play(speeds + positions)) if time >= 2.0]
+    assert shown == [float(second) for second in range(2, 20) for _ in range(2)]
+
+
+def test_pause_refills_the_burst(play: Play) -> None:
+    speeds = [start + n / 20 for start in (0, 30) for n in range(1, 15)]
+    assert len(play(values(*((time, topics.EFFECTOR_SPEED, time) for time in speeds)))) == 12
+
+
+def test_clock_that_is_set_back_hides_no_lines() -> None:
+    allowance = Allowance(1)
+    shown = [allowance.covers(Timestamp(None, ORIGIN + timedelta(seconds=time))) for time in (1000, 1, 2, 2)]
+    assert shown == [True, False, True, False]
+
+
+def test_all_heartbeats_of_the_listing_are_shown(play: Play) -> None:
+    times = (1.942, 1.991, 2.041, 2.091, 2.141, 2.192, 2.242, 2.292, 2.342, 2.392, 4.444)
+    script = [(time, topics.OPERATOR_HEARTBEAT, Bool(data=True)) for time in times]
+    assert len(play(script)) == len(times)
