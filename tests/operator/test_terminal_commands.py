@@ -9,8 +9,10 @@ from collections.abc import Callable, Iterator
 from itertools import pairwise
 
 import pytest
+from rclpy.executors import Executor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from rclpy.task import Future
 from std_msgs.msg import Bool, String
 
 from deploy.operator import hand, remote
@@ -22,6 +24,8 @@ from interfaces.topics import ENGINES, ENGINES_STATE, OFF, ON, OPERATOR_HEARTBEA
 from reactive_node import ReactiveNode
 from reactive_node.testing import MakeNode, SpinFor, SpinUntil
 from services import dead_mans_switch
+
+Live = Callable[[Callable[[], object]], None]
 
 
 class Operator:
@@ -129,21 +133,21 @@ def said(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
 
 @pytest.fixture
-def live_until(operator: Operator, spin_until: SpinUntil) -> SpinUntil:
-    """Lets the terminal live until a condition is true."""
+def live_until(operator: Operator, executor: Executor) -> Live:
+    """Lets the terminal live, as `make console` does, until a condition is true."""
 
     def until(condition: Callable[[], object]) -> None:
-        def lives() -> bool:
+        deadline = time.monotonic() + 10.0
+        while not condition():
+            assert time.monotonic() < deadline, "the condition was not true in time"
+            executor.spin_until_future_complete(Future(), timeout_sec=0.01)
             operator.live()
-            return bool(condition())
-
-        spin_until(lives)
 
     return until
 
 
 @pytest.fixture
-def held(operator: Operator, make_node: MakeNode, live_until: SpinUntil) -> Switch:
+def held(operator: Operator, make_node: MakeNode, live_until: Live) -> Switch:
     """A switch that the terminal has taken from a latched parameter."""
     switch = Switch(make_node, pressed=True)
     operator.type("press")
@@ -161,7 +165,7 @@ def test_terminal_that_holds_sends_the_heartbeats_itself(held: Switch, said: lis
 
 
 def test_release_ends_the_heartbeats(
-    held: Switch, operator: Operator, live_until: SpinUntil, said: list[str]
+    held: Switch, operator: Operator, live_until: Live, said: list[str]
 ) -> None:
     operator.type("release")
     assert_silence(held, live_until)
@@ -169,7 +173,7 @@ def test_release_ends_the_heartbeats(
 
 
 def test_terminal_that_stood_still_has_to_press_again(
-    held: Switch, operator: Operator, live_until: SpinUntil, spin_for: SpinFor, said: list[str]
+    held: Switch, operator: Operator, live_until: Live, spin_for: SpinFor, said: list[str]
 ) -> None:
     spin_for(2 * hand.LONGEST_PAUSE)
     assert held.heartbeats[-1] < time.monotonic() - hand.LONGEST_PAUSE
@@ -183,7 +187,7 @@ def test_terminal_that_stood_still_has_to_press_again(
 
 @pytest.mark.parametrize("pressed", [False, True])
 def test_another_hand_takes_the_switch_from_the_terminal(
-    held: Switch, live_until: SpinUntil, said: list[str], pressed: bool
+    held: Switch, live_until: Live, said: list[str], pressed: bool
 ) -> None:
     live_for(ECHO, live_until)
     held.set(pressed)
@@ -194,7 +198,7 @@ def test_another_hand_takes_the_switch_from_the_terminal(
 
 
 def test_death_of_the_virtual_switch_releases_no_terminal(
-    held: Switch, live_until: SpinUntil, make_node: MakeNode
+    held: Switch, live_until: Live, make_node: MakeNode
 ) -> None:
     held.node.destroy_node()
     successor = Switch(make_node)
@@ -202,7 +206,7 @@ def test_death_of_the_virtual_switch_releases_no_terminal(
     assert not successor.pressed
 
 
-def assert_silence(switch: Switch, live_until: SpinUntil) -> None:
+def assert_silence(switch: Switch, live_until: Live) -> None:
     """Nothing is heard of the operator any more, but for a heartbeat on its way."""
     live_for(0.2, live_until)
     switch.heartbeats.clear()
@@ -210,7 +214,7 @@ def assert_silence(switch: Switch, live_until: SpinUntil) -> None:
     assert switch.heartbeats == []
 
 
-def live_for(seconds: float, live_until: SpinUntil) -> None:
+def live_for(seconds: float, live_until: Live) -> None:
     end = time.monotonic() + seconds
     live_until(lambda: time.monotonic() > end)
 
@@ -234,9 +238,7 @@ def test_release_reaches_the_successor_of_a_hung_switch(
     spin_until(lambda: not switch.pressed)
 
 
-def test_newest_command_to_the_switch_wins(
-    operator: Operator, make_node: MakeNode, live_until: SpinUntil
-) -> None:
+def test_newest_command_to_the_switch_wins(operator: Operator, make_node: MakeNode, live_until: Live) -> None:
     operator.type("press")
     operator.type("release")
     switch = Switch(make_node, pressed=True)

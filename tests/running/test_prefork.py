@@ -122,7 +122,7 @@ def test_signals_of_a_program_do_not_wake_supervisord(tmp_path: Path) -> None:
 
 
 def test_edited_module_of_the_checkout_counts_at_the_next_start(tmp_path: Path) -> None:
-    shutil.copytree(ROOT / "deploy" / "running", tmp_path / "deploy" / "supervision")
+    shutil.copytree(ROOT / "deploy" / "running", tmp_path / "deploy" / "running")
     (tmp_path / "deploy" / "__init__.py").touch()
     edit = "from deploy.running import rpc; open('deploy/running/rpc.py', 'a').write('EDITED = True')"
     done = run(tmp_path, f"from deploy.running import rpc; print(rpc.EDITED); {FORKED}", more=edit)
