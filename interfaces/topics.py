@@ -156,7 +156,7 @@ OPERATOR_HEARTBEAT = Topic(
     Bool,
     _qos(1, reliable=False, lifespan=0.5),
     "",
-    ("dead_mans_switch", "console", "operator_console"),
+    ("dead_mans_switch", "console", "operator_page"),
     "`true` while the switch is pressed, at 20 Hz or much faster. Neither `false` nor a heartbeat that "
     "waited in a queue is a sign of life",
     _not_pressed,
@@ -186,7 +186,7 @@ ENGINES = Topic(
     String,
     _EVENTS,
     "",
-    ("operator_watchdog", "dead_mans_switch", "console", "operator_console"),
+    ("operator_watchdog", "dead_mans_switch", "console", "operator_page"),
     f"command `{TURN_OFF}` or `{TURN_ON}`",
     _not_one_of(TURN_OFF, TURN_ON),
     longest_gap=math.inf,

@@ -152,7 +152,7 @@ def variously() -> Schedule:
         PlannedFault(27.8, "kill", "robot_state"),
         PlannedFault(28.6, "kill", "dead_mans_switch"),
         PlannedFault(30.0, "kill", "config_l1"),
-        PlannedFault(31.0, "kill", "operator_console"),
+        PlannedFault(31.0, "kill", "operator_page"),
         PlannedFault(32.0, "kill", "config_l2"),
         PlannedFault(33.0, "kill", "velocity"),
         PlannedFault(34.0, "kill", "config_theta2"),

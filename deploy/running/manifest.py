@@ -13,7 +13,7 @@ GROUP = "arm"
 """The supervisor group of all programs."""
 SENTINEL = "sentinel"
 """The program that supervises the others together with supervisord."""
-PAGE = "operator_console"
+PAGE = "operator_page"
 """The program that serves the operator's page."""
 
 

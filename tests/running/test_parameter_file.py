@@ -17,7 +17,7 @@ PARAMETERS = {
     "kinematics": set(),
     "operator_watchdog": {"lifespan", "sampling", "silence", "strikes", "repeat"},
     "engine_controller": {"max_presence_age", "presence_timeout", "repeat"},
-    "operator_console": {"port", "address", "names", "certificate", "key"},
+    "operator_page": {"port", "address", "names", "certificate", "key"},
     "sentinel": {"period", "health_timeout", "start_timeout"},
 }
 
@@ -52,7 +52,7 @@ operator_watchdog: {ros__parameters: {strikes: 0}}      operator_watchdog.strike
 config_l1: {ros__parameters: {value: .nan}}             config_l1.value: must be from 0 to 1000, not nan
 dead_mans_switch: {ros__parameters: {pressed: 1}}       dead_mans_switch.pressed: must be true or false, not 1
 dead_mans_switch: {ros__parameters: {scenario: x}}      dead_mans_switch.scenario: is no parameter
-operator_console: {ros__parameters: {address: 1}}       operator_console.address: must be a string, not 1
+operator_page: {ros__parameters: {address: 1}}       operator_page.address: must be a string, not 1
 /**: {ros__parameters: {silense: 2.0}}                  /**.silense: is no parameter
 /**: {ros__parameters: {repeat: 0.03}}                  /**.repeat of operator_watchdog: must be from
 /**: {ros__parameters: {repeat: 0.5}}                   /**.repeat of engine_controller: must be from

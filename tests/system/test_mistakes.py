@@ -63,8 +63,8 @@ def test_a_page_that_cannot_be_served_is_reported_before_the_start(
     site: Site, tmp_path: Path, page: str, complaint: str
 ) -> None:
     file = tmp_path / "mine.yaml"
-    file.write_text(f"operator_console: {{ros__parameters: {page}}}")
-    expected = f"{file}: operator_console: {complaint.format(folder=tmp_path)}"
+    file.write_text(f"operator_page: {{ros__parameters: {page}}}")
+    expected = f"{file}: operator_page: {complaint.format(folder=tmp_path)}"
     assert site.do("start", STEADY, str(file)) == (1, expected)
     assert not site.run.exists()
 

@@ -34,7 +34,7 @@ SECURITY_HEADERS = {
 
 WRONG_HOST = (
     b"This is no address of the page. Open the one that the terminal shows.\n"
-    b"The parameter `names` of operator_console adds names of this machine.\n"
+    b"The parameter `names` of operator_page adds names of this machine.\n"
 )
 _HOST = re.compile(r"([^:]+)(:[0-9]+)?")
 

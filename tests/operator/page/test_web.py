@@ -16,7 +16,7 @@ def port_of(web: str, namespace: str = "", user_file: str = "") -> Any:
         patch.setenv("WEB", web)
         patch.setenv(NAMESPACE, namespace)
         given = parameters.of_system("demo", user_file)
-    return given.get(f"{namespace}/operator_console", {}).get(KEY)
+    return given.get(f"{namespace}/operator_page", {}).get(KEY)
 
 
 @pytest.mark.parametrize(
@@ -36,7 +36,7 @@ def test_other_values_are_an_error(web: str) -> None:
 
 def test_web_wins_over_the_parameter_file(tmp_path: Path) -> None:
     file = tmp_path / "parameters.yaml"
-    file.write_text("operator_console: {ros__parameters: {port: 9000, names: arm.example}}")
+    file.write_text("operator_page: {ros__parameters: {port: 9000, names: arm.example}}")
 
     assert port_of("", user_file=str(file)) == {"port": 9000, "names": "arm.example"}
     assert port_of("8000", user_file=str(file)) == {"port": 8000, "names": "arm.example"}
@@ -48,7 +48,7 @@ def test_files_of_the_page_are_beside_the_parameter_file(
     loaded: list[tuple[str, ...]] = []
     monkeypatch.setattr(parameters, "tls", lambda *given: loaded.append(given))
     file = tmp_path / "parameters.yaml"
-    file.write_text("operator_console: {ros__parameters: {certificate: arm.pem, key: /etc/arm.key}}")
+    file.write_text("operator_page: {ros__parameters: {certificate: arm.pem, key: /etc/arm.key}}")
 
     started_with = port_of("", user_file=str(file))
 

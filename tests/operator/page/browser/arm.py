@@ -39,7 +39,7 @@ class Arm:
         page = {"port": self.port} | page
         parameters = run.with_suffix(".yaml")
         lines = "".join(f"\n    {name}: {value}" for name, value in page.items())
-        parameters.write_text(f"operator_console:\n  ros__parameters:{lines}\n")
+        parameters.write_text(f"operator_page:\n  ros__parameters:{lines}\n")
         within = ["ip", "netns", "exec", namespace] if namespace else []
         launcher = [self.site.python, "-m", "deploy.commands.launcher"]
         code, printed = self.site.do_command(*within, *launcher, "start", STEADY, str(parameters))

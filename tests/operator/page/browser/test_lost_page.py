@@ -65,14 +65,14 @@ def test_suspended_browser_releases_and_resumes_released(arm: Arm, own_browser: 
 
 def test_killed_console_releases_and_comes_back_released(arm: Arm, hand: HandOnPage) -> None:
     hold_with_engines_on(arm, hand)
-    process = arm.site.members["operator_console"]
+    process = arm.site.members["operator_page"]
     page = hand.page.get_attribute("html", "data-page")
     os.kill(process, signal.SIGKILL)
     killed = time.time()
     hand.page.wait_for_selector(f"html[data-connection=live]:not([data-page='{page}'])")
     hand.await_state("released")
     arm.record.silence_after(killed, time.time() - killed + 0.5)
-    assert arm.site.members["operator_console"] != process
+    assert arm.site.members["operator_page"] != process
     hand.up()
     hand.hold()  # the open page finds the new process
     arm.record.await_beats(time.time())
@@ -80,7 +80,7 @@ def test_killed_console_releases_and_comes_back_released(arm: Arm, hand: HandOnP
 
 def test_stopped_console_releases_and_resumes_released(arm: Arm, hand: HandOnPage) -> None:
     hold_with_engines_on(arm, hand)
-    process = arm.site.members["operator_console"]
+    process = arm.site.members["operator_page"]
     arm.record.await_beats(time.time())
     os.kill(process, signal.SIGSTOP)
     try:

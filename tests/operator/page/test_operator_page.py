@@ -16,7 +16,7 @@ from std_msgs.msg import Bool, String
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
-from deploy.operator import operator_page as operator_console
+from deploy.operator import operator_page as operator_page
 from deploy.operator import remote
 from deploy.operator.hand import Hand
 from deploy.operator.page.state import RESTARTED
@@ -82,7 +82,7 @@ class World:
         with socket.create_server(("127.0.0.1", 0)) as free:
             port = free.getsockname()[1]
         overrides = {"port": port, "settings": str(folder)} | options
-        self.console = self._service(make_node, "operator_console", operator_console.wire, **overrides)
+        self.console = self._service(make_node, "operator_page", operator_page.wire, **overrides)
         self.switch = self._service(make_node, "dead_mans_switch", dead_mans_switch.wire, rate=20.0)
         self.l1 = self._service(
             make_node, "config_l1", lambda node: config_publisher.wire(node, CONFIGURATION["l1"])
@@ -399,7 +399,7 @@ def test_input_outside_the_protocol_is_counted_in_the_health(
 
 
 def test_topics_are_observed_only_while_a_page_is_open(world: World, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(operator_console, "LINGER", 0.2)
+    monkeypatch.setattr(operator_page, "LINGER", 0.2)
 
     def observed() -> set[str]:
         return {each.topic_name for each in world.console.subscriptions}
