@@ -16,14 +16,15 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from deploy.chaos import plan, record
+from deploy.chaos import plan
 from deploy.chaos.arm import file_suffix
 from deploy.chaos.cost import Cost
-from deploy.chaos.findings import HOLDS, count, overall
-from deploy.chaos.page import page, verdict
-from deploy.chaos.pictures import framed, timeline
-from deploy.chaos.promises import CHECKERS, overloads
-from deploy.chaos.report import text
+from deploy.promises import observations as record
+from deploy.promises.charts import framed, timeline
+from deploy.promises.findings import HOLDS, count, overall
+from deploy.promises.html_report import page, verdict
+from deploy.promises.promises import CHECKERS, overloads
+from deploy.promises.text_report import text
 from deploy.running import interruption, processes
 from deploy.running.system import DeploymentError, System, make_directory, set_middleware
 

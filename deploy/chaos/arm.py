@@ -7,9 +7,9 @@ import time
 from collections.abc import Iterable
 from contextlib import suppress
 
-from deploy.chaos.babbler import BABBLER
 from deploy.chaos.clock import Clock
 from deploy.chaos.overlaps import Overlaps
+from deploy.promises.marks import BABBLER
 from deploy.running import processes
 from deploy.running.system import DeploymentError, System
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import os
 import random
-import struct
 import sys
 import time
 from collections.abc import Iterator
@@ -24,34 +23,14 @@ from rclpy.serialization import serialize_message
 from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import Bool, Float64, Header, String
 
+from deploy.promises.marks import GARBAGE, TEXT, nan
 from deploy.running.system import namespace_of
 from interfaces import topics
 
-BABBLER = "babbler"
-"""The program name of a babbler's process, which is neither a program of the arm nor supervisord."""
 RATES = {"flood": 10_000.0, "babble": 200.0, "pretend": 2.0}  # Hz; of babble, over all topics
 PRETENDED_AGE = 2.0  # s of a presence: too old for `turn_on`, young enough to leave the engines on
 
-TEXT = "babble"
-_CDR_TEXT = struct.pack("<I", len(TEXT) + 1) + TEXT.encode() + b"\0"  # the whole string, not a part of one
-_NANS = {
-    topic.name: struct.pack("<Q", 0x7FF8_BAB1_EBAB_1E00 + number)
-    for number, topic in enumerate(topics.CONTRACT)
-}
-_GARBAGE = b"\x00\xba\xbb\x1e"
-"""The first bytes of an unreadable message after the CDR header: as a bool false, as a length too big."""
 _INVALID_STAMPS = (Time(sec=0), Time(sec=2**31 - 1))  # of a presence: too old, and in the future
-
-
-def nan(topic: topics.Topic) -> float:
-    """Return a NaN that marks a topic. Arithmetic keeps the mark, so each topic has another one."""
-    number: float = struct.unpack("<d", _NANS[topic.name])[0]
-    return number
-
-
-def is_babble(topic: topics.Topic, data: bytes) -> bool:
-    """Return whether a babbler wrote this serialized message on a topic."""
-    return data[4:8] == _GARBAGE or _NANS[topic.name] in data or _CDR_TEXT in data
 
 
 def nonsense(topic: topics.Topic, rng: random.Random) -> bytes:
@@ -61,7 +40,7 @@ def nonsense(topic: topics.Topic, rng: random.Random) -> bytes:
         return bytes(serialize_message(message))
     # DDS checks the header. The rest is too short for a number, even padded to 4 bytes.
     tail = b"" if topic.type is Float64 else rng.randbytes(rng.randrange(64))
-    return b"\x00\x01\x00\x00" + _GARBAGE + tail
+    return b"\x00\x01\x00\x00" + GARBAGE + tail
 
 
 def _bad_message(topic: topics.Topic, rng: random.Random) -> Any:

@@ -16,16 +16,13 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-STEP = "step_clock"
-"""The kind of fault."""
 LARGEST = 3600.0  # s; of a step
-SPREAD = 1.0  # s within which a step reaches all processes
 PACKAGE = "libfaketime"  # of Debian and Ubuntu
 LIBRARY = Path(f"/usr/lib/{platform.machine()}-linux-gnu/faketime/libfaketimeMT.so.1")
 
 
 def missing() -> str:
-    """Return what this machine lacks for :data:`STEP`; empty if nothing."""
+    """Return what this machine lacks for a step; empty if nothing."""
     return "" if LIBRARY.exists() else f"there is no {PACKAGE} (apt-get install {PACKAGE})"
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from deploy.chaos.arm import Arm
-from deploy.chaos.babbler import BABBLER
+from deploy.promises.marks import BABBLER
 
 
 @dataclass(frozen=True)

@@ -16,8 +16,9 @@ import yaml
 
 from deploy.chaos import clock
 from deploy.chaos.arm import Arm
-from deploy.chaos.babbler import BABBLER
-from deploy.chaos.history import ALL, NO_TARGET, PROGRAMS
+from deploy.promises import marks
+from deploy.promises.history import ALL, NO_TARGET, PROGRAMS
+from deploy.promises.marks import BABBLER
 from deploy.running import parameter_file, processes
 from deploy.running.system import KEY
 
@@ -194,6 +195,6 @@ FAULT_KINDS: dict[str, FaultKind] = {
     "full_disk": FaultKind(full_disk, (NO_TARGET,), (3.0, 10.0)),
     "flood": FaultKind(_babbler("flood"), (NO_TARGET,), (3.0, 6.0)),
     "babble": FaultKind(_babbler("babble"), (NO_TARGET,), (3.0, 10.0)),
-    **({} if clock.missing() else {clock.STEP: FaultKind(step_clock, (NO_TARGET,))}),
+    **({} if clock.missing() else {marks.STEP: FaultKind(step_clock, (NO_TARGET,))}),
 }
 """All faults within one host that this machine can have; `partition` has those between hosts."""

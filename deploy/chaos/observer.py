@@ -26,9 +26,9 @@ from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 
-from deploy.chaos.history import LOSS, NO_TARGET, OVERLOAD, InjectedFault, Life
 from deploy.chaos.process_monitor import SCAN_PERIOD, ProcessMonitor, Rounds
-from deploy.chaos.record import FAULTS, PROCESSES
+from deploy.promises.history import LOSS, NO_TARGET, OVERLOAD, InjectedFault, Life
+from deploy.promises.observations import FAULTS, PROCESSES
 from deploy.running.recorder import Recorder, clocks, record
 from reactive_node import ReactiveNode
 

@@ -18,10 +18,10 @@ from typing import Any
 
 from deploy.chaos.arm import Arm
 from deploy.chaos.faults import FAULT_KINDS, FaultKind, Undo
-from deploy.chaos.history import OPERATOR
-from deploy.chaos.history import SWITCH as PROGRAM
 from deploy.chaos.schedule import PlannedFault
 from deploy.chaos.testbed import SCENARIO, Testbed
+from deploy.promises.history import OPERATOR
+from deploy.promises.history import SWITCH as PROGRAM
 from deploy.running import manifest, processes
 from deploy.running.system import System
 

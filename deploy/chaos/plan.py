@@ -11,9 +11,10 @@ from typing import NamedTuple
 
 from deploy.chaos import clock, partition, schedule, schedule_file
 from deploy.chaos.faults import FAULT_KINDS
-from deploy.chaos.history import PROGRAMS
 from deploy.chaos.schedule import Schedule
 from deploy.chaos.testbed import SCENARIO, Testbed, sources
+from deploy.promises import marks
+from deploy.promises.history import PROGRAMS
 from deploy.running.system import DeploymentError
 from reactive_node.domains import DOMAINS
 
@@ -35,7 +36,7 @@ class Plan(NamedTuple):
     @property
     def steps_clock(self) -> bool:
         """Whether the faults include a step of the time of day."""
-        return any(each.kind == clock.STEP for planned in self.schedules for each in planned)
+        return any(each.kind == marks.STEP for planned in self.schedules for each in planned)
 
 
 def parse(arguments: Sequence[str]) -> argparse.Namespace:
@@ -49,8 +50,8 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     add("--minutes", type=number(0.01, 10_000), default=5.0, help="length of the random faults, default 5")
     add("--seed", help="the same seed gives the same random faults")
     add("--every", type=number(0.01, 3600), default=5.0, help="seconds between two random faults, default 5")
-    kinds = tuple(dict.fromkeys((*FAULT_KINDS, clock.STEP)))
-    of_kinds = f"separated by commas, of {', '.join(kinds)}; {clock.STEP} needs {clock.PACKAGE}"
+    kinds = tuple(dict.fromkeys((*FAULT_KINDS, marks.STEP)))
+    of_kinds = f"separated by commas, of {', '.join(kinds)}; {marks.STEP} needs {clock.PACKAGE}"
     add("--faults", type=names(kinds), default=tuple(FAULT_KINDS), help=of_kinds)
     add("--targets", type=names(PROGRAMS), default=(), help=f"separated by commas, of {', '.join(PROGRAMS)}")
     scenarios = f"instead of random faults: {', '.join(NAMED)}"
@@ -118,8 +119,8 @@ def _scheduled(path: Path) -> Plan:
 
 
 def _require_clock(kinds: Collection[str]) -> None:
-    if clock.STEP in kinds and (reason := clock.missing()):
-        raise DeploymentError(f"{clock.STEP} is not possible on this machine: {reason}")
+    if marks.STEP in kinds and (reason := clock.missing()):
+        raise DeploymentError(f"{marks.STEP} is not possible on this machine: {reason}")
 
 
 def _fleet(arms: int) -> Callable[..., Testbed]:

@@ -10,8 +10,8 @@ import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from deploy.chaos.babbler import BABBLER
-from deploy.chaos.history import Life
+from deploy.promises.history import Life
+from deploy.promises.marks import BABBLER
 from deploy.running import processes
 
 STALL = 0.1  # s; a round that takes longer shows that the machine is overloaded

@@ -8,9 +8,9 @@ import random
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from deploy.chaos.clock import STEP
 from deploy.chaos.faults import FAULT_KINDS
-from deploy.chaos.history import ALL, NO_TARGET, PROGRAMS
+from deploy.promises.history import ALL, NO_TARGET, PROGRAMS
+from deploy.promises.marks import STEP
 
 DAY = 45.0  # s after which the operator's scenario repeats
 AWAKE = 30.0  # s of each day in which the operator holds the switch

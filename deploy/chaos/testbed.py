@@ -31,7 +31,8 @@ import yaml
 from deploy.chaos import clock
 from deploy.chaos.arm import Arm, file_suffix
 from deploy.chaos.faults import FAULT_KINDS, INJECTED, Undo
-from deploy.chaos.history import (
+from deploy.chaos.schedule import AWAKE, DAY, FIRST_FAULT, PlannedFault, Schedule
+from deploy.promises.history import (
     LOSS,
     NO_TARGET,
     OPERATOR,
@@ -41,7 +42,6 @@ from deploy.chaos.history import (
     InjectedFault,
     target_name,
 )
-from deploy.chaos.schedule import AWAKE, DAY, FIRST_FAULT, PlannedFault, Schedule
 from deploy.running import interruption, processes
 from deploy.running.system import NAMESPACE, DeploymentError, System, scenario_parameters
 from interfaces import topics

@@ -4,7 +4,11 @@ from __future__ import annotations
 
 REACTIVE_NODE = "interfaces/reactive_node/src/reactive_node"
 _NODE_TESTS = "interfaces/reactive_node/tests"
-_CHECKERS = ("tests/chaos/test_findings.py", "tests/chaos/test_bounds.py", "tests/chaos/test_checkers.py")
+_CHECKERS = (
+    "tests/promises/test_findings.py",
+    "tests/promises/test_bounds.py",
+    "tests/promises/test_checkers.py",
+)
 
 GUARDS: dict[str, tuple[str, ...]] = {
     "services/operator_watchdog.py": (
@@ -75,10 +79,10 @@ GUARDS: dict[str, tuple[str, ...]] = {
         "tests/running/test_sentinel_wiring.py",
         "tests/component/test_readme.py",
     ),
-    "deploy/chaos/history.py": ("tests/chaos/test_history.py", *_CHECKERS),
-    "deploy/chaos/promises.py": ("tests/chaos/test_checkers.py", "tests/chaos/test_reports.py"),
-    "deploy/chaos/safety.py": _CHECKERS,
-    "deploy/chaos/liveness.py": _CHECKERS,
+    "deploy/promises/history.py": ("tests/promises/test_history.py", *_CHECKERS),
+    "deploy/promises/promises.py": ("tests/promises/test_checkers.py", "tests/promises/test_reports.py"),
+    "deploy/promises/safety.py": _CHECKERS,
+    "deploy/promises/liveness.py": _CHECKERS,
 }
 """Paths of modules, and of the tests that run for each mutant of the module, quick ones first."""
 

@@ -7,7 +7,7 @@ from rclpy.serialization import deserialize_message, serialize_message
 from rclpy_simulation.host import SECOND
 from std_msgs.msg import Header, String
 
-from deploy.chaos.babbler import is_babble
+from deploy.promises.marks import is_babble
 from deploy.replay.lives import Latch, begins_away, latch, lives
 from deploy.replay.record import Message, Record, text
 from interfaces.robot_model import BASE, frame_id

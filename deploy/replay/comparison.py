@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 from rclpy.serialization import deserialize_message
 from rclpy_simulation.host import SECOND
 
-from deploy.chaos.record import time_sent
+from deploy.promises.observations import time_sent
 from deploy.replay.record import Message
 from interfaces import topics
 from interfaces.topics import Topic

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from rclpy.serialization import deserialize_message
 from rclpy_simulation.host import SECOND
 
-from deploy.chaos.record import FAULTS, PROCESSES
+from deploy.promises.observations import FAULTS, PROCESSES
 from deploy.replay.record import Message, Record, text
 from interfaces.service.health import reported_parameters
 from interfaces.service.parameters import declarations

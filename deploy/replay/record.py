@@ -12,7 +12,7 @@ from mcap_files import McapFile, UnreadableError
 from rclpy.serialization import deserialize_message
 from rclpy_simulation.host import SECOND
 
-from deploy.chaos.record import FAULTS, PROCESSES, clock_offsets, read_event, time_sent
+from deploy.promises.observations import FAULTS, PROCESSES, clock_offsets, read_event, time_sent
 from deploy.running.recorder import METADATA
 from deploy.running.system import DeploymentError
 from interfaces import topics

@@ -14,12 +14,12 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from deploy.chaos import schedule_file
-from deploy.chaos.findings import count, how_often
-from deploy.chaos.history import STUCK_DRIVE
-from deploy.chaos.page import page, verdict
 from deploy.chaos.plan import names, number
-from deploy.chaos.report import text
 from deploy.chaos.schedule_file import Shift
+from deploy.promises.findings import count, how_often
+from deploy.promises.history import STUCK_DRIVE
+from deploy.promises.html_report import page, verdict
+from deploy.promises.text_report import text
 from deploy.running import interruption, processes
 from deploy.running.system import DeploymentError, make_directory
 from deploy.simulation import plan, systematic

@@ -12,8 +12,8 @@ import yaml
 from rclpy_simulation import Delay, Network, Process, Simulation
 from rclpy_simulation.host import BOOT, SECOND
 
-from deploy.chaos.history import SWITCH, Life
 from deploy.chaos.overlaps import Overlaps
+from deploy.promises.history import SWITCH, Life
 from deploy.running import manifest
 from deploy.running.processes import MARK
 from deploy.running.system import SERVICE_GRACE, SETTINGS, DeploymentError, scenario_parameters

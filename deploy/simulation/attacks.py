@@ -19,8 +19,9 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
 
-from deploy.chaos.clock import STEP
-from deploy.chaos.history import (
+from deploy.chaos.schedule import PlannedFault
+from deploy.chaos.schedule_file import Shift
+from deploy.promises.history import (
     ALL,
     BAD_LINE,
     CONTROLLER,
@@ -39,9 +40,8 @@ from deploy.chaos.history import (
     gaps,
     last_sent,
 )
-from deploy.chaos.safety import OFF_WITHIN, SAMPLING, STRIKE, STRIKES, running
-from deploy.chaos.schedule import PlannedFault
-from deploy.chaos.schedule_file import Shift
+from deploy.promises.marks import STEP
+from deploy.promises.safety import OFF_WITHIN, SAMPLING, STRIKE, STRIKES, running
 from interfaces import topics
 
 FAIL_SAFES = ("F1", "F2", "F3")

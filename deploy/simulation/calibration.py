@@ -22,10 +22,10 @@ from mcap_files import McapFile
 from rclpy.serialization import deserialize_message
 from rclpy_simulation import Delay
 
-from deploy.chaos import record
-from deploy.chaos.findings import percentile
-from deploy.chaos.history import SOURCES, History, Life
-from deploy.chaos.promises import CHECKERS
+from deploy.promises import observations as record
+from deploy.promises.findings import percentile
+from deploy.promises.history import SOURCES, History, Life
+from deploy.promises.promises import CHECKERS
 from deploy.running.system import DeploymentError
 
 PATH = Path(__file__).with_name("calibration.json")

@@ -11,7 +11,8 @@ from rclpy_simulation import Delay, Process
 
 from deploy.chaos import clock
 from deploy.chaos.faults import PARAMETERS, Undo
-from deploy.chaos.history import ALL, FALSE_PRESENCE, HOLD, NO_TARGET, OPERATOR, PARTITION, STUCK_DRIVE
+from deploy.promises import marks
+from deploy.promises.history import ALL, FALSE_PRESENCE, HOLD, NO_TARGET, OPERATOR, PARTITION, STUCK_DRIVE
 from deploy.running.system import KEY
 from deploy.simulation import people
 from deploy.simulation.arm import CONTROL, NAMES, ROBOT, Arm
@@ -101,7 +102,7 @@ def _step_clock(arm: Arm, target: str, duration: float) -> None:
     """Set the time of day of both hosts, one after the other."""
     seconds = arm.simulation.random.uniform(-clock.LARGEST, clock.LARGEST)
     arm.simulation.host(ROBOT).step(seconds)
-    pause = arm.simulation.random.uniform(0.0, clock.SPREAD)
+    pause = arm.simulation.random.uniform(0.0, marks.SPREAD)
     arm.simulation.after(pause, lambda: arm.simulation.host(CONTROL).step(seconds))
 
 
@@ -157,7 +158,7 @@ FAULT_KINDS: dict[str, FaultKind] = {
     "crash_loop": FaultKind(_crash_loop, tuple(each for each in PARAMETERS if each in NAMES), (3.0, 6.0)),
     "flood": FaultKind(_stranger(people.flood), (NO_TARGET,), (3.0, 6.0)),
     "babble": FaultKind(_stranger(people.babble), (NO_TARGET,), (3.0, 10.0)),
-    clock.STEP: FaultKind(_step_clock, (NO_TARGET,)),
+    marks.STEP: FaultKind(_step_clock, (NO_TARGET,)),
     "skew_clock": FaultKind(_skew_clock, (OPERATOR,)),
     "drift_clock": FaultKind(_drift_clock, (NO_TARGET,), (5.0, 60.0)),
     PARTITION: FaultKind(_partition, (OPERATOR,), (0.5, 20.0)),

@@ -8,9 +8,9 @@ from typing import Any
 
 from rclpy_simulation import Simulation
 
-from deploy.chaos.babbler import is_babble
-from deploy.chaos.history import History, InjectedFault, Life, Sample
-from deploy.chaos.record import values
+from deploy.promises.history import History, InjectedFault, Life, Sample
+from deploy.promises.marks import is_babble
+from deploy.promises.observations import values
 from interfaces import topics
 
 RECEPTION = 0.0005  # s after sending

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from deploy.chaos.findings import Finding
-from deploy.chaos.history import OPERATOR, PROGRAMS, SILENCE, History, InjectedFault
-from deploy.chaos.promises import CHECKERS
 from deploy.chaos.schedule import PlannedFault
 from deploy.chaos.schedule_file import Shift
+from deploy.promises.findings import Finding
+from deploy.promises.history import OPERATOR, PROGRAMS, SILENCE, History, InjectedFault
+from deploy.promises.promises import CHECKERS
 from deploy.running.system import DeploymentError
 from deploy.simulation import people
 from deploy.simulation.arm import NAMES, ROBOT, Arm, simulated_arm

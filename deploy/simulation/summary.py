@@ -8,8 +8,8 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
-from deploy.chaos.findings import Evidence, Finding, percentile
-from deploy.chaos.promises import CHECKERS
+from deploy.promises.findings import Evidence, Finding, percentile
+from deploy.promises.promises import CHECKERS
 from deploy.simulation.shift import Outcome
 
 

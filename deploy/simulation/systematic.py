@@ -16,9 +16,9 @@ from pathlib import Path
 from rclpy_simulation import Process
 
 from deploy.chaos import testbed
-from deploy.chaos.history import CONTROLLER, SWITCH, WATCHDOG
 from deploy.chaos.schedule import AWAKE, DAY, FIRST_FAULT, SETTLE, PlannedFault
 from deploy.chaos.schedule_file import Shift
+from deploy.promises.history import CONTROLLER, SWITCH, WATCHDOG
 from deploy.simulation import people
 from deploy.simulation.arm import NAMES, simulated_arm
 

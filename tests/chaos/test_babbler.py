@@ -14,7 +14,8 @@ from rclpy.serialization import deserialize_message, serialize_message
 from std_msgs.msg import Header
 
 from deploy.chaos import babbler
-from deploy.chaos.babbler import TEXT, is_babble, nan, nonsense
+from deploy.chaos.babbler import nonsense
+from deploy.promises.marks import TEXT, is_babble, nan
 from interfaces import topics
 from services import engine_controller
 from services.kinematics import forward_kinematics

@@ -16,7 +16,7 @@ import pytest
 from deploy.chaos import clock
 from deploy.chaos.clock import LARGEST, Clock
 from deploy.chaos.faults import INJECTED
-from deploy.chaos.record import time_sent
+from deploy.promises.observations import time_sent
 
 needs_library = pytest.mark.skipif(bool(clock.missing()), reason=f"platform: {clock.missing()}")
 

@@ -13,7 +13,7 @@ import pytest
 from deploy.chaos.arm import Arm
 from deploy.chaos.cost import Cost
 from deploy.chaos.faults import FAULT_KINDS
-from deploy.chaos.history import ALL
+from deploy.promises.history import ALL
 from deploy.running import processes
 from deploy.running.system import System
 

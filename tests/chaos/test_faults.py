@@ -21,10 +21,10 @@ from std_msgs.msg import Float64
 
 from deploy.chaos import process_monitor
 from deploy.chaos.arm import Arm
-from deploy.chaos.babbler import BABBLER
 from deploy.chaos.faults import FAULT_KINDS, PARAMETERS, Undo
-from deploy.chaos.history import ALL, NO_TARGET, Life
 from deploy.chaos.process_monitor import ProcessMonitor, Rounds
+from deploy.promises.history import ALL, NO_TARGET, Life
+from deploy.promises.marks import BABBLER
 from deploy.running import processes
 from deploy.running.system import ALL as ALL_NODES
 from deploy.running.system import KEY, NAMESPACE, System

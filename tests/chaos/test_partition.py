@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from deploy.chaos.findings import HOLDS
-from deploy.chaos.history import History, InjectedFault, between
 from deploy.chaos.partition import missing, namespaces
-from deploy.chaos.promises import CHECKERS
+from deploy.promises.findings import HOLDS
+from deploy.promises.history import History, InjectedFault, between
+from deploy.promises.promises import CHECKERS
 from deploy.running import processes
 from interfaces.topics import ENGINES_STATE, OFF, ON, OPERATOR_HEARTBEAT
 

@@ -8,8 +8,8 @@ import pytest
 
 from deploy.chaos import schedule
 from deploy.chaos.faults import FAULT_KINDS
-from deploy.chaos.history import PROGRAMS
-from deploy.chaos.liveness import MEDIAN
+from deploy.promises.history import PROGRAMS
+from deploy.promises.liveness import MEDIAN
 
 
 def test_only_the_same_seed_gives_the_same_schedule() -> None:

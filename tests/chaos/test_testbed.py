@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
-from deploy.chaos.history import OUTPUTS
 from deploy.chaos.testbed import START_TIMEOUT, Testbed
+from deploy.promises.history import OUTPUTS
 from deploy.running.system import DeploymentError
 
 ARMS = tuple(f"/arm{number}" for number in range(1, 31))

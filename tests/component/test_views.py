@@ -9,7 +9,7 @@ from typing import Any
 
 import yaml
 
-from deploy.chaos.record import FAULTS
+from deploy.promises.observations import FAULTS
 from interfaces import robot_model, topics
 
 VIEWS = Path(__file__).parents[2] / "deploy" / "views"

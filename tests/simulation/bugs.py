@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import NamedTuple
 from unittest import mock
 
-from deploy.chaos.history import CONTROLLER, WATCHDOG
+from deploy.promises.history import CONTROLLER, WATCHDOG
 from deploy.running.manifest import Program
 from deploy.running.processes import ROOT
 from deploy.simulation import arm, plan

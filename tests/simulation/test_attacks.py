@@ -7,9 +7,9 @@ import random
 
 import pytest
 
-from deploy.chaos.history import CONTROLLER, FALSE_PRESENCE, STUCK_DRIVE
 from deploy.chaos.schedule import PlannedFault
 from deploy.chaos.schedule_file import Shift
+from deploy.promises.history import CONTROLLER, FALSE_PRESENCE, STUCK_DRIVE
 from deploy.simulation import __main__ as simulate
 from deploy.simulation import attacks, people, plan
 from deploy.simulation.attacks import FAIL_SAFES, JUDGED

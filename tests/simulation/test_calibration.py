@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from deploy.chaos import schedule
-from deploy.chaos.findings import percentile
 from deploy.chaos.schedule_file import Shift
 from deploy.chaos.testbed import SCENARIO
+from deploy.promises.findings import percentile
 from deploy.simulation.arm import NAMES
 from deploy.simulation.calibration import load
 from deploy.simulation.shift import play

@@ -11,7 +11,7 @@ import rclpy
 from rclpy_simulation import Network, Simulation
 from std_msgs.msg import Bool
 
-from deploy.chaos.record import values
+from deploy.promises.observations import values
 from deploy.simulation.machine import simulated_services
 from interfaces import topics
 

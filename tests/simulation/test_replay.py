@@ -24,9 +24,9 @@ from rclpy.serialization import deserialize_message, serialize_message
 from std_msgs.msg import Float64, Header, String
 from tf2_msgs.msg import TFMessage
 
-from deploy.chaos.clock import STEP
-from deploy.chaos.history import NO_TARGET, InjectedFault
-from deploy.chaos.record import FAULTS
+from deploy.promises.history import NO_TARGET, InjectedFault
+from deploy.promises.marks import STEP
+from deploy.promises.observations import FAULTS
 from deploy.replay import chains
 from deploy.replay.comparison import compare
 from deploy.replay.record import Message, Record, load

@@ -14,10 +14,10 @@ import yaml
 from rclpy_simulation.host import BOOT, SECOND
 
 from deploy.chaos import schedule
-from deploy.chaos.history import ALL, NO_TARGET, OPERATOR
 from deploy.chaos.schedule import AWAKE, DAY, PlannedFault
 from deploy.chaos.schedule_file import Shift
 from deploy.chaos.testbed import SCENARIO, sources
+from deploy.promises.history import ALL, NO_TARGET, OPERATOR
 from deploy.running.manifest import Program
 from deploy.running.processes import ROOT
 from deploy.simulation import arm, people, plan

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import pytest
 
-from deploy.chaos.findings import HOLDS, UNKNOWN, VIOLATED, percentile
-from deploy.chaos.history import (
+from deploy.promises.findings import HOLDS, UNKNOWN, VIOLATED, percentile
+from deploy.promises.history import (
     ALL,
     DEPENDENTS,
     NEEDED_AT_START,
@@ -20,8 +20,8 @@ from deploy.chaos.history import (
     Life,
     Sample,
 )
-from deploy.chaos.promises import CHECKERS, meaning
-from deploy.chaos.report import text
+from deploy.promises.promises import CHECKERS, meaning
+from deploy.promises.text_report import text
 from interfaces import topics
 from interfaces.topics import OFF, ON, TURN_OFF
 from services.kinematics import forward_kinematics

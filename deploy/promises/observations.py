@@ -13,8 +13,7 @@ from mcap_files import McapFile, UnreadableError
 from rclpy.serialization import deserialize_message
 from std_msgs.msg import String
 
-from deploy.chaos.babbler import is_babble
-from deploy.chaos.history import (
+from deploy.promises.history import (
     BAD_LINE,
     LOSS,
     NO_TARGET,
@@ -27,6 +26,7 @@ from deploy.chaos.history import (
     Sample,
     merged,
 )
+from deploy.promises.marks import is_babble
 from deploy.running.recorder import METADATA
 from deploy.running.system import DeploymentError
 from interfaces import topics

@@ -7,11 +7,11 @@ import subprocess
 import sys
 from pathlib import Path
 
-from deploy.chaos import record
 from deploy.chaos.arm import file_suffix
-from deploy.chaos.findings import Finding
-from deploy.chaos.history import History
-from deploy.chaos.promises import CHECKERS
+from deploy.promises import observations as record
+from deploy.promises.findings import Finding
+from deploy.promises.history import History
+from deploy.promises.promises import CHECKERS
 from deploy.running import processes
 
 TIMEOUT = 150.0  # s

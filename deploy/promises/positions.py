@@ -7,7 +7,7 @@ import math
 from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
 
-from deploy.chaos.history import SOURCES, History, Sample, last_sent
+from deploy.promises.history import SOURCES, History, Sample, last_sent
 from interfaces import topics
 
 ROUNDING = 1e-8  # m

@@ -8,9 +8,9 @@ from typing import Any
 
 import pytest
 
-from deploy.chaos.findings import HOLDS, VIOLATED
-from deploy.chaos.history import NO_TARGET, History, InjectedFault, Life, between
-from deploy.chaos.promises import CHECKERS
+from deploy.promises.findings import HOLDS, VIOLATED
+from deploy.promises.history import NO_TARGET, History, InjectedFault, Life, between
+from deploy.promises.promises import CHECKERS
 from interfaces.topics import CONFIGURATION, OFF, ON, TURN_OFF
 from services.kinematics import forward_kinematics
 

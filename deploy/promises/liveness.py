@@ -7,8 +7,8 @@ import math
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterator
 
-from deploy.chaos.findings import Evidence, Finding, count, percentile
-from deploy.chaos.history import (
+from deploy.promises.findings import Evidence, Finding, count, percentile
+from deploy.promises.history import (
     ALL,
     DEPENDENTS,
     KINEMATICS,
@@ -23,7 +23,7 @@ from deploy.chaos.history import (
     InjectedFault,
     between,
 )
-from deploy.chaos.positions import PublishedValues, may_have_missed_values, may_have_reached_only_some
+from deploy.promises.positions import PublishedValues, may_have_missed_values, may_have_reached_only_some
 from interfaces import topics
 
 MEDIAN, SLOWEST = 1.0, 2.0  # s, L1

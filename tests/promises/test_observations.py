@@ -17,9 +17,9 @@ from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 from std_msgs.msg import Bool, Float64, String
 
-from deploy.chaos.clock import STEP
-from deploy.chaos.history import NO_TARGET, InjectedFault, Life
-from deploy.chaos.record import FAULTS, PROCESSES, load, values
+from deploy.promises.history import NO_TARGET, InjectedFault, Life
+from deploy.promises.marks import STEP
+from deploy.promises.observations import FAULTS, PROCESSES, load, values
 from deploy.running import processes
 from deploy.running.recorder import Recorder, qos_profiles
 from interfaces import topics

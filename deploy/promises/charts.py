@@ -10,8 +10,8 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from html import escape
 
-from deploy.chaos.findings import VIOLATED, Finding, percentile
-from deploy.chaos.history import (
+from deploy.promises.findings import VIOLATED, Finding, percentile
+from deploy.promises.history import (
     ALL,
     LOSS,
     NO_TARGET,
@@ -23,7 +23,7 @@ from deploy.chaos.history import (
     Sample,
     target_name,
 )
-from deploy.chaos.safety import running
+from deploy.promises.safety import running
 
 LEFT, ROW, BAR = 150, 26, 14  # px: labels, rows, bars
 PER_SECOND, PER_SECOND_LONG, NARROWEST = 8.0, 3.0, 1000.0  # px of a timeline

@@ -8,9 +8,8 @@ from typing import Any
 
 import pytest
 
-from deploy.chaos.clock import STEP
-from deploy.chaos.findings import Evidence, Finding
-from deploy.chaos.history import (
+from deploy.promises.findings import Evidence, Finding
+from deploy.promises.history import (
     ALL,
     BAD_LINE,
     CONTROLLER,
@@ -27,8 +26,9 @@ from deploy.chaos.history import (
     Life,
     Sample,
 )
-from deploy.chaos.promises import CHECKERS
-from deploy.chaos.safety import PRESENCE_TIMEOUT, SAMPLING, TRANSPORT
+from deploy.promises.marks import STEP
+from deploy.promises.promises import CHECKERS
+from deploy.promises.safety import PRESENCE_TIMEOUT, SAMPLING, TRANSPORT
 from interfaces.topics import ALIVE, DRIVE_TIMEOUT, INCAPACITATED, MISSED, OFF, ON, TURN_OFF, TURN_ON
 
 TOPICS = {

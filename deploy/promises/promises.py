@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from deploy.chaos import liveness, safety
-from deploy.chaos.findings import Finding, count
-from deploy.chaos.history import OVERLOAD, History
+from deploy.promises import liveness, safety
+from deploy.promises.findings import Finding, count
+from deploy.promises.history import OVERLOAD, History
 
 CHECKERS: dict[str, Callable[[History], Finding]] = {
     "S1": safety.engines_off_in_time,

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from deploy.chaos.history import (
+from deploy.promises.history import (
     ALL,
     CONDITIONS,
     DEPENDENTS,
@@ -24,7 +24,7 @@ from deploy.chaos.history import (
     merged,
     target_name,
 )
-from deploy.chaos.liveness import STREAMS
+from deploy.promises.liveness import STREAMS
 from deploy.running import processes
 from interfaces import topics
 
@@ -75,8 +75,8 @@ new = [manifest.Program(name, "services.velocity", ()) for name in ("guard", "ac
 programs = (*manifest.programs(), *new)
 manifest.programs = lambda: programs
 
-from deploy.chaos.history import DEPENDENTS, OUTPUTS
-from deploy.chaos.liveness import STREAMS
+from deploy.promises.history import DEPENDENTS, OUTPUTS
+from deploy.promises.liveness import STREAMS
 from deploy.chaos.schedule import everything, kill_each
 
 assert OUTPUTS["dead_mans_switch"] is shared

@@ -8,9 +8,8 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Iterator, Sequence
 from operator import itemgetter
 
-from deploy.chaos.clock import SPREAD, STEP
-from deploy.chaos.findings import Evidence, Finding, count, how_often
-from deploy.chaos.history import (
+from deploy.promises.findings import Evidence, Finding, count, how_often
+from deploy.promises.history import (
     ALL,
     BAD_LINE,
     CONTROLLER,
@@ -30,7 +29,8 @@ from deploy.chaos.history import (
     last_sent,
     merged,
 )
-from deploy.chaos.positions import LONGEST_PAUSE, PublishedValues, may_have_missed_values
+from deploy.promises.marks import SPREAD, STEP
+from deploy.promises.positions import LONGEST_PAUSE, PublishedValues, may_have_missed_values
 from interfaces import topics
 from interfaces.topics import DRIVE_TIMEOUT, INCAPACITATED, OFF, ON, TURN_OFF, TURN_ON
 

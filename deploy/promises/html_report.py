@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 
-from deploy.chaos.findings import UNKNOWN, VIOLATED, Finding, count, overall
-from deploy.chaos.history import ALL, NO_TARGET, History, InjectedFault, Life, target_name
-from deploy.chaos.liveness import HUNG, MEDIAN, SLOWEST
-from deploy.chaos.pictures import COLORS, STYLE, histograms, timeline
-from deploy.chaos.promises import DURATIONS, meaning
+from deploy.promises.charts import COLORS, STYLE, histograms, timeline
+from deploy.promises.findings import UNKNOWN, VIOLATED, Finding, count, overall
+from deploy.promises.history import ALL, NO_TARGET, History, InjectedFault, Life, target_name
+from deploy.promises.liveness import HUNG, MEDIAN, SLOWEST
+from deploy.promises.promises import DURATIONS, meaning
 
 SHOWN = 10  # pieces of evidence of a promise
 EFFECT = 5.0  # s after a fault in which the end of a process is its effect, unless another fault follows

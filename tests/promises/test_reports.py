@@ -7,12 +7,12 @@ from dataclasses import replace
 from html import unescape
 from xml.etree import ElementTree
 
-from deploy.chaos.findings import Finding, count, how_often
-from deploy.chaos.history import ALL, NO_TARGET, History, InjectedFault
-from deploy.chaos.page import page
-from deploy.chaos.pictures import framed, timeline
-from deploy.chaos.promises import CHECKERS, overloads
-from deploy.chaos.report import text
+from deploy.promises.charts import framed, timeline
+from deploy.promises.findings import Finding, count, how_often
+from deploy.promises.history import ALL, NO_TARGET, History, InjectedFault
+from deploy.promises.html_report import page
+from deploy.promises.promises import CHECKERS, overloads
+from deploy.promises.text_report import text
 
 from .histories import END, faulty, good, killed, silent, with_value
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import pytest
 
-from deploy.chaos.clock import STEP, missing
-from deploy.chaos.findings import HOLDS
-from deploy.chaos.history import PROGRAMS, SILENCE, Sample, between
-from deploy.chaos.promises import CHECKERS
-from deploy.chaos.safety import OFF_WITHIN, TRANSPORT, running
+from deploy.chaos.clock import missing
+from deploy.promises.findings import HOLDS
+from deploy.promises.history import PROGRAMS, SILENCE, Sample, between
+from deploy.promises.marks import STEP
+from deploy.promises.promises import CHECKERS
+from deploy.promises.safety import OFF_WITHIN, TRANSPORT, running
 from interfaces.topics import DRIVE_TIMEOUT, ENGINES, OPERATOR_HEARTBEAT, OPERATOR_PRESENCE
 
 from .experiments import Experiment, experiment

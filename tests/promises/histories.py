@@ -9,7 +9,7 @@ from dataclasses import replace
 from functools import cache
 from typing import Any
 
-from deploy.chaos.history import PROGRAMS, History, InjectedFault, Life, Sample
+from deploy.promises.history import PROGRAMS, History, InjectedFault, Life, Sample
 from interfaces import topics
 from services.kinematics import forward_kinematics
 

@@ -1,0 +1,1 @@
+"""The judge: the history of an arm, the checkers of its promises, and their reports."""
