@@ -79,13 +79,13 @@ stop:
 	@exec $(HOLD) deploy/commands/python.sh deploy.commands.stop "$$PYTHON"
 
 chaos: setup
-	@exec $(HOLD) $(PY) -m deploy.chaos --minutes $(MINUTES) $(if $(SEED),--seed $(SEED)) $(CHAOS)
+	@exec $(HOLD) $(PY) -m deploy.trials.chaos --minutes $(MINUTES) $(if $(SEED),--seed $(SEED)) $(CHAOS)
 
 simulate: setup
-	@RUNTIME=embedded exec $(HOLD) $(PY) -m deploy.simulation --hours $(HOURS) $(if $(SEED),--seed $(SEED)) $(if $(SCHEDULE),--schedule "$(SCHEDULE)") $(SIMULATE)
+	@RUNTIME=embedded exec $(HOLD) $(PY) -m deploy.trials.simulation --hours $(HOURS) $(if $(SEED),--seed $(SEED)) $(if $(SCHEDULE),--schedule "$(SCHEDULE)") $(SIMULATE)
 
 replay: setup
-	@RUNTIME=embedded exec $(HOLD) $(PY) -m deploy.replay $(if $(RECORD),"$(RECORD)") $(REPLAY)
+	@RUNTIME=embedded exec $(HOLD) $(PY) -m deploy.trials.replay $(if $(RECORD),"$(RECORD)") $(REPLAY)
 
 test: setup
 	@$(PY) -m deploy.commands.test $(TESTS)

@@ -26,7 +26,8 @@ ELSEWHERE = (
     "deploy/tools",
     "deploy/package",
     "deploy/benchmarks",
-    "deploy/chaos",
+    "deploy/trials",
+    "deploy/promises",
     "deploy/mutants",
 )
 """Folders that are installed otherwise, or that an installed arm does not need."""

@@ -28,8 +28,8 @@ from deploy.benchmarks.link import (
     WATCHDOG,
     Job,
 )
-from deploy.chaos.cost import proportional_set_size
 from deploy.running import interruption
+from deploy.trials.chaos.cost import proportional_set_size
 from reactive_node.domains import reserved_domain
 
 _SILENCE = 20.0  # s without a report that an alternative may take

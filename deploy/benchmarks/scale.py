@@ -18,12 +18,12 @@ from pathlib import Path
 from deploy.benchmarks.alternatives import Alternative
 from deploy.benchmarks.measurement import MeasurementFailed, Scenario, measure_subscribers
 from deploy.benchmarks.table import Results, table
-from deploy.chaos.arm import Arm
-from deploy.chaos.cost import Cost
 from deploy.commands.setup import sourced_rclpy
 from deploy.running import interruption
 from deploy.running.processes import ROOT
 from deploy.running.system import NAMESPACE, System
+from deploy.trials.chaos.arm import Arm
+from deploy.trials.chaos.cost import Cost
 from reactive_node.domains import reserved_domain
 
 SIZES = (1, 2, 5, 10, 20, 30)

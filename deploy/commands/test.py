@@ -28,7 +28,8 @@ EMBEDDED_ONLY = (
     "deploy/runtime/tests/runtime",
     "deploy/runtime/tests/simulation",
     "tests/mutants",
-    "tests/simulation",
+    "tests/trials/replay",
+    "tests/trials/simulation",
 )
 """Tests of the embedded rclpy, and of what runs only on it."""
 TRANSFORMS = ("interfaces/reactive_node/tests/test_transforms.py",)

@@ -12,10 +12,10 @@ from deploy.benchmarks import __main__ as command
 from deploy.benchmarks import alternatives, measurement, scale
 from deploy.benchmarks.alternatives import Alternative
 from deploy.benchmarks.measurement import MeasurementFailed
-from deploy.chaos.arm import Arm
-from deploy.chaos.cost import Cost
 from deploy.commands.setup import sourced_rclpy
 from deploy.running.system import System
+from deploy.trials.chaos.arm import Arm
+from deploy.trials.chaos.cost import Cost
 
 pytestmark = pytest.mark.timeout(120)
 

@@ -14,7 +14,7 @@ from deploy.commands import test as command
 HERE = command.Part("", "", ["tests/system", "-x"])
 """Tests for one rclpy."""
 IGNORED = "--ignore=tests/mutants"
-ONE = "tests/simulation/test_shift.py::test"
+ONE = "tests/trials/simulation/test_shift.py::test"
 
 
 @pytest.mark.parametrize(
@@ -64,9 +64,9 @@ def arguments(words: str) -> dict[str, str]:
     ("words", "on_ros", "on_embedded"),
     [
         ("tests/system -x", "-x tests/system", None),
-        ("tests/simulation -x", None, "-x tests/simulation"),
-        ("tests -x", "-x tests", "-x tests/mutants tests/simulation"),
-        (f"tests {IGNORED}", f"{IGNORED} tests", f"{IGNORED} tests/simulation"),
+        ("tests/trials/simulation -x", None, "-x tests/trials/simulation"),
+        ("tests -x", "-x tests", "-x tests/mutants tests/trials/replay tests/trials/simulation"),
+        (f"tests {IGNORED}", f"{IGNORED} tests", f"{IGNORED} tests/trials/replay tests/trials/simulation"),
         (f"{ONE} tests/page", "tests/page", ONE),
     ],
 )

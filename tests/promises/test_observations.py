@@ -43,7 +43,7 @@ def recorded(path: Path, *lives: Life, seconds: int = 20) -> bytes:
 
 def replay(record: Path) -> subprocess.CompletedProcess[str]:
     """Judge a record in a subprocess, because it handles signals."""
-    command = [sys.executable, "-m", "deploy.chaos", "--replay", str(record)]
+    command = [sys.executable, "-m", "deploy.trials.chaos", "--replay", str(record)]
     return subprocess.run(command, cwd=processes.ROOT, capture_output=True, text=True, timeout=60)
 
 
@@ -72,7 +72,7 @@ def test_health_without_a_pid_says_nothing_about_processes(pid: str) -> None:
     ],
 )
 def test_impossible_options_are_refused(tmp_path: Path, options: str, code: int, reason: str) -> None:
-    command = [sys.executable, "-m", "deploy.chaos", *options.split()]
+    command = [sys.executable, "-m", "deploy.trials.chaos", *options.split()]
     environment = {**os.environ, "REACTIVE_ARM_RUN_DIR": str(tmp_path)}
     end = subprocess.run(
         command, cwd=processes.ROOT, env=environment, capture_output=True, text=True, timeout=60
@@ -88,7 +88,7 @@ def test_ctrl_c_ends_the_judgement(tmp_path: Path) -> None:
     script = (
         "import os, signal, sys; signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT});"
         "os.kill(os.getpid(), signal.SIGINT);"
-        f"import deploy.chaos.__main__ as chaos; sys.exit(chaos.main(['--replay', {str(path)!r}]))"
+        f"import deploy.trials.chaos.__main__ as chaos; sys.exit(chaos.main(['--replay', {str(path)!r}]))"
     )
     end = subprocess.run(
         [sys.executable, "-c", script], cwd=processes.ROOT, capture_output=True, text=True, timeout=60

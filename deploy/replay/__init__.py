@@ -1,3 +1,0 @@
-"""Replay: feeds a record through today's services in virtual time, and compares what they publish."""
-
-import deploy.simulation  # noqa: F401 (first: it reports a missing simulation)

@@ -1,0 +1,200 @@
+"""The kinds of faults that can be injected into an arm, and the targets of each."""
+
+from __future__ import annotations
+
+import os
+import resource
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import NamedTuple
+
+import yaml
+
+from deploy.promises import marks
+from deploy.promises.history import ALL, NO_TARGET, PROGRAMS
+from deploy.promises.marks import BABBLER
+from deploy.running import parameter_file, processes
+from deploy.running.system import KEY
+from deploy.trials.chaos import clock
+from deploy.trials.chaos.arm import Arm
+
+INJECTED = Path(__file__).parent / "inject"
+"""On the PYTHONPATH of an arm under test; the faults `hang`, `raise` and `hog` need it."""
+HEADROOM = 64 << 20  # bytes that a process may still allocate in `hog`
+
+
+def _numbers() -> dict[str, str]:
+    """Return the first parameter that is a number, of each program that has one."""
+    return {
+        program: name
+        for program, declared in parameter_file.declared().items()
+        for name in [name for name, each in declared.items() if type(each.default) in (int, float)][:1]
+    }
+
+
+PARAMETERS = _numbers()
+
+Undo = Callable[[], None]
+
+
+class FaultKind(NamedTuple):
+    """A kind of fault."""
+
+    inject: Callable[[Arm, str], Undo | None]
+    """Injects the fault into an arm and a target; returns how to end it, or ``None`` if it is momentary."""
+    targets: tuple[str, ...]
+    duration: tuple[float, float] = (0.0, 0.0)
+    """The shortest and the longest duration [s]."""
+
+
+def _send(arm: Arm, pid: int, number: int) -> None:
+    for handle in processes.open_handles(arm.system.run, [pid] if pid else []):
+        with suppress(ProcessLookupError):
+            signal.pidfd_send_signal(handle, number)
+        processes.close([handle])
+
+
+def _signal(number: int) -> Callable[[Arm, str], None]:
+    return lambda arm, program: _send(arm, arm.pid(program), number)
+
+
+def stop(arm: Arm, program: str) -> Undo:
+    """Suspend a process by SIGSTOP; at the end, continue it if it is still alive."""
+    pid = arm.pid(program)
+    _send(arm, pid, signal.SIGSTOP)
+    return arm.overlaps.begin(("stop", pid), lambda: _send(arm, pid, signal.SIGCONT))
+
+
+def hog(arm: Arm, program: str) -> None:
+    """Let a process allocate memory up to a limit."""
+    pid = arm.pid(program)
+    with suppress(OSError):
+        pages = int(Path(f"/proc/{pid}/statm").read_text().split()[0])
+        limit = pages * os.sysconf("SC_PAGE_SIZE") + HEADROOM
+        resource.prlimit(pid, resource.RLIMIT_AS, (limit, limit))
+        _send(arm, pid, signal.SIGRTMIN)
+
+
+def kill_all(arm: Arm, target: str) -> None:
+    """SIGKILL all programs at once."""
+    pids = [process.pid for process in arm.system.members() if process.program not in ("", BABBLER)]
+    handles = processes.open_handles(arm.system.run, pids)
+    for handle in handles:
+        with suppress(ProcessLookupError):
+            signal.pidfd_send_signal(handle, signal.SIGKILL)
+    processes.close(handles)
+
+
+def kill_supervisor(arm: Arm, target: str) -> Undo:
+    """SIGKILL supervisord; at the end, start the system again over its orphans."""
+    supervisor = arm.system.supervisor() or 0
+    arm.remember_processor_time([supervisor])
+    _send(arm, supervisor, signal.SIGKILL)
+
+    def start_again() -> None:
+        orphans = [member.pid for member in arm.system.members() if member.program not in ("", BABBLER)]
+        arm.remember_processor_time(orphans)
+        arm.system.start_again()
+
+    return arm.overlaps.begin("kill_supervisor", start_again)
+
+
+def double(arm: Arm, program: str) -> Undo:
+    """Start a second instance of a program."""
+    command = []
+    with suppress(OSError):  # it has just ended
+        command = Path(f"/proc/{arm.pid(program)}/cmdline").read_bytes().decode().split("\0")[1:-1]
+    if not command:
+        return lambda: None
+    process = subprocess.Popen(
+        [sys.executable, *command],
+        cwd=arm.system.run,
+        env=arm.environment() | {"SUPERVISOR_PROCESS_NAME": program},
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    return _kill(process)
+
+
+def crash_loop(arm: Arm, program: str) -> Undo:
+    """SIGKILL a program after giving a parameter the wrong type: the program refuses to start."""
+    path = arm.system.parameters
+    node = f"{arm.namespace.rstrip('/')}/{program}"
+    bad = {node: {KEY: {PARAMETERS[program]: "not a number"}}}
+    arm.system.write_parameters(yaml.safe_load(path.read_text()) | bad)
+    _send(arm, arm.pid(program), signal.SIGKILL)
+
+    def repair() -> None:
+        with suppress(FileNotFoundError):  # the system was stopped
+            # The file is read again: another program may have a bad parameter now.
+            left = yaml.safe_load(path.read_text())
+            left.pop(node, None)
+            arm.system.write_parameters(left)
+
+    return arm.overlaps.begin(("crash_loop", program), repair)
+
+
+def full_disk(arm: Arm, target: str) -> Undo:
+    """Let every write of supervisord to a log fail."""
+    supervisor = arm.system.supervisor()
+    if supervisor is None:
+        return lambda: None
+
+    def limit(size: int | None) -> None:
+        with suppress(OSError):
+            _, hard = resource.prlimit(supervisor, resource.RLIMIT_FSIZE)
+            resource.prlimit(supervisor, resource.RLIMIT_FSIZE, (hard if size is None else size, hard))
+
+    limit(1)
+    return arm.overlaps.begin(("full_disk", supervisor), lambda: limit(None))
+
+
+def step_clock(arm: Arm, target: str) -> None:
+    """Step the time of day of all processes of an arm, within a second; it stays so."""
+    arm.clock.step()
+
+
+def _babbler(mode: str) -> Callable[[Arm, str], Undo]:
+    def start(arm: Arm, target: str) -> Undo:
+        process = subprocess.Popen(
+            [sys.executable, "-m", "deploy.trials.chaos.babbler", mode],
+            cwd=processes.ROOT,
+            env=arm.environment() | {"SUPERVISOR_PROCESS_NAME": BABBLER},
+            stdout=subprocess.DEVNULL,
+            start_new_session=True,  # Ctrl-C at the terminal must not end it
+        )
+        return _kill(process)
+
+    return start
+
+
+def _kill(process: subprocess.Popen[bytes]) -> Undo:
+    def end() -> None:
+        process.kill()
+        process.wait()
+
+    return end
+
+
+FAULT_KINDS: dict[str, FaultKind] = {
+    "kill": FaultKind(_signal(signal.SIGKILL), PROGRAMS),
+    "terminate": FaultKind(_signal(signal.SIGTERM), PROGRAMS),
+    "stop": FaultKind(stop, PROGRAMS, (1.0, 15.0)),
+    "hang": FaultKind(_signal(signal.SIGUSR1), PROGRAMS, (15.0, 15.0)),
+    "raise": FaultKind(_signal(signal.SIGUSR2), PROGRAMS),
+    "hog": FaultKind(hog, PROGRAMS),
+    "kill_all": FaultKind(kill_all, (ALL,)),
+    "kill_supervisor": FaultKind(kill_supervisor, (ALL,), (0.5, 5.0)),
+    "double": FaultKind(double, PROGRAMS, (6.0, 8.0)),
+    "crash_loop": FaultKind(crash_loop, tuple(PARAMETERS), (3.0, 6.0)),
+    "full_disk": FaultKind(full_disk, (NO_TARGET,), (3.0, 10.0)),
+    "flood": FaultKind(_babbler("flood"), (NO_TARGET,), (3.0, 6.0)),
+    "babble": FaultKind(_babbler("babble"), (NO_TARGET,), (3.0, 10.0)),
+    **({} if clock.missing() else {marks.STEP: FaultKind(step_clock, (NO_TARGET,))}),
+}
+"""All faults within one host that this machine can have; `partition` has those between hosts."""

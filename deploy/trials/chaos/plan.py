@@ -1,0 +1,158 @@
+"""The plan of `make chaos`: the command line, and the schedules and the testbed that follow from it."""
+
+from __future__ import annotations
+
+import argparse
+import random
+from collections.abc import Callable, Collection, Iterable, Sequence
+from functools import partial
+from pathlib import Path
+from typing import NamedTuple
+
+from deploy.promises import marks
+from deploy.promises.history import PROGRAMS
+from deploy.running.system import DeploymentError
+from deploy.trials.chaos import clock, partition, schedule, schedule_file
+from deploy.trials.chaos.faults import FAULT_KINDS
+from deploy.trials.chaos.schedule import Schedule
+from deploy.trials.chaos.testbed import SCENARIO, Testbed, sources
+from reactive_node.domains import DOMAINS
+
+RANDOM = "monkey"  # the scenario of random faults
+FLEET_RATE = 10.0  # Hz, of each source; many arms share the machine
+NAMED = (*partition.SCHEDULES, *schedule.SCENARIOS)
+
+
+class Plan(NamedTuple):
+    """An experiment: the faults, the arms, and the length of the record."""
+
+    title: str
+    schedules: list[Schedule]
+    """For each arm."""
+    length: float
+    """[s]."""
+    testbed: Callable[..., Testbed]
+
+    @property
+    def steps_clock(self) -> bool:
+        """Whether the faults include a step of the time of day."""
+        return any(each.kind == marks.STEP for planned in self.schedules for each in planned)
+
+
+def parse(arguments: Sequence[str]) -> argparse.Namespace:
+    """Parse the command line; exits with code 2 if it has an error."""
+    parser = argparse.ArgumentParser(
+        prog="make chaos",
+        usage='make chaos [MINUTES=N] [SEED=WORD] [CHAOS="OPTION ..."]',
+        description="Inject faults into an arm, record it from outside, and check the promises.",
+    )
+    add = parser.add_argument
+    add("--minutes", type=number(0.01, 10_000), default=5.0, help="length of the random faults, default 5")
+    add("--seed", help="the same seed gives the same random faults")
+    add("--every", type=number(0.01, 3600), default=5.0, help="seconds between two random faults, default 5")
+    kinds = tuple(dict.fromkeys((*FAULT_KINDS, marks.STEP)))
+    of_kinds = f"separated by commas, of {', '.join(kinds)}; {marks.STEP} needs {clock.PACKAGE}"
+    add("--faults", type=names(kinds), default=tuple(FAULT_KINDS), help=of_kinds)
+    add("--targets", type=names(PROGRAMS), default=(), help=f"separated by commas, of {', '.join(PROGRAMS)}")
+    scenarios = f"instead of random faults: {', '.join(NAMED)}"
+    add("--scenario", choices=(RANDOM, *NAMED), default=RANDOM, metavar="NAME", help=scenarios)
+    add("--arms", type=int, default=1, help="they share the random faults; each gets a whole scenario")
+    add("--loss", type=number(0, 100), default=0.0, help="percent of all DDS packets that are lost")
+    add("--schedule", type=Path, metavar="FILE", help="play a schedule, such as `make simulate` writes")
+    add("--replay", type=Path, metavar="RECORD", help="only judge a record")
+    options = parser.parse_args(arguments)
+    if not 1 <= options.arms <= len(DOMAINS):
+        parser.error(f"--arms must be from 1 to {len(DOMAINS)}: each arm needs a ROS domain")
+    if options.arms > 1 and options.scenario in partition.SCHEDULES:
+        parser.error(f"--scenario {options.scenario} allows only one arm")
+    if options.schedule and (options.scenario != RANDOM or options.arms > 1):
+        parser.error("--schedule has faults of its own, for one arm")
+    if options.scenario != RANDOM and any(
+        getattr(options, name) != parser.get_default(name) for name in ("every", "faults", "targets")
+    ):
+        parser.error("--every, --faults and --targets apply to random faults, not to a --scenario")
+    return options
+
+
+def plan(options: argparse.Namespace) -> Plan:
+    """Return the plan that a command line asks for.
+
+    :raises DeploymentError: if it is empty, or not possible on this machine.
+    """
+    if options.scenario in partition.SCHEDULES:
+        if reason := partition.missing(options.scenario):
+            raise DeploymentError(f"{options.scenario} is not possible on this machine: {reason}")
+        title = f"Scenario {options.scenario}: the network between the operator's host and the robot's"
+        return Plan(title, [partition.SCHEDULES[options.scenario]], partition.LENGTH, partition.TwoHosts)
+    if options.schedule:
+        return _scheduled(options.schedule)
+    several = f", {options.arms} arms" if options.arms > 1 else ""
+    testbed = _fleet(options.arms) if options.arms > 1 else Testbed
+    if options.scenario != RANDOM:
+        planned = schedule.SCENARIOS[options.scenario]()
+        length = schedule.duration(planned)
+        title = f"Scenario {options.scenario}, {length:.0f} s{several}"
+        return Plan(title, [planned] * options.arms, length, testbed)
+    _require_clock(options.faults)
+    seed = options.seed or str(random.randrange(10**6))
+    length = 60 * options.minutes
+    planned = schedule.random_faults(
+        seed, length, every=options.every, kinds=options.faults, targets=options.targets
+    )
+    if not planned:
+        reason = "the time is too short, or none of the faults applies to the targets"
+        raise DeploymentError(f"No fault is planned: {reason}")
+    title = f"Random faults, seed {seed}, {options.minutes:g} min, every {options.every:g} s{several}"
+    if options.faults != tuple(FAULT_KINDS) or options.targets:
+        title += f", only {', '.join(options.faults)} of {', '.join(options.targets) or 'all programs'}"
+    return Plan(title, [planned[arm :: options.arms] for arm in range(options.arms)], length, testbed)
+
+
+def _scheduled(path: Path) -> Plan:
+    shift = schedule_file.load(path)
+    kinds = {each.kind for each in shift.faults}
+    _require_clock(kinds)
+    if unknown := sorted(kinds - FAULT_KINDS.keys()):
+        raise DeploymentError(f"{path}: only make simulate can inject {', '.join(unknown)}")
+    title = f"Schedule {path}, {shift.length:.0f} s"
+    return Plan(title, [shift.faults], shift.length, partial(Testbed, scenario=shift.scenario))
+
+
+def _require_clock(kinds: Collection[str]) -> None:
+    if marks.STEP in kinds and (reason := clock.missing()):
+        raise DeploymentError(f"{marks.STEP} is not possible on this machine: {reason}")
+
+
+def _fleet(arms: int) -> Callable[..., Testbed]:
+    """Return a testbed with several arms, each in another namespace."""
+    namespaces = tuple(f"/arm{number}" for number in range(1, arms + 1))
+    return partial(Testbed, namespaces=namespaces, scenario={**SCENARIO, **sources(FLEET_RATE)})
+
+
+def number(least: float, most: float) -> Callable[[str], float]:
+    """Return a parser of numbers of the command line."""
+
+    def parse(text: str) -> float:
+        try:
+            value = float(text)
+        except ValueError:
+            raise argparse.ArgumentTypeError(f"{text!r} is not a number") from None
+        if not least <= value <= most:
+            raise argparse.ArgumentTypeError(f"{text} is not from {least:g} to {most:g}")
+        return value
+
+    return parse
+
+
+def names(known: Iterable[str]) -> Callable[[str], tuple[str, ...]]:
+    """Return a parser of names of the command line, with commas between."""
+    all_names = list(known)
+
+    def parse(text: str) -> tuple[str, ...]:
+        words = tuple(word.strip() for word in text.split(","))
+        for word in words:
+            if word not in all_names:
+                raise argparse.ArgumentTypeError(f"{word!r} is not one of {', '.join(all_names)}")
+        return words
+
+    return parse

@@ -1,0 +1,84 @@
+"""Schedule files: what happens to an arm, in YAML. `make simulate` and `make chaos` play them.
+
+.. code-block:: yaml
+
+    seed: 7 shift 12
+    length: 45.0                                          # s
+    scenario: {l1: {...}, operator: {...}, engines: ...}  # as in a scenario file
+    faults:
+      - {at: 5.0, kind: kill, target: kinematics, duration: 0.0}
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from deploy.running.system import DeploymentError
+from deploy.trials.chaos.schedule import PlannedFault, Schedule
+
+
+@dataclass(frozen=True)
+class Shift:
+    """What happens to an arm. In a simulation, equal shifts give equal records."""
+
+    seed: str
+    """Of all chance in a simulation: in the network and the processes."""
+    length: float
+    """[s] of the scenario."""
+    scenario: Mapping[str, Any]
+    faults: Schedule
+
+
+def save(shift: Shift, path: Path) -> None:
+    """Write a shift to a file."""
+    document = {
+        "seed": shift.seed,
+        "length": shift.length,
+        "scenario": dict(shift.scenario),
+        "faults": [each._asdict() for each in shift.faults],
+    }
+    path.write_text(yaml.safe_dump(document, sort_keys=False, default_flow_style=None), encoding="utf-8")
+
+
+def load(path: Path) -> Shift:
+    """Read a shift from a file. Raises DeploymentError: one line with the file and the reason."""
+    try:
+        document: Any = yaml.safe_load(path.read_text(encoding="utf-8"))
+        scenario = _checked(document, "scenario", dict, "mapping")
+        faults = [_fault(each) for each in _checked(document, "faults", list, "list")]
+        return Shift(str(document["seed"]), _seconds("length", document["length"]), scenario, faults)
+    except OSError as error:
+        raise DeploymentError(f"{path}: {error.strerror}") from None
+    except (yaml.YAMLError, UnicodeDecodeError, KeyError, TypeError, ValueError) as error:
+        reason = " ".join(str(error).split())
+        raise DeploymentError(f"{path} is no schedule: {reason}") from None
+
+
+def _fault(content: Any) -> PlannedFault:
+    fault = PlannedFault(**content)
+    for key in ("kind", "target"):
+        _checked(content, key, str, "name")
+    return fault._replace(at=_seconds("at", fault.at), duration=_seconds("duration", fault.duration))
+
+
+def _checked(content: Any, key: str, kind: type, name: str) -> Any:
+    """Return a value of a type. Raises ValueError."""
+    value = content[key]
+    if not isinstance(value, kind):
+        raise ValueError(f"{key}: {value!r} is no {name}")
+    return value
+
+
+def _seconds(key: str, value: Any) -> float:
+    """Return a time [s]. Raises ValueError unless it is finite and not negative."""
+    with suppress(TypeError, ValueError, OverflowError):
+        if 0.0 <= (seconds := float(value)) < math.inf:
+            return seconds
+    raise ValueError(f"{key}: {value!r} is no time in s")

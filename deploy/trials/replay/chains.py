@@ -1,0 +1,163 @@
+"""What is replayed: chains of services, the topics that they hear, and the topics that they publish."""
+
+from __future__ import annotations
+
+from builtin_interfaces.msg import Time
+from rclpy.serialization import deserialize_message, serialize_message
+from rclpy_simulation.host import SECOND
+from std_msgs.msg import Header, String
+
+from deploy.promises.marks import is_babble
+from deploy.trials.replay.lives import Latch, begins_away, latch, lives
+from deploy.trials.replay.record import Message, Record, text
+from interfaces.robot_model import BASE, frame_id
+from interfaces.topics import (
+    CONFIGURATION,
+    CONTRACT,
+    EFFECTOR_POSITION,
+    EFFECTOR_SPEED,
+    ENGINES,
+    ENGINES_STATE,
+    INCAPACITATED,
+    ON,
+    OPERATOR_ACTIVITY,
+    OPERATOR_HEARTBEAT,
+    OPERATOR_PRESENCE,
+    TF,
+    TURN_OFF,
+    TURN_ON,
+    Topic,
+    is_latched,
+)
+
+WATCHDOG = OPERATOR_PRESENCE.publishers[0]
+CONTROLLER = ENGINES_STATE.publishers[0]
+
+HEARD: dict[str, tuple[Topic, ...]] = {
+    "kinematics": tuple(CONFIGURATION.values()),
+    "velocity": (EFFECTOR_POSITION,),
+    WATCHDOG: (OPERATOR_HEARTBEAT,),
+    CONTROLLER: (ENGINES, OPERATOR_PRESENCE),
+    "robot_state": tuple(CONFIGURATION.values()),
+}
+"""The topics that each replayed service hears."""
+
+Chain = tuple[str, ...]
+CHAINS: tuple[Chain, ...] = (
+    ("robot_state",),
+    ("kinematics",),
+    ("velocity",),
+    (WATCHDOG, CONTROLLER),
+)
+"""
+Services that hear the replayed output of each other. Chains hear the recorded output of each other.
+
+So velocity hears the recorded positions: its recipe divides by the time between two emissions, of which a
+replay of kinematics has others. The slowest chain is the first: chains run in parallel.
+"""
+
+
+def outputs(chain: Chain) -> list[Topic]:
+    """Return the topics that the services of a chain publish, without their health."""
+    return [topic for topic in CONTRACT if set(topic.publishers) & set(chain)]
+
+
+def inputs(record: Record, namespace: str, chain: Chain) -> list[tuple[Topic, list[Message]]]:
+    """
+    Return the recorded messages that a chain hears, and that none of its services has sent.
+
+    Of those that were sent before the arm began, it hears the latched ones.
+    """
+    made = outputs(chain)
+    found = []
+    for topic in (topic for service in chain for topic in HEARD[service]):
+        if topic is ENGINES or topic not in made:
+            sent = commands(record, namespace)[0] if topic is ENGINES else record.of(topic, namespace)
+            heard = [each for each in sent if each.sent >= record.begin or is_latched(topic.qos)]
+            found.append((topic, heard))
+    return found
+
+
+def has_input(record: Record, namespace: str, chain: Chain) -> bool:
+    """Return whether a record contains what a chain hears; a watchdog alone hears an operator who is away."""
+    if WATCHDOG in chain and record.of(OPERATOR_ACTIVITY, namespace):
+        return True
+    return any(messages for _, messages in inputs(record, namespace, chain))
+
+
+def past(record: Record, namespace: str, chain: Chain) -> list[tuple[Topic, list[Message]]]:
+    """Return made-up messages that bring the controller of a chain into the state that the record shows."""
+    shown = first_latch(record, namespace) if CONTROLLER in chain else None
+    if shown is None or not shown.operator_is_present:
+        return []
+    presence = Message(
+        shown.known,
+        serialize_message(Header(stamp=Time(sec=shown.known // SECOND, nanosec=shown.known % SECOND))),
+    )
+    turn_on = Message(shown.known + SECOND // 100, serialize_message(String(data=TURN_ON)))
+    return [(OPERATOR_PRESENCE, [presence]), (ENGINES, [turn_on] if shown.engines == ON else [])]
+
+
+def first_latch(record: Record, namespace: str) -> Latch | None:
+    """Return what the record shows first of the latch of the arm in a namespace."""
+    return latch(record, namespace, lives(record, namespace, CONTROLLER)[0])
+
+
+def known(record: Record, namespace: str, topic: Topic) -> int:
+    """
+    Return from when on the record shows what an output depends on [ns since 1970]; its end if it never does.
+
+    The strikes are known from the beginning: what comes later shows them.
+    """
+    if topic is EFFECTOR_SPEED:  # a speed that equals the last one is not published
+        shown = [record.of(topic, namespace)]
+    elif topic is ENGINES_STATE:
+        first = first_latch(record, namespace)
+        return record.end if first is None else first.known
+    elif WATCHDOG in topic.publishers:
+        # While the operator is away, there is neither. A presence shows that heartbeats were not recorded.
+        is_unknown = record.of(OPERATOR_PRESENCE, namespace) and not record.of(OPERATOR_HEARTBEAT, namespace)
+        return record.end if is_unknown else record.begin
+    else:
+        shown = [record.of(each, namespace) for each in CONFIGURATION.values()]
+    return max((each[0].sent if each else record.end for each in shown), default=record.begin)
+
+
+def recorded(record: Record, namespace: str, topic: Topic) -> list[Message]:
+    """Return what the services of an arm have published on a topic, without what the chaos monkey has."""
+    sent = commands(record, namespace)[1] if topic is ENGINES else record.of(topic, namespace)
+    if topic is TF:  # all arms share it
+        sent = [message for message in sent if _is_of_arm(message, namespace)]
+    return [message for message in sent if not is_babble(topic, message.data)]
+
+
+def _is_of_arm(message: Message, namespace: str) -> bool:
+    """Return whether transforms are of the frames of the arm in a namespace."""
+    try:
+        found = deserialize_message(message.data, TF.type).transforms
+    except Exception:  # of any type, by the runtime
+        return False
+    return any(each.header.frame_id == frame_id(BASE, namespace) for each in found)
+
+
+def commands(record: Record, namespace: str) -> tuple[list[Message], list[Message]]:
+    """
+    Return the commands of people, and those of the watchdog.
+
+    A record does not name publishers. The watchdog sends ``turn_off`` after its conclusion that the operator
+    is incapacitated, until its next conclusion.
+    """
+    people: list[Message] = []
+    watchdog: list[Message] = []
+    conclusions = [
+        (message.sent, text(message, OPERATOR_ACTIVITY))
+        for message in record.of(OPERATOR_ACTIVITY, namespace)
+    ]
+    conclusions.reverse()
+    is_away = begins_away(record, namespace, lives(record, namespace, WATCHDOG)[0])
+    for message in record.of(ENGINES, namespace):
+        while conclusions and conclusions[-1][0] <= message.sent:
+            is_away = conclusions.pop()[1] == INCAPACITATED
+        of_watchdog = is_away and text(message, ENGINES) == TURN_OFF
+        (watchdog if of_watchdog else people).append(message)
+    return people, watchdog

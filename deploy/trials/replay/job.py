@@ -1,0 +1,102 @@
+"""One chain of one arm: its replay and the comparison, in a process of its own."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from rclpy_simulation.host import SECOND
+
+from deploy.running import interruption
+from deploy.trials.replay import chains
+from deploy.trials.replay.chains import Chain
+from deploy.trials.replay.comparison import BOUNDS, Comparison, Interval, compare
+from deploy.trials.replay.playback import Playback, play
+from deploy.trials.replay.record import Message, Record
+from interfaces.topics import ENGINES, Topic
+
+START = 2 * SECOND
+"""After the begin of the record or of a process, in which nothing is compared: processes discover each other
+[ns]. It is the longest restart of promise L1."""
+CATCH_UP = SECOND  # ns after a suspension in which nothing is compared
+
+
+class Job(NamedTuple):
+    """A chain to replay."""
+
+    namespace: str
+    chain: Chain
+    parameters: Path | None
+    """A ROS parameter file."""
+
+
+class Outcome(NamedTuple):
+    """What a replay shows."""
+
+    job: Job
+    messages: dict[str, list[Message]]
+    """By topic name of the contract, in the order of sending."""
+    comparisons: list[Comparison]
+    """Of the topics that were recorded."""
+    failures: list[tuple[int, str]]
+    """When a service ended by itself [ns since 1970], and why."""
+
+
+def run_all(record: Record, jobs: Sequence[Job]) -> list[Outcome]:
+    """
+    Replay chains, as many at a time as there are cores.
+
+    :raises Interrupted: after a signal.
+    """
+    context = multiprocessing.get_context("fork")  # the processes share the record
+    cores = len(os.sched_getaffinity(0))
+    with context.Pool(min(cores, len(jobs)), _prepare, (record,)) as pool, interruption.blocking():
+        return pool.map(_run, jobs, chunksize=1)
+
+
+_record: Record
+
+
+def _prepare(record: Record) -> None:
+    global _record
+    _record = record
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent process ends this one
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+
+
+def _run(job: Job) -> Outcome:
+    return run(_record, job)
+
+
+def run(record: Record, job: Job) -> Outcome:
+    """Replay a chain, and compare its output."""
+    record = record.of_arm(job.namespace)
+    playback = play(record, job.namespace, job.chain, job.parameters)
+    comparisons = []
+    for topic in chains.outputs(job.chain):
+        recorded = chains.recorded(record, job.namespace, topic)
+        if recorded or topic is ENGINES:  # which nobody may have sent
+            excused = _excused(record, playback, topic, chains.known(record, job.namespace, topic))
+            replayed = playback.messages[topic.name]
+            comparisons.append(compare(topic, recorded, replayed, excused, record.offsets))
+    return Outcome(job, playback.messages, comparisons, playback.failures)
+
+
+def _excused(record: Record, playback: Playback, topic: Topic, known: int) -> list[Interval]:
+    """
+    Return the times in which the output of a chain may differ.
+
+    :param known: from when on the record shows what the output depends on [ns since 1970].
+    """
+    around = round(BOUNDS[topic.name].time * SECOND)
+    found = [(0, max(record.begin, known) + START), (record.end - around, max(record.end, known) + START)]
+    for life in (life for lives in playback.lives.values() for life in lives):
+        found.append((life.began - around, life.began + START))
+        if life.ended is not None:
+            found.append((life.ended - around, life.ended + around))
+        found += [(each.begin - around, each.end + CATCH_UP) for each in life.suspensions]
+    return found

@@ -1,0 +1,168 @@
+"""`make simulate`: hours of an arm under faults, in virtual time, judged by its promises.
+
+Exit code 1 if a promise is violated. Then the smallest schedule that violates it is in a file.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import random
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from deploy.promises.findings import count, how_often
+from deploy.promises.history import STUCK_DRIVE
+from deploy.promises.html_report import page, verdict
+from deploy.promises.text_report import text
+from deploy.running import interruption, processes
+from deploy.running.system import DeploymentError, make_directory
+from deploy.trials.chaos import schedule_file
+from deploy.trials.chaos.plan import names, number
+from deploy.trials.chaos.schedule_file import Shift
+from deploy.trials.simulation import plan, systematic
+from deploy.trials.simulation.attacks import FAIL_SAFES
+from deploy.trials.simulation.experiment import Outcome, play
+from deploy.trials.simulation.faults import FAULT_KINDS
+from deploy.trials.simulation.shrink import shrink
+from deploy.trials.simulation.summary import Summary
+from deploy.trials.simulation.workers import summaries
+
+BAR = 40  # characters
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Run the command line; return the exit code."""
+    interruption.install()
+    try:
+        return _run(_parse(arguments))
+    except interruption.Interrupted:
+        print("Interrupted.")
+        return 130
+    except DeploymentError as error:
+        print(error, file=sys.stderr)
+        return 1
+
+
+def _parse(arguments: Sequence[str]) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(
+        prog="make simulate",
+        usage='make simulate [HOURS=N] [SEED=WORD] [SCHEDULE=FILE] [SIMULATE="OPTION ..."]',
+        description="Simulate an arm under faults, and check its promises.",
+    )
+    add = parser.add_argument
+    add("--hours", type=number(0.01, 100_000), default=1.0, help="of the arm, default 1")
+    add("--seed", help="the same seed gives the same record, byte for byte; default: a new one")
+    add("--every", type=number(0.1, 3600), default=5.0, help="seconds between two faults, default 5")
+    of_kinds = (
+        "only these random faults, and no attacks on the fail-safes; separated by commas, "
+        f"of {', '.join(FAULT_KINDS)}"
+    )
+    add("--faults", type=names(FAULT_KINDS), default=tuple(FAULT_KINDS), help=of_kinds)
+    add("--schedule", type=Path, metavar="FILE", help="play this schedule instead")
+    minutes = "for so many minutes, inject faults at every message and timer of an operator's day instead"
+    add("--systematic", type=number(0.01, 100_000), metavar="MINUTES", help=minutes)
+    return parser.parse_args(arguments)
+
+
+def _run(options: argparse.Namespace) -> int:
+    if options.schedule:
+        return _conclude(play(schedule_file.load(options.schedule)), f"Schedule {options.schedule}")
+    seed = options.seed or str(random.randrange(10**6))
+    if options.systematic:
+        shifts, title = systematic.cases(seed)
+        return _play(shifts, title, 60 * options.systematic)
+    shifts = plan.shifts(seed, options.hours, options.every, options.faults)
+    title = f"Simulated arm, seed {seed}, {options.hours:g} h, a fault every {options.every:g} s"
+    return _play(shifts, title, math.inf)
+
+
+def _play(shifts: Sequence[Shift], title: str, limit: float) -> int:
+    """Play shifts, at most for so many seconds, and report; return the exit code."""
+    print(title, flush=True)
+    hours = sum(shift.length for shift in shifts) / 3600.0
+    summary, broken = Summary(), list[Shift]()
+    began = time.monotonic()
+    interrupted = False
+    try:
+        for shift, part in zip(shifts, summaries(shifts), strict=False):
+            summary.add(part)
+            if part.violated():
+                broken.append(shift)
+            _show(summary, hours, time.monotonic() - began, len(broken))
+            if time.monotonic() - began > limit:
+                break
+    except interruption.Interrupted:
+        interrupted = True
+    if not summary.shifts:
+        raise interruption.Interrupted
+    print(report(summary, time.monotonic() - began))
+    if broken and not interrupted:
+        return _explain(broken[0], title)
+    return int(bool(broken)) or (130 if interrupted else 0)
+
+
+def _show(summary: Summary, hours: float, seconds: float, broken: int) -> None:
+    """Show the progress on a terminal."""
+    if not sys.stdout.isatty():
+        return
+    done = BAR * min(1.0, summary.hours / hours)
+    bar = "#" * int(done) + "." * (BAR - int(done))
+    speed = 3600.0 * summary.hours / seconds
+    state = f"{count(broken, 'shift')} with a violation" if broken else "no violation"
+    print(f"\r[{bar}] {summary.hours:.1f} of {hours:g} h, {speed:.0f} times real time, {state} ", end="")
+
+
+def report(summary: Summary, seconds: float) -> str:
+    """Return what shifts have shown, in so many seconds of this machine."""
+    kinds = ", ".join(f"{kind} {number}" for kind, number in sorted(summary.injected.items()))
+    speed = 3600.0 * summary.hours / seconds
+    return (
+        f"\n{text(summary.total())}\n\n"
+        f"{count(summary.injected.total(), 'fault')}: {kinds}\n"
+        f"{_alone(summary)}"
+        f"{count(summary.restarts, 'restart')}, {count(summary.messages, 'message')}; "
+        f"record {summary.digest}\n"
+        f"{count(summary.shifts, 'run')}, {summary.hours:.2f} h in {seconds:.0f} s: "
+        f"{speed:.0f} times real time"
+    )
+
+
+def _alone(summary: Summary) -> str:
+    """Return how often each fail-safe stood alone, in a line; empty if no silence was attacked."""
+    if not summary.injected[STUCK_DRIVE]:
+        return ""
+    numbers = ", ".join(f"{each} {how_often(summary.alone[each])}" for each in FAIL_SAFES)
+    return f"Fail-safes that turned the engines off alone: {numbers}\n"
+
+
+def _explain(shift: Shift, title: str) -> int:
+    """Shrink a shift that violates a promise, and report on it."""
+    outcome = play(shift)
+    print(f"\nLooking for the fewest faults that violate {outcome.violated()[0]}, of {len(shift.faults)}")
+
+    def tell(faults: int) -> None:
+        interruption.check()
+        print(f"  {count(faults, 'fault')}", flush=True)
+
+    return _conclude(shrink(outcome, tell), title)
+
+
+def _conclude(outcome: Outcome, title: str) -> int:
+    """Report on one shift; return the exit code."""
+    directory = processes.run_directory() / "simulation"
+    name = "".join(each if each.isalnum() else "-" for each in outcome.shift.seed)
+    schedule, html = directory / f"{name}.yaml", directory / f"{name}.html"
+    make_directory(directory)
+    schedule_file.save(outcome.shift, schedule)
+    remarks = [f"{title} · {count(len(outcome.shift.faults), 'fault')} in {outcome.shift.length:.0f} s"]
+    html.write_text(page(title, remarks, outcome.findings, outcome.history), encoding="utf-8")
+    print(f"\n{text(outcome.findings)}\n\n{verdict(outcome.findings)}")
+    print(f"Report: {html}\nPlay it again: make simulate SCHEDULE={schedule}")
+    return int(bool(outcome.violated()))
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,150 @@
+"""An arm in virtual time: the programs of the manifest, unmodified, under a simulated supervisor."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import yaml
+from rclpy_simulation import Delay, Network, Process, Simulation
+from rclpy_simulation.host import BOOT, SECOND
+
+from deploy.promises.history import SWITCH, Life
+from deploy.running import manifest
+from deploy.running.processes import MARK
+from deploy.running.system import SERVICE_GRACE, SETTINGS, DeploymentError, scenario_parameters
+from deploy.trials.chaos.nested_faults import Overlaps
+from deploy.trials.simulation.calibration import Calibration, load
+from deploy.trials.simulation.machine import simulated_services
+from deploy.trials.simulation.supervisor import Supervisor
+from interfaces.service import UserError
+from interfaces.sources import scenario_file
+
+PROGRAMS = tuple(each for each in manifest.programs() if each.name != manifest.PAGE)
+"""All but the page, which serves HTTP on threads of its own."""
+NAMES = tuple(each.name for each in PROGRAMS)
+ROBOT, CONTROL = "robot", "operator"
+"""The hosts; the dead man's switch runs on the operator's."""
+LEAD = 1.0  # s from the start of the arm to the origin of the scenario
+
+
+class Arm:
+    """The processes of one arm."""
+
+    def __init__(
+        self,
+        simulation: Simulation,
+        directory: Path,
+        scenario: Mapping[str, Any],
+        start_up: Delay,
+    ) -> None:
+        """
+        Start an arm, at the beginning of a simulation.
+
+        :param directory: for its parameter file and its settings.
+        :param start_up: from the start of a process to that of its program.
+        """
+        self.simulation = simulation
+        self._ended: list[Life] = []
+        self._start_up = start_up
+        self.good_line = simulation.network.loss, simulation.network.latency
+        """Packet loss and latency without faults."""
+        self.skew = 0.0
+        """By which the clock of the operator's host is ahead of the robot's [s]."""
+        self.overlaps = Overlaps()
+        self._directory = directory
+        file = directory / "scenario.yaml"
+        file.write_text(yaml.safe_dump(dict(scenario)))
+        try:
+            scenario_file.load(file)
+        except UserError as error:
+            raise DeploymentError(f"the scenario has an error: {error}") from None
+        origin = (BOOT / SECOND) + simulation.now + LEAD
+        self.origin = simulation.now + LEAD
+        """The beginning of the scenario [s of the simulation]."""
+        self.parameters = scenario_parameters(file, origin, directory / SETTINGS)
+        """The content of the parameter file."""
+        self._programs = {each.name: each for each in PROGRAMS}
+        self.write_parameters()
+        self.supervisor = Supervisor(simulation, list(NAMES), self.spawn)
+
+    def process(self, program: str) -> Process | None:
+        """Return the supervised process of a program, or an orphan of it."""
+        supervised = self.supervisor.process(program)
+        if supervised is not None or self.supervisor.is_alive:
+            return supervised
+        return next((each for each in self.processes() if each.name == program), None)
+
+    def processes(self) -> list[Process]:
+        """Return all live processes of the arm."""
+        return [each for each in self.simulation.processes if each.name in NAMES]
+
+    def start_again(self) -> None:
+        """Start supervisord again over the orphans of the last one, which end first; not if it runs."""
+        if not self.supervisor.is_alive:
+            for process in self.processes():
+                process.send_signal(signal.SIGTERM)
+            self.simulation.after(SERVICE_GRACE, self._start_anew)
+
+    def _start_anew(self) -> None:
+        if self.supervisor.is_alive:
+            return
+        for process in self.processes():
+            process.kill()
+        self.supervisor = Supervisor(self.simulation, list(NAMES), self.spawn)
+
+    def write_parameters(self) -> None:
+        """Write the parameter file that services read when they start."""
+        (self._directory / "parameters.yaml").write_text(yaml.safe_dump(self.parameters))
+
+    def spawn(self, name: str, parent: int) -> Process:
+        """Start a process of a program."""
+        program = self._programs[name]
+        file = str(self._directory / "parameters.yaml")
+        process = self.simulation.start(
+            program.module,
+            *program.arguments,
+            "--ros-args",
+            "--params-file",
+            file,
+            host=CONTROL if name == SWITCH else ROBOT,
+            environment={MARK: str(self._directory), "SUPERVISOR_PROCESS_NAME": name},
+            name=name,
+            parent=parent,
+            delay=self._start_up,
+        )
+        began = self.simulation.now
+        process.at_end(lambda: self._ended.append(Life(name, process.pid, began, self.simulation.now)))
+        return process
+
+    def lives(self) -> list[Life]:
+        """Return the lives of all processes, also of those that live."""
+        alive = [
+            Life(each.name, each.pid, (each.began - BOOT) / SECOND, None)
+            for each in self.simulation.processes
+            if each.name in NAMES
+        ]
+        return sorted([*self._ended, *alive], key=lambda life: (life.began, life.pid))
+
+
+@contextmanager
+def simulated_arm(
+    seed: str,
+    directory: Path,
+    scenario: Mapping[str, Any],
+    durations: Calibration | None = None,
+) -> Iterator[Arm]:
+    """
+    Simulate an arm until the end of the ``with``.
+
+    :param durations: by default, those of ``calibration.json``.
+    """
+    given = durations or load()
+    network = Network(latency=given.latency, discovery=given.discovery)
+    arm: Arm
+    with simulated_services(seed, network, lambda: arm.supervisor) as simulation:
+        arm = Arm(simulation, directory, scenario, given.start_up)
+        yield arm

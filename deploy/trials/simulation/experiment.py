@@ -1,0 +1,95 @@
+"""A shift: one simulated run of an arm, with its operator and its faults, judged by the promises."""
+
+from __future__ import annotations
+
+import tempfile
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from deploy.promises.findings import Finding
+from deploy.promises.history import OPERATOR, PROGRAMS, SILENCE, History, InjectedFault
+from deploy.promises.promises import CHECKERS
+from deploy.running.system import DeploymentError
+from deploy.trials.chaos.schedule import PlannedFault
+from deploy.trials.chaos.schedule_file import Shift
+from deploy.trials.simulation import people
+from deploy.trials.simulation.arm import NAMES, ROBOT, Arm, simulated_arm
+from deploy.trials.simulation.attacks import alone
+from deploy.trials.simulation.calibration import Calibration
+from deploy.trials.simulation.faults import ATTACK_KINDS, FAULT_KINDS
+from deploy.trials.simulation.observer import Observer
+from deploy.trials.simulation.viewer import view
+
+KINDS = FAULT_KINDS | ATTACK_KINDS
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """The result of a shift."""
+
+    shift: Shift
+    findings: list[Finding]
+    history: History
+    digest: str
+    """A hash of all messages with their times."""
+    messages: int
+
+    @property
+    def injected(self) -> Counter[str]:
+        """How often each kind of fault was injected."""
+        return Counter(fault.kind for fault in self.history.injected)
+
+    @property
+    def alone(self) -> Counter[str]:
+        """How often each fail-safe turned the engines off while the two others could not."""
+        return alone(self.history)
+
+    def violated(self) -> list[str]:
+        """Return the violated promises."""
+        return [finding.promise for finding in self.findings if finding.evidence]
+
+
+def play(shift: Shift, durations: Calibration | None = None) -> Outcome:
+    """
+    Simulate a shift, and check the promises.
+
+    :param durations: of a real arm; by default, those of ``calibration.json``.
+    :raises DeploymentError: if the shift has a fault that cannot be simulated, or a bad scenario.
+    """
+    for planned in shift.faults:
+        if planned.kind not in KINDS or planned.target not in KINDS[planned.kind].targets:
+            raise DeploymentError(f"a simulation has no fault {planned.kind} of {planned.target}")
+    with tempfile.TemporaryDirectory(prefix="reactive-arm-") as directory:
+        with simulated_arm(shift.seed, Path(directory), shift.scenario, durations) as arm:
+            observer = Observer(arm.simulation, arm.origin)
+            arm.simulation.start(view, name="viewer", host=ROBOT)
+            injected: list[InjectedFault] = []
+            for planned in shift.faults:
+                arm.simulation.at(arm.origin + planned.at, _injection(arm, planned, injected))
+            arm.simulation.run(arm.origin + shift.length)
+            lives = arm.lives()
+        conditions = [
+            InjectedFault(SILENCE, OPERATOR, begin, until)
+            for begin, until in people.silences(shift.scenario, shift.length)
+            if until > begin
+        ]
+        history = observer.history(
+            lives, [*injected, *conditions], shift.length, frozenset(PROGRAMS) - set(NAMES)
+        )
+    findings = [check(history) for check in CHECKERS.values()]
+    return Outcome(shift, findings, history, observer.digest, observer.messages)
+
+
+def _injection(arm: Arm, planned: PlannedFault, injected: list[InjectedFault]) -> Any:
+    def inject() -> None:
+        _, kind, target, duration = planned
+        process = arm.process(target) if target in NAMES else None
+        now = arm.simulation.now - arm.origin
+        undo = KINDS[kind].inject(arm, target, duration)
+        injected.append(InjectedFault(kind, target, now, now + duration, process.pid if process else 0))
+        if undo is not None:
+            arm.simulation.after(duration, undo)
+
+    return inject

@@ -1,0 +1,86 @@
+"""The people around a simulated arm: an operator, and a stranger who publishes what nobody should."""
+
+from __future__ import annotations
+
+import math
+import random
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from deploy.trials.chaos import babbler
+from deploy.trials.chaos.testbed import sources
+from interfaces import topics
+
+RATE = 5.0  # Hz, of each source: the least with which L2 can be checked
+FLOOD_RATE = 500.0  # Hz; 25 times the rate of the switch
+BABBLE_RATE = 100.0  # Hz, over all topics
+PRETENCE_RATE = 2.0  # Hz; that of the watchdog
+FIRST_PRESS = 0.5  # s
+
+
+def operator(seed: str, length: float) -> dict[str, Any]:
+    """
+    Return a scenario for ``length`` [s]: all values move, and an operator works and sleeps at random.
+
+    The operator holds the switch, lets go for a moment or for a strike, hammers on it, falls asleep, and
+    turns the engines on. Only the watchdog turns them off: so each stop needs a reason.
+    """
+    rng = random.Random(f"operator {seed}")
+    pressed: list[dict[str, float]] = []
+    commands: list[dict[str, Any]] = []
+    now = FIRST_PRESS
+    while now < length:
+        for begin, end in _hold(rng, now):
+            pressed.append({"from": round(begin, 3), "to": round(end, 3)})
+        begin, now = now, pressed[-1]["to"]
+        for _ in range(rng.randrange(1, 4)):
+            at = round(rng.uniform(begin, now + 2.0), 3)
+            commands.append({"at": at, "command": topics.TURN_ON})
+        now += _away(rng)
+    commands.sort(key=lambda command: float(command["at"]))
+    return {**sources(RATE), "operator": {"pressed": pressed}, "engines": commands}
+
+
+def _hold(rng: random.Random, now: float) -> Iterator[tuple[float, float]]:
+    """Yield when the switch is pressed, until the operator leaves it alone."""
+    if rng.random() < 0.2:  # hammers
+        for _ in range(rng.randrange(5, 30)):
+            end = now + rng.uniform(0.02, 0.4)
+            yield now, end
+            now = end + rng.uniform(0.02, 0.4)
+    yield now, now + rng.uniform(1.0, 60.0)
+
+
+def _away(rng: random.Random) -> float:
+    """Return how long the operator leaves the switch alone: a moment, a strike, or asleep [s]."""
+    moment, strike, asleep = (0.05, 1.0), (2.5, 4.0), (8.0, 30.0)
+    nap = 12.0, 15.0  # just long enough for an attack on the fail-safes
+    return rng.uniform(*rng.choice((moment, strike, asleep, nap, nap)))
+
+
+def silences(scenario: Mapping[str, Any], end: float) -> Iterator[tuple[float, float]]:
+    """Yield when the operator of a scenario does not press the switch [s]."""
+    pressed = scenario.get("operator", {}).get("pressed", [])
+    repeat = scenario.get("repeat", math.inf)
+    last = 0.0
+    for day in range(1 + int(end / repeat)):
+        for each in pressed:
+            begin = each["from"] + (day and day * repeat)
+            yield last, begin
+            last = begin + each["to"] - each["from"] if "to" in each else end
+    yield last, max(last, end)
+
+
+def flood() -> None:
+    """Run a stranger's program that sends too many heartbeats until it is killed."""
+    babbler.run("flood", FLOOD_RATE)
+
+
+def babble() -> None:
+    """Run a stranger's program that sends nonsense until it is killed."""
+    babbler.run("babble", BABBLE_RATE)
+
+
+def pretend() -> None:
+    """Run a stranger's program that reports an operator who is not there until it is killed."""
+    babbler.run("pretend", PRETENCE_RATE)

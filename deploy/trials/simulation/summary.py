@@ -1,0 +1,94 @@
+"""What many shifts have shown together."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+from deploy.promises.findings import Evidence, Finding, percentile
+from deploy.promises.promises import CHECKERS
+from deploy.trials.simulation.experiment import Outcome
+
+
+@dataclass
+class Summary:
+    """The sum of the outcomes of shifts."""
+
+    hours: float = 0.0
+    shifts: int = 0
+    messages: int = 0
+    restarts: int = 0
+    injected: Counter[str] = field(default_factory=Counter)
+    alone: Counter[str] = field(default_factory=Counter)
+    findings: dict[str, list[Finding]] = field(default_factory=lambda: {promise: [] for promise in CHECKERS})
+    digests: list[str] = field(default_factory=list)
+
+    @classmethod
+    def of(cls, outcome: Outcome) -> Summary:
+        """Return the summary of one shift."""
+        history = outcome.history
+        return cls(
+            outcome.shift.length / 3600.0,
+            1,
+            outcome.messages,
+            len(history.lives) - len({life.program for life in history.lives}),
+            outcome.injected,
+            outcome.alone,
+            {finding.promise: [_named(finding, outcome.shift.seed)] for finding in outcome.findings},
+            [outcome.digest],
+        )
+
+    def add(self, other: Summary) -> None:
+        """Add the shifts of another summary."""
+        self.hours += other.hours
+        self.shifts += other.shifts
+        self.messages += other.messages
+        self.restarts += other.restarts
+        self.injected += other.injected
+        self.alone += other.alone
+        self.digests += other.digests
+        for promise, findings in other.findings.items():
+            self.findings[promise] += findings
+
+    def total(self) -> list[Finding]:
+        """Return one finding for each promise."""
+        return [_sum(findings) for findings in self.findings.values() if findings]
+
+    def violated(self) -> list[str]:
+        """Return the violated promises."""
+        return [each.promise for each in self.total() if each.evidence]
+
+    @property
+    def digest(self) -> str:
+        """A hash of all records, in order."""
+        return hashlib.sha256("".join(self.digests).encode()).hexdigest()[:16]
+
+
+def _named(finding: Finding, seed: str) -> Finding:
+    """Let the evidence name the shift."""
+    evidence = [Evidence(each.time, f"{each.text} ({seed})") for each in finding.evidence]
+    return replace(finding, evidence=evidence)
+
+
+def _sum(findings: Sequence[Finding]) -> Finding:
+    times: dict[str, list[float]] = {}
+    for finding in findings:
+        for program, values in finding.times.items():
+            times.setdefault(program, []).extend(values)
+    worst = max(findings, key=lambda finding: -math.inf if math.isnan(finding.worst) else finding.worst)
+    every = [time for values in times.values() for time in values]
+    measured = worst.measured if not math.isnan(worst.worst) else ""
+    if worst.promise == "L1" and every:
+        p50, p99 = percentile(every, 50), percentile(every, 99)
+        measured = f"p50 {p50:.2f} s, p99 {p99:.2f} s, at most {max(every):.2f} s"
+    return replace(
+        worst,
+        cases=sum(finding.cases for finding in findings),
+        unknown=sum(finding.unknown for finding in findings),
+        evidence=[each for finding in findings for each in finding.evidence],
+        measured=measured,
+        times=times,
+    )

@@ -1,0 +1,59 @@
+"""Runs of the chaos monkey in a subprocess, and their results."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+from deploy.promises import observations as record
+from deploy.promises.findings import Finding
+from deploy.promises.history import History
+from deploy.promises.promises import CHECKERS
+from deploy.running import processes
+from deploy.trials.chaos.arm import file_suffix
+
+TIMEOUT = 150.0  # s
+
+
+class Experiment:
+    """The result of an experiment with one arm."""
+
+    def __init__(self, directory: Path, output: str, code: int, namespace: str = "/") -> None:
+        self.output = output
+        self.code = code
+        self.page = next(directory.glob(f"chaos/*/report{file_suffix(namespace)}.html"))
+        self.history: History = record.load(self.page.with_name("record.mcap"), namespace)
+        self.findings: dict[str, Finding] = {name: check(self.history) for name, check in CHECKERS.items()}
+
+    def finding(self, promise: str) -> Finding:
+        """Return the finding on a promise, which must not be violated."""
+        finding = self.findings[promise]
+        assert not finding.evidence, f"{promise}: {finding.evidence}"
+        return finding
+
+
+def experiment(run: Path, *options: str) -> Experiment:
+    """Run an experiment with one arm; its files are in a directory."""
+    return Experiment(run, *unleash(run, *options))
+
+
+def unleash(run: Path, *options: str) -> tuple[str, int]:
+    """Run `make chaos`; return its output and its exit code."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "deploy.trials.chaos", *options],
+        cwd=processes.ROOT,
+        env={**os.environ, "REACTIVE_ARM_RUN_DIR": str(run)},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
+    try:
+        output = process.communicate(timeout=TIMEOUT)[0]
+    finally:
+        if process.poll() is None:
+            process.terminate()
+            process.wait(timeout=20.0)
+    assert "Report: " in output, output
+    return output, process.returncode

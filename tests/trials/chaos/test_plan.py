@@ -1,0 +1,76 @@
+"""The plan of `make chaos` that follows from its command line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from deploy.running.system import DeploymentError
+from deploy.trials.chaos import clock, plan
+from deploy.trials.chaos.schedule import PlannedFault
+from deploy.trials.chaos.schedule_file import Shift, save
+from deploy.trials.chaos.testbed import SCENARIO, Testbed
+
+
+def schedule(path: Path, kind: str = "kill", target: str = "velocity") -> str:
+    save(Shift("7", 30.0, SCENARIO, [PlannedFault(6.0, kind, target)]), path)
+    return str(path)
+
+
+def test_a_schedule_is_played_with_its_operator_and_its_length(tmp_path: Path) -> None:
+    path = schedule(tmp_path / "schedule.yaml")
+    planned = plan.plan(plan.parse(["--schedule", path]))
+    assert planned.schedules == [[PlannedFault(6.0, "kill", "velocity")]]
+    assert planned.length == 30.0
+    assert path in planned.title
+    testbed = planned.testbed(tmp_path)
+    assert testbed._scenario == SCENARIO
+
+
+def test_a_fault_that_only_a_simulation_has_is_refused(tmp_path: Path) -> None:
+    path = schedule(tmp_path / "schedule.yaml", "skew_clock", "operator")
+    with pytest.raises(DeploymentError, match="only make simulate can inject skew_clock"):
+        plan.plan(plan.parse(["--schedule", path]))
+
+
+def test_a_seed_may_be_a_word() -> None:
+    plans = [plan.plan(plan.parse(["--minutes", "1", "--seed", seed])) for seed in ("abc", "abc", "abd")]
+    assert "seed abc," in plans[0].title
+    assert plans[0].schedules == plans[1].schedules != plans[2].schedules
+
+
+@pytest.fixture
+def without_library(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(clock, "LIBRARY", tmp_path / "libfaketime")
+
+
+NEEDED = "step_clock is not possible on this machine: there is no libfaketime (apt-get install libfaketime)"
+
+
+@pytest.mark.usefixtures("without_library")
+def test_a_step_of_the_clock_without_libfaketime_is_refused(tmp_path: Path) -> None:
+    for options in (
+        ["--faults", "kill,step_clock"],
+        ["--schedule", schedule(tmp_path / "schedule.yaml", "step_clock", "nothing")],
+    ):
+        with pytest.raises(DeploymentError) as error:
+            plan.plan(plan.parse(options))
+        assert str(error.value) == NEEDED
+
+
+def test_only_a_step_of_the_clock_needs_libfaketime() -> None:
+    plans = [
+        plan.Plan("", [[PlannedFault(5.0, kind, "nothing")]], 1.0, Testbed)
+        for kind in ("flood", "step_clock")
+    ]
+    assert [each.steps_clock for each in plans] == [False, True]
+
+
+@pytest.mark.parametrize("other", [["--scenario", "briefly"], ["--arms", "2"]])
+def test_a_schedule_excludes_other_faults_and_arms(
+    other: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit):
+        plan.parse(["--schedule", schedule(tmp_path / "schedule.yaml"), *other])
+    assert "--schedule has faults of its own, for one arm" in capsys.readouterr().err

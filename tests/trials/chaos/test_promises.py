@@ -1,0 +1,84 @@
+"""The promises in one short play with a real system: every kind of fault, and every program killed."""
+
+from __future__ import annotations
+
+import pytest
+
+from deploy.promises.findings import HOLDS
+from deploy.promises.history import PROGRAMS, SILENCE, Sample, between
+from deploy.promises.marks import STEP
+from deploy.promises.promises import CHECKERS
+from deploy.promises.safety import OFF_WITHIN, TRANSPORT, running
+from deploy.trials.chaos.clock import missing
+from interfaces.topics import DRIVE_TIMEOUT, ENGINES, OPERATOR_HEARTBEAT, OPERATOR_PRESENCE
+
+from .experiments import Experiment, experiment
+
+pytestmark = [pytest.mark.timed, pytest.mark.timeout(180)]
+
+
+@pytest.fixture(scope="module")
+def play(tmp_path_factory: pytest.TempPathFactory) -> Experiment:
+    return experiment(tmp_path_factory.mktemp("variously"), "--scenario", "variously")
+
+
+@pytest.mark.parametrize("promise", CHECKERS)
+def test_promise_is_exercised_and_holds(play: Experiment, promise: str) -> None:
+    assert play.finding(promise).verdict == HOLDS
+
+
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_killed_program_is_back_within_two_seconds(play: Experiment, program: str) -> None:
+    assert max(play.finding("L1").times[program]) <= 2.0
+
+
+def test_engines_turn_off_in_time_with_a_stopped_controller(play: Experiment) -> None:
+    history = play.history
+    sleep = next(fault for fault in history.faults if fault.kind == SILENCE and fault.begin > 0.0)
+    begin = between(history.stream(OPERATOR_HEARTBEAT), 0.0, sleep.begin + 1.0)[-1].sent
+    off = max(off for on, off in running(history) if on < sleep.end)
+    stop = next(f for f in history.faults if (f.kind, f.target) == ("stop", "engine_controller"))
+    assert stop.begin < off <= stop.begin + DRIVE_TIMEOUT + TRANSPORT  # by the drive, without a command
+    assert not between(history.stream(ENGINES), begin, off)  # the watchdog has lost its strikes
+    assert off - begin <= OFF_WITHIN
+
+
+def test_hung_programs_and_a_stopped_sentinel_are_replaced(play: Experiment) -> None:
+    assert set(play.finding("L4").times) == {"kinematics", "config_l1", "sentinel"}
+
+
+@pytest.mark.skipif(bool(missing()), reason=f"platform: {missing()}")
+def test_time_of_day_of_the_arm_steps_forward_and_back(play: Experiment) -> None:
+    steps = [fault for fault in play.history.faults if fault.kind == STEP]
+    assert len(steps) == 2
+    presences = play.history.stream(OPERATOR_PRESENCE)
+
+    def ahead(presence: Sample) -> float:  # its value is its stamp
+        return float(presence.value) - presence.sent - (presences[0].value - presences[0].sent)
+
+    for step in steps:
+        after = next(presence for presence in presences if presence.sent > step.begin + 1.5)
+        assert ahead(after) == pytest.approx(step.ahead, abs=1.0)
+    assert steps[0].ahead < 0.0 < steps[1].ahead - steps[0].ahead
+
+
+def test_killed_supervisord_leaves_no_second_instance(play: Experiment) -> None:
+    supervisors = [life for life in play.history.lives if not life.program]
+    assert len(supervisors) == 2
+    assert play.finding("S5").cases >= len(PROGRAMS)
+
+
+def test_every_output_flows_at_the_end(play: Experiment) -> None:
+    history = play.history
+    silent = {p for p in PROGRAMS if history.output(p)[-1].received < history.end - 3.0}
+    assert not silent
+
+
+def test_exit_code_output_and_page_show_cost_and_verdict(play: Experiment) -> None:
+    assert play.code == 0, play.output
+    assert f") in {len(PROGRAMS) + 1} processes per arm" in play.output
+    page = play.page.read_text(encoding="utf-8")
+    assert "All exercised promises hold" in page
+    assert page.count("<svg") >= 2
+    page = page.replace("http://www.w3.org/2000/svg", "")  # a name, not an address
+    assert not any(word in page for word in ("http:", "https:", "src="))

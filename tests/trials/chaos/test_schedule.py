@@ -1,0 +1,64 @@
+"""Schedules: random faults and named scenarios."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import pytest
+
+from deploy.promises.history import PROGRAMS
+from deploy.promises.liveness import MEDIAN
+from deploy.trials.chaos import schedule
+from deploy.trials.chaos.faults import FAULT_KINDS
+
+
+def test_only_the_same_seed_gives_the_same_schedule() -> None:
+    assert schedule.random_faults(7, 300.0) == schedule.random_faults(7, 300.0)
+    assert schedule.random_faults(7, 300.0) != schedule.random_faults(8, 300.0)
+
+
+def test_one_random_fault_in_each_interval_in_order() -> None:
+    times = [planned.at for planned in schedule.random_faults(1, 600.0, every=5.0)]
+    assert len(times) == 119
+    assert times == sorted(times)
+
+
+def test_random_faults_cover_all_kinds_and_programs() -> None:
+    planned = [each for seed in range(3) for each in schedule.random_faults(seed, 600.0)]
+    assert {each.kind for each in planned} == set(FAULT_KINDS)
+    assert {each.target for each in planned} >= set(PROGRAMS)
+
+
+def test_random_faults_have_only_the_given_kinds_and_targets() -> None:
+    planned = schedule.random_faults(3, 600.0, kinds=["kill", "stop"], targets=["kinematics", "velocity"])
+    assert {(each.kind, each.target) for each in planned} == {
+        (kind, target) for kind in ("kill", "stop") for target in ("kinematics", "velocity")
+    }
+
+
+@pytest.mark.parametrize("name", schedule.SCENARIOS)
+def test_scenarios_inject_known_faults_into_their_targets(name: str) -> None:
+    planned = schedule.SCENARIOS[name]()
+    assert planned
+    for each in planned:
+        assert each.target in FAULT_KINDS[each.kind].targets
+
+
+def test_everything_injects_each_fault_into_each_target() -> None:
+    planned = {(each.kind, each.target) for each in schedule.everything()}
+    assert planned == {(kind, target) for kind, fault in FAULT_KINDS.items() for target in fault.targets}
+
+
+def test_kill_each_kills_every_program_twenty_times() -> None:
+    killed = [each.target for each in schedule.kill_each()]
+    assert {program: killed.count(program) for program in PROGRAMS} == dict.fromkeys(PROGRAMS, 20)
+
+
+def test_a_brief_run_kills_every_program_three_times_while_the_operator_is_awake() -> None:
+    killed = [each.target for each in schedule.briefly() if each.at % schedule.DAY < schedule.AWAKE]
+    assert {program: killed.count(program) for program in PROGRAMS} == dict.fromkeys(PROGRAMS, 3)
+
+
+def test_a_killed_program_has_time_to_restart_before_the_next_kill() -> None:
+    for planned in (schedule.kill_each(), schedule.briefly()):
+        assert min(two.at - one.at for one, two in pairwise(planned)) >= MEDIAN

@@ -1,0 +1,68 @@
+"""The testbed waits for its arms: their sources are silent until the origin of the scenario."""
+
+from __future__ import annotations
+
+import queue
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from deploy.promises.history import OUTPUTS
+from deploy.running.system import DeploymentError
+from deploy.trials.chaos.testbed import START_TIMEOUT, Testbed
+
+ARMS = tuple(f"/arm{number}" for number in range(1, 31))
+
+
+class Observer:
+    """In place of the lines of the observer: it sees each topic from a time on [s], and time passes."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, lines: list[str], since: float) -> None:
+        self.now = 0.0
+        self._lines = lines
+        self._since = since
+        monkeypatch.setattr(time, "monotonic", lambda: self.now)
+
+    def get(self, timeout: float) -> str:
+        self.now += timeout
+        if self.now < self._since or not self._lines:
+            raise queue.Empty
+        return self._lines.pop()
+
+
+@pytest.fixture
+def fleet(tmp_path: Path) -> Any:
+    testbed: Any = Testbed(tmp_path / "fleet", ARMS)
+    testbed._epoch = testbed.lead
+    assert testbed.lead > START_TIMEOUT, "a fleet starts longer than an arm may be silent"
+    return testbed
+
+
+def seen(names: list[str]) -> list[str]:
+    return [f"seen {name}/{topic.name}" for name in names for topic in OUTPUTS.values()]
+
+
+def test_waits_for_the_output_of_all_arms_until_after_the_origin(
+    fleet: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lines = seen(list(ARMS))
+    fleet._await_messages(fleet.arms, list(OUTPUTS.values()), Observer(monkeypatch, lines, fleet.lead))
+    assert not lines
+
+
+def test_names_the_topics_without_a_message(fleet: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    observer = Observer(monkeypatch, seen([*ARMS[1:]]), fleet.lead)
+    with pytest.raises(DeploymentError) as error:
+        fleet._await_messages(fleet.arms, list(OUTPUTS.values()), observer)
+    topics = "/arm1/effector/position, /arm1/effector/speed, /arm1/engines/state and 7 more topics"
+    assert str(error.value) == f"No message on {topics} within 60 s: try fewer --arms"
+    assert observer.now == pytest.approx(fleet.lead + START_TIMEOUT, abs=1.0)
+
+
+def test_topics_that_were_seen_before_are_not_awaited(fleet: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    observer = Observer(monkeypatch, seen([ARMS[0]]), 1.0)
+    fleet._await_messages(fleet.arms[:1], list(OUTPUTS.values()), observer)
+    fleet._await_messages(fleet.arms[:1], list(OUTPUTS.values()), observer)
+    assert observer.now < 10.0

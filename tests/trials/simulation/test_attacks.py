@@ -1,0 +1,101 @@
+"""Attacks on one fail-safe at a time: each holds alone, and no other one hides its bugs."""
+
+from __future__ import annotations
+
+import itertools
+import random
+
+import pytest
+
+from deploy.promises.history import CONTROLLER, FALSE_PRESENCE, STUCK_DRIVE
+from deploy.trials.chaos.schedule import PlannedFault
+from deploy.trials.chaos.schedule_file import Shift
+from deploy.trials.simulation import __main__ as simulate
+from deploy.trials.simulation import attacks, people, plan
+from deploy.trials.simulation.attacks import FAIL_SAFES, JUDGED
+from deploy.trials.simulation.experiment import Outcome, play
+from deploy.trials.simulation.faults import ATTACK_KINDS, FAULT_KINDS
+from deploy.trials.simulation.summary import Summary
+from interfaces import topics
+
+from .bugs import BUGS, planted
+
+RELEASE = 14.0  # s
+DAYS = 30  # within which a bug must be found
+
+
+def day(seed: str, fail_safe: str) -> Shift:
+    """Return a day in which the controller pauses while it runs, and a fail-safe has to act alone later."""
+    scenario = {
+        **people.sources(people.RATE),
+        "operator": {"pressed": [{"from": 0.0, "to": RELEASE}]},
+        "engines": [{"at": at, "command": topics.TURN_ON} for at in (1.5, 12.5, RELEASE + JUDGED)],
+    }
+    pause = PlannedFault(6.0, "stop", CONTROLLER, 1.5)
+    faults = attacks.attack(fail_safe, RELEASE, random.Random(f"{seed} {fail_safe}"))
+    return Shift(seed, RELEASE + JUDGED + 3.0, scenario, [pause, *faults])
+
+
+def evidence(outcome: Outcome) -> list[object]:
+    return [each for finding in outcome.findings for each in finding.evidence]
+
+
+@pytest.mark.parametrize("fail_safe", FAIL_SAFES)
+def test_each_fail_safe_turns_the_engines_off_in_time_alone(fail_safe: str) -> None:
+    counted = 0
+    for seed in range(6):
+        outcome = play(day(str(seed), fail_safe))
+        assert evidence(outcome) == []
+        assert set(outcome.alone) <= {fail_safe}
+        counted += outcome.alone[fail_safe]
+    # A successor of the controller may turn off before the drive does.
+    assert counted == 6 if fail_safe != "F3" else counted >= 4
+
+
+def test_the_report_says_how_often_each_fail_safe_stood_alone() -> None:
+    summary = Summary.of(play(day("1", "F1")))
+    summary.add(Summary.of(play(day("1", "F2"))))
+    summary.add(Summary.of(play(day("2", "F2"))))
+    line = "Fail-safes that turned the engines off alone: F1 once, F2 2 times, F3 0 times"
+    assert line in simulate.report(summary, 1.0).splitlines()
+    assert "alone" not in simulate.report(Summary(hours=1.0), 1.0)
+
+
+@pytest.mark.parametrize("name", BUGS)
+def test_a_bug_in_one_fail_safe_is_found(name: str) -> None:
+    with planted(BUGS[name]):
+        for number, fail_safe in zip(range(DAYS), itertools.cycle(FAIL_SAFES), strict=False):
+            if evidence(play(day(f"{name} {number}", fail_safe))):
+                return
+    pytest.fail(f"{DAYS} attacks have not found that {name}")
+
+
+def test_random_shifts_attack_each_fail_safe_in_turn() -> None:
+    shifts = plan.shifts("1", 2.0, 5.0, list(FAULT_KINDS))
+    faults = [each for shift in shifts for each in shift.faults]
+    stuck, deceived = (sum(each.kind == kind for each in faults) for kind in (STUCK_DRIVE, FALSE_PRESENCE))
+    assert 15 < deceived < 40  # F1
+    assert abs(stuck - 2 * deceived) <= len(shifts)  # F1 and F2
+    assert {each.kind for each in faults} == {*FAULT_KINDS, *ATTACK_KINDS}
+
+
+def test_chosen_kinds_of_faults_are_without_attacks() -> None:
+    kinds = list(FAULT_KINDS)[1:]
+    faults = [each for shift in plan.shifts("1", 1.0, 5.0, kinds) for each in shift.faults]
+    assert {each.kind for each in faults} <= set(kinds)
+
+
+def test_random_faults_leave_the_attacked_fail_safe_unharmed() -> None:
+    for seed in range(5):
+        bare = Shift(str(seed), 600.0, people.operator(str(seed), 600.0), [])
+        targets = ("operator_watchdog", "engine_controller", "all", "operator", "nothing", "velocity")
+        faults = [PlannedFault(float(at), "kill", target, 2.0) for at in range(600) for target in targets]
+        whole = attacks.attacked(Shift(bare.seed, bare.length, bare.scenario, faults))
+        planned = attacks.attacked(bare).faults
+        releases = [each.at for each in planned if each.kind == STUCK_DRIVE]
+        assert releases
+        kept = [each for each in whole.faults if each not in planned]
+        assert sum(each.target == "velocity" for each in kept) == 600
+        for release, fault in itertools.product(releases, kept):
+            is_near = release - 6.0 < fault.at + fault.duration and fault.at < release + JUDGED
+            assert fault.target == "velocity" or not is_near

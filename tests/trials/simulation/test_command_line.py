@@ -1,0 +1,106 @@
+"""`make simulate`, as a user runs it."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from deploy.running.processes import ROOT
+from deploy.trials.chaos.schedule import PlannedFault
+from deploy.trials.chaos.schedule_file import Shift, save
+from deploy.trials.chaos.testbed import SCENARIO
+from deploy.trials.simulation import plan
+from deploy.trials.simulation.experiment import play
+from deploy.trials.simulation.faults import FAULT_KINDS
+from deploy.trials.simulation.summary import Summary
+
+
+def simulate(run: Path, *arguments: str, **environment: str) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [sys.executable, "-m", "deploy.trials.simulation", *arguments],
+        cwd=ROOT,
+        env={**os.environ, "REACTIVE_ARM_RUN_DIR": str(run), **environment},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def test_the_same_seed_gives_the_same_record(tmp_path: Path) -> None:
+    run = simulate(tmp_path, "--hours", "0.01", "--seed", "7")
+    output, _ = run.communicate()
+    assert run.returncode == 0
+    (shift,) = plan.shifts("7", 0.01, 5.0, tuple(FAULT_KINDS))
+    assert f"record {Summary.of(play(shift)).digest}\n" in output
+    assert "seed 7" in output
+    assert "times real time" in output
+
+
+def test_a_schedule_is_played_and_reported(tmp_path: Path) -> None:
+    path = tmp_path / "schedule.yaml"
+    save(Shift("1", 10.0, SCENARIO, [PlannedFault(5.0, "kill", "operator_watchdog")]), path)
+    run = simulate(tmp_path, "--schedule", str(path))
+    output, errors = run.communicate()
+    assert (run.returncode, errors) == (0, "")
+    report = re.search(r"Report: (.*)", output)
+    assert report is not None
+    assert "<html" in Path(report[1]).read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "reason"),
+    [
+        (["--hours", "much"], "'much' is not a number"),
+        (["--faults", "magic"], "'magic' is not one of kill,"),
+        (["--schedule", "nowhere.yaml"], "nowhere.yaml: No such file or directory"),
+    ],
+)
+def test_a_users_mistake_is_one_line(arguments: list[str], reason: str, tmp_path: Path) -> None:
+    run = simulate(tmp_path, *arguments)
+    _, errors = run.communicate()
+    assert run.returncode in (1, 2)
+    assert reason in errors.splitlines()[-1]
+    assert "Traceback" not in errors
+
+
+def test_ctrl_c_gives_the_verdict_so_far_or_ends(tmp_path: Path) -> None:
+    run = simulate(tmp_path, "--hours", "24", "--seed", "1")
+    assert run.stdout is not None
+    assert "seed 1" in run.stdout.readline()
+    run.send_signal(signal.SIGINT)
+    output, errors = run.communicate(timeout=30)
+    assert run.returncode == 130
+    assert "Interrupted" in output
+    assert errors == ""
+
+
+@pytest.mark.parametrize("module", ["deploy.trials.simulation", "deploy.trials.replay"])
+def test_a_missing_simulation_is_one_line(module: str) -> None:
+    code = (
+        "import runpy, sys; sys.modules['rclpy_simulation'] = None; "
+        f"runpy.run_module({module!r}, run_name='__main__')"
+    )
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 1
+    (line,) = done.stderr.splitlines()
+    assert "use a terminal in which no ROS 2 is sourced" in line
+
+
+def test_ctrl_c_leaves_nothing_behind(tmp_path: Path) -> None:
+    run = simulate(tmp_path / "run", "--hours", "24", "--seed", "1", TMPDIR=str(tmp_path))
+    assert run.stdout is not None
+    assert "seed 1" in run.stdout.readline()
+    deadline = time.monotonic() + 60.0
+    while not any(path.is_dir() for path in tmp_path.glob("reactive-arm-*/reactive-arm-*")):
+        assert time.monotonic() < deadline, "no shift has begun"
+        time.sleep(0.05)
+    run.send_signal(signal.SIGINT)
+    run.communicate(timeout=30)
+    assert not list(tmp_path.glob("reactive-arm-*"))

@@ -1,0 +1,98 @@
+"""A schedule that violates a promise is shrunk to the faults that matter."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+
+from deploy.running.system import DeploymentError
+from deploy.trials.chaos import schedule_file
+from deploy.trials.chaos.schedule import PlannedFault
+from deploy.trials.chaos.schedule_file import Shift
+from deploy.trials.chaos.testbed import SCENARIO
+from deploy.trials.simulation.experiment import play
+from deploy.trials.simulation.shrink import minimal, shrink
+from tests.trials.simulation.test_shift import ASLEEP, BRIEF, with_a_bug
+
+
+@pytest.mark.parametrize("needed", [set(), {0}, {3}, {2, 7}, {0, 5, 9}, set(range(10))])
+def test_the_minimum_is_exactly_what_fails(needed: set[int]) -> None:
+    tried = 0
+
+    def fails(items: Sequence[int]) -> bool:
+        nonlocal tried
+        tried += 1
+        return needed <= set(items)
+
+    assert set(minimal(range(10), fails)) == needed
+    assert tried < 100
+
+
+def test_a_schedule_is_shrunk_to_the_faults_that_violate_the_promise(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    with_a_bug(monkeypatch)
+    others = [PlannedFault(2.0, "kill", "velocity"), PlannedFault(3.0, "terminate", "config_l1")]
+    kills = [PlannedFault(ASLEEP + 1.0 + 4 * n, "kill", "operator_watchdog") for n in range(3)]
+    outcome = play(Shift("bug", ASLEEP + 15.0, BRIEF, [*others, *kills]))
+    assert "S1" in outcome.violated()
+    left: list[int] = []
+    small = shrink(outcome, left.append)
+    assert "S1" in small.violated()
+    assert {each.target for each in small.shift.faults} == {"operator_watchdog"}
+    assert left[-1] == len(small.shift.faults) < len(kills) + 1
+
+    path = tmp_path / "small.yaml"
+    schedule_file.save(small.shift, path)
+    again = play(schedule_file.load(path))
+    assert again.digest == small.digest
+
+
+FAULT = "{{seed: 1, length: 5, scenario: {{}}, faults: [{{{}}}]}}"
+
+
+@pytest.mark.parametrize(
+    ("content", "reason"),
+    [
+        ("", "no schedule"),
+        ("faults: 3", "no schedule"),
+        ("seed: 1\nlength: x\nscenario: {}\nfaults: []", "length: 'x' is no time in s"),
+        ("seed: 1\nlength: .inf\nscenario: {}\nfaults: []", "length: inf is no time in s"),
+        ("seed: 1\nlength: -1.0\nscenario: {}\nfaults: []", "length: -1.0 is no time in s"),
+        (f"seed: 1\nlength: 1{'0' * 400}\nscenario: {{}}\nfaults: []", "length: 10+ is no time in s"),
+        ("seed: 1\nlength: 5\nscenario: much\nfaults: []", "scenario: 'much' is no mapping"),
+        ("seed: 1\nlength: 5\nfaults: []", "scenario"),
+        ("seed: 1\nlength: 5\nscenario: {}", "faults"),
+        (FAULT.format("at: abc, kind: kill, target: all"), "at: 'abc' is no time in s"),
+        (FAULT.format("at: .nan, kind: kill, target: all"), "at: nan is no time in s"),
+        (FAULT.format("at: -1, kind: kill, target: all"), "at: -1 is no time in s"),
+        (FAULT.format("at: 1, kind: kill, target: all, duration: .inf"), "duration: inf is no time in s"),
+        (FAULT.format("at: 1, kind: [], target: all"), r"kind: \[\] is no name"),
+        (FAULT.format("at: 1, kind: kill, target: 7"), "target: 7 is no name"),
+        (FAULT.format("at: 1, kind: kill, target: all, why: x"), "why"),
+        ("[1]", "no schedule"),
+        ("seed: 1\nlength: 5\nscenario: {}\nfaults: [{at: 1, kind: kill}]", "target"),
+        ("{", "no schedule"),
+    ],
+)
+def test_a_bad_schedule_is_one_line(content: str, reason: str, tmp_path: Path) -> None:
+    path = tmp_path / "bad.yaml"
+    path.write_text(content)
+    with pytest.raises(DeploymentError, match=reason) as error:
+        schedule_file.load(path)
+    assert str(path) in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(("kind", "target"), [("magic", "all"), ("kill", "moon"), ("full_disk", "nothing")])
+def test_a_fault_that_cannot_be_simulated_is_named(kind: str, target: str) -> None:
+    with pytest.raises(DeploymentError, match=f"no fault {kind} of {target}"):
+        play(Shift("1", 5.0, SCENARIO, [PlannedFault(1.0, kind, target)]))
+
+
+def test_an_error_of_the_scenario_is_one_line() -> None:
+    with pytest.raises(DeploymentError, match=r"the scenario has an error: .*theta1") as error:
+        play(Shift("1", 5.0, {"theta1": "much"}, []))
+    assert "\n" not in str(error.value)
