@@ -16,8 +16,9 @@ from mcap_files import McapFile
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
+from deploy.commands.setup import sourced_rclpy
 from interfaces import topics
-from tests.system.sites import LIMIT, Command, Site
+from tests.system.sites import LIMIT, ROOT, Command, Site
 
 TYPES = {
     topic.name if topic.name.startswith("/") else f"/arm1/{topic.name}": topic.type_name
@@ -129,3 +130,20 @@ def test_record_tells_that_supervisord_has_died(small_site: Site) -> None:
 
 def test_record_of_nothing_is_refused(site: Site) -> None:
     assert site.do("record") == (1, "Nothing runs: make start")
+
+
+@pytest.mark.timed
+def test_record_of_a_real_arm_replays_equal_in_virtual_time(site: Site) -> None:
+    """What simulation and replay show holds for the rclpy of the real arm, too: both give the same output."""
+    if sourced_rclpy():
+        pytest.skip("platform: a sourced ROS 2 leaves no place for the embedded rclpy")
+    assert site.do("start", "demo")[0] == 0
+    command = record(site)
+    time.sleep(15.0)  # the engines have been turned on, and the arm has moved
+    command.signal(signal.SIGINT)
+    assert command.wait() == 0
+    path = command.await_line(SUMMARY)[1]
+    assert site.do("stop")[0] == 0
+    replay = ("-m", "deploy.trials.replay", path)
+    code, shown = site.do_command("env", "RUNTIME=embedded", str(ROOT / "deploy/commands/venv.sh"), *replay)
+    assert code == 0, shown
