@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 from hypothesis import Phase, settings
 
-from deploy.commands.test import left_out_here
+from tests.runtimes import left_out_here
 
 collect_ignore = [*left_out_here()]  # `make test` runs these with RUNTIME=embedded
 

@@ -11,8 +11,8 @@ from pathlib import Path
 
 from deploy.benchmarks import c_program
 from deploy.benchmarks.link import FIRST, HEARTBEATS, LAST, MIDDLE, SINK, SOURCE, Job
-from deploy.commands.setup import RUNTIME
 from deploy.running.processes import ROOT
+from deploy.running.rclpy_choice import RUNTIME
 
 BENCH_PYTHON = ROOT / ".venv-bench" / "bin" / "python"
 SYSTEM_PYTHON = ROOT / "deploy" / "commands" / "venv.sh"

@@ -18,9 +18,9 @@ from pathlib import Path
 from deploy.benchmarks.alternatives import Alternative
 from deploy.benchmarks.measurement import MeasurementFailed, Scenario, measure_subscribers
 from deploy.benchmarks.table import Results, table
-from deploy.commands.setup import sourced_rclpy
 from deploy.running import interruption
 from deploy.running.processes import ROOT
+from deploy.running.rclpy_choice import sourced_rclpy
 from deploy.running.system import NAMESPACE, System
 from deploy.trials.chaos.arm import Arm
 from deploy.trials.chaos.cost import Cost

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import fcntl
 import hashlib
-import importlib.machinery
 import importlib.util
 import os
 import platform
@@ -30,6 +29,7 @@ from pathlib import Path
 from types import FrameType
 
 from deploy.running.processes import ROOT, run_directory, using
+from deploy.running.rclpy_choice import RUNTIME, sourced_rclpy
 
 VENV = ROOT / ".venv"
 PYTHON = VENV / "bin" / "python"
@@ -39,8 +39,6 @@ REQUIREMENTS = ROOT / "deploy" / "requirements"
 PIP = [str(PYTHON), "-m", "pip", "install", "--no-deps", "--no-input", "--progress-bar=off"]
 SOURCES = [ROOT / "interfaces" / "reactive_node" / "src", ROOT / "deploy" / "tools" / "src"]
 """Packages of this checkout that Python finds after those of an installed ROS 2."""
-RUNTIME = "RUNTIME"
-"""Environment variable: "embedded" for the rclpy of this checkout, "" for ROS 2's own."""
 EMBEDDED = ROOT / "deploy" / "runtime" / "src"
 FAST_DDS = "rmw_fastrtps_cpp"
 SCRIPTS = {
@@ -84,14 +82,6 @@ def main() -> int:
     finally:
         signal.signal(signal.SIGINT, signal.SIG_DFL)  # no traceback from an interpreter that ends
     return 0
-
-
-def sourced_rclpy() -> str:
-    """The file of the rclpy of a sourced ROS 2, which is in PYTHONPATH; '' without one."""
-    path = [entry for entry in os.environ.get("PYTHONPATH", "").split(os.pathsep) if entry]
-    spec = importlib.machinery.PathFinder.find_spec("rclpy", path)
-    origin = (spec and spec.origin) or ""
-    return "" if Path(origin).is_relative_to(ROOT) else origin
 
 
 def check_runtime(environment: Mapping[str, str], ros: str) -> None:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 
+from deploy.running.columns import table
 from deploy.running.system import Program
 from interfaces.service.health import Health
 
@@ -14,14 +15,6 @@ HEADER = ("SERVICE", "STATE", "PID", "UPTIME", "RESTARTS", "LAST OUTPUT", "HEALT
 def of_services(programs: Iterable[Program], health: Mapping[str, Health]) -> str:
     """The services, one per line, with the latest health of each."""
     return table([HEADER, *(_row(program, health.get(program.name)) for program in programs)])
-
-
-def table(rows: Sequence[Sequence[str]]) -> str:
-    """Rows of cells in columns as wide as needed, one row per line."""
-    widths = [max(len(cell) for cell in column) for column in zip(*rows, strict=True)]
-    return "\n".join(
-        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows
-    )
 
 
 def _row(program: Program, health: Health | None) -> tuple[str, ...]:

@@ -17,25 +17,13 @@ from pathlib import Path
 from typing import NamedTuple
 from xml.etree import ElementTree
 
-from deploy.commands.setup import RUNTIME, sourced_rclpy
+from deploy.running.rclpy_choice import RUNTIME, sourced_rclpy
+from tests.runtimes import left_out_here
 
 PASSED, FAILED, WRONG_USE, NO_TESTS = 0, 1, 4, 5  # exit codes of pytest
 PROCESSORS = os.cpu_count() or 1
 PHASES = {"not timed and not alone": 2 * PROCESSORS, "timed": PROCESSORS, "alone": 1}  # and their workers
 IGNORE = "--ignore="
-EMBEDDED_ONLY = (
-    "deploy/runtime/tests/interop",
-    "deploy/runtime/tests/runtime",
-    "deploy/runtime/tests/simulation",
-    "tests/mutants",
-    "tests/trials/replay",
-    "tests/trials/simulation",
-)
-"""Tests of the embedded rclpy, and of what runs only on it."""
-TRANSFORMS = ("interfaces/reactive_node/tests/test_transforms.py",)
-"""Tests that need tf2_msgs, which ROS 2's wheels do not have."""
-EVENTS = ("interfaces/reactive_node/tests/test_events_executor.py",)
-"""Tests of an executor that ROS 2 has, but the embedded rclpy has not."""
 
 
 class Part(NamedTuple):
@@ -95,13 +83,6 @@ def parts(arguments: Sequence[str]) -> list[Part]:
     if embedded and not sourced_rclpy():
         found.append(Part("Embedded rclpy", "embedded", [*options, *embedded]))
     return found
-
-
-def left_out_here() -> tuple[str, ...]:
-    """Return the files and folders whose tests cannot run on the rclpy of this process."""
-    if importlib.util.find_spec("rosidl_runtime_embedded"):
-        return EVENTS
-    return EMBEDDED_ONLY if importlib.util.find_spec("tf2_msgs") else EMBEDDED_ONLY + TRANSFORMS
 
 
 def run(part: Part, reports: Path) -> list[int]:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from deploy.commands.status import table
 from deploy.promises.findings import VIOLATED, Finding, percentile
 from deploy.promises.promises import DURATIONS, meaning
+from deploy.running.columns import table
 
 SHOWN = 5  # pieces of evidence of a promise
 HEADER = ("", "PROMISE", "VERDICT", "CASES", "UNKNOWN", "MEASURED")

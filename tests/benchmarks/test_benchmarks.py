@@ -16,7 +16,7 @@ from deploy.benchmarks import alternatives, c_program, measurement, table
 from deploy.benchmarks.alternatives import Alternative
 from deploy.benchmarks.link import LAST, MIDDLE, SINK, SOURCE, Job
 from deploy.benchmarks.measurement import MeasurementFailed, Scenario
-from deploy.commands.setup import sourced_rclpy
+from deploy.running.rclpy_choice import sourced_rclpy
 
 
 @pytest.fixture(autouse=True)

@@ -15,7 +15,7 @@ import pytest
 from deploy.benchmarks import alternatives, measurement
 from deploy.benchmarks.alternatives import Alternative
 from deploy.benchmarks.measurement import Scenario
-from deploy.commands.setup import sourced_rclpy
+from deploy.running.rclpy_choice import sourced_rclpy
 
 pytestmark = [pytest.mark.alone, pytest.mark.timeout(120)]
 

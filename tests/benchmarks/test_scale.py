@@ -12,7 +12,7 @@ from deploy.benchmarks import __main__ as command
 from deploy.benchmarks import alternatives, measurement, scale
 from deploy.benchmarks.alternatives import Alternative
 from deploy.benchmarks.measurement import MeasurementFailed
-from deploy.commands.setup import sourced_rclpy
+from deploy.running.rclpy_choice import sourced_rclpy
 from deploy.running.system import System
 from deploy.trials.chaos.arm import Arm
 from deploy.trials.chaos.cost import Cost

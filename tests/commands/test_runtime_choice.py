@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from deploy.commands import setup
+from deploy.running import rclpy_choice
 
 ROOT = Path(__file__).parents[2]
 EMBEDDED = ROOT / "deploy" / "runtime" / "src"
@@ -54,11 +55,11 @@ def test_rclpy_in_pythonpath_is_a_sourced_ros(tmp_path: Path, monkeypatch: pytes
     (tmp_path / "rclpy" / "__init__.py").touch()
     monkeypatch.setattr(sys, "path", [str(tmp_path), *sys.path])  # as if pip had installed it
     monkeypatch.setenv("PYTHONPATH", f"{ROOT}{os.pathsep}")
-    assert setup.sourced_rclpy() == ""
+    assert rclpy_choice.sourced_rclpy() == ""
     monkeypatch.setenv("PYTHONPATH", str(EMBEDDED))
-    assert setup.sourced_rclpy() == ""
+    assert rclpy_choice.sourced_rclpy() == ""
     monkeypatch.setenv("PYTHONPATH", f"/none{os.pathsep}{tmp_path}")
-    assert setup.sourced_rclpy() == str(tmp_path / "rclpy" / "__init__.py")
+    assert rclpy_choice.sourced_rclpy() == str(tmp_path / "rclpy" / "__init__.py")
 
 
 @pytest.mark.parametrize(

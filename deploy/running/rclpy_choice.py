@@ -1,0 +1,20 @@
+"""Which rclpy a command runs on. Standard library only: `make setup` works without .venv."""
+
+from __future__ import annotations
+
+import importlib.machinery
+import os
+from pathlib import Path
+
+from deploy.running.processes import ROOT
+
+RUNTIME = "RUNTIME"
+"""Environment variable: "embedded" for the rclpy of this checkout, "" for ROS 2's own."""
+
+
+def sourced_rclpy() -> str:
+    """The file of the rclpy of a sourced ROS 2, which is in PYTHONPATH; '' without one."""
+    path = [entry for entry in os.environ.get("PYTHONPATH", "").split(os.pathsep) if entry]
+    spec = importlib.machinery.PathFinder.find_spec("rclpy", path)
+    origin = (spec and spec.origin) or ""
+    return "" if Path(origin).is_relative_to(ROOT) else origin

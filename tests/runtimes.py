@@ -1,0 +1,26 @@
+"""Which tests run on which rclpy."""
+
+from __future__ import annotations
+
+import importlib.util
+
+EMBEDDED_ONLY = (
+    "deploy/runtime/tests/interop",
+    "deploy/runtime/tests/runtime",
+    "deploy/runtime/tests/simulation",
+    "tests/mutants",
+    "tests/trials/replay",
+    "tests/trials/simulation",
+)
+"""Tests of the embedded rclpy, and of what runs only on it."""
+TRANSFORMS = ("interfaces/reactive_node/tests/test_transforms.py",)
+"""Tests that need tf2_msgs, which ROS 2's wheels do not have."""
+EVENTS = ("interfaces/reactive_node/tests/test_events_executor.py",)
+"""Tests of an executor that ROS 2 has, but the embedded rclpy has not."""
+
+
+def left_out_here() -> tuple[str, ...]:
+    """Return the files and folders whose tests cannot run on the rclpy of this process."""
+    if importlib.util.find_spec("rosidl_runtime_embedded"):
+        return EVENTS
+    return EMBEDDED_ONLY if importlib.util.find_spec("tf2_msgs") else EMBEDDED_ONLY + TRANSFORMS
