@@ -34,6 +34,13 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 @pytest.fixture
+def executor(context: Context) -> Iterator[SingleThreadedExecutor]:
+    """The executor that rclpy documents, in the test's context."""
+    with SingleThreadedExecutor(context=context) as executor:
+        yield executor
+
+
+@pytest.fixture
 def make_node(context: Context) -> Iterator[Callable[..., Node]]:
     """Makes nodes in the test's context and destroys them after the test; no executor spins them."""
     with ExitStack() as stack:
