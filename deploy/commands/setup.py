@@ -42,11 +42,11 @@ SOURCES = [ROOT / "interfaces" / "reactive_node" / "src", ROOT / "deploy" / "too
 EMBEDDED = ROOT / "deploy" / "runtime" / "src"
 FAST_DDS = "rmw_fastrtps_cpp"
 SCRIPTS = {
-    "supervisord": "supervisor.supervisord",
-    "supervisorctl": "supervisor.supervisorctl",
-    "ros2": "ros2cli.cli",
+    "supervisord": "-m supervisor.supervisord",
+    "supervisorctl": "-m supervisor.supervisorctl",
+    "ros2": '-c "import sys; from ros2cli.cli import main; sys.exit(main())"',  # ROS 2's has no `-m`
 }
-"""Commands in .venv/bin and the modules of their `main`; pip's own scripts fail in a path with quotes."""
+"""Commands in .venv/bin, by what Python runs for them; pip's own scripts fail in a path with quotes."""
 
 ENOUGH_SPACE = 1e9  # bytes of the disk, for a set-up
 
@@ -152,10 +152,9 @@ def make(ros: str) -> None:
     elif has_wheels():
         _step("ROS 2's rclpy from PyPI", [*PIP, "--require-hashes", *_requirements("ros.txt")])
     _write_pth(embedded=not ros)
-    for name, module in SCRIPTS.items():
+    for name, program in SCRIPTS.items():
         script = VENV / "bin" / name
-        program = f"import sys; from {module} import main; sys.exit(main())"
-        script.write_text(f'#!/bin/sh\nexec "${{0%/*}}/python" -c "{program}" "$@"\n')
+        script.write_text(f'#!/bin/sh\nexec "${{0%/*}}/python" {program} "$@"\n')
         script.chmod(0o755)
 
 

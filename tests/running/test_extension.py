@@ -92,6 +92,7 @@ def test_an_existing_log_is_continued_and_rolled_over(tmp_path: Path) -> None:
 
 
 def test_supervisord_uses_it_from_then_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)  # supervisord locks its directory; a set-up waits for a lock of the checkout
     monkeypatch.setattr(loggers, "RotatingFileHandler", loggers.RotatingFileHandler)  # restored at the end
     monkeypatch.setattr(events, "callbacks", [])
     file = tmp_path / "supervisord.log"

@@ -56,6 +56,7 @@ def test_common_names_stay_out_of_the_import_path_of_the_workspace(prefix: Path)
     (python_path,) = prefix.glob("lib/python3*/site-packages")
     assert {path.name for path in python_path.iterdir() if path.suffix != ".egg-info"} == {
         PACKAGE,
+        "mcap_files",
         "reactive_node",
     }
     assert not (prefix / "share" / PACKAGE / "deploy" / "runtime").exists()
