@@ -53,12 +53,12 @@ WORK: dict[str, tuple[Sequence[Alternative], Sequence[Scenario]]] = {
 CHARTS = (COMPARISON, SCALE)
 
 
-def present(alternatives: Iterable[Alternative], refused: dict[str, str]) -> list[Alternative]:
+def present(alternatives: Iterable[Alternative]) -> list[Alternative]:
     """Return the alternatives that can be measured; print the others with the reason, one line each."""
     found = []
     for each in alternatives:
         interruption.check()
-        if reason := refused.get(each.requirements) or each.missing():
+        if reason := each.missing():
             print(f"absent: {each.title}: {reason}", flush=True)
         else:
             found.append(each)
@@ -100,11 +100,10 @@ def machine() -> str:
 
 
 def versions() -> str:
-    """Return the versions of what was measured from PyPI."""
+    """Return the versions of the libraries below the embedded rclpy and ReactiveNode."""
     (site,) = (BENCH_PYTHON.parents[1] / "lib").glob("python*/site-packages")
-    names = ("cyclonedds", "reactivex", "dora-rs", "eclipse-zenoh", "pyzmq", "iceoryx2")
     found = {each.name: each.version for each in metadata.distributions(path=[str(site)])}
-    return ", ".join(f"{name} {found[name]}" for name in names if name in found)
+    return ", ".join(f"{name} {found[name]}" for name in ("cyclonedds", "reactivex"))
 
 
 def main(arguments: Sequence[str]) -> int:
@@ -147,8 +146,8 @@ def main(arguments: Sequence[str]) -> int:
 def _compare(results: dict[str, Any], kind: str, rounds: int) -> None:
     """Collect the rounds of each figure, by alternative."""
     alternatives, scenarios = WORK[kind]
-    needed = {each.requirements for each in alternatives if each.requirements} | {environment.CHART}
-    found = present(alternatives, environment.prepare(sorted(needed)))
+    environment.prepare([environment.CHART])
+    found = present(alternatives)
     if kind == CHAIN and any(each.build for each in found):  # the source of the heartbeats is in C
         scenarios = (*scenarios, *WATCHDOG_SCENARIOS)
     print(f"{machine()}; {versions()}", flush=True)

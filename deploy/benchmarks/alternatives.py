@@ -10,7 +10,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from deploy.benchmarks import c_program
-from deploy.benchmarks.link import FIRST, HEARTBEATS, LAST, MIDDLE, SINK, SOURCE, Job
+from deploy.benchmarks.link import HEARTBEATS, Job
 from deploy.running.processes import ROOT
 from deploy.running.rclpy_choice import RUNTIME
 
@@ -35,25 +35,6 @@ def job_command(alternative: Alternative, job: Job) -> list[str]:
 def processes(alternative: Alternative, jobs: Sequence[Job]) -> list[list[str]]:
     """Return a command for each job."""
     return [job_command(alternative, job) for job in jobs]
-
-
-def dataflow(alternative: Alternative, jobs: Sequence[Job]) -> list[list[str]]:
-    """Return the command that starts all jobs as the nodes of a dora dataflow."""
-    origin = {job.topic: SOURCE for job in jobs} | ({LAST: MIDDLE} if len(jobs) > 2 else {})
-    listens = {MIDDLE: FIRST, SINK: LAST}
-    nodes = []
-    for job in jobs:
-        python, *arguments = job_command(alternative, job)
-        node = {"id": job.role, "path": python, "args": " ".join(arguments)}
-        outputs = [topic for topic, role in origin.items() if role == job.role]
-        topic = listens.get(job.role)
-        inputs = {topic: {"source": f"{origin[topic]}/{topic}", "queue_size": job.depth}} if topic else {}
-        nodes.append(
-            node | ({"outputs": outputs} if outputs else {}) | ({"inputs": inputs} if inputs else {})
-        )
-    file = Path(jobs[0].directory, "dataflow.yml")
-    file.write_text(json.dumps({"nodes": nodes}))  # JSON is YAML
-    return [[str(BENCH_PYTHON.with_name("dora")), "run", str(file)]]
 
 
 def services(alternative: Alternative, jobs: Sequence[Job]) -> list[list[str]]:
@@ -81,8 +62,6 @@ class Alternative:
     title: str
     link: str
     """The module of :mod:`deploy.benchmarks.links`, or the program of :mod:`deploy.benchmarks.c_program`."""
-    requirements: str = ""
-    """The file with what PyPI has of it; '' if it needs nothing but the runtime."""
     ros: bool = False
     """Whether it runs on ROS 2's rclpy: of .venv, or of a sourced ROS 2."""
     commands: Commands = processes
@@ -128,12 +107,7 @@ ALTERNATIVES = (
     Alternative("ROS 2, callbacks", "callbacks", ros=True),
     Alternative("ROS 2, callbacks on EventsExecutor", "callbacks_events", ros=True),
     Alternative("ROS 2, rxros2 style", "rxros2", ros=True),
-    Alternative("cyclonedds-python", "cyclone"),
     Alternative("Cyclone DDS, C program", c_program.PIPELINE, commands=c_processes, build=c_program.build),
-    Alternative("dora-rs", "dora_nodes", "dora.txt", commands=dataflow),
-    Alternative("eclipse-zenoh", "zenoh_peers", "zenoh.txt"),
-    Alternative("pyzmq", "zeromq", "zeromq.txt"),
-    Alternative("iceoryx2", "iceoryx", "iceoryx.txt"),
 )
 CHAINS = (
     Alternative("services", "chain_services", commands=services),

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 Item: TypeAlias = "array[int]"
-"""Octets; the first eight are the time of sending, see :func:`stamp`."""
+"""Octets; the first eight are the time of sending."""
 
 SOURCE, MIDDLE, SINK = "source", "middle", "sink"
 KINEMATICS, VELOCITY = "kinematics", "velocity"
@@ -46,7 +46,7 @@ class Job:
 
     @property
     def depth(self) -> int:
-        """How many items a queue holds, with every alternative that has such a setting."""
+        """How many items a queue holds."""
         return 1000 if self.size <= 1000 else 10
 
 

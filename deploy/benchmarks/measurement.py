@@ -216,17 +216,11 @@ class _Run:
         for command in listeners:
             self._popen(command)
         waiting = [job.role for job in self._jobs if job.role != SOURCE]
-        if listeners:
-            self._await(waiting)
+        for role in set(waiting):
+            self.pids[role] = int(self.report(role, "ready", waiting.count(role))["pid"])
         began = time.monotonic()
         self.pids[SOURCE] = self._popen(source)
-        if not listeners:  # one command starts them all
-            self._await(waiting)
         return began
-
-    def _await(self, roles: Sequence[str]) -> None:
-        for role in set(roles):
-            self.pids[role] = int(self.report(role, "ready", roles.count(role))["pid"])
 
     def _popen(self, command: list[str]) -> int:
         process = subprocess.Popen(
@@ -262,7 +256,7 @@ class _Run:
         return lines[-1] if lines else ""
 
     def _end(self) -> None:
-        """End all processes; those that a launcher started end when it has ended."""
+        """End all processes."""
         for process in reversed(self._processes):
             process.terminate()
         for process in self._processes:
