@@ -15,7 +15,6 @@ import json
 import os
 import platform
 import random
-import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -36,7 +35,7 @@ from deploy.benchmarks.measurement import (
 )
 from deploy.benchmarks.table import chain_tables, image_tables, tables
 from deploy.running import interruption
-from deploy.running.processes import ROOT, run_directory
+from deploy.running.processes import run_directory
 
 COMPARISON, CHAIN, IMAGE, SCALE = "comparison", "chain", "images", "scale"
 TABLES: dict[str, Callable[[Any], str]] = {
@@ -50,7 +49,6 @@ WORK: dict[str, tuple[Sequence[Alternative], Sequence[Scenario]]] = {
     CHAIN: (CHAINS, CHAIN_SCENARIOS),
     IMAGE: (IMAGES, IMAGE_SCENARIOS),
 }
-CHARTS = (COMPARISON, SCALE)
 
 
 def present(alternatives: Iterable[Alternative]) -> list[Alternative]:
@@ -139,14 +137,14 @@ def main(arguments: Sequence[str]) -> int:
     if any(results.values()):
         interruption.ignore()
         print(f"\n{TABLES[options.kind](results)}\n")
-        return _write(options.kind, results) or code
+        _write(options.kind, results)
     return code
 
 
 def _compare(results: dict[str, Any], kind: str, rounds: int) -> None:
     """Collect the rounds of each figure, by alternative."""
     alternatives, scenarios = WORK[kind]
-    environment.prepare([environment.CHART])
+    environment.prepare()
     found = present(alternatives)
     if kind == CHAIN and any(each.build for each in found):  # the source of the heartbeats is in C
         scenarios = (*scenarios, *WATCHDOG_SCENARIOS)
@@ -159,27 +157,19 @@ def _compare(results: dict[str, Any], kind: str, rounds: int) -> None:
 
 def _scale(results: dict[str, Any]) -> None:
     """Collect the figures of each number of arms and subscribers, by kind."""
-    environment.prepare([environment.CHART])
+    environment.prepare()
     print(machine(), flush=True)
     for kind, number, figures in scale.measure():
         results.setdefault(kind, {})[number] = {name: [value] for name, value in figures.items()}
 
 
-def _write(kind: str, results: dict[str, Any]) -> int:
-    """Write the figures and, if the kind has one, the chart; return the exit code."""
+def _write(kind: str, results: dict[str, Any]) -> None:
+    """Write the figures to a file."""
     directory = run_directory() / "bench"
     directory.mkdir(parents=True, exist_ok=True)
-    file, chart = directory / f"{kind}.json", directory / f"{kind}.svg"
+    file = directory / f"{kind}.json"
     file.write_text(json.dumps(results, indent=1))
-    if kind not in CHARTS:
-        print(f"Figures: {file}")
-        return 0
-    command = [str(BENCH_PYTHON), "-m", f"deploy.benchmarks.{kind}_chart", str(file), str(chart)]
-    if subprocess.run(command, cwd=ROOT, start_new_session=True).returncode:
-        print("The chart was not drawn.", file=sys.stderr)
-        return 1
-    print(f"Figures: {file}\nChart: {chart}")
-    return 0
+    print(f"Figures: {file}")
 
 
 if __name__ == "__main__":

@@ -96,7 +96,7 @@ def test_kinds_are_measured_one_after_the_other(
 
     monkeypatch.setattr(scale, "fleet", fleet)
     monkeypatch.setattr(scale, "subscribers", lambda: iter([("5", {"publisher_us": 30.0})]))
-    monkeypatch.setattr(command.environment, "prepare", lambda names: {})
+    monkeypatch.setattr(command.environment, "prepare", lambda: None)
     results: dict[str, dict[str, dict[str, list[float]]]] = {}
     command._scale(results)
     assert results == {
