@@ -128,9 +128,12 @@ def _public_members(cls: type) -> set[str]:
 
 
 def table(rows: list[Module]) -> str:
-    """Return a Markdown table, one row for each module."""
+    """Return a Markdown table: a row for each module that lacks something, and one for all others."""
     lines = ["| module | supported | raises NotImplementedError | missing |", "|---|---:|---|---|"]
-    for row in rows:
+    complete = [row for row in rows if not row.not_implemented and not row.missing]
+    names = ", ".join(f"`{row.name}`" for row in complete)
+    lines.append(f"| {names} | {sum(len(row.supported) for row in complete)} |  |  |")
+    for row in (row for row in rows if row not in complete):
         not_implemented = ", ".join(f"`{name}`" for name in row.not_implemented)
         missing = ", ".join(f"`{name}`" for name in row.missing)
         lines.append(f"| `{row.name}` | {len(row.supported)} | {not_implemented} | {missing} |")
