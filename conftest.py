@@ -60,7 +60,7 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
 
 
 def _started_processes() -> dict[int, str]:
-    """Return the live processes of this session with their commands, also orphans."""
+    """Return the live processes of this session, orphans included, with their commands."""
     mark = f"{MARK}={os.environ[MARK]}".encode()
     found = {}
     for entry in Path("/proc").iterdir():

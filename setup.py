@@ -11,7 +11,7 @@ from pathlib import Path
 
 from setuptools import setup
 
-ROOT = Path(__file__).resolve().parent  # of the sources, also where colcon has linked this file
+ROOT = Path(__file__).resolve().parent  # of the sources, even where colcon has linked this file
 sys.path.insert(0, str(ROOT))
 
 from deploy.package.executables import ARM  # noqa: E402

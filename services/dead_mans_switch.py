@@ -82,7 +82,7 @@ def wire(node: ServiceNode) -> None:
     node.publish(OPERATOR_HEARTBEAT, beats, lambda beat: Bool(data=beat))
     states, heard = (node.observe(topic, attrgetter("data")) for topic in (ENGINES_STATE, ENGINES))
     commands = engine_commands(source.play(source.scenario.commands), states, heard)
-    # A person who takes the switch replaces the virtual operator, also for the commands.
+    # A person who takes the switch replaces the virtual operator for the commands too.
     commands = source.until_set("pressed", commands)
     node.publish(ENGINES, commands, lambda command: String(data=command))
 

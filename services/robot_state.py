@@ -23,7 +23,7 @@ from interfaces.service import ServiceNode, parameter
 from interfaces.topics import CONTRACT, JOINT_STATES, L1, L2, ROBOT_DESCRIPTION, TF, THETA1, THETA2
 
 REPEAT = 0.1  # s: transforms are volatile, and a listener that asks for the present needs young ones
-DESCRIPTION_PERIOD = 1.0  # s: tools build the model anew for each description
+DESCRIPTION_PERIOD = 1.0  # s: tools build the model again for each description
 
 
 class Configuration(NamedTuple):

@@ -153,8 +153,8 @@ def _cost(run: _Run, pids: Sequence[int], seconds: float) -> tuple[dict[str, Any
     """
     Return what the sink has seen at the end, and the processor time of an item in each process [µs].
 
-    The items go on, so this process may read the clocks later than the sink reports, but as long after each
-    other as the measurement takes.
+    The source keeps sending, so this process may read the clocks later than the sink reports, if the time
+    between both readings is that of the measurement.
     """
     run.report(SINK, "begin")
     began, before = time.monotonic(), [cpu_seconds(pid) for pid in pids]
@@ -165,7 +165,7 @@ def _cost(run: _Run, pids: Sequence[int], seconds: float) -> tuple[dict[str, Any
 
 
 def cpu_seconds(pid: int) -> float:
-    """Return the processor time of a process, with all its threads, also those that have ended."""
+    """Return the processor time of a process, with all its threads, ended ones included."""
     return time.clock_gettime(~pid << 3 | 2)  # the kernel's name of this clock: clock_getcpuclockid(3)
 
 

@@ -72,7 +72,7 @@ class Meter:
 
 
 class Life:
-    """Whether this process goes on."""
+    """Whether this process continues."""
 
     def __init__(self) -> None:
         self._parent = os.getppid()

@@ -1,4 +1,4 @@
-"""A node beside the services: it sees their topics and sets their parameters."""
+"""A node that joins the services: it sees their topics and sets their parameters."""
 
 from __future__ import annotations
 

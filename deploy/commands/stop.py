@@ -11,7 +11,7 @@ from deploy.running.system import DeploymentError, System
 
 
 def stop(system: System) -> None:
-    """Stop a system and report it, also where no terminal is left to read it."""
+    """Stop a system and report it, even where no terminal is left to read it."""
 
     def tell(count: int) -> None:
         with suppress(OSError):

@@ -117,7 +117,7 @@ def results_in(reports: Path) -> Results:
 
 
 def uncollected(arguments: Sequence[str], tests: Iterable[str]) -> list[str]:
-    """Return the files of which no test is known, if all tests below some folders should have run."""
+    """Return the files without a known test, if all tests below some folders should have run."""
     given = paths(arguments)
     if len(given) + len(ignored(arguments)) < len(arguments) or any("::" in path for path in given):
         return []  # an option selects tests

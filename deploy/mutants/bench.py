@@ -74,14 +74,14 @@ class Bench:
             self._write(path, original)
 
     def _write(self, path: Path, content: bytes) -> None:
-        """Change a file; no two versions have a time in common, so that Python compiles each anew."""
+        """Change a file; no two versions have a time in common, so Python compiles each of them."""
         path.write_bytes(content)
         self._changes += 1
         os.utime(path, (self._changes, self._changes))
 
     def _test(self, tests: Sequence[str], timeout: float) -> int:
         """Return the exit code of pytest; that of a kill after `timeout` [s]."""
-        # The test that killed the mutant before comes first: it often kills the next one, too.
+        # The test that killed the mutant before comes first: it often kills the next one as well.
         options = ["-x", "-q", "--failed-first", "--hypothesis-profile=mutants"]
         assert self._runner.stdin is not None
         print(json.dumps([*options, *tests]), file=self._runner.stdin, flush=True)

@@ -54,7 +54,7 @@ class Hand:
         self._takes.on_next(None)
 
     def release(self) -> None:
-        """Release the switch, also where another hand holds it."""
+        """Release the switch, even where another hand holds it."""
         self._events.on_next(hold.Release())
         self._takes.on_next(None)
 

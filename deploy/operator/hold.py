@@ -95,7 +95,7 @@ def step(hold: Hold, event: Event, now: float, max_age: float = MAX_NONCE_AGE) -
 
 
 def monotonic() -> float:
-    """Return the time of a clock that nobody sets and that goes on while the machine sleeps [s]."""
+    """Return the time of a clock that nobody sets and that counts while the machine sleeps [s]."""
     return time.clock_gettime(time.CLOCK_BOOTTIME)
 
 

@@ -25,7 +25,7 @@ class ParameterChange(NamedTuple):
 
 
 def parameter_changes(node: ReactiveNode) -> Observable[ParameterChange]:
-    """Emit each parameter that is set on a node of the arm, also to the same value; a start sets none."""
+    """Emit each parameter that is set on a node of the arm, even to the same value; a start sets none."""
     prefix = node.get_namespace().rstrip("/") + "/"
 
     def changes(event: ParameterEvent) -> Observable[ParameterChange]:

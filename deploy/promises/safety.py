@@ -274,7 +274,7 @@ def _abandoned(history: History, off: Sample) -> bool:
     begin = off.sent - PRESENCE_TIMEOUT + SAMPLING + TRANSPORT  # a presence is as old as its stamp
     deaf = [(one, two) for one, two in _deaf(history) if one < off.sent and two > begin]
     for presence in between(history.stream(topics.OPERATOR_PRESENCE), begin, off.sent - TRANSPORT):
-        # One that the watchdog sent when it went on may be of a heartbeat before that.
+        # A presence sent right after resuming may stem from an older heartbeat.
         if not any(one < presence.sent <= two + TRANSPORT for one, two in deaf):
             return False
     heartbeats = [s.sent for s in history.signs_of_life()]

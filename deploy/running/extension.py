@@ -34,7 +34,7 @@ from deploy.running.system import PARAMETERS
 LONGEST_WAIT = 0.1  # s, while the state of a program changes with time
 _CHANGING = (ProcessStates.STARTING, ProcessStates.BACKOFF, ProcessStates.STOPPING)
 _ENDS = (events.ProcessStateExitedEvent, events.ProcessStateBackoffEvent)
-SENTINEL_START_TIMEOUT = 30.0  # s until its first call, also on a machine that is starting a fleet
+SENTINEL_START_TIMEOUT = 30.0  # s until its first call, even on a machine that is starting a fleet
 SENTINEL_TIMEOUT = 3.0  # s between its calls
 
 
@@ -92,7 +92,7 @@ class ArmInterface:
         events.subscribe(events.SupervisorStoppingEvent, self._on_stopping)
 
     def wake_at_signals(self) -> None:
-        """Let each signal end the wait of supervisord: Python itself would go on with it."""
+        """Let each signal end the wait of supervisord: Python itself would continue it."""
         self._signals, writing = os.pipe()
         os.set_blocking(writing, False)
         signal.set_wakeup_fd(writing, warn_on_full_buffer=False)
@@ -187,7 +187,7 @@ def make_interface(supervisord: Any, **config: str) -> ArmInterface:
     """The factory of the RPC interface (plugin.py)."""
     loggers.RotatingFileHandler = LossyLog  # for the programs: each start opens its log
     for handler in supervisord.options.logger.handlers:
-        if isinstance(handler, RotatingFileHandler):  # in the foreground, there is the terminal, too
+        if isinstance(handler, RotatingFileHandler):  # in the foreground, there is a handler for the terminal
             handler.__class__ = LossyLog  # supervisord's own log is open already
     lock_directory()
     prefork.import_libraries()

@@ -43,7 +43,7 @@ def hand_over() -> None:
 
 @contextmanager
 def blocking() -> Iterator[None]:
-    """Let a signal end a system call that may block for ever; nothing else belongs into the block."""
+    """Let a signal end a system call that may block forever; nothing else belongs into the block."""
     global _blocking
     _blocking = not _ignored
     try:

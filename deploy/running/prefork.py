@@ -42,7 +42,7 @@ LIBRARIES = (
     "websockets.server",
     "yaml",
 )
-"""What the services import from outside of this checkout, also late."""
+"""What the services import from outside of this checkout, at once or later."""
 EMBEDDED = ("rclpy._graph", "rclpy._parameter_files")
 """What the embedded rclpy imports late."""
 TYPES = (

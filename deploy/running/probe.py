@@ -11,7 +11,7 @@ from deploy.running.policy import Observation
 from deploy.running.system import DeploymentError, Program, System
 from interfaces.service.health import Health
 
-ASKING_PERIOD = 1.0  # s between two questions to supervisord, of which each costs both of us a millisecond
+ASKING_PERIOD = 1.0  # s between two questions to supervisord; each costs both of us a millisecond
 DUPLICATES_PERIOD = 1.0  # s between two searches for duplicates, which read the whole process table
 SEARCHING = 1000  # on a machine with many processes, so many times as long as a search takes
 LONGEST_PERIOD = 10.0  # s

@@ -103,7 +103,7 @@ class System:
         return f"It gave no reason; {free / 1000:.0f} kB are free on the disk of {self.run}"
 
     def members(self) -> list[processes.Process]:
-        """The live processes of the system, also those that a dead supervisord left behind."""
+        """The live processes of the system, and those that a dead supervisord left behind."""
         return processes.of_system(self.run)
 
     def supervisor(self) -> int | None:
@@ -199,7 +199,7 @@ class System:
         self._ask(supervisor, "supervisor.startProcess", name, False, timeout=ANSWER_LIMIT)
 
     def halt(self, program: str) -> None:
-        """Stop a program until the system starts anew. Raises DeploymentError."""
+        """Stop a program until the next start of the system. Raises DeploymentError."""
         self._ask(self.supervisor() or 0, "supervisor.stopProcess", f"{manifest.GROUP}:{program}")
 
     def _programs(self, supervisor: int, method: str, timeout: float = rpc.LIMIT) -> list[Program]:

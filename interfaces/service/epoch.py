@@ -60,7 +60,7 @@ class Origin:
 
     def delay_subscription(self, items: Observable[T]) -> Observable[T]:
         """Subscribe to an observable when the scenario begins, at once if it has begun."""
-        # Not RxPY's operator of this name: it schedules each item anew, which doubles the cost of a source.
+        # RxPY's operator of this name schedules each item again, which doubles the cost of a source.
         known = self._epochs.filter(lambda epoch: epoch >= 0.0).take(1)
         begun = known.flat_map(lambda _: rx.timer(max(0.0, -self.elapsed())))
         return begun.flat_map(lambda _: items)

@@ -116,7 +116,7 @@ class HealthReporter:
 
 
 def reported_parameters(status: DiagnosticStatus) -> dict[str, Any]:
-    """Return the parameters in a report: those of which the value is not the default. Raises ValueError."""
+    """Return the parameters in a report: those whose value is not the default. Raises ValueError."""
     return {
         pair.key.removeprefix(_PARAMETER): json.loads(pair.value)
         for pair in status.values

@@ -15,7 +15,7 @@ def avoid_shared_memory() -> None:
     """
     Keep this process on this machine by settings of Fast DDS; ROS 2's LOCALHOST would add shared memory.
 
-    Call this before ``rclpy.init()``. The settings are in ``NAME.localhost.xml`` beside ``NAME.xml``, the
+    Call this before ``rclpy.init()``. The settings are in ``NAME.localhost.xml`` next to ``NAME.xml``, the
     profiles file of the environment; without that file, nothing changes.
     """
     profiles = os.environ.get(PROFILES, "")

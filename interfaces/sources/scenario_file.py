@@ -14,7 +14,7 @@ the sources play nothing. ::
                                             # its samples per second, what it is ahead [rad], and how long it
                                             # stays at each end [s]; without them 25, 0 and 0
     operator:
-      pressed:                              # when the switch is pressed; without `to`: for ever
+      pressed:                              # when the switch is pressed; without `to`: forever
         - {from: 0.0, to: 40.0}
       heartbeats: [41.942, 42.991]          # single heartbeats, in addition
     engines:                                # the commands of the virtual operator
@@ -111,7 +111,7 @@ class _Item:
     def number(self, least: float = -math.inf, *, above: float = -math.inf, most: float = math.inf) -> float:
         if isinstance(self.value, bool) or not isinstance(self.value, int | float):
             raise self.error(f"must be a number, not {self.value!r}")
-        if not -LARGEST <= self.value <= LARGEST:  # NaN is refused, too
+        if not -LARGEST <= self.value <= LARGEST:  # this refuses NaN
             raise self.error(f"must be from {-LARGEST:g} to {LARGEST:g}")
         if self.value < least:
             raise self.error(f"must be at least {least:g}, not {self.value:g}")

@@ -61,7 +61,7 @@ class VirtualSource:
         """
         Return the values of a parameter, or those of a timeline until the parameter is set by hand.
 
-        A restarted process goes on with the parameter that was set. See :func:`playback.follow`.
+        A restarted process keeps the parameter that was set. See :func:`playback.follow`.
 
         :param given_back: a boolean parameter: whether the timeline is followed, or the first value of the
             parameter without a timeline. Setting the parameter by hand makes it false; setting it to true

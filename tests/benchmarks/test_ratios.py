@@ -1,4 +1,4 @@
-"""ReactiveNode and the arm's services beside plain callbacks on the same rclpy: regressions must show.
+"""ReactiveNode and the arm's services against plain callbacks on the same rclpy: regressions must show.
 
 Absolute times depend on the machine, so only ratios of interleaved rounds are bounded, generously.
 `make bench` measures precisely.

@@ -1,4 +1,4 @@
-"""`make test`: runs of pytest, of which the later ones have the tests with bounds of time."""
+"""`make test`: runs of pytest; the later ones have the tests with bounds of time."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def test_exit_code_is_the_worst_and_an_interruption_ends_it(
     assert left == []
 
 
-def test_every_test_runs_once_and_those_with_bounds_of_time_beside_few(
+def test_every_test_runs_once_and_timed_ones_with_few_others(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     commands: list[list[str]] = []

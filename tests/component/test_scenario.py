@@ -64,7 +64,7 @@ def test_event_at_the_origin_is_emitted(scheduler: TestScheduler) -> None:
     assert played(scheduler, playback.events(Events(((0.0, "a"),)), 0.0)) == [(0, "a")]
 
 
-def test_events_repeat_for_ever(scheduler: TestScheduler) -> None:
+def test_events_repeat_forever(scheduler: TestScheduler) -> None:
     events = Events(((0.0, "a"), (3.0, "b")), repeat=5.0)
 
     changes = played(scheduler, playback.state(events, 4.0))

@@ -1,4 +1,4 @@
-"""The contract beside the README's table: what is wrong with a message, and which topics may be silent."""
+"""The contract, except for its table: what is wrong with a message, and which topics may be silent."""
 
 from __future__ import annotations
 

@@ -46,7 +46,7 @@ class Wired:
         names = {self.service.resolve_topic_name(topic.name) for topic in outputs}
         assert names <= {each.topic_name for each in self.service.publishers}
         own = [each.topic_name for each in self.service.subscriptions]  # it may hear itself
-        # Not by get_subscription_count, which with ROS 2 takes the event `matched` away from health.
+        # With ROS 2, get_subscription_count would take the event `matched` away from health.
         spin_until(lambda: all(self.service.count_subscribers(name) > own.count(name) for name in names))
         spin_until(self.reports)  # the peer hears all further ones
 

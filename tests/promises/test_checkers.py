@@ -366,7 +366,7 @@ def test_s5_detects_two_that_report_health_in_turn() -> None:
     assert verdict("S5", added(good(), "/diagnostics", *((t + 0.5, v) for t, v in reports))) == VIOLATED
 
 
-def test_s5_detects_one_report_of_an_instance_beside_another() -> None:
+def test_s5_detects_one_report_of_a_second_instance() -> None:
     history = good()
     history = replace(history, lives=[*history.lives, Life("kinematics", 777, 20.0, 20.3)])
     history = added(history, "/diagnostics", (20.2, ("kinematics", 777)))

@@ -467,7 +467,7 @@ def test_s5_names_the_processes_in_the_order_of_their_start() -> None:
     )
 
 
-def test_s5_reports_beside_another_process() -> None:
+def test_s5_reports_of_a_second_process() -> None:
     ends = {7: 3.0, 8: 6.0, 9: 9.0, 10: 10.0}
     lives = [Life("velocity", pid, 0.0, end) for pid, end in ends.items()]
     reports = [(1.0, 7), (3.0, 8), (5.0, 9), (8.0, 10), (8.5, 9), (9.25, 11)]

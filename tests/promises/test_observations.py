@@ -131,7 +131,7 @@ def test_times_of_a_stepped_arm_are_those_of_the_machine(tmp_path: Path) -> None
 
 
 def overloads_of(path: Path, lateness: float, *events: Life | InjectedFault) -> list[tuple[float, float]]:
-    """Record a speed each second, of which the one of second 10 is late [s]; return the overloads."""
+    """Record a speed each second, the one of second 10 late by ``lateness`` [s]; return the overloads."""
     recorder = Recorder(path, 0, 10**18)
     for event in events:
         topic = PROCESSES if isinstance(event, Life) else FAULTS

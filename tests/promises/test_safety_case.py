@@ -24,7 +24,7 @@ def test_table_names_every_promise() -> None:
 
 
 def test_every_claim_has_evidence() -> None:
-    claims = re.search(r"## S1, line by line(.*?)## The sentinel", CASE, re.DOTALL)
+    claims = re.search(r"## S1, line by line(.*?)## Why the sentinel", CASE, re.DOTALL)
     assert claims
     rows = [
         line for line in claims[1].splitlines() if line.startswith("| ") and not line.startswith("| claim")

@@ -169,7 +169,7 @@ def test_deaf_sentinel_ends_itself_at_the_start_timeout() -> None:
     assert (when, actions) == (12.5, [silence_of(12.5, SENTINEL)])
 
 
-def test_sentinel_that_heard_itself_again_is_deaf_anew() -> None:
+def test_sentinel_that_heard_itself_can_be_deaf_again() -> None:
     run = Run(program(SENTINEL), program("a"))
     run.hear([SENTINEL, "a"])
     assert run.first(12.0, healthy="a")[1] == []

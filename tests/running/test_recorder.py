@@ -151,7 +151,7 @@ def test_pause_between_two_clocks_changes_no_time(
     assert recorded == [(2_030_000_000, 1_500_000_000)]
 
 
-def test_numbers_of_a_new_publisher_begin_anew(
+def test_numbers_of_a_new_publisher_begin_again(
     node: Subscriptions, clock: Clock, reports: list[tuple[float, float]]
 ) -> None:
     for at, number in ((1.0, 7), (2.0, 1), (3.0, 2)):

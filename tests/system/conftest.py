@@ -48,6 +48,6 @@ def checkout(small_arm: Path, domain_id: int) -> Iterator[Checkout]:
 
 @pytest.fixture
 def peer(module_site: Site) -> Iterator[Peer]:
-    """A node of the test beside the module's system."""
+    """A node of the test that joins the module's system."""
     with closing(Peer(module_site.domain)) as peer:
         yield peer

@@ -1,4 +1,4 @@
-"""Whole systems as a user runs them: run directories, commands and terminals, and a node beside them."""
+"""Whole systems as a user runs them: run directories, commands, terminals, and a node that observes."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from deploy.running.system import System
 from interfaces import topics
 
 ROOT = Path(__file__).parents[2]
-LIMIT = 30.0  # s for each awaited event, also on a busy machine
+LIMIT = 30.0  # s for each awaited event, even on a busy machine
 LOOK = 0.1  # s between two looks at all processes, which cost some milliseconds
 STEADY = str(Path(__file__).with_name("steady.yaml"))
 SMALL = ("dead_mans_switch", "engine_controller", "sentinel")
@@ -150,7 +150,7 @@ class Site:
 
     @property
     def environment(self) -> dict[str, str]:
-        """The variables that a user sets for a second system beside the usual one."""
+        """The variables that a user sets for a second system next to the usual one."""
         return os.environ | {
             "REACTIVE_ARM_RUN_DIR": str(self.run),
             "REACTIVE_ARM_NAMESPACE": self.namespace,
@@ -211,7 +211,7 @@ class Site:
 
     @property
     def programs(self) -> set[str]:
-        """The programs of the system, of which each has a process while it runs."""
+        """The programs of the system; each has a process while it runs."""
         return {each.name for each in manifest.programs(self.directory / "deploy" / "supervisord.conf")}
 
     def await_members(self, condition: Callable[[dict[str, int]], bool]) -> None:

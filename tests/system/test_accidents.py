@@ -1,4 +1,4 @@
-"""Accidents: a terminal closes, supervisord or make is killed. The system goes on in order, or ends whole."""
+"""Accidents: a terminal closes, supervisord or make is killed. The system continues, or all of it ends."""
 
 from __future__ import annotations
 

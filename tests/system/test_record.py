@@ -134,7 +134,7 @@ def test_record_of_nothing_is_refused(site: Site) -> None:
 
 @pytest.mark.timed
 def test_record_of_a_real_arm_replays_equal_in_virtual_time(site: Site) -> None:
-    """What simulation and replay show holds for the rclpy of the real arm, too: both give the same output."""
+    """What simulation and replay show holds for the rclpy of the real arm: both give the same output."""
     if sourced_rclpy():
         pytest.skip("platform: a sourced ROS 2 leaves no place for the embedded rclpy")
     assert site.do("start", "demo")[0] == 0

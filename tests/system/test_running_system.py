@@ -290,7 +290,7 @@ def test_example_of_a_service_joins_the_system(module_site: Site, peer: Peer) ->
     reports = peer.collect(topics.DIAGNOSTICS)
     guard = module_site.begin_python("-m", "services.examples.speed_guard", "--ros-args", "-p", "limit:=3.0")
 
-    def it_has_commanded() -> bool:  # the operator watchdog may command, too
+    def it_has_commanded() -> bool:  # the operator watchdog may command as well
         for value in (2.9, 3.1, 3.2):  # the last two in a row are too fast
             speed.publish(Float64(data=value))
         health = [status for report in reports for status in report.status if status.name == "/speed_guard"]

@@ -26,7 +26,7 @@ def test_a_service_that_does_not_start_shows_its_last_words(
     module = "services.engine_controller"
     crash = f"import os, sys\nif {module!r} in sys.orig_argv: print('crash', flush=True); os._exit(1)"
     (tmp_path / "sitecustomize.py").write_text(crash)
-    monkeypatch.setenv("PYTHONPATH", str(tmp_path), prepend=os.pathsep)  # beside a sourced ROS 2
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path), prepend=os.pathsep)  # ahead of a sourced ROS 2
     logs = small_site.run / "logs"
     logs.mkdir(parents=True)
     (logs / "engine_controller.log").write_text("a line of an earlier start\n")
@@ -42,7 +42,7 @@ def test_the_scenario_begins_when_all_services_are_up(
 ) -> None:
     slow = "import sys, time\nif 'services.dead_mans_switch' in sys.orig_argv: time.sleep(6.0)"
     (tmp_path / "sitecustomize.py").write_text(slow)
-    monkeypatch.setenv("PYTHONPATH", str(tmp_path), prepend=os.pathsep)  # beside a sourced ROS 2
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path), prepend=os.pathsep)  # ahead of a sourced ROS 2
     scenario = tmp_path / "early.yaml"
     scenario.write_text("operator: {pressed: [{from: 0.0}]}\nengines: [{at: 1.0, command: turn_on}]")
     command = site.begin("run", str(scenario))

@@ -57,7 +57,7 @@ def tls(address: str, certificate: str, key: str) -> ssl.SSLContext | None:
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
     try:
         context.load_cert_chain(certificate, key or None, password="")  # instead of asking for one
-    except OSError as error:  # an SSLError, too; it names no file
+    except OSError as error:  # or an SSLError, which names no file
         files = f"certificate {certificate!r}" + (f" or key {key!r}" if key else "")
         raise UserError(f"{files}: {error.strerror or error}") from None
     return context

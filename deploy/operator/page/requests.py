@@ -1,4 +1,4 @@
-"""What pages ask for beside the switch: the engines, the configuration, the processes."""
+"""What pages ask for besides the switch: the engines, the configuration, the processes."""
 
 from __future__ import annotations
 

@@ -52,7 +52,7 @@ class Closed(NamedTuple):
 
 
 class Request(NamedTuple):
-    """A page asks for something beside the switch."""
+    """A page asks for something besides the switch."""
 
     page: str
     message: protocol.Engines | protocol.Set | protocol.FollowScenario | protocol.Process

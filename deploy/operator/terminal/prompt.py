@@ -48,7 +48,7 @@ class Prompt:
 
     def show(self, lines: Iterable[str]) -> None:
         """Print lines above the prompt; drop them if the terminal has no room."""
-        if text := "\n".join(lines):  # in one go, as the prompt is drawn anew below
+        if text := "\n".join(lines):  # in one go, because the prompt is drawn again below
             say(text)
 
     def read(self, seconds: float) -> list[str]:

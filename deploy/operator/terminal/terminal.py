@@ -32,7 +32,7 @@ Lines that come too fast to be read are thinned to one a second of each kind."""
 
 class Console:
     """
-    The terminal of a node beside the system, open in a ``with``.
+    The terminal of a node that joins the system, open in a ``with``.
 
     Lines are shown in batches: the node need not spin between them, which saves most of the work.
     """

@@ -47,7 +47,7 @@ class Arm:
         return self._environment
 
     def processor_time(self) -> float:
-        """Return the processor time [s] of the arm's processes, also of those that have ended."""
+        """Return the processor time [s] of the arm's processes, ended ones included."""
         pids = [member.pid for member in self.system.members() if member.program != BABBLER]
         return self._spent + sum(map(_processor_time, pids))
 

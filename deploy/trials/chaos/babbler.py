@@ -44,7 +44,7 @@ def nonsense(topic: topics.Topic, rng: random.Random) -> bytes:
 
 
 def _bad_message(topic: topics.Topic, rng: random.Random) -> Any:
-    """Return a readable message with bad content; ``None`` for a type of which none is known."""
+    """Return a readable message with bad content; ``None`` for a type without one."""
     if topic.type is PointStamped:
         return PointStamped(header=Header(frame_id=TEXT), point=Point(x=nan(topic), y=rng.random()))
     if topic.type is Header:

@@ -58,7 +58,7 @@ def faked() -> Iterator[dict[str, str]]:
         "LD_PRELOAD": " ".join(filter(None, [str(LIBRARY), os.environ.get("LD_PRELOAD")])),
         "FAKETIME_DONT_FAKE_MONOTONIC": "1",
         "FAKETIME_CACHE_DURATION": "0",  # reads the file again when a second of the time of day begins
-        "NO_FAKE_STAT": "1",  # otherwise, Python finds all modules changed and compiles them anew
+        "NO_FAKE_STAT": "1",  # otherwise, Python finds all modules changed and compiles them again
     }
     # Each process would create a semaphore, and leave it behind when it is killed, unless it inherits one.
     with subprocess.Popen(

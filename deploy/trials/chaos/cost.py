@@ -19,7 +19,7 @@ class Cost:
     time: float
     """[s], monotonic clock."""
     busy: float
-    """Processor time of the arms' processes [s], also of those that were killed."""
+    """Processor time of the arms' processes [s], killed ones included."""
     arms: int
     processes: int
     memory: float

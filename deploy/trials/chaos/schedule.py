@@ -22,7 +22,7 @@ WEIGHTS = {"kill": 6, "stop": 3, "hang": 2}
 """How often the random schedule picks a kind, in relation to the other kinds."""
 
 ROUND = PROGRAMS[::2] + PROGRAMS[1::2]
-"""All programs; neighbours in the manifest, of which one often depends on the other, are far apart."""
+"""All programs. Neighbours in the manifest, which often depend on each other, are far apart."""
 
 
 class PlannedFault(NamedTuple):

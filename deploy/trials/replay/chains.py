@@ -52,8 +52,8 @@ CHAINS: tuple[Chain, ...] = (
 """
 Services that hear the replayed output of each other. Chains hear the recorded output of each other.
 
-So velocity hears the recorded positions: its recipe divides by the time between two emissions, of which a
-replay of kinematics has others. The slowest chain is the first: chains run in parallel.
+So velocity hears the recorded positions: its recipe divides by the time between two emissions, which a
+replay of kinematics changes. The slowest chain is the first: chains run in parallel.
 """
 
 

@@ -26,7 +26,7 @@ _OUTPUTS = (
     topics.OPERATOR_ACTIVITY,
     topics.ENGINES_STATE,
 )
-"""Topics that only services of an arm publish; other robots have joint states and a description, too."""
+"""Topics that only services of an arm publish; other robots have joint states and a description as well."""
 
 
 class Message(NamedTuple):

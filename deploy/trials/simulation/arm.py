@@ -121,7 +121,7 @@ class Arm:
         return process
 
     def lives(self) -> list[Life]:
-        """Return the lives of all processes, also of those that live."""
+        """Return the lives of all processes, dead and alive."""
         alive = [
             Life(each.name, each.pid, (each.began - BOOT) / SECOND, None)
             for each in self.simulation.processes

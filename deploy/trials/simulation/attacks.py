@@ -2,7 +2,7 @@
 
 An attack takes two of the three fail-safes of deploy/SAFETY.md away:
 
-- F1, the operator watchdog: it is killed, stopped or hung in the silence, so it loses its strikes.
+- F1, the operator watchdog: it is killed, stopped or hung during the silence, so it loses its strikes.
 - F2, the engine controller's timeout: a stranger reports the operator's presence. If F3 shall act, the
   controller is stopped, hung or slow when F2 has to act.
 - F3, the drive's timeout: the drive keeps the last command.
@@ -69,7 +69,7 @@ def attacked(shift: Shift) -> Shift:
 
 
 def attack(fail_safe: str, release: float, rng: random.Random) -> list[PlannedFault]:
-    """Return the faults that leave a fail-safe alone in the silence after a release [s]."""
+    """Return the faults that leave a fail-safe alone during the silence after a release [s]."""
     # The watchdog loses the strikes of earlier silences, so F1 does not act early.
     without_strikes = PlannedFault(-rng.uniform(4.0, 5.0), "kill", WATCHDOG)
     return [

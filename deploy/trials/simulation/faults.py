@@ -61,7 +61,7 @@ def _fail(error: type[BaseException]) -> Callable[[Process], None]:
 
 
 def _slow(arm: Arm, program: str, duration: float) -> None:
-    """Let a callback take long; DDS goes on meanwhile."""
+    """Let a callback take long; DDS continues meanwhile."""
     if process := arm.process(program):
         process.interrupt(lambda: time.sleep(duration))
 

@@ -15,7 +15,7 @@ from interfaces import topics
 
 RECEPTION = 0.0005  # s after sending
 _UNREAD = (topics.JOINT_STATES, topics.TF, topics.ROBOT_DESCRIPTION)
-"""Topics of which the checkers read only the times; decoding them would be slow."""
+"""The checkers read only the times of these topics; decoding them would be slow."""
 
 
 class Observer:

@@ -25,7 +25,7 @@ def shifts(seed: str, hours: float, every: float, kinds: Sequence[str]) -> list[
 
 
 def shift(seed: str, length: float, every: float, kinds: Sequence[str]) -> Shift:
-    """Return a shift with a random operator and random faults; with all kinds of them, also with attacks."""
+    """Return a shift with a random operator and random faults; with all kinds of faults, attacks as well."""
     faults = random_faults(seed, length - QUIET, every=every, kinds=kinds, table=FAULT_KINDS)
     quiet = Shift(seed, length, people.operator(seed, length), faults)
     return attacked(quiet) if set(kinds) == set(FAULT_KINDS) else quiet

@@ -341,7 +341,7 @@ def test_each_subscription_sends_a_goal(node: ReactiveNode, server: Server, spin
     assert server.goals == [7, 7]
 
 
-def test_goals_run_beside_each_other(node: ReactiveNode, server: Server, spin_until: SpinUntil) -> None:
+def test_goals_run_in_parallel(node: ReactiveNode, server: Server, spin_until: SpinUntil) -> None:
     act = node.create_action_call(Fibonacci, "fibonacci")
     watch = Watch(rx.of(goal(7), goal(8)).flat_map(lambda one: act(one).last()), node)
     spin_until(lambda: len(server.ends) == 2)

@@ -1,4 +1,4 @@
-"""Slow work beside the node's thread: only the newest item waits."""
+"""Slow work on another thread: only the newest item waits."""
 
 from __future__ import annotations
 

@@ -97,7 +97,7 @@ def test_observable_on_demand_is_observed_while_there_are_subscribers(
     spin_until(lambda: received == [1.5])
     second = peer.create_subscription(Float64, "numbers", lambda _: None, 10)
     spin_until(lambda: node.count_subscribers("numbers") == 2)
-    spin_for(0.1)  # the second one is no reason to begin anew
+    spin_for(0.1)  # the second one is no reason to begin again
     peer.destroy_subscription(first)
     spin_until(lambda: node.count_subscribers("numbers") == 1)
     spin_for(0.1)

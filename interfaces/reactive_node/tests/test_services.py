@@ -158,7 +158,7 @@ def test_answer_of_another_thread_wakes_sleeping_executor(
     assert response.done()
 
 
-def test_recipe_does_not_run_beside_callbacks_of_node(context: Context, domain_id: int) -> None:
+def test_recipe_does_not_run_in_parallel_with_callbacks_of_node(context: Context, domain_id: int) -> None:
     node = ReactiveNode("reactive", context=context)
     peer = Node("peer", context=context)
     ran = threading.Event()

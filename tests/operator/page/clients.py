@@ -183,7 +183,7 @@ class Link:
         self._flows.clear()
 
     def heal(self) -> None:
-        """Let all bytes go on, also those that were held back."""
+        """Pass all bytes on, and those that were held back."""
         self._flows.set()
 
     def _relay(self, source: socket.socket, target: socket.socket) -> None:

@@ -1,4 +1,4 @@
-"""The wiring of the page: a page that holds the switch, beside a terminal and a virtual operator."""
+"""The wiring of the page: a page that holds the switch, with a terminal and a virtual operator."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ class Page:
 
 
 class World:
-    """The operator console beside a dead man's switch and two sources, and an observer of the topics."""
+    """The page program with a dead man's switch, two sources, and an observer of the topics."""
 
     def __init__(
         self, make_node: Callable[..., Any], spin_until: SpinUntil, folder: Path, **options: Any

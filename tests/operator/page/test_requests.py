@@ -1,4 +1,4 @@
-"""What pages ask for beside the switch: who may kill and stop processes."""
+"""What pages ask for besides the switch: who may kill and stop processes."""
 
 from __future__ import annotations
 

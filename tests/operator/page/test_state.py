@@ -188,7 +188,7 @@ def test_limits_are_those_of_this_arm(play: Play) -> None:
     assert view(found, "page", 209.2)["engines"]["why"] == BY_CONTROLLER.replace("10", "2.5")
 
 
-def test_strikes_of_an_older_watchdog_are_unknown_until_it_begins_anew(play: Play) -> None:
+def test_strikes_of_an_older_watchdog_are_unknown_until_it_begins_again(play: Play) -> None:
     play.watchdogs.append(on_next(201, False))
     conclude(play, (210, MISSED))
     assert play.run(211).strikes_left is None

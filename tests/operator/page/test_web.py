@@ -42,7 +42,7 @@ def test_web_wins_over_the_parameter_file(tmp_path: Path) -> None:
     assert port_of("8000", user_file=str(file)) == {"port": 8000, "names": "arm.example"}
 
 
-def test_files_of_the_page_are_beside_the_parameter_file(
+def test_files_of_the_page_are_next_to_the_parameter_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     loaded: list[tuple[str, ...]] = []

@@ -1,4 +1,4 @@
-"""What an arm costs: the processor time of its own processes, also of those that have ended."""
+"""What an arm costs: the processor time of its own processes, ended ones included."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Faults whose target does not run, and the processes that the testbed starts beside an arm."""
+"""Faults whose target does not run, and the processes that the testbed starts in addition to an arm."""
 
 from __future__ import annotations
 
@@ -152,7 +152,7 @@ def await_members(system: System, count: int) -> list[processes.Process]:
 
 @pytest.fixture
 def babbler(arm: Arm, domain_id: int) -> Iterator[int]:
-    """Start a babbler beside the arm."""
+    """Start a babbler next to the arm."""
     undo: Undo | None = FAULT_KINDS["babble"].inject(arm, NO_TARGET)
     assert undo is not None
     try:
@@ -164,7 +164,7 @@ def babbler(arm: Arm, domain_id: int) -> Iterator[int]:
 
 @pytest.fixture
 def velocity(arm: Arm, babbler: int) -> Iterator[subprocess.Popen[bytes]]:
-    """Start a process of the arm beside the babbler."""
+    """Start a process of the arm next to the babbler."""
     environment = arm.environment() | {"SUPERVISOR_PROCESS_NAME": "velocity"}
     with subprocess.Popen(
         [sys.executable, "-c", "import signal; signal.pause()"], env=environment

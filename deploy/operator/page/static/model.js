@@ -39,7 +39,7 @@ export class Model {
     Object.assign(this, INITIAL);
   }
 
-  /** Begin anew after a connection; the last minute stays, with a gap. */
+  /** Begin again after a connection; the last minute stays, with a gap. */
   begin(welcome) {
     this.welcome = welcome;
     this.lines = [];

@@ -68,7 +68,7 @@ class Kernel:
         self.ends: deque[End] = deque(maxlen=_LAST_ENDS)
         """The last processes that have ended."""
         self.unwilling: list[Thread] = []
-        """Threads of killed processes that catch every exception: they wait for ever."""
+        """Threads of killed processes that catch every exception: they wait forever."""
         self._events: list[tuple[int, int, Callable[[], Any]]] = []
         self._orders = itertools.count()
         self._pids = itertools.count(1000)

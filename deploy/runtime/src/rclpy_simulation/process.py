@@ -205,11 +205,11 @@ class Process:
                 participant.fall_silent()
 
     def hang(self) -> None:
-        """Let it run an endless loop in a callback. DDS, which has threads of its own, goes on."""
+        """Let it run an endless loop in a callback. DDS, which has threads of its own, continues."""
         self.is_hung = True
 
     def proceed(self) -> None:
-        """SIGCONT: it goes on, with all that has arrived meanwhile."""
+        """SIGCONT: it resumes, with all that has arrived meanwhile."""
         if not self.is_stopped or self.ended:
             return
         self.is_stopped = False

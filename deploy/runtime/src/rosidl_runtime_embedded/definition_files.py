@@ -1,7 +1,7 @@
 """Finds the definition files of message packages, and reads each file once.
 
 A message package is a directory with ``msg/*.msg``, ``srv/*.srv`` and ``action/*.action``. The packages of
-this distribution are the directories beside this one. Packages of users are in ``<prefix>/share/<package>``,
+this distribution are the directories next to this one. Packages of users are in ``<prefix>/share/<package>``,
 for every prefix in ``AMENT_PREFIX_PATH``. A package of this distribution wins over a user's package of the
 same name.
 """
@@ -112,7 +112,7 @@ def action_definition(name: str) -> ActionDefinition:
 
 @cache
 def service_definition(name: str) -> ServiceDefinition:
-    """Definition of a service, also of an action's, by full name. Raises LookupError or InvalidDefinition."""
+    """Definition of a service, or an action's, by full name. Raises LookupError or InvalidDefinition."""
     if "/action/" in name:
         action, _, service = name.rpartition("_")
         if service not in ACTION_SERVICES:
@@ -125,7 +125,7 @@ def service_definition(name: str) -> ServiceDefinition:
 
 @cache
 def message_definition(name: str) -> MessageDefinition:
-    """Definition of a message, also of a service's or action's. Raises LookupError or InvalidDefinition."""
+    """Definition of a message, or of one in a service or action. Raises LookupError or InvalidDefinition."""
     if "/msg/" in name:
         path, text = definition_source(name)
         return parse_message(name, text, path, is_defined)

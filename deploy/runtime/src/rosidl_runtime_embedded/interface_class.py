@@ -20,7 +20,7 @@ def module_of(name: str) -> str:
 
 
 class InterfaceType(type):
-    """Base of the metaclasses, of which each interface has its own, as in ROS 2."""
+    """Base of the metaclasses: each interface has its own, as in ROS 2."""
 
     _TYPE_SUPPORT: ClassVar[str]
     """In ROS 2 a structure of C, or None before its import. Here the name of the type: there is no C."""
@@ -50,7 +50,7 @@ def make_class(
             **{constant: _constant(value) for constant, value in constants.items()},
         },
     )
-    # The instances do not see the properties of the metaclass, so the class has the constants, too.
+    # Instances do not see the properties of the metaclass, so the class has the constants as well.
     members = {"__module__": module, "_TYPE_NAME": name, **namespace, **constants}
     cls: type[_Base] = metaclass(class_name, (base,), members)
     return cls

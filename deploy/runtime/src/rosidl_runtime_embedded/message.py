@@ -226,7 +226,7 @@ _classes: dict[str, type[Message]] = {}
 
 
 def message_class(name: str) -> type[Message]:
-    """Class of a message, also of a service's or action's, by its full name.
+    """Class of a message, or of one in a service or action, by its full name.
 
     Raises LookupError or InvalidDefinition.
     """

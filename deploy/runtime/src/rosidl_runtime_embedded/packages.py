@@ -94,7 +94,7 @@ class _UserPackages:
         kind, _, module = kind.partition(".")
         if module:
             if kind in KINDS and (found := PathFinder.find_spec(name, path, target)):
-                return found  # of a ROS 2 that is sourced beside this distribution
+                return found  # of a ROS 2 that is sourced as well
             names = interface_names(package, kind) if kind in KINDS else []
             known = any(module_of(f"{package}/{kind}/{interface}") == name for interface in names)
             return ModuleSpec(name, cast("Loader", self)) if known else None

@@ -247,7 +247,7 @@ def test_an_entity_created_on_another_thread_wakes_the_executor(
     executor: SingleThreadedExecutor, node: Node
 ) -> None:
     called = threading.Event()
-    spinning = threading.Thread(target=executor.spin_once)  # waits for ever: the node has no entity yet
+    spinning = threading.Thread(target=executor.spin_once)  # waits forever: the node has no entity yet
     spinning.start()
     node.create_timer(0.0, called.set)
     spinning.join(10)
@@ -705,7 +705,7 @@ def test_an_exception_on_a_pool_thread_propagates_from_spin(make_node: MakeNode,
             executor.spin()
 
 
-def test_executor_that_was_shut_down_ends_silently_also_after_its_context(
+def test_executor_that_was_shut_down_ends_silently_even_after_its_context(
     executor: SingleThreadedExecutor, context: Context
 ) -> None:
     executor.shutdown()

@@ -117,7 +117,7 @@ def test_other_threads_run_while_an_executor_waits(executor: SingleThreadedExecu
     counted = 0
     waiting = threading.Thread(target=executor.spin_once)
     waiting.start()
-    while counted < 100_000:  # would take for ever if waiting held the interpreter lock
+    while counted < 100_000:  # would never end if waiting held the interpreter lock
         counted += 1
     executor.wake()
     executor.shutdown()

@@ -28,7 +28,7 @@ ABSTRACT = {
     "Executor": ("spin_once", "spin_once_until_future_complete"),
     "Waitable": ("add_to_wait_set", "execute", "get_num_entities", "is_ready", "take_data"),
 }
-"""Methods that raise NotImplementedError in rclpy, too: tests/conformance shows it on both."""
+"""Methods that raise NotImplementedError in rclpy as well: tests/conformance shows it on both."""
 
 TOOLS = {
     "ros2topic.api": ("get_msg_class", "get_topic_names", "get_topic_names_and_types"),

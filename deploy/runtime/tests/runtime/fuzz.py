@@ -46,7 +46,7 @@ DISCOVERY, SCALAR = "ros_discovery_info", "a parameter's value"
 NAMES = [*MAIN_TYPES, DISCOVERY, SCALAR]
 
 BATCH = 50_000  # inputs
-MEMORY = 64 << 20  # bytes that a process may allocate beside what it has when the first batch begins
+MEMORY = 64 << 20  # bytes that a process may allocate in addition to what it has when the first batch begins
 ADDRESSES = resource.getrlimit(resource.RLIMIT_AS)  # made now: without memory, nothing can be made
 
 

@@ -147,7 +147,7 @@ def test_huge_counts_cost_no_memory_and_no_time(message_type: Any, count: int) -
 
 
 def allocated() -> int:
-    """The private memory of this process [kB], also what it has not touched yet."""
+    """The private memory of this process [kB], including what it has not touched yet."""
     (line,) = (line for line in Path("/proc/self/status").read_text().splitlines() if "VmData" in line)
     return int(line.split()[1])
 

@@ -126,7 +126,7 @@ def spin():
     print("ended", flush=True)
 threading.Thread(target=spin).start()
 libc.pthread_mutex_lock(mutex)
-libc.pthread_mutex_lock(mutex)  # for ever
+libc.pthread_mutex_lock(mutex)  # forever
 """
 
 

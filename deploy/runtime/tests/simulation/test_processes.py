@@ -212,7 +212,7 @@ def test_a_signal_handler_runs_on_the_waiting_main_thread(simulation: Simulation
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGKILL])
-def test_a_signal_without_handler_ends_a_process_also_while_it_starts(
+def test_a_signal_without_handler_ends_a_process_even_while_it_starts(
     simulation: Simulation, number: int
 ) -> None:
     began: list[str] = []

@@ -1,4 +1,4 @@
-"""A real thread beside a simulation is in no simulated process, whichever runs at that moment."""
+"""A real thread outside of a simulation is in no simulated process, whichever runs at that moment."""
 
 from __future__ import annotations
 

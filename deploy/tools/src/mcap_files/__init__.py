@@ -1,6 +1,6 @@
 """MCAP files of ROS 2 messages that survive the sudden death of their writer, and what reads them.
 
-It stands on the library ``mcap`` alone, so any rclpy may run beside it.
+It needs only the library ``mcap``, so it works with any rclpy.
 """
 
 from mcap_files.reader import McapFile, UnreadableError

@@ -105,7 +105,7 @@ def is_published(topic: str) -> Callable[[Node], bool]:
 
 
 def wait_for(condition: Callable[[], bool], timeout: float) -> bool:
-    """Wait until ``condition`` is true, at most ``timeout`` [s]; negative: for ever. Return whether it is."""
+    """Wait until ``condition`` is true, at most ``timeout`` [s]; negative: forever. Return whether it is."""
     deadline = time.monotonic() + timeout
     while not condition():
         if timeout >= 0 and deadline < time.monotonic():
@@ -155,7 +155,7 @@ def interface_class(kind: str, name: str, problem: str) -> Any:
 
 
 def spin(node: Node, until: Future | None = None, timeout: float | None = None) -> None:
-    """Run the callbacks of a node until a future is done, or for a time [s], or for ever."""
+    """Run the callbacks of a node until a future is done, or for a time [s], or forever."""
     with spinning(node, until, timeout) as ending:
         ending.result()
 
@@ -167,7 +167,7 @@ def spinning(
     """
     Run the callbacks of a node in a thread until the scope is left; arguments as of `spin`.
 
-    In the main thread, a signal would interrupt rclpy anywhere, also between two steps that belong together,
+    In the main thread, a signal would interrupt rclpy anywhere, even between two steps that belong together,
     or it would have to wait while rclpy waits in C.
 
     :return: the end of the thread, with the error of a callback.

@@ -13,7 +13,7 @@ from tf2_ros.transform_broadcaster import as_list
 
 
 class StaticTransformBroadcaster:
-    """Publishes static transforms on ``/tf_static``; subscribers that come later get them, too."""
+    """Publishes static transforms on ``/tf_static``; later subscribers get them as well."""
 
     def __init__(self, node: Node, qos: QoSProfile | int | None = None) -> None:
         """Create the publisher, by default reliable, transient local and with the last message."""

@@ -1,4 +1,4 @@
-"""A graph, and commands that run as processes beside it."""
+"""A graph, and commands that run as processes of their own."""
 
 from __future__ import annotations
 

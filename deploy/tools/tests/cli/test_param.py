@@ -57,7 +57,7 @@ def test_get_shows_type_and_value(lab: Any, ros2: Any, arguments: list[str], tex
     assert (done.stdout, done.returncode) == (text, 0)
 
 
-def test_set_changes_the_value_also_to_a_negative_one(lab: Any, ros2: Any) -> None:
+def test_set_changes_the_value_even_to_a_negative_one(lab: Any, ros2: Any) -> None:
     done = ros2("param", "set", "/arm/lab", "limits.speed", "-4", "--no-daemon")
     assert (done.stdout, done.returncode) == ("Set parameter successful\n", 0)
     assert lab.get_parameter("limits.speed").value == -4

@@ -96,7 +96,7 @@ class _Execution:
                 self._accepted = handle
         if cancelled:
             handle.cancel_goal_async()
-        # Of a cancelled goal, too: only with its result, rclpy forgets the feedback's callback.
+        # Even of a cancelled goal: only with its result, rclpy forgets the feedback's callback.
         self._then(handle.get_result_async(), self._ended)
 
     def _ended(self, response: Any) -> None:

@@ -17,7 +17,7 @@ _STEADY = Clock(clock_type=ClockType.STEADY_TIME)
 
 
 def server_ready(node: Node, is_ready: Callable[[], bool], scheduler: abc.SchedulerBase) -> Observable[None]:
-    """Emit while there is a server; asks in real time, also while ROS time is simulated."""
+    """Emit while there is a server. It asks in real time, even while ROS time is simulated."""
 
     def subscribe(observer: abc.ObserverBase[None], _: abc.SchedulerBase | None = None) -> abc.DisposableBase:
         def poll() -> None:

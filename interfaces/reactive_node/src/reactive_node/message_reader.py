@@ -17,7 +17,7 @@ from reactive_node.end import End
 from reactive_node.shared_reader import SharedReader
 from reactive_node.stamps import Timestamp
 
-_RECENT = 16  # messages of which a second reader may deliver a copy
+_RECENT = 16  # messages that a second reader may deliver again
 
 
 class MessageReader(SharedReader):
@@ -72,7 +72,7 @@ class MessageReader(SharedReader):
                 self._subscriptions.append(self._create(self._receive_with_info, qos))
 
     def _receive_with_info(self, message: Any, info: Any) -> None:
-        """Hand on a message of which the source time matters, unless the other reader has delivered it."""
+        """Hand on a message whose source time matters, unless the other reader has delivered it."""
         if self._recent is not None:
             if info["source_timestamp"] in self._recent:
                 return

@@ -82,7 +82,7 @@ class ReactiveNode(Node):
             At each tick the newest message becomes an item, if it has come since the tick before. What comes
             in between costs no Python: the reader keeps one message, and only a tick reads it. Late observers
             get no retained samples, and QoS events are not warned of.
-        :param buffered: the same for topics of which each message counts: at each tick, all messages become
+        :param buffered: the same for topics where each message counts: at each tick, all messages become
             items that have come since the tick before, one after the other. The reader keeps 1000.
         :param item: turns each message, with ``timestamped`` each Timestamp, into the item, once for all
             observers and at less cost than the operator ``map``; if it returns ``None``, there is none.
@@ -163,7 +163,7 @@ class ReactiveNode(Node):
         def subscribe(
             observer: abc.ObserverBase[Any], scheduler: abc.SchedulerBase | None = None
         ) -> abc.DisposableBase:
-            lock = threading.RLock()  # the present value comes first, also if another thread sets a new one
+            lock = threading.RLock()  # the present value comes first, even if another thread sets a new one
 
             def changed(parameters: list[Parameter]) -> None:
                 with lock:
@@ -260,8 +260,8 @@ class ReactiveNode(Node):
         ``act(goal).last()`` is the result only. A goal that does not succeed is an error of the observable:
         :class:`~reactive_node.actions.GoalRejected`, :class:`~reactive_node.actions.GoalAborted`,
         :class:`~reactive_node.actions.GoalCanceled` (by another client), or
-        :class:`~reactive_node.actions.GoalUnknown` (by a server that has forgotten the goal). Disposing, also
-        by the end of the node, asks the server to cancel the goal, so ``goals.map(act).switch_latest()``
+        :class:`~reactive_node.actions.GoalUnknown` (by a server that has forgotten the goal). Disposing, and
+        the end of the node, asks the server to cancel the goal, so ``goals.map(act).switch_latest()``
         replaces it. A server that vanishes is not noticed: limit its silence by
         ``act(goal).timeout(seconds)``. The observable completes when the node ends.
 
@@ -301,8 +301,8 @@ class ReactiveNode(Node):
 
         :param message: turns each item into a message; if it returns ``None``, nothing is published. By
             default, the items are the messages.
-        :param on_demand: whether the observable is observed only while the topic has subscribers, each time
-            anew. Without them it costs nothing, down to its own topics.
+        :param on_demand: whether the observable is observed only while the topic has subscribers, with a
+            new subscription each time. Without them it costs nothing, down to its own topics.
         :param options: further arguments of :meth:`rclpy.node.Node.create_publisher`; with ``on_demand``
             without ``event_callbacks``. A subject makes an observable of the publisher's QoS events:
             ``event_callbacks=PublisherEventCallbacks(deadline=subject.on_next)``.
@@ -360,10 +360,10 @@ class ReactiveNode(Node):
         It must answer each request once, with the request itself, not a copy. A request without an answer is
         kept, and its client waits in vain; others do not. An error of the recipe, its completion, an answer
         to a request that does not wait, and a response of another type are raised out of the spinning of
-        this node. Then the service ends, too, so clients see that there is no server.
+        this node. Then the service ends as well, so clients see that there is no server.
 
         :param options: further arguments of :meth:`rclpy.node.Node.create_service`, without
-            ``callback_group``: requests arrive by the node's scheduler, also while others wait.
+            ``callback_group``: requests arrive by the node's scheduler, even while others wait.
         """
         requests = Requests(self, srv_type, srv_name, self.scheduler)
         sink = CompositeDisposable()
@@ -409,6 +409,6 @@ class ReactiveNode(Node):
             if not self._end.is_stopped:
                 stack.callback(self.scheduler.dispose)
                 stack.callback(self._sinks.dispose)
-                for sink in reversed(self._sinks.to_list()):  # each, also if another one raises
+                for sink in reversed(self._sinks.to_list()):  # each, even if another one raises
                     stack.callback(sink.dispose)
                 self._end.come()

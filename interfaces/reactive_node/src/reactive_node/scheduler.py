@@ -221,7 +221,7 @@ class NodeScheduler(PeriodicScheduler):
         self._timer: Timer = self._node.create_timer(1.0, self._run, clock=self._clock, autostart=False)
 
     def _read(self) -> int:
-        # Without a simulation, not by the steady clock of rclpy, which reads the same in six calls.
+        # In real time, read `time.monotonic_ns` directly; rclpy's clock takes six calls.
         now = int(self._clock.now().nanoseconds) if self._simulated else time.monotonic_ns()
         return now + self._offset
 
@@ -239,7 +239,7 @@ class NodeScheduler(PeriodicScheduler):
                 return
             simulated = self._time_is_simulated()
             if simulated != self._simulated:
-                # Not by the jump's delta, which ROS 2 leaves at 0 where simulated time begins or ends.
+                # The jump's delta does not help: ROS 2 leaves it at 0 where simulated time begins or ends.
                 self._node.destroy_timer(self._timer)
                 self._use_clock(simulated)
                 self._offset += self._before_jump - self._read()

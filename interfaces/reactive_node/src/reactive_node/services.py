@@ -31,7 +31,7 @@ class Requests:
         self._scheduler.schedule(lambda *_: self.observable.on_next(request))
         response = await future
         if self._closed:
-            await Future()  # for ever: rclpy would answer through the destroyed service, and raise
+            await Future()  # forever: rclpy would answer through the destroyed service, and raise
         return response
 
     def answer(self, answer: Any) -> None:

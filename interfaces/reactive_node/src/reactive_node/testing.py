@@ -80,7 +80,7 @@ class VirtualTime(TestScheduler):
         return Recording(observer.messages)
 
     def worker(self, seconds: float) -> Scheduler:
-        """Return a scheduler for slow work: its actions run beside each other and end after ``seconds``."""
+        """Return a scheduler for slow work: its actions run in parallel and end after ``seconds``."""
         return _SlowWorker(self, seconds)
 
 

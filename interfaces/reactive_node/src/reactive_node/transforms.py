@@ -85,7 +85,7 @@ class Transforms:
                 receive, observer.on_error, observer.on_completed, scheduler=scheduler
             )
 
-        # When simulated time starts anew, transforms of the future would hide those that come.
+        # When simulated time starts again, transforms of the future would hide those that come.
         jumps = self._clock.create_jump_callback(_JUMP, post_callback=lambda _: buffer.clear())
         return CompositeDisposable(
             listen("/tf", _QOS, buffer.set_transform),

@@ -72,7 +72,7 @@ def hold_with_engines_on(arm: Arm, hand: HandOnPage, *hands: Callable[[], None])
 
 
 def undisturbed(test: Callable[..., None]) -> Callable[..., None]:
-    """Begin a test of a ``hand`` anew if the page had to release because the machine stood still."""
+    """Begin a test of a ``hand`` again if the page had to release because the machine stood still."""
 
     @functools.wraps(test)
     def attempts(hand: HandOnPage, **others: Any) -> None:

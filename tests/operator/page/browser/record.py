@@ -1,4 +1,4 @@
-"""A node beside the arm that records, with their source times, the messages that the switch moves.
+"""A node outside of the arm that records, with their source times, the messages that the switch moves.
 
 It is a process of its own, because it may have to be in the network namespace of the arm.
 """

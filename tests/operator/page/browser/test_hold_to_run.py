@@ -4,7 +4,7 @@ The times are the source times of heartbeats. Heartbeats must stop. That the eng
 the last heartbeat (S1) follows from that: test_lost_page.py and test_cut_link.py measure it.
 
 By its rules the page also releases when the machine stands still for 250 ms. A test that this disturbs begins
-anew.
+again.
 """
 
 from __future__ import annotations

@@ -60,7 +60,7 @@ BEYOND = """
     && it.getBoundingClientRect().right > document.documentElement.clientWidth + 1
 ).map((it) => `${it.tagName} ${it.id} ${it.className}`)
 """
-"""The elements that reach beyond the right edge, also where they are cut off."""
+"""The elements that reach beyond the right edge, even where they are cut off."""
 
 INLINE = """
 window.violations = [];

@@ -67,7 +67,7 @@ def send_goal(action_name: str, action_type: str, goal: str, feedback: bool) -> 
             click.echo(f"Goal accepted with ID: {bytes(handle.goal_id.uuid).hex()}\n")
             ending = handle.get_result_async()
             graph.spin(node, ending)
-        except BaseException:  # Ctrl-C above all: whenever it comes, the goal must not go on
+        except BaseException:  # Ctrl-C above all: whenever it comes, the goal must not continue
             if sent:
                 _cancel(node, sent[0])
             raise

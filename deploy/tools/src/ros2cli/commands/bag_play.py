@@ -81,7 +81,7 @@ _MATCHING_TIME = 0.5
     type=NON_NEGATIVE_INT,
     default=500,
     show_default=True,
-    help="Wait at the end until reliable subscriptions have all, at most this time in ms; 0: for ever.",
+    help="Wait at the end until reliable subscriptions have all, at most this time in ms; 0: forever.",
 )
 def play(
     bag_path: str,

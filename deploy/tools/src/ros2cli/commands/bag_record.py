@@ -78,7 +78,7 @@ def record(
     storage_preset_profile: str,
     **options: Any,
 ) -> None:
-    """Record ROS data to a bag, until Ctrl-C. New topics are recorded, too."""
+    """Record ROS data to a bag, until Ctrl-C. New topics are recorded as well."""
     from mcap_files import SAVE_PERIOD
     from rclpy.clock import Clock, ClockType
     from ros2cli.bag_writer import BagWriter
