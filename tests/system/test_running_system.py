@@ -20,6 +20,7 @@ from geometry_msgs.msg import Point, PointStamped
 from std_msgs.msg import Bool, Float64, String
 
 from deploy.running import processes
+from deploy.running.rclpy_choice import sourced_rclpy
 from interfaces import topics
 from tests.system.sites import LIMIT, ROOT, STEADY, Peer, Site
 
@@ -54,6 +55,22 @@ def test_status_shows_every_service_running(module_site: Site) -> None:
     assert services.keys() >= module_site.programs
     for name, (state, pid, _uptime, restarts, *_) in services.items():
         assert (state, int(pid), restarts) == ("RUNNING", module_site.members[name], "0")
+
+
+@pytest.mark.parametrize("wrapped", [False, True], ids=["python", "venv.sh"])
+def test_status_works_from_a_shell_of_the_other_runtime(
+    module_site: Site, monkeypatch: pytest.MonkeyPatch, wrapped: bool
+) -> None:
+    if sourced_rclpy():
+        pytest.skip("platform: a sourced ROS 2 leaves no place for the embedded rclpy")
+    monkeypatch.setenv("RUNTIME", "" if os.environ.get("RUNTIME") else "embedded")
+    for name in ("LD_LIBRARY_PATH", "_ROS_WHEELS_BOOTSTRAP_COMPLETE"):  # as in a new shell
+        monkeypatch.delenv(name, raising=False)
+    python = str(ROOT / "deploy/commands/venv.sh") if wrapped else sys.executable
+    code, printed = module_site.do_command(python, "-m", "deploy.commands.launcher", "status")
+    assert code == 0, printed
+    assert {row[0] for row in rows(printed).values()} == {"RUNNING"}
+    assert "no report" not in printed
 
 
 def test_a_second_start_reports_the_running_system(module_site: Site) -> None:
