@@ -10,8 +10,10 @@ from typing import Any
 
 import pytest
 from builtin_interfaces.msg import Time
+from geometry_msgs.msg import PointStamped
 from hypothesis import given
 from hypothesis import strategies as st
+from std_msgs.msg import Header
 
 from reactive_node import Timestamp, stamps
 
@@ -43,6 +45,19 @@ def test_message_of_a_time_has_its_seconds_and_nanoseconds() -> None:
 
     assert stamps.to_message(time) == Time(sec=65, nanosec=7000)
     assert stamps.from_message(Time(sec=65, nanosec=7999)) == time
+
+
+def test_a_value_is_stamped_to_the_nanosecond() -> None:
+    item = stamps.stamped("a", 1_000_000_007)
+
+    assert isinstance(item, Timestamp)
+    assert (item.value, item.nanoseconds) == ("a", 1_000_000_007)
+
+
+def test_a_message_is_stamped_by_its_header() -> None:
+    message = PointStamped(header=Header(stamp=Time(sec=5, nanosec=123_456_789)))
+
+    assert stamps.by_header(message) == stamps.stamped(message, 5_123_456_789)
 
 
 def pickled(item: Any) -> Any:

@@ -14,6 +14,8 @@ from builtin_interfaces.msg import Time
 
 __all__ = [
     "Timestamp",
+    "stamped",
+    "by_header",
     "from_message",
     "from_nanoseconds",
     "now",
@@ -54,6 +56,17 @@ class Timestamp(_Stamped[_T]):
 
     def __repr__(self) -> str:
         return f"Timestamp({self.value!r}, {self.timestamp!r})"
+
+
+def stamped(value: _T, nanoseconds: int) -> Timestamp[_T]:
+    """Return a value with its time in nanoseconds since 1970, which a datetime would round."""
+    return tuple.__new__(Timestamp, (value, nanoseconds))
+
+
+def by_header(message: Any) -> Timestamp[Any]:
+    """Return a message with the time in its header."""
+    stamp = message.header.stamp
+    return stamped(message, stamp.sec * 10**9 + stamp.nanosec)
 
 
 def now() -> datetime:
