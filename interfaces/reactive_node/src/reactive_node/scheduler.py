@@ -90,6 +90,10 @@ class NodeScheduler(PeriodicScheduler):
         """The present time of this scheduler."""
         return stamps.from_nanoseconds(self._read())
 
+    def time_of_stamps(self) -> int:
+        """Return the time by the node's clock, by which stamps count [ns]; it may be set."""
+        return int(self._node.get_clock().now().nanoseconds)
+
     def schedule(
         self, action: typing.ScheduledAction[_TState], state: _TState | None = None
     ) -> abc.DisposableBase:

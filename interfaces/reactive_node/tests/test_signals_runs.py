@@ -1,0 +1,287 @@
+"""How a signal is evaluated: replay, memory, clocks, the end, and a node."""
+
+from __future__ import annotations
+
+import random
+from datetime import UTC, datetime
+from typing import Any
+
+import pytest
+import reactivex as rx
+from hypothesis import given
+from hypothesis import strategies as st
+from rclpy.node import Node
+from reactivex.notification import OnError
+from reactivex.subject import Subject
+from reactivex.testing import ReactiveTest
+from std_msgs.msg import Float64
+
+from interfaces.reactive_node.tests.arrivals import (
+    LATENESS,
+    MS,
+    SECOND,
+    Arrival,
+    answers,
+    arrivals,
+    arriving,
+    items,
+)
+from reactive_node import ReactiveNode, stamps
+from reactive_node.signals import (
+    CERTAIN,
+    Answer,
+    Extrapolated,
+    Held,
+    Nothing,
+    Refused,
+    Silence,
+    Unchanged,
+    as_taken,
+    constant,
+    hold,
+    lift,
+    linear,
+)
+from reactive_node.signals.source import Source
+from reactive_node.stamps import stamped
+from reactive_node.testing import SpinUntil, VirtualTime
+
+GAP = 0.1  # s
+
+
+# Replay
+
+
+@pytest.mark.parametrize("silence", [Nothing(), Unchanged(), Held(), Extrapolated(0.05)], ids=repr)
+@given(samples=arrivals(most=400), randomness=st.randoms(use_true_random=False))
+def test_replay_gives_the_answers_of_a_run_with_late_samples(
+    samples: list[Arrival], silence: Silence, randomness: random.Random
+) -> None:
+    refused: list[Refused] = []
+
+    def run(observable: Any, lateness: float, scheduler: VirtualTime) -> list[Answer[Any]]:
+        signal = linear(observable, lateness=lateness, gap=GAP, silence=silence, refused=refused.append)
+        return answers(scheduler, signal.derivative(GAP), until=2.5)
+
+    live = VirtualTime()
+    answered = run(arriving(live, samples), LATENESS, live)
+    record, refused = refused, []
+    again = VirtualTime()
+    other = [each._replace(delay=randomness.randrange(400) * MS) for each in samples]
+    replayed = run(as_taken(arriving(again, other), record), 0.5, again)
+
+    count = min(len(answered), len(replayed))
+    assert repr(replayed[:count]) == repr(answered[:count])
+    assert count > 100
+    assert not refused
+
+
+# Memory and clocks
+
+
+def test_memory_is_flat(scheduler: VirtualTime, monkeypatch: pytest.MonkeyPatch) -> None:
+    sources: list[Any] = []
+    take = Source.settle
+    monkeypatch.setattr(
+        Source, "settle", lambda self, now: sources.append(self) if self not in sources else take(self, now)
+    )
+    samples = rx.interval(0.02).map(lambda count: stamped(1.0, (count + 1) * 20 * MS))
+    signal = linear(samples, lateness=LATENESS, gap=GAP)
+    asked = lift(lambda *parts: parts)(
+        signal.derivative(0.1), signal.integral(0.01), signal.window(0.5, 0.1), signal.delay(1.0)
+    )
+
+    recording = scheduler.record(asked.sample(0.05).map(lambda answer: answer.mark), until=100.0)
+
+    (source,) = sources
+    assert [mark for _, mark in recording.items].count(CERTAIN) > 1900
+    assert len(source.waiting) < 10
+    assert len(source._times) == len(source._values) < 64 + 1.5 / 0.02
+
+
+def test_clock_that_is_set_back_begins_again() -> None:
+    """The value of a state does not come again."""
+    clock = _Clock()
+    moving, state = Subject[Any](), Subject[Any]()
+    signal = lift(lambda *parts: parts)(
+        hold(state, lateness=LATENESS),
+        linear(state, lateness=LATENESS, gap=GAP, silence=Unchanged()),
+        linear(moving, lateness=LATENESS, gap=GAP, silence=Held()).delay(0.0),
+        constant(1.0).integral(0.1),
+    )
+    found: list[Any] = []
+    signal.sample(0.1).subscribe(found.append, scheduler=clock)
+
+    def send(time: float) -> None:
+        moving.on_next(stamped(time, round(time * SECOND)))
+
+    state.on_next(stamped("old state", -50 * MS))
+    state.on_next(stamped("state", 0))
+    for tenth in range(100):
+        clock.time = tenth / 10
+        send(tenth / 10)
+    assert found[-1].time == 97 * 100 * MS
+    found.clear()
+    for tenth in range(50, 70):
+        clock.time = tenth / 10
+        send(tenth / 10)
+
+    assert [each.time for each in found] == [tenth * 100 * MS for tenth in range(50, 68)]
+    assert found[0].value == ("state", "state", 5.0, 0.0)
+    assert found[-1].value == ("state", "state", 6.7, pytest.approx(1.7))
+
+
+def test_samples_of_a_future_that_was_set_back_are_forgotten() -> None:
+    clock = _Clock()
+    samples = Subject[Any]()
+    found: list[Answer[Any]] = []
+    held = linear(samples, lateness=LATENESS, gap=GAP, silence=Held())
+    held.sample(0.1).subscribe(found.append, scheduler=clock)
+    for clock.time in (9.8, 9.9):
+        samples.on_next(stamped("old", round(clock.time * SECOND)))
+    found.clear()
+    for clock.time, name in ((5.0, "new"), (9.0, "newer"), (11.0, "newest")):
+        samples.on_next(stamped(name, round(clock.time * SECOND)))
+
+    assert {each.value for each in found if each.time >= 9 * SECOND} == {"newer"}
+    assert found[-1].time == 10_900 * MS
+
+
+def test_clock_that_goes_back_a_little_does_not_begin_again() -> None:
+    clock = _Clock()
+    found: list[Any] = []
+    samples = Subject[Any]()
+    hold(samples, lateness=LATENESS).sample(0.5).subscribe(found.append, scheduler=clock)
+    for clock.time in (0.0, 2.0, 1.1, 2.5):
+        samples.on_next(stamped(clock.time, round(clock.time * SECOND)))
+
+    assert [each.time for each in found] == [500 * MS * k for k in range(5)]
+
+
+class _Clock(VirtualTime):
+    """A clock that is set by hand."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.time = 0.0
+
+    @property
+    def now(self) -> datetime:
+        return datetime.fromtimestamp(self.time, UTC)
+
+
+# Subscribing and ending
+
+
+def test_nothing_is_subscribed_before_a_question(scheduler: VirtualTime) -> None:
+    samples = arriving(scheduler, [Arrival(0, 1.0, 0)])
+    answers_ = hold(samples, lateness=LATENESS).sample(0.1)
+    assert samples.subscriptions == []
+
+    scheduler.record(answers_, until=1.0)
+
+    assert samples.subscriptions == [ReactiveTest.subscribe(0, 1.0)]
+
+
+def test_each_subscription_has_its_own_memory(scheduler: VirtualTime) -> None:
+    asked = hold(arriving(scheduler, [Arrival(0, 1.0, 0)]), lateness=LATENESS).sample(0.1)
+    assert scheduler.record(asked, until=1.0).items
+
+    assert {answer.value for _, answer in scheduler.record(asked, until=2.0).items} == {None}
+
+
+def test_it_completes_when_all_samples_have_come(scheduler: VirtualTime) -> None:
+    one = scheduler.create_hot_observable(
+        ReactiveTest.on_next(0.1, stamped(1.0, 100 * MS)), ReactiveTest.on_completed(0.4)
+    )
+    other = scheduler.create_hot_observable(ReactiveTest.on_completed(0.63))
+    signal = lift(lambda a, b: (a, b))(hold(one, lateness=LATENESS), hold(other, lateness=LATENESS))
+
+    *messages, end = scheduler.record(signal.sample(0.1), until=2.0).messages
+
+    assert end == ReactiveTest.on_completed(0.63)
+    assert len(messages) == 7
+
+
+def test_snapshot_completes_when_all_events_are_answered(scheduler: VirtualTime) -> None:
+    events = scheduler.create_hot_observable(
+        ReactiveTest.on_next(0.1, stamped("a", 100 * MS)), ReactiveTest.on_completed(0.1)
+    )
+    signal = linear(scheduler.hot(), lateness=LATENESS, gap=GAP)
+
+    messages = scheduler.record(signal.snapshot(events, lateness=LATENESS), until=2.0).messages
+
+    assert [message.time for message in messages] == pytest.approx([0.3, 0.3])
+
+
+@pytest.mark.parametrize("part", ["samples", "function", "predicate"])
+def test_errors_are_errors_of_the_answers(scheduler: VirtualTime, part: str) -> None:
+    def fail(_: Any) -> Any:
+        raise ZeroDivisionError(part)
+
+    samples = scheduler.create_hot_observable(
+        ReactiveTest.on_error(0.3, ZeroDivisionError("samples"))
+        if part == "samples"
+        else ReactiveTest.on_next(0.3, stamped(1.0, 300 * MS))
+    )
+    signal = hold(samples, lateness=LATENESS)
+    asked = {
+        "samples": signal.sample(0.1),
+        "function": lift(fail)(signal).sample(0.1),
+        "predicate": signal.when(fail, resolution=0.1),
+    }[part]
+
+    *_, last = scheduler.record(asked, until=2.0).messages
+
+    assert isinstance(last.value, OnError)
+    assert str(last.value.exception) == part
+
+
+def test_it_needs_a_clock() -> None:
+    with pytest.raises(ValueError, match=r"^a signal needs a clock: .*scheduler=node.scheduler\)$"):
+        constant(1.0).sample(0.1).subscribe()
+
+
+def test_an_observer_may_send_samples(scheduler: VirtualTime) -> None:
+    """Answers keep their order."""
+    samples = Subject[Any]()
+    found: list[int] = []
+
+    def observe(answer: Answer[Any]) -> None:
+        found.append(answer.time)
+        samples.on_next(stamped(1.0, answer.time + SECOND))
+
+    hold(samples, lateness=LATENESS).sample(0.1).subscribe(observe, scheduler=scheduler)
+    scheduler.advance_to(2.0)
+
+    assert found == [100 * MS * k for k in range(20)]
+
+
+def test_disposal_ends_everything(scheduler: VirtualTime) -> None:
+    samples = arriving(scheduler, [Arrival(k * 100 * MS, 1.0, 0) for k in range(20)])
+
+    found = items(scheduler, hold(samples, lateness=LATENESS).sample(0.1).take(3))
+
+    assert len(found) == 3
+    assert samples.subscriptions[0].unsubscribe < 0.5
+
+
+# On a node
+
+
+def test_a_topic_becomes_a_signal_by_the_source_times(
+    node: ReactiveNode, peer: Node, spin_until: SpinUntil
+) -> None:
+    publisher = peer.create_publisher(Float64, "value", 10)
+    messages = node.create_observable(Float64, "value", timestamped=True)
+    values = messages.map(lambda it: it._replace(value=it.value.data))
+    found: list[Answer[float]] = []
+    before = stamps.to_nanoseconds(stamps.now())
+    hold(values, lateness=0.1).sample(0.01).subscribe(found.append, scheduler=node.scheduler)
+
+    spin_until(lambda: publisher.get_subscription_count())
+    publisher.publish(Float64(data=3.0))
+    spin_until(lambda: found and found[-1].is_certain)
+
+    assert found[-1].value == 3.0
+    assert before <= found[-1].time <= stamps.to_nanoseconds(stamps.now())

@@ -1,0 +1,355 @@
+"""Signals from samples: their values are those of plain functions, however late the samples arrive."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from interfaces.reactive_node.tests.arrivals import (
+    LATENESS,
+    MS,
+    SECOND,
+    Arrival,
+    answers,
+    arrivals,
+    arriving,
+)
+from reactive_node.signals import (
+    CERTAIN,
+    EXTRAPOLATED,
+    HELD,
+    UNKNOWN,
+    Answer,
+    Extrapolated,
+    Held,
+    Nothing,
+    Refused,
+    Silence,
+    Unchanged,
+    constant,
+    hold,
+    interpolate,
+    linear,
+    slerp,
+)
+from reactive_node.testing import VirtualTime
+
+GAP = 0.06  # s
+GAP_NS = round(GAP * SECOND)
+
+
+def held(samples: list[Arrival], time: int) -> tuple[Any, int]:
+    """The meaning of `hold`."""
+    before = [sample for sample in samples if sample.time <= time]
+    return (before[-1].value, CERTAIN) if before else (None, UNKNOWN)
+
+
+def straight(samples: list[Arrival], time: int, silence: Silence) -> tuple[Any, int]:
+    """The meaning of `linear`."""
+    before = [sample for sample in samples if sample.time <= time]
+    after = [sample for sample in samples if sample.time > time]
+    if not before:
+        return None, UNKNOWN
+    a = before[-1]
+    if a.time == time:
+        return a.value, CERTAIN
+    if after and after[0].time - a.time <= GAP_NS:
+        b = after[0]
+        return a.value + (b.value - a.value) * ((time - a.time) / (b.time - a.time)), CERTAIN
+    match silence:
+        case Unchanged():
+            is_rest = not after or time < after[0].time - GAP_NS
+            return a.value, CERTAIN if is_rest else HELD
+        case Held():
+            return a.value, HELD
+        case Extrapolated(bound):
+            if len(before) > 1 and a.time - before[-2].time <= GAP_NS and time - a.time <= bound * SECOND:
+                c = before[-2]
+                ratio = (time - c.time) / (a.time - c.time)
+                return c.value + (a.value - c.value) * ratio, EXTRAPOLATED
+    return None, UNKNOWN
+
+
+@given(arrivals())
+def test_hold_is_the_last_value_however_late_it_arrives(samples: list[Arrival]) -> None:
+    scheduler = VirtualTime()
+
+    found = answers(scheduler, hold(arriving(scheduler, samples), lateness=LATENESS))
+
+    assert [each.time for each in found[:3]] == [0, 17 * MS, 34 * MS]
+    assert found[-1].time >= 1383 * MS
+    for time, value, mark in found:
+        assert (value, mark) == held(samples, time)
+
+
+@pytest.mark.parametrize("silence", [Nothing(), Unchanged(), Held(), Extrapolated(0.03)], ids=repr)
+@given(samples=arrivals())
+def test_linear_is_the_line_between_neighbours(samples: list[Arrival], silence: Silence) -> None:
+    scheduler = VirtualTime()
+    signal = linear(arriving(scheduler, samples), lateness=LATENESS, gap=GAP, silence=silence)
+
+    found = answers(scheduler, signal)
+
+    assert found[-1].time >= 1323 * MS
+    for time, value, mark in found:
+        assert (value, mark) == straight(samples, time, silence)
+
+
+@given(arrivals(), st.data())
+def test_answers_do_not_depend_on_the_order_of_arrival(samples: list[Arrival], data: Any) -> None:
+    """Not even their bytes."""
+    other = [each._replace(delay=MS * data.draw(st.integers(0, 99))) for each in samples]
+    results = []
+    for each in (samples, other):
+        scheduler = VirtualTime()
+        results.append(answers(scheduler, linear(arriving(scheduler, each), lateness=LATENESS, gap=GAP)))
+
+    assert repr(results[0]) == repr(results[1])
+
+
+@given(st.floats(-10, 10), st.floats(-10, 10), arrivals(st.none()))
+def test_linear_motion_is_exact(position: float, speed: float, samples: list[Arrival]) -> None:
+    def at(time: int) -> float:
+        return position + speed * time / SECOND
+
+    scheduler = VirtualTime()
+    moving = [each._replace(value=at(each.time)) for each in samples]
+    for time, value, mark in answers(
+        scheduler, linear(arriving(scheduler, moving), lateness=LATENESS, gap=GAP)
+    ):
+        assert mark == UNKNOWN or value == pytest.approx(at(time), abs=1e-9)
+
+
+def test_linear_follows_the_structure_of_tuples(scheduler: VirtualTime) -> None:
+    a = Answer(time=0, value=(0.0, 10.0), mark=4)
+    b = Answer(time=8, value=(1.0, 30.0), mark=8)
+    samples = arriving(scheduler, [Arrival(0, a, 0), Arrival(SECOND, b, 0)])
+
+    found = answers(scheduler, linear(samples, lateness=LATENESS, gap=1.0), period=0.25)
+
+    assert found[1] == Answer(SECOND // 4, Answer(2.0, (0.25, 15.0), 5.0), CERTAIN)
+
+
+Quaternion = tuple[float, float, float, float]
+
+
+def product(a: Quaternion, b: Quaternion) -> Quaternion:
+    """The rotation b, followed by a."""
+    (ax, ay, az, aw), (bx, by, bz, bw) = a, b
+    return (
+        aw * bx + ax * bw + ay * bz - az * by,
+        aw * by - ax * bz + ay * bw + az * bx,
+        aw * bz + ax * by - ay * bx + az * bw,
+        aw * bw - ax * bx - ay * by - az * bz,
+    )
+
+
+def about(axis: tuple[float, float, float], angle: float) -> Quaternion:
+    """A rotation about an axis [rad]."""
+    scale = math.sin(angle / 2) / math.hypot(*axis)
+    return axis[0] * scale, axis[1] * scale, axis[2] * scale, math.cos(angle / 2)
+
+
+axes = st.tuples(st.floats(0.1, 1), st.floats(-1, 1), st.floats(-1, 1))
+angles = st.floats(-3.1, 3.1)
+
+
+@given(axes, angles, axes, angles, st.sampled_from([1, -1]))
+def test_slerp_turns_at_constant_speed_the_short_way(
+    axis: tuple[float, float, float],
+    angle: float,
+    other: tuple[float, float, float],
+    turn: float,
+    sign: int,
+) -> None:
+    begin = about(axis, angle)
+    x, y, z, w = product(begin, about(other, turn))
+    scheduler = VirtualTime()
+    end = (sign * x, sign * y, sign * z, sign * w)  # the same rotation
+    samples = arriving(scheduler, [Arrival(0, begin, 0), Arrival(SECOND, end, 0)])
+
+    found = answers(scheduler, slerp(samples, lateness=LATENESS, gap=1.0), period=0.2)
+
+    assert [each.time for each in found[:5]] == [200 * MS * k for k in range(5)]
+    for number, each in enumerate(found[:5]):
+        assert each.value == pytest.approx(product(begin, about(other, turn * number / 5)), abs=1e-6)
+
+
+def test_slerp_knows_silence_and_refuses(scheduler: VirtualTime) -> None:
+    refused: list[Refused] = []
+    turned = about((0.0, 0.0, 1.0), 1.0)
+    samples = arriving(scheduler, [Arrival(0, turned, 0), Arrival(MS, turned, 300 * MS)])
+    signal = slerp(samples, lateness=LATENESS, gap=GAP, silence=Held(), refused=refused.append)
+
+    assert answers(scheduler, signal, 0.5)[1] == Answer(SECOND // 2, turned, HELD)
+    assert len(refused) == 1
+
+
+def test_a_user_may_bring_an_interpolation(scheduler: VirtualTime) -> None:
+    samples = arriving(scheduler, [Arrival(0, 1.0, 0), Arrival(SECOND, 16.0, 0)])
+    signal = interpolate(lambda a, b, ratio: a * (b / a) ** ratio, samples, lateness=LATENESS, gap=1.0)
+
+    assert [each.value for each in answers(scheduler, signal, 0.25)[:5]] == [1.0, 2.0, 4.0, 8.0, 16.0]
+
+
+# When answers come
+
+
+def test_a_line_is_answered_when_its_second_sample_is_settled(scheduler: VirtualTime) -> None:
+    samples = arriving(scheduler, [Arrival(time * MS, 1.0, 0) for time in range(0, 500, 20)])
+    signal = linear(samples, lateness=LATENESS, gap=GAP)
+
+    recording = scheduler.record(signal.sample(0.01), until=0.4)
+
+    waited = [at - answer.time / SECOND for at, answer in recording.items]
+    assert min(waited) == pytest.approx(LATENESS)
+    assert max(waited) == pytest.approx(LATENESS + 0.01)
+
+
+def test_silence_is_answered_after_lateness_and_gap(scheduler: VirtualTime) -> None:
+    signal = linear(scheduler.hot(), lateness=LATENESS, gap=GAP, silence=Unchanged())
+
+    recording = scheduler.record(signal.sample(0.01), until=0.4)
+
+    assert recording.items[0] == (pytest.approx(LATENESS + GAP), Answer(0, None, UNKNOWN))
+
+
+def test_a_resting_state_is_answered_after_lateness_and_gap(scheduler: VirtualTime) -> None:
+    samples = arriving(scheduler, [Arrival(0, 1.0, 0)])
+    signal = linear(samples, lateness=LATENESS, gap=GAP, silence=Unchanged())
+
+    recording = scheduler.record(signal.sample(0.01), until=5.0)
+
+    *_, (at, answer) = recording.items
+    assert at - answer.time / SECOND == pytest.approx(LATENESS + GAP, abs=0.0101)
+    assert all(answer.is_certain for _, answer in recording.items)
+
+
+def test_a_held_value_is_answered_after_lateness(scheduler: VirtualTime) -> None:
+    signal = hold(arriving(scheduler, [Arrival(0, 1.0, 0)]), lateness=LATENESS)
+
+    recording = scheduler.record(signal.sample(0.5), until=5.0)
+
+    assert [at for at, _ in recording.items] == pytest.approx([0.5 * k + LATENESS for k in range(10)])
+
+
+# What is refused
+
+
+def test_late_sample_is_dropped_and_reported(scheduler: VirtualTime) -> None:
+    refused: list[Refused] = []
+    samples = [Arrival(0, 1.0, 0), Arrival(20 * MS, 9.0, 101 * MS), Arrival(40 * MS, 3.0, 0)]
+    signal = linear(arriving(scheduler, samples), lateness=LATENESS, gap=GAP, refused=refused.append)
+
+    found = answers(scheduler, signal, 0.02)
+
+    assert found[:3] == [Answer(0, 1.0), Answer(20 * MS, 2.0), Answer(40 * MS, 3.0)]
+    assert refused == [Refused(20 * MS, 9.0, "it is 0.101 s late")]
+
+
+@pytest.mark.parametrize("is_state", [True, False])
+def test_late_value_of_a_state_counts_if_it_is_the_newest(scheduler: VirtualTime, is_state: bool) -> None:
+    refused: list[Refused] = []
+    samples = arriving(scheduler, [Arrival(0, 1.0, 0), Arrival(20 * MS, 9.0, 400 * MS)])
+    silence = Unchanged() if is_state else Held()
+    signal = linear(samples, lateness=LATENESS, gap=GAP, silence=silence, refused=refused.append)
+
+    found = answers(scheduler, signal, 0.02)
+
+    taken = 320 * MS + 1 if is_state else None
+    assert refused == [Refused(20 * MS, 9.0, "it is 0.400 s late", taken)]
+    assert {each.value for each in found if each.time <= 320 * MS} == {1.0}
+    assert {each.value for each in found if each.time > 320 * MS} == {9.0 if is_state else 1.0}
+
+
+def test_sample_on_its_bound_is_too_late(scheduler: VirtualTime) -> None:
+    """Its time was settled before."""
+    samples = [Arrival(0, 1.0, 0), Arrival(200 * MS, 9.0, 100 * MS), Arrival(250 * MS, 3.0, 0)]
+    signal = hold(arriving(scheduler, samples), lateness=LATENESS)
+
+    assert answers(scheduler, signal, 0.1)[2:4] == [Answer(200 * MS, 1.0), Answer(300 * MS, 3.0)]
+
+
+def test_late_copy_of_the_last_value_is_dropped(scheduler: VirtualTime) -> None:
+    refused: list[Refused] = []
+    samples = arriving(scheduler, [Arrival(0, 1.0, 0), Arrival(0, 2.0, 400 * MS)])
+
+    found = answers(scheduler, hold(samples, lateness=LATENESS, refused=refused.append), 0.1)
+
+    assert {each.value for each in found} == {1.0}
+    assert [each.taken for each in refused] == [None]
+
+
+def test_nothing_that_an_answer_needs_is_forgotten(scheduler: VirtualTime) -> None:
+    samples = [Arrival(k * 5 * MS, float(k), 0) for k in range(200)]
+    signal = linear(arriving(scheduler, samples), lateness=LATENESS, gap=GAP, silence=Extrapolated(0.2))
+
+    for time, value, mark in answers(scheduler, signal.delay(0.1), 0.001):
+        assert mark == UNKNOWN or value == pytest.approx((time - 100 * MS) / (5 * MS))
+
+
+def test_first_value_of_a_state_may_be_old(scheduler: VirtualTime) -> None:
+    """A transient-local topic delivers it when it is discovered."""
+    samples = arriving(scheduler, [Arrival(0, 1.0, 500 * MS)])
+    refused: list[Refused] = []
+
+    found = answers(scheduler, hold(samples, lateness=LATENESS, refused=refused.append), 0.1)
+
+    assert refused == [Refused(0, 1.0, "it is 0.500 s late", 400 * MS + 1, is_first=True)]
+
+    assert [each.value for each in found[:7]] == [None] * 5 + [1.0] * 2
+
+
+def test_late_value_does_not_replace_a_newer_one_that_waits(scheduler: VirtualTime) -> None:
+    samples = [Arrival(0, 1.0, 200 * MS), Arrival(150 * MS, 2.0, 0)]
+    refused: list[Refused] = []
+    signal = hold(arriving(scheduler, samples), lateness=LATENESS, refused=refused.append)
+
+    assert answers(scheduler, signal, 0.1)[2] == Answer(200 * MS, 2.0)
+    assert [each.taken for each in refused] == [None]
+
+
+def test_sample_far_ahead_of_the_clock_is_dropped(scheduler: VirtualTime) -> None:
+    """It would wait, and fill the memory."""
+    refused: list[Refused] = []
+    samples = [Arrival(0, 1.0, 0), Arrival(200 * MS, 2.0, -100 * MS), Arrival(500 * MS, 3.0, -101 * MS)]
+    signal = hold(arriving(scheduler, samples), lateness=LATENESS, refused=refused.append)
+
+    found = answers(scheduler, signal, 0.1)
+
+    assert found[-1].value == 2.0
+    assert refused == [Refused(500 * MS, 3.0, "it is 0.101 s ahead of the clock")]
+
+
+def test_of_two_samples_with_one_time_the_first_counts(scheduler: VirtualTime) -> None:
+    refused: list[Refused] = []
+    samples = [Arrival(0, 2.0, 0), Arrival(0, 1.0, MS)]
+    signal = hold(arriving(scheduler, samples), lateness=LATENESS, refused=refused.append)
+
+    assert {each.value for each in answers(scheduler, signal)} == {2.0}
+    assert refused == [Refused(0, 1.0, "another sample has the same time")]
+
+
+# Dead publishers
+
+
+def test_value_of_a_dead_publisher_is_held(scheduler: VirtualTime) -> None:
+    alive = hold(
+        arriving(scheduler, [Arrival(0, True, 0), Arrival(300 * MS, False, 0), Arrival(500 * MS, True, 0)]),
+        lateness=LATENESS,
+    )
+    signal = constant(1.0).certain_while(alive)
+
+    marks = [each.mark for each in answers(scheduler, signal, 0.1)]
+
+    assert marks[:7] == [CERTAIN] * 3 + [HELD] * 2 + [CERTAIN] * 2
+
+
+def test_value_is_held_while_nothing_is_known_of_the_publisher(scheduler: VirtualTime) -> None:
+    signal = constant(1.0).certain_while(hold(scheduler.hot(), lateness=LATENESS))
+
+    assert {each.mark for each in answers(scheduler, signal)} == {HELD}
