@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from reactivex import Observable
+from reactivex import Observable, never
 
 from interfaces.reactive_node.tests.arrivals import (
     LATENESS,
@@ -323,6 +323,18 @@ def test_events_at_one_time_all_take_the_value(scheduler: VirtualTime) -> None:
     assert taken == [("a", Answer(MS, 1.0)), ("b", Answer(MS, 1.0))]
 
 
+def test_what_a_waiting_event_needs_is_kept(scheduler: VirtualTime) -> None:
+    fast = arriving(scheduler, [Arrival(k * MS, k, 0) for k in range(1, 1000)])
+    slow = arriving(scheduler, [Arrival(0, 0.0, 0), Arrival(900 * MS, 9.0, 0)])
+    pairs = lift(lambda *pair: pair)(hold(fast, lateness=LATENESS), linear(slow, lateness=LATENESS, gap=1.0))
+
+    found = items(
+        scheduler, pairs.snapshot(arriving(scheduler, [Arrival(50 * MS, "a", 0)]), lateness=LATENESS)
+    )
+
+    assert found == [("a", Answer(50 * MS, (50, pytest.approx(0.5))))]
+
+
 # Crossings
 
 
@@ -368,7 +380,29 @@ def test_when_finds_a_crossing_between_samples(scheduler: VirtualTime) -> None:
     assert found == [(True, 125 * MS), (False, pytest.approx(475 * MS, abs=1))]
 
 
-@pytest.mark.parametrize("make", [lambda s: s.sample(0.0), lambda s: s.when(bool, resolution=-1.0)])
-def test_period_must_be_positive(make: Callable[[Signal[float]], Any]) -> None:
-    with pytest.raises(ValueError, match="must be more than 0 s"):
+def test_when_finds_a_crossing_long_before_it_looks(scheduler: VirtualTime) -> None:
+    samples = arriving(scheduler, [Arrival(k * MS, k, 0) for k in range(1, 1000)])
+    signal = hold(samples, lateness=LATENESS)
+
+    found = changes(scheduler, signal.when(lambda value: value >= 210, resolution=0.2))
+
+    assert found == [(True, 210 * MS)]
+
+
+@pytest.mark.parametrize(
+    ("what", "make"),
+    [
+        ("the period", lambda s: s.sample(0.0)),
+        ("the resolution", lambda s: s.when(bool, resolution=-1.0)),
+        ("the step", lambda s: s.integral(0.0)),
+        ("the step", lambda s: s.window(1.0, 0.0)),
+        ("half the time of a derivative", lambda s: s.derivative(1e-10)),
+        ("the lateness", lambda s: s.snapshot(never(), lateness=0.0)),
+        ("the lateness", lambda s: hold(never(), lateness=0.0)),
+        ("the lateness", lambda s: linear(never(), lateness=0.0, gap=1.0)),
+        ("the gap", lambda s: linear(never(), lateness=1.0, gap=-1.0)),
+    ],
+)
+def test_durations_must_be_positive(what: str, make: Callable[[Signal[float]], Any]) -> None:
+    with pytest.raises(ValueError, match=f"^{what} must be more than 0 s, not .* s$"):
         make(constant(1.0))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import random
 from datetime import UTC, datetime
 from typing import Any
@@ -11,6 +12,7 @@ import reactivex as rx
 from hypothesis import given
 from hypothesis import strategies as st
 from rclpy.node import Node
+from reactivex import Observable
 from reactivex.notification import OnError
 from reactivex.subject import Subject
 from reactivex.testing import ReactiveTest
@@ -145,6 +147,23 @@ def test_samples_of_a_future_that_was_set_back_are_forgotten() -> None:
 
     assert {each.value for each in found if each.time >= 9 * SECOND} == {"newer"}
     assert found[-1].time == 10_900 * MS
+
+
+def test_events_of_a_future_that_was_set_back_are_forgotten() -> None:
+    clock = _Clock()
+    samples, events = Subject[Any](), Subject[Any]()
+    found: list[str] = []
+    signal = linear(samples, lateness=LATENESS, gap=1.0)
+    taken = signal.snapshot(events, lateness=LATENESS)
+    taken.subscribe(lambda pair: found.append(pair[0]), scheduler=clock)
+    clock.time = 9.75
+    samples.on_next(stamped(0.0, 9750 * MS))
+    for clock.time, name in ((9.8, "old"), (9.95, "older")):
+        events.on_next(stamped(name, round(clock.time * SECOND)))
+    for clock.time, name in ((5.0, "new"), (7.0, "newer"), (12.0, "newest"), (14.0, "last")):
+        events.on_next(stamped(name, round(clock.time * SECOND)))
+
+    assert found == ["new", "newer", "newest"]
 
 
 def test_clock_that_goes_back_a_little_does_not_begin_again() -> None:
@@ -285,3 +304,36 @@ def test_a_topic_becomes_a_signal_by_the_source_times(
 
     assert found[-1].value == 3.0
     assert before <= found[-1].time <= stamps.to_nanoseconds(stamps.now())
+
+
+def test_live_answers_are_those_of_virtual_time(
+    node: ReactiveNode, peer: Node, spin_until: SpinUntil
+) -> None:
+    """Not even their bytes differ."""
+    publisher = peer.create_publisher(Float64, "value", 100)
+    arrived: list[Any] = []
+    refused: list[Refused] = []
+    live: list[Answer[float]] = []
+
+    def asked(samples: Observable[Any], lateness: float) -> Observable[Answer[float]]:
+        signal = linear(samples, lateness=lateness, gap=1.0, silence=Held(), refused=refused.append)
+        return signal.derivative(0.02).sample(0.01)
+
+    messages = node.create_observable(Float64, "value", 100, timestamped=True)
+    samples = messages.map(lambda it: it._replace(value=it.value.data)).do_action(arrived.append)
+    asked(samples, 0.2).subscribe(live.append, scheduler=node.scheduler)
+    spin_until(lambda: publisher.get_subscription_count())
+    for number in range(50):
+        publisher.publish(Float64(data=math.sin(number)))
+        spin_until(lambda number=number: len(arrived) > number)
+    spin_until(lambda: live and live[-1].time > arrived[-1].nanoseconds)
+
+    scheduler = VirtualTime()
+    scheduler.advance_to(arrived[0].nanoseconds / SECOND - 1.0)
+    inputs = [(it.nanoseconds / SECOND + 0.001, it) for it in arrived]
+    virtual = asked(as_taken(scheduler.hot(*inputs), refused), 0.3)
+    found = items(scheduler, virtual, arrived[-1].nanoseconds / SECOND + 3.0)
+
+    common = {answer.time for answer in found} & {answer.time for answer in live}
+    assert len(common) > 5
+    assert repr([it for it in found if it.time in common]) == repr([it for it in live if it.time in common])

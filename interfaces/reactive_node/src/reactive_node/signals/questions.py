@@ -54,7 +54,7 @@ class Events(Source):
         events: Observable[Timestamp[Any]],
         answer: Callable[[Any, Answer[Any]], None],
         *,
-        lateness: float,
+        lateness: int,
         refused: Callable[[Refused], None] | None,
     ) -> None:
         """``answer`` receives each event with its answer; for the others see :class:`Source`."""

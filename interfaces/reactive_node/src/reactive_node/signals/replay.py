@@ -29,15 +29,13 @@ def as_taken(samples: Observable[Timestamp[T]], refused: Iterable[Refused]) -> O
         for each in known:
             left.setdefault(each.time, []).append(each)
 
-        def taken(sample: Timestamp[T]) -> Observable[Timestamp[T]]:
-            for each in left.get(sample.nanoseconds, []):
+        def taken(sample: Timestamp[T]) -> Timestamp[T] | None:
+            for each in left.get(sample.nanoseconds, ()):
                 if each.value == sample.value:
                     left[sample.nanoseconds].remove(each)
-                    if each.taken is None:
-                        return rx.empty()
-                    return rx.just(sample._replace(nanoseconds=each.taken))
-            return rx.just(sample)
+                    return None if each.taken is None else sample._replace(nanoseconds=each.taken)
+            return sample
 
-        return samples.flat_map(taken)
+        return samples.map(taken).filter(lambda sample: sample is not None)
 
     return rx.defer(begin)

@@ -17,7 +17,7 @@ from reactivex import Observable
 from reactive_node.signals.answers import CERTAIN, EXTRAPOLATED, HELD, UNKNOWN, Refused
 from reactive_node.signals.run import Run
 from reactive_node.signals.signal import Signal
-from reactive_node.signals.source import SECOND, Source
+from reactive_node.signals.source import SECOND, Source, nanoseconds
 from reactive_node.signals.values import between
 from reactive_node.stamps import Timestamp
 
@@ -74,7 +74,8 @@ def hold(
         the newest of all, its value counts from ``lateness`` ago on.
     :param refused: called with each sample that was outside of these bounds.
     """
-    return Signal(lambda run: _Held(run, samples, lateness, refused))
+    bound = nanoseconds("the lateness", lateness)
+    return Signal(lambda run: _Held(run, samples, bound, refused))
 
 
 def linear(
@@ -134,7 +135,8 @@ def interpolate(
     :param gap: the longest time between two samples of one movement [s].
     :param refused: called with each sample that was outside of these bounds.
     """
-    return Signal(lambda run: _Interpolated(run, samples, lateness, refused, between, gap, silence))
+    bound, longest = nanoseconds("the lateness", lateness), nanoseconds("the gap", gap)
+    return Signal(lambda run: _Interpolated(run, samples, bound, refused, between, longest, silence))
 
 
 def rotation_between(
@@ -155,9 +157,7 @@ def rotation_between(
 class _Held(Source):
     """Evaluates :func:`hold`; keeps the samples that answers may need."""
 
-    def __init__(
-        self, run: Run, samples: Observable[Any], lateness: float, refused: OnRefused | None
-    ) -> None:
+    def __init__(self, run: Run, samples: Observable[Any], lateness: int, refused: OnRefused | None) -> None:
         super().__init__(samples, now=run.now, advance=run.advance, lateness=lateness, refused=refused)
         self._times: list[int] = []
         self._values: list[Any] = []
@@ -202,15 +202,15 @@ class _Interpolated(_Held):
         self,
         run: Run,
         samples: Observable[Any],
-        lateness: float,
+        lateness: int,
         refused: OnRefused | None,
         between: Between[Any],
-        gap: float,
+        gap: int,
         silence: Silence,
     ) -> None:
         super().__init__(run, samples, lateness, refused)
         self._between = between
-        self._gap = round(gap * SECOND)
+        self._gap = gap
         self._silence = silence
         self.wait += self._gap
 

@@ -17,7 +17,7 @@ from reactive_node.signals.crossings import Crossings
 from reactive_node.signals.integral import Integral
 from reactive_node.signals.questions import Events, Grid
 from reactive_node.signals.run import Node, Run, evaluation
-from reactive_node.signals.source import SECOND
+from reactive_node.signals.source import SECOND, nanoseconds
 from reactive_node.stamps import Timestamp
 
 T = TypeVar("T")
@@ -47,7 +47,7 @@ class Signal(Generic[T]):
 
         The first one follows the subscription. Answers come in the order of time, as soon as they are known.
         """
-        every = _positive("the period", period)
+        every = nanoseconds("the period", period)
         return Observable(evaluation(self, lambda run, node: Grid(run, node, every, run.observer.on_next)))
 
     def snapshot(
@@ -64,11 +64,13 @@ class Signal(Generic[T]):
         :param refused: called with each event that was dropped.
         """
 
+        bound = nanoseconds("the lateness", lateness)
+
         def ask(run: Run, node: Node) -> Events:
             def answer(event: E, answer: Answer[T]) -> None:
                 run.observer.on_next((event, answer))
 
-            return Events(run, node, events, answer, lateness=lateness, refused=refused)
+            return Events(run, node, events, answer, lateness=bound, refused=refused)
 
         return Observable(evaluation(self, ask))
 
@@ -81,7 +83,7 @@ class Signal(Generic[T]):
 
         :param resolution: the distance of the times at which the signal is looked at [s].
         """
-        every = _positive("the resolution", resolution)
+        every = nanoseconds("the resolution", resolution)
 
         def ask(run: Run, node: Node) -> Grid:
             return Grid(run, node, every, Crossings(node, predicate, every, run.observer.on_next).look)
@@ -102,7 +104,7 @@ class Signal(Generic[T]):
         [s], the less noise, and the later the answer. If it is not longer than the gap of the samples, no
         silence goes unnoticed.
         """
-        half = _positive("the time of a derivative", over) // 2
+        half = nanoseconds("half the time of a derivative", over / 2)
         seconds = 2 * half / SECOND
 
         def slope(before: T, after: T) -> T:
@@ -117,11 +119,12 @@ class Signal(Generic[T]):
         It is exact for a signal whose slope changes only at these times. Once a value is unknown, so is the
         integral from then on.
         """
-        return Signal(lambda run: Integral(run, run.node(self), _positive("the step", step)))
+        every = nanoseconds("the step", step)
+        return Signal(lambda run: Integral(run, run.node(self), every))
 
     def window(self, seconds: float, step: float) -> Signal[tuple[T, ...]]:
         """Return ``t ↦ (s(t - n · step), …, s(t - step), s(t))`` with n = seconds / step, rounded."""
-        _positive("the step", step)
+        nanoseconds("the step", step)
         count = round(seconds / step)
         return lift(lambda *items: items)(*(self.delay(back * step) for back in range(count, -1, -1)))
 
@@ -194,14 +197,6 @@ def switch(key: Signal[K], choices: Mapping[K, Signal[T]]) -> Signal[T]:
     return Signal(
         lambda run: _Switched(run.node(key), {name: run.node(each) for name, each in choices.items()})
     )
-
-
-def _positive(what: str, seconds: float) -> int:
-    """Return nanoseconds."""
-    nanoseconds = round(seconds * SECOND)
-    if nanoseconds <= 0:
-        raise ValueError(f"{what} must be more than 0 s, not {seconds} s")
-    return nanoseconds
 
 
 class _Lifted:

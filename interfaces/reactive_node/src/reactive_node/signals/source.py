@@ -15,6 +15,14 @@ SECOND = 1_000_000_000  # ns
 _FAR = 1 << 62  # ns, more than any time
 
 
+def nanoseconds(what: str, seconds: float) -> int:
+    """Return a duration in ns. Raises ValueError if it is not more than 0 s."""
+    duration = round(seconds * SECOND)
+    if duration <= 0:
+        raise ValueError(f"{what} must be more than 0 s, not {seconds} s")
+    return duration
+
+
 class Memory:
     """Keeps values for the answers to come."""
 
@@ -41,7 +49,7 @@ class Source(Memory):
         *,
         now: Callable[[], int],
         advance: Callable[[], None],
-        lateness: float,
+        lateness: int,
         refused: Callable[[Refused], None] | None,
     ) -> None:
         """
@@ -49,12 +57,12 @@ class Source(Memory):
 
         :param now: returns the time by the clock of the stamps [ns].
         :param advance: called when something may have become known.
-        :param lateness: a sample that is older when it arrives [s], or that much ahead of the clock, is
+        :param lateness: a sample that is older when it arrives [ns], or that much ahead of the clock, is
             refused.
         """
         self.samples = samples
         self.is_complete = False
-        self.lateness = round(lateness * SECOND)
+        self.lateness = lateness
         self.settled = now() - self.lateness
         """No sample up to this time will be taken any more [ns]."""
         self.wait = self.lateness
