@@ -34,6 +34,7 @@ from reactive_node.signals import (
     hold,
     interpolate,
     linear,
+    of_time,
     slerp,
 )
 from reactive_node.testing import VirtualTime
@@ -342,11 +343,12 @@ def test_value_of_a_dead_publisher_is_held(scheduler: VirtualTime) -> None:
         arriving(scheduler, [Arrival(0, True, 0), Arrival(300 * MS, False, 0), Arrival(500 * MS, True, 0)]),
         lateness=LATENESS,
     )
-    signal = constant(1.0).certain_while(alive)
+    signal = of_time(lambda time: time).certain_while(alive)
 
-    marks = [each.mark for each in answers(scheduler, signal, 0.1)]
+    found = answers(scheduler, signal, 0.1)
 
-    assert marks[:7] == [CERTAIN] * 3 + [HELD] * 2 + [CERTAIN] * 2
+    assert all(each.value == each.time for each in found)
+    assert [each.mark for each in found[:7]] == [CERTAIN] * 3 + [HELD] * 2 + [CERTAIN] * 2
 
 
 def test_value_is_held_while_nothing_is_known_of_the_publisher(scheduler: VirtualTime) -> None:
