@@ -284,6 +284,14 @@ def test_switch_chooses_by_events(events: list[Arrival], one: list[Arrival], oth
     check(answers(scheduler, switch(key, {"a": a, "b": b})), chosen)
 
 
+def test_switch_without_a_key_chooses_nothing(scheduler: VirtualTime) -> None:
+    choices = {None: constant(1.0)}
+
+    found = answers(scheduler, switch(hold(scheduler.hot(), lateness=LATENESS), choices))
+
+    assert {each.mark for each in found} == {UNKNOWN}
+
+
 @given(keys("x"), arrivals(), arrivals())
 def test_until_the_first_event(events: list[Arrival], one: list[Arrival], other: list[Arrival]) -> None:
     scheduler = VirtualTime()
