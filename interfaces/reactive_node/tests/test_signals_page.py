@@ -37,8 +37,9 @@ def test_problems_run_as_tests(files: Path) -> None:
 def test_pictures_are_up_to_date(files: Path, tmp_path: Path) -> None:
     drawn = tmp_path / "drawn"
     command = [sys.executable, PROJECT / "pictures" / "draw.py", drawn]
+    paths = os.pathsep.join([str(files), *filter(None, [os.environ.get("PYTHONPATH")])])
 
-    subprocess.run(command, cwd=files, env=os.environ | {"PYTHONPATH": str(files)}, check=True)
+    subprocess.run(command, cwd=files, env=os.environ | {"PYTHONPATH": paths}, check=True)
 
     names = re.findall(r"\(pictures/(\w+\.svg)\)", PAGE)
     assert len(names) == 3
