@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import reactivex as rx
 from reactivex import Observable
+from reactivex.scheduler import ImmediateScheduler
 from std_msgs.msg import String
 
 from interfaces import service, topics
@@ -23,21 +24,37 @@ CLOCK_TOLERANCE = 0.05  # s between the clocks of two hosts (deploy/SAFETY.md, A
 NEVER = datetime.min.replace(tzinfo=UTC)
 
 
-class Event(NamedTuple):
-    """A command, a ``presence`` or a ``tick``."""
+class Tick(NamedTuple):
+    """It is time to repeat the state."""
 
+    at: datetime  # on the Rx clock, which is never set
+
+
+class Presence(NamedTuple):
+    """The operator was seen."""
+
+    at: datetime  # of the arrival, on the Rx clock
+    age: float  # of the stamp at arrival [s]
+
+
+class Command(NamedTuple):
+    """``turn_on`` or ``turn_off``."""
+
+    at: datetime  # of the arrival, on the Rx clock
+    age: float  # of the source time at arrival [s]
     name: str
-    at: datetime  # of the arrival, on the Rx clock, which is never set
-    age: float = 0.0  # of the stamp at arrival [s]
 
 
-class State(NamedTuple):
-    """The latch: the engines, when the operator was last seen, and when the state was last repeated."""
+Event = Tick | Presence | Command
+
+
+class Latch(NamedTuple):
+    """The engines, when the operator was last seen, when the state was last repeated, and what to emit."""
 
     engines: str = OFF
     seen: datetime = NEVER
     repeated: datetime = NEVER
-    rejected: Rejected | None = None  # the last event
+    says: tuple[str | Rejected, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -55,57 +72,55 @@ DEFAULTS = Parameters()
 
 
 def step(
-    state: State, event: Event, given: Parameters = DEFAULTS, drive_timeout: float = topics.DRIVE_TIMEOUT
-) -> State:
+    latch: Latch, event: Event, given: Parameters = DEFAULTS, drive_timeout: float = topics.DRIVE_TIMEOUT
+) -> Latch:
     """
-    Return the state after an event.
+    Return the latch after an event.
 
     :param drive_timeout: the drive stops the engines if ``on`` is not repeated within this time [s].
     """
+    unseen = (event.at - latch.seen).total_seconds()
+    paused = (event.at - latch.repeated).total_seconds() > drive_timeout
+    after = latch._replace(says=())
+    if latch.engines == ON and (paused or unseen >= given.presence_timeout):
+        after = after._replace(engines=OFF, repeated=event.at)
 
-    def reject(topic: topics.Topic, reason: str) -> State:
-        return state._replace(rejected=Rejected(topic, reason))
+    def reject(topic: topics.Topic, reason: str) -> Latch:
+        return after._replace(says=(Rejected(topic, reason),))
 
-    unseen = (event.at - state.seen).total_seconds()
-    paused = (event.at - state.repeated).total_seconds() > drive_timeout
-    if state.engines == ON and (paused or unseen >= given.presence_timeout):
-        state = state._replace(engines=OFF, repeated=event.at)
-    state = state._replace(rejected=None)
-    match event.name, event.age:
-        case "tick", _:
-            return state._replace(repeated=event.at)
-        case "presence", age if age < -CLOCK_TOLERANCE:
+    match event:
+        case Tick():
+            after = after._replace(repeated=event.at)
+        case Presence(age=age) if age < -CLOCK_TOLERANCE:
             reason = f"it is stamped by a clock that is {-age:.3f} s ahead of ours"
-            return reject(topics.OPERATOR_PRESENCE, reason)
-        case "presence", age:
-            return state._replace(seen=max(state.seen, event.at - timedelta(seconds=max(age, 0.0))))
-        case topics.TURN_ON, age if abs(age) >= given.max_presence_age:
-            return reject(topics.ENGINES, f"turn_on refused: {age:.3f} s old")
-        case topics.TURN_ON, _ if unseen >= given.max_presence_age:
-            since = "yet" if state.seen == NEVER else f"for {unseen:.3f} s"
-            return reject(topics.ENGINES, f"turn_on refused: no operator seen {since}")
-        case command, _:
+            after = reject(topics.OPERATOR_PRESENCE, reason)
+        case Presence(age=age):
+            after = after._replace(seen=max(latch.seen, event.at - timedelta(seconds=max(age, 0.0))))
+        case Command(age=age, name=topics.TURN_ON) if abs(age) >= given.max_presence_age:
+            after = reject(topics.ENGINES, f"turn_on refused: {age:.3f} s old")
+        case Command(name=topics.TURN_ON) if unseen >= given.max_presence_age:
+            since = "yet" if latch.seen == NEVER else f"for {unseen:.3f} s"
+            after = reject(topics.ENGINES, f"turn_on refused: no operator seen {since}")
+        case Command(name=command):
             engines = ON if command == topics.TURN_ON else OFF
-            return state if engines == state.engines else state._replace(engines=engines, repeated=event.at)
+            if engines != after.engines:
+                after = after._replace(engines=engines, repeated=event.at)
+    is_news = (after.engines, after.repeated) != (latch.engines, latch.repeated)
+    return after._replace(says=(*after.says, after.engines)) if is_news else after
 
 
 def engine_state(
-    commands: Observable[Event],
-    presences: Observable[Event],
+    commands: Observable[Command],
+    presences: Observable[Presence],
     given: Parameters = DEFAULTS,
     drive_timeout: float = topics.DRIVE_TIMEOUT,
 ) -> Observable[str | Rejected]:
     """Emit ``on`` or ``off``, on every change and repeatedly, and each input that is rejected."""
-    ticks = rx.timer(0.0, given.repeat).timestamp().map(lambda it: Event("tick", it.timestamp))
-    events = rx.merge(commands, presences, ticks)
-    states = events.scan(lambda state, event: step(state, event, given, drive_timeout), State())
-
-    def emitted(states: Observable[State]) -> Observable[str | Rejected]:
-        rejections = states.map(lambda state: state.rejected).filter(bool)
-        news = states.distinct_until_changed(lambda state: (state.engines, state.repeated))
-        return rx.merge(rejections, news.map(lambda state: state.engines))
-
-    return states.publish(emitted)
+    ticks = rx.timer(0.0, given.repeat).timestamp().map(lambda it: Tick(it.timestamp))
+    events: Observable[Event] = rx.merge(commands, presences, ticks)
+    latches = events.scan(lambda latch, event: step(latch, event, given, drive_timeout), Latch())
+    at_once = ImmediateScheduler.singleton()
+    return latches.flat_map(lambda latch: rx.from_iterable(latch.says, at_once))
 
 
 def wire(node: ServiceNode) -> None:
@@ -114,10 +129,8 @@ def wire(node: ServiceNode) -> None:
     commands = node.observe(topics.ENGINES, timestamped=True).timestamp()
     presences = node.observe(topics.OPERATOR_PRESENCE).timestamp()
     states = engine_state(
-        commands.map(lambda it: Event(it.value.value.data, it.timestamp, node.age(it.value.timestamp))),
-        presences.map(
-            lambda it: Event("presence", it.timestamp, node.age(stamps.from_message(it.value.stamp)))
-        ),
+        commands.map(lambda it: Command(it.timestamp, node.age(it.value.timestamp), it.value.value.data)),
+        presences.map(lambda it: Presence(it.timestamp, node.age(stamps.from_message(it.value.stamp)))),
         node.declare(Parameters),
     )
     node.publish(topics.ENGINES_STATE, states, lambda state: String(data=state))

@@ -13,7 +13,18 @@ from reactivex.testing import ReactiveTest, TestScheduler
 from interfaces.service import Rejected
 from interfaces.topics import DRIVE_TIMEOUT, OFF, ON, TURN_OFF, TURN_ON
 from reactive_node.stamps import Timestamp
-from services.engine_controller import CLOCK_TOLERANCE, NEVER, Event, Parameters, State, engine_state, step
+from services.engine_controller import (
+    CLOCK_TOLERANCE,
+    NEVER,
+    Command,
+    Event,
+    Latch,
+    Parameters,
+    Presence,
+    Tick,
+    engine_state,
+    step,
+)
 
 on_next, subscribe = ReactiveTest.on_next, ReactiveTest.subscribe
 
@@ -22,69 +33,87 @@ def at_time(seconds: float) -> datetime:
     return datetime.fromtimestamp(seconds, UTC)
 
 
-def latch(engines: str, seen: float | None, repeated: float) -> State:
-    return State(engines, NEVER if seen is None else at_time(seen), at_time(repeated))
+def latch(engines: str, seen: float | None, repeated: float, *says: str) -> Latch:
+    return Latch(engines, NEVER if seen is None else at_time(seen), at_time(repeated), says)
+
+
+def presence(age: float) -> Presence:
+    return Presence(at_time(NOW), age)
+
+
+def command(name: str, age: float = 0.0) -> Command:
+    return Command(at_time(NOW), age, name)
 
 
 NOW = 100.0
 OFF_AND_SEEN = latch(OFF, 99.5, 99.9)
 ON_AND_SEEN = latch(ON, 99.5, 99.9)
+TICK = Tick(at_time(NOW))
 
 
 @pytest.mark.parametrize(
-    ("state", "event", "after"),
+    ("before", "event", "after"),
     [
-        (OFF_AND_SEEN, ("tick",), latch(OFF, 99.5, NOW)),
-        (ON_AND_SEEN, ("tick",), latch(ON, 99.5, NOW)),
-        (ON_AND_SEEN, (TURN_OFF, 0.0), latch(OFF, 99.5, NOW)),
-        (ON_AND_SEEN, (TURN_OFF, 99.0), latch(OFF, 99.5, NOW)),
-        (OFF_AND_SEEN, (TURN_ON, 0.0), latch(ON, 99.5, NOW)),
-        (OFF_AND_SEEN, (TURN_OFF, 0.0), OFF_AND_SEEN),
-        (ON_AND_SEEN, (TURN_ON, 0.0), ON_AND_SEEN),
-        (OFF_AND_SEEN, (TURN_ON, 0.999), latch(ON, 99.5, NOW)),
-        (latch(OFF, 99.001, 99.9), (TURN_ON, 0.0), latch(ON, 99.001, NOW)),
-        (OFF_AND_SEEN, ("presence", 0.125), latch(OFF, 99.875, 99.9)),
-        (OFF_AND_SEEN, ("presence", 0.75), OFF_AND_SEEN),  # an older one than the last
-        (OFF_AND_SEEN, ("presence", -CLOCK_TOLERANCE), latch(OFF, NOW, 99.9)),
-        (latch(ON, 90.001, 99.9), ("tick",), latch(ON, 90.001, NOW)),
-        (latch(ON, 90.0, 99.9), ("tick",), latch(OFF, 90.0, NOW)),
-        (latch(ON, 90.0, 99.9), ("presence", 0.0), latch(OFF, NOW, NOW)),
-        (latch(ON, 99.5, 99.6), ("tick",), latch(ON, 99.5, NOW)),
-        (latch(ON, 99.5, 99.599), ("tick",), latch(OFF, 99.5, NOW)),
-        (latch(ON, 99.5, 99.599), ("presence", 0.0), latch(OFF, NOW, NOW)),
-        (latch(ON, 99.5, 99.599), (TURN_ON, 0.0), latch(ON, 99.5, NOW)),  # a new start
+        (OFF_AND_SEEN, TICK, latch(OFF, 99.5, NOW, OFF)),
+        (ON_AND_SEEN, TICK, latch(ON, 99.5, NOW, ON)),
+        (ON_AND_SEEN, command(TURN_OFF), latch(OFF, 99.5, NOW, OFF)),
+        (ON_AND_SEEN, command(TURN_OFF, 99.0), latch(OFF, 99.5, NOW, OFF)),
+        (OFF_AND_SEEN, command(TURN_ON), latch(ON, 99.5, NOW, ON)),
+        (OFF_AND_SEEN, command(TURN_OFF), OFF_AND_SEEN),
+        (ON_AND_SEEN, command(TURN_ON), ON_AND_SEEN),
+        (OFF_AND_SEEN, command(TURN_ON, 0.999), latch(ON, 99.5, NOW, ON)),
+        (latch(OFF, 99.001, 99.9), command(TURN_ON), latch(ON, 99.001, NOW, ON)),
+        (OFF_AND_SEEN, presence(0.125), latch(OFF, 99.875, 99.9)),
+        (OFF_AND_SEEN, presence(0.75), OFF_AND_SEEN),  # an older one than the last
+        (OFF_AND_SEEN, presence(-CLOCK_TOLERANCE), latch(OFF, NOW, 99.9)),
+        (latch(ON, 90.001, 99.9), TICK, latch(ON, 90.001, NOW, ON)),
+        (latch(ON, 90.0, 99.9), TICK, latch(OFF, 90.0, NOW, OFF)),
+        (latch(ON, 90.0, 99.9), presence(0.0), latch(OFF, NOW, NOW, OFF)),
+        (latch(ON, 99.5, 99.6), TICK, latch(ON, 99.5, NOW, ON)),
+        (latch(ON, 99.5, 99.599), TICK, latch(OFF, 99.5, NOW, OFF)),
+        (latch(ON, 99.5, 99.599), presence(0.0), latch(OFF, NOW, NOW, OFF)),
+        (latch(ON, 99.5, 99.599), command(TURN_ON), latch(ON, 99.5, NOW, ON)),  # a new start
     ],
 )
-def test_step(state: State, event: tuple[Any, ...], after: State) -> None:
-    name, *age = event
-
-    assert step(state, Event(name, at_time(NOW), *age)) == after
+def test_step(before: Latch, event: Event, after: Latch) -> None:
+    assert step(before, event) == after
 
 
 @pytest.mark.parametrize(
-    ("state", "event", "topic", "reason"),
+    ("before", "event", "topic", "reason"),
     [
-        (OFF_AND_SEEN, (TURN_ON, 1.0), "engines", "turn_on refused: 1.000 s old"),
-        (OFF_AND_SEEN, (TURN_ON, -1.0), "engines", "turn_on refused: -1.000 s old"),
-        (latch(OFF, None, 99.9), (TURN_ON, 0.0), "engines", "turn_on refused: no operator seen yet"),
-        (latch(OFF, 99.0, 99.9), (TURN_ON, 0.0), "engines", "turn_on refused: no operator seen for 1.000 s"),
+        (OFF_AND_SEEN, command(TURN_ON, 1.0), "engines", "turn_on refused: 1.000 s old"),
+        (OFF_AND_SEEN, command(TURN_ON, -1.0), "engines", "turn_on refused: -1.000 s old"),
+        (latch(OFF, None, 99.9), command(TURN_ON), "engines", "turn_on refused: no operator seen yet"),
+        (
+            latch(OFF, 99.0, 99.9),
+            command(TURN_ON),
+            "engines",
+            "turn_on refused: no operator seen for 1.000 s",
+        ),
         (
             ON_AND_SEEN,
-            ("presence", -0.051),
+            presence(-0.051),
             "operator_presence",
             "it is stamped by a clock that is 0.051 s ahead of ours",
         ),
     ],
 )
-def test_step_rejects(state: State, event: tuple[str, float], topic: str, reason: str) -> None:
-    name, age = event
+def test_step_rejects(before: Latch, event: Event, topic: str, reason: str) -> None:
+    after = step(before, event)
 
-    after = step(state, Event(name, at_time(NOW), age))
+    (rejected,) = after.says
+    assert isinstance(rejected, Rejected)
+    assert (rejected.topic.name, rejected.reason) == (topic, reason)
+    assert after._replace(says=()) == before
+    assert step(after, TICK).says == (before.engines,)
 
-    assert after.rejected is not None
-    assert (after.rejected.topic.name, after.rejected.reason) == (topic, reason)
-    assert after._replace(rejected=None) == state
-    assert step(after, Event("tick", at_time(NOW))).rejected is None
+
+def test_event_that_comes_too_late_is_rejected_and_turns_off() -> None:
+    rejected, engines = step(latch(ON, 90.0, 99.9), command(TURN_ON, 2.0)).says
+
+    assert isinstance(rejected, Rejected)
+    assert engines == OFF
 
 
 class Engines:
@@ -132,8 +161,8 @@ class Engines:
         )
         results = self.scheduler.start(
             lambda: engine_state(
-                self.commands.map(self._event),
-                self.presences.map(self._event),
+                self.commands.map(lambda it: Command(self.scheduler.now, self._age(it), it.value)),
+                self.presences.map(lambda it: Presence(self.scheduler.now, self._age(it))),
                 Parameters(repeat=repeat),
                 drive_timeout,
             ),
@@ -145,9 +174,8 @@ class Engines:
         self.rejections = [item.reason for _, item in emitted if isinstance(item, Rejected)]
         return [(time, item) for time, item in emitted if not isinstance(item, Rejected)]
 
-    def _event(self, item: Timestamp[str]) -> Event:
-        age = self.scheduler.now + self.clock_is_ahead - item.timestamp
-        return Event(item.value, self.scheduler.now, age.total_seconds())
+    def _age(self, item: Timestamp[str]) -> float:
+        return (self.scheduler.now + self.clock_is_ahead - item.timestamp).total_seconds()
 
 
 def changes(states: list[tuple[float, str]]) -> list[tuple[float, str]]:
@@ -259,8 +287,8 @@ def test_pause_longer_than_the_drive_timeout_turns_off(engines: Engines) -> None
 
 def test_turn_on_that_waited_during_a_pause_is_not_undone() -> None:
     paused = latch(OFF, 99.5, NOW - 1.5)
-    on = step(paused, Event(TURN_ON, at_time(NOW), 0.2))
-    assert step(on, Event("tick", at_time(NOW + 0.001))).engines == ON
+    on = step(paused, command(TURN_ON, 0.2))
+    assert step(on, Tick(at_time(NOW + 0.001))).engines == ON
 
 
 def test_short_pause_across_timeout_turns_off(engines: Engines) -> None:

@@ -19,7 +19,7 @@ from deploy.operator.lines import Line, line_batches
 from interfaces import topics
 from interfaces.sources import playback, scenario_file
 from reactive_node import stamps
-from services.engine_controller import Event, engine_state
+from services.engine_controller import Command, Presence, engine_state
 from services.kinematics import effector_position
 from services.operator_watchdog import engine_commands, operator_activity
 from services.velocity import Position, effector_speed
@@ -118,9 +118,9 @@ class Arm:
         self.publish("operator_activity", activity.map(lambda it: String(data=it.conclusion)))
         self.publish("engines", engine_commands(activity).map(lambda command: String(data=command)))
 
-        commands = self.topics["engines"].map(lambda m: Event(m.data, self.scheduler.now))
+        commands = self.topics["engines"].map(lambda m: Command(self.scheduler.now, 0.0, m.data))
         presences = self.topics["operator_presence"].map(
-            lambda m: Event("presence", self.scheduler.now, self.age(stamps.from_message(m.stamp)))
+            lambda m: Presence(self.scheduler.now, self.age(stamps.from_message(m.stamp)))
         )
         states = engine_state(commands, presences)
         self.publish("engines/state", states.map(lambda state: String(data=state)))

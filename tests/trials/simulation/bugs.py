@@ -56,18 +56,16 @@ BUGS: dict[str, Bug] = {
         "        replace(topics.OPERATOR_HEARTBEAT, problem=lambda _: ''), t",
     ),
     "a presence from the future counts": Bug(CONTROLLER, "if age < -CLOCK_TOLERANCE:", "if age < -1e12:"),
-    "an older presence replaces a newer one": Bug(CONTROLLER, "seen=max(state.seen, ", "seen=min(event.at, "),
+    "an older presence replaces a newer one": Bug(CONTROLLER, "seen=max(latch.seen, ", "seen=min(event.at, "),
     "the controller is deaf to turn_off": Bug(
         CONTROLLER,
         "engines = ON if command == topics.TURN_ON else OFF",
-        "engines = ON if command == topics.TURN_ON else state.engines",
+        "engines = ON if command == topics.TURN_ON else latch.engines",
     ),
     "the latch starts on": Bug(
-        CONTROLLER, "drive_timeout), State())", "drive_timeout), State(ON, *2 * [NEVER.replace(year=9999)]))"
+        CONTROLLER, "drive_timeout), Latch())", "drive_timeout), Latch(ON, *2 * [NEVER.replace(year=9999)]))"
     ),
-    "turn_on needs no presence": Bug(
-        CONTROLLER, "_ if unseen >= given.max_presence_age:", "_ if unseen < 0.0:"
-    ),
+    "turn_on needs no presence": Bug(CONTROLLER, "if unseen >= given.max_presence_age:", "if unseen < 0.0:"),
     "the controller does not notice its pause": Bug(CONTROLLER, "(paused or unseen", "(unseen"),
 }
 """The first four are hidden by the other fail-safes unless one of them stands alone."""

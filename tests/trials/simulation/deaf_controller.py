@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from interfaces import service
 from services import engine_controller
-from services.engine_controller import Event, Parameters, State
+from services.engine_controller import Event, Latch, Parameters
 
 _step = engine_controller.step
 
 
-def step(state: State, event: Event, given: Parameters, drive_timeout: float) -> State:
+def step(latch: Latch, event: Event, given: Parameters, drive_timeout: float) -> Latch:
     """Take every presence for one that is still valid an hour later."""
-    return _step(state, event, Parameters(given.max_presence_age, 3600.0, given.repeat), drive_timeout)
+    return _step(latch, event, Parameters(given.max_presence_age, 3600.0, given.repeat), drive_timeout)
 
 
 if __name__ == "__main__":
