@@ -17,7 +17,7 @@ from std_msgs.msg import Header, String
 
 from interfaces import service, topics
 from interfaces.service import ServiceNode, UserError, parameter
-from interfaces.service.epoch import Origin
+from interfaces.service.epoch import Epoch
 from interfaces.topics import ALIVE, INCAPACITATED, MISSED, TURN_OFF
 from reactive_node import stamps
 from reactive_node.stamps import Timestamp
@@ -92,7 +92,7 @@ def engine_commands(activity: Observable[Activity], *, repeat: float = 0.5) -> O
 def wire(node: ServiceNode) -> None:
     """Connect the recipes with their topics."""
     given = node.declare(Parameters)
-    origin = Origin(node)
+    epoch = Epoch(node)
 
     def warn(activity: Activity) -> None:
         node.get_logger().warning(f"operator {activity.conclusion}")
@@ -102,9 +102,9 @@ def wire(node: ServiceNode) -> None:
     heartbeats = node.observe(
         topics.OPERATOR_HEARTBEAT, timestamped=True, sampled=reading, max_age=given.lifespan
     )
-    first = min(FIRST_SAMPLE_AFTER_RESTART, given.sampling) if origin.is_past else given.sampling
+    first = min(FIRST_SAMPLE_AFTER_RESTART, given.sampling) if epoch.is_past else given.sampling
     # Silences count from the origin of the scenario: before it, no operator is expected.
-    activity = origin.delay_subscription(operator_activity(heartbeats, given, first=first)).share()
+    activity = epoch.start(operator_activity(heartbeats, given, first=first)).share()
     presence, absence = activity.partition(lambda it: it.conclusion == ALIVE)
     absence.subscribe(warn, scheduler=node.scheduler)
     node.publish(topics.OPERATOR_PRESENCE, presence, lambda it: Header(stamp=stamps.to_message(it.seen)))

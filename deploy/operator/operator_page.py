@@ -27,7 +27,7 @@ from deploy.operator.switch import VIRTUAL_SWITCH, Switch
 from deploy.running import manifest
 from interfaces import service, topics
 from interfaces.service import ServiceNode, UserError, parameter
-from interfaces.service.epoch import Origin
+from interfaces.service.epoch import Epoch
 from interfaces.topics import TURN_OFF
 from reactive_node import stamps
 from services import engine_controller, operator_watchdog
@@ -75,10 +75,10 @@ def wire(node: ServiceNode) -> None:
     """Connect the pages with topics, parameters and processes."""
     parameters, given = node.declare(Parameters), node.declare(_Parameters)
     tls = address.tls(parameters.address, parameters.certificate, parameters.key)
-    origin = Origin(node)
-    clock = state.Clock(hold.monotonic, node.age, lambda: origin.elapsed() if origin.is_known else 0.0)
+    epoch = Epoch(node)
+    clock = state.Clock(hold.monotonic, node.age, lambda: epoch.elapsed() if epoch.is_known else 0.0)
     initial = state.PageState(
-        since_when=state.OLDER if origin.is_past else state.NOT_YET,
+        since_when=state.OLDER if epoch.is_past else state.NOT_YET,
         strikes=given.strikes,
         presence_timeout=given.presence_timeout,
     )
@@ -113,7 +113,7 @@ def wire(node: ServiceNode) -> None:
     lines = line_batches(seen, turn_offs.map(just_now), rx.interval(LINES_PERIOD), node.get_namespace())
     session = state.while_open(seen, lines, node.get_namespace(), clock)
     changes = rx.merge(
-        state.always(always_seen, new_watchdogs(node, origin), controllers(node), clock),
+        state.always(always_seen, new_watchdogs(node, epoch), controllers(node), clock),
         is_open.switch_map(lambda it: session if it else rx.never()),
         switch.holds.map(state.held),
         switch.pressed.map(state.pressed),
@@ -147,12 +147,12 @@ def pages_are_open(events: Observable[server.Event]) -> Observable[bool]:
     return present.distinct_until_changed()
 
 
-def new_watchdogs(node: ServiceNode, origin: Origin) -> Observable[bool]:
+def new_watchdogs(node: ServiceNode, epoch: Epoch) -> Observable[bool]:
     """Emit for each operator watchdog that appears whether it is new; the first may be older than us."""
     topic = topics.OPERATOR_ACTIVITY
     matches = node.create_event_observable(topic.type, topic.name, topic.qos, "matched")
     appeared = matches.filter(lambda it: it.current_count_change > 0)
-    return appeared.map_indexed(lambda _, index: index > 0 or not origin.is_past)
+    return appeared.map_indexed(lambda _, index: index > 0 or not epoch.is_past)
 
 
 def terminal_holds(node: ServiceNode, is_open: Observable[bool]) -> Observable[bool]:

@@ -1,4 +1,4 @@
-"""The origin of the scenario's time: the parameter ``scenario_epoch``, the same for all processes."""
+"""The epoch: the origin of the time of the scenario, the same for all processes (``scenario_epoch``)."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ class _Parameters:
     )
 
 
-class Origin:
-    """Tells a process when the scenario begins; the first origin is final."""
+class Epoch:
+    """Tells a process when the scenario begins; the first value is final."""
 
     def __init__(self, node: ServiceNode) -> None:
         """Declare the parameter on a node."""
@@ -58,9 +58,9 @@ class Origin:
         """Return the time since the origin [s]; negative before it. The origin must be known."""
         return time.monotonic() - self._epochs.value
 
-    def delay_subscription(self, items: Observable[T]) -> Observable[T]:
+    def start(self, items: Observable[T]) -> Observable[T]:
         """Subscribe to an observable when the scenario begins, at once if it has begun."""
-        # RxPY's operator of this name schedules each item again, which doubles the cost of a source.
+        # RxPY's delay_subscription schedules each item again, which doubles the cost of a source.
         known = self._epochs.filter(lambda epoch: epoch >= 0.0).take(1)
         begun = known.flat_map(lambda _: rx.timer(max(0.0, -self.elapsed())))
         return begun.flat_map(lambda _: items)

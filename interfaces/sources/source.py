@@ -12,7 +12,7 @@ from reactivex import Observable
 from reactivex.subject import Subject
 
 from interfaces.service import ServiceNode, UserError, parameter
-from interfaces.service.epoch import Origin
+from interfaces.service.epoch import Epoch
 from interfaces.sources import playback
 from interfaces.sources.scenario_file import Scenario, load
 from interfaces.sources.settings import Settings
@@ -38,9 +38,9 @@ class VirtualSource:
         """
         parameters = node.declare(_Parameters)
         self._node = node
-        self._origin = Origin(node)
+        self._epoch = Epoch(node)
         self._settings = Settings(parameters.settings, node.get_name())
-        self._are_lost = self._origin.is_past and not self._settings.exist
+        self._are_lost = self._epoch.is_past and not self._settings.exist
         if self._are_lost:
             node.remark("settings", "they are lost, with what was set by hand")
         elif not self._settings.exist:
@@ -84,9 +84,7 @@ class VirtualSource:
         values: Observable[T] = self._node.create_parameter_observable(name)
         played: Observable[T] | None = None
         if timeline is not None:
-            played = self._origin.delay_subscription(
-                rx.defer(lambda _: playback.state(timeline, self._origin.elapsed()))
-            )
+            played = self._epoch.start(rx.defer(lambda _: playback.state(timeline, self._epoch.elapsed())))
         if not given_back:
             return values if is_set else playback.follow(values, played)
         follows = self._node.create_parameter_observable(given_back).distinct_until_changed()
@@ -97,9 +95,9 @@ class VirtualSource:
         if timeline is None:
             return rx.never()
         played = rx.defer(
-            lambda _: playback.events(timeline, self._origin.elapsed(), resume=self._origin.is_past)
+            lambda _: playback.events(timeline, self._epoch.elapsed(), resume=self._epoch.is_past)
         )
-        return self._origin.delay_subscription(played)
+        return self._epoch.start(played)
 
     def until_set(self, name: str, items: Observable[T]) -> Observable[T]:
         """Return items until a parameter is set by hand; none if a process before this one kept it."""

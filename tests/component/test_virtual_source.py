@@ -20,7 +20,7 @@ from reactivex import Observable
 
 from interfaces import topics
 from interfaces.service import ServiceNode, UserError, parameter
-from interfaces.service.epoch import EPOCH, Origin
+from interfaces.service.epoch import EPOCH, Epoch
 from interfaces.sources.source import VirtualSource
 from interfaces.sources.timeline import Events, Sweep
 
@@ -167,8 +167,8 @@ def test_source_waits_for_an_origin_to_come(
 
 def test_first_origin_is_final(make_source: Make) -> None:
     waiting, running = make_source(scenario_epoch=-1.0), make_source(scenario_epoch=7.0)
-    Origin(waiting)
-    Origin(running)
+    Epoch(waiting)
+    Epoch(running)
 
     assert set_to(waiting, EPOCH, -1.0)
     assert set_to(waiting, EPOCH, 7.0)
@@ -181,19 +181,17 @@ def test_first_origin_is_final(make_source: Make) -> None:
 def test_only_a_source_that_starts_after_the_origin_resumes(make_source: Make) -> None:
     now = time.monotonic()
 
-    past = [
-        Origin(make_source(scenario_epoch=epoch)).is_past for epoch in (-1.0, 0.0, now - 0.1, now + 100.0)
-    ]
+    past = [Epoch(make_source(scenario_epoch=epoch)).is_past for epoch in (-1.0, 0.0, now - 0.1, now + 100.0)]
 
     assert past == [False, False, True, False]
 
 
 @pytest.mark.parametrize("ahead", [0.2, -100.0])
-def test_subscription_waits_for_the_origin(make_source: Make, spin_until: SpinUntil, ahead: float) -> None:
+def test_start_waits_for_the_origin(make_source: Make, spin_until: SpinUntil, ahead: float) -> None:
     origin = time.monotonic() + ahead
     node = make_source(scenario_epoch=origin)
 
-    begun = emitted(node, Origin(node).delay_subscription(rx.defer(lambda _: rx.just(time.monotonic()))))
+    begun = emitted(node, Epoch(node).start(rx.defer(lambda _: rx.just(time.monotonic()))))
 
     spin_until(lambda: begun)
     assert begun[0] >= origin - 1e-3
