@@ -15,7 +15,7 @@ from interfaces.service import ServiceNode, UserError, parameter
 from interfaces.service.epoch import Epoch
 from interfaces.sources import playback
 from interfaces.sources.scenario_file import Scenario, load
-from interfaces.sources.settings import Settings
+from interfaces.sources.settings_file import Settings
 from interfaces.sources.timeline import Events, Sweep
 
 T = TypeVar("T")
