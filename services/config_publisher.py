@@ -14,7 +14,9 @@ from dataclasses import dataclass
 
 from interfaces import service
 from interfaces.service import ServiceNode, parameter
-from interfaces.sources.source import VirtualSource
+from interfaces.service.epoch import Epoch
+from interfaces.sources.player import Player
+from interfaces.sources.settings import Settings
 from interfaces.topics import CONFIGURATION, L1, L2, THETA1, THETA2, Topic
 
 
@@ -41,10 +43,11 @@ Parameters = {
 def wire(node: ServiceNode, topic: Topic) -> None:
     """Publish the values of the parameter or the scenario."""
     node.declare(Parameters[topic.name])
-    source = VirtualSource(node)
-    timeline = source.scenario.configuration.get(topic.name)
-    values = source.follow("value", timeline, given_back="follow_scenario")
-    node.publish(topic, values, lambda value: topic.type(data=value))
+    epoch = Epoch(node)
+    player, settings = Player(node, epoch), Settings(node, is_restart=epoch.is_past)
+    value = settings.keep("value", given_back="follow_scenario")
+    track = player.state(player.scenario.configuration.get(topic.name))
+    node.publish(topic, value.instead_of(track), lambda value: topic.type(data=value))
 
 
 if __name__ == "__main__":

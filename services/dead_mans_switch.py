@@ -16,7 +16,9 @@ from std_msgs.msg import Bool, String
 
 from interfaces import service
 from interfaces.service import ServiceNode, parameter
-from interfaces.sources.source import VirtualSource
+from interfaces.service.epoch import Epoch
+from interfaces.sources.player import Player
+from interfaces.sources.settings import Settings
 from interfaces.topics import ENGINES, ENGINES_STATE, OFF, ON, OPERATOR_HEARTBEAT, TURN_ON
 
 
@@ -73,18 +75,17 @@ class Parameters:
 def wire(node: ServiceNode) -> None:
     """Connect the recipes with their topics."""
     node.declare(Parameters)
-    source = VirtualSource(node)
-    beats = heartbeats(
-        source.follow("pressed", source.scenario.pressed, if_lost=False),
-        source.follow("rate"),
-        source.until_set("pressed", source.play(source.scenario.heartbeats)),
-    )
+    epoch = Epoch(node)
+    player, settings = Player(node, epoch), Settings(node, is_restart=epoch.is_past)
+    scenario = player.scenario
+    pressed, rate = settings.keep("pressed", if_lost=False), settings.keep("rate")
+    single = pressed.until_set(player.events(scenario.heartbeats))
+    beats = heartbeats(pressed.instead_of(player.state(scenario.pressed)), rate.values, single)
     node.publish(OPERATOR_HEARTBEAT, beats, lambda beat: Bool(data=beat))
     states, heard = (node.observe(topic, attrgetter("data")) for topic in (ENGINES_STATE, ENGINES))
-    commands = engine_commands(source.play(source.scenario.commands), states, heard)
+    commands = engine_commands(player.events(scenario.commands), states, heard)
     # A person who takes the switch replaces the virtual operator for the commands too.
-    commands = source.until_set("pressed", commands)
-    node.publish(ENGINES, commands, lambda command: String(data=command))
+    node.publish(ENGINES, pressed.until_set(commands), lambda command: String(data=command))
 
 
 if __name__ == "__main__":

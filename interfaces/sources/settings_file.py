@@ -18,7 +18,7 @@ from interfaces.service.errors import UserError
 from interfaces.sources import yaml_file
 
 
-class Settings:
+class SettingsFile:
     """The settings of one service, in one file."""
 
     def __init__(self, directory: str, service: str) -> None:
@@ -29,11 +29,11 @@ class Settings:
         :raises UserError: for a bad file: forgetting it would not be safe.
         """
         self._path = Path(directory) / f"{service}.yaml" if directory else None
-        self.exist = self._path is None or self._path.exists()
+        self.exists = self._path is None or self._path.exists()
         """Whether a file tells what was set; nothing is lost where nothing is kept."""
         self.values: dict[str, Any] = {}
         """The settings by name; to be saved after a change."""
-        if self._path is not None and self.exist:
+        if self._path is not None and self.exists:
             self.values = yaml_file.load(self._path)
             if not isinstance(self.values, dict):
                 raise UserError(f"{self._path}: contains no settings; remove it to start afresh")

@@ -21,7 +21,8 @@ from reactivex import Observable
 from interfaces import topics
 from interfaces.service import ServiceNode, UserError, parameter
 from interfaces.service.epoch import EPOCH, Epoch
-from interfaces.sources.source import VirtualSource
+from interfaces.sources.player import Player
+from interfaces.sources.settings import Settings
 from interfaces.sources.timeline import Events, Sweep
 
 Make = Callable[..., Any]
@@ -58,6 +59,18 @@ def emitted(node: ServiceNode, items: Observable[Any]) -> list[Any]:
     return received
 
 
+class Source:
+    """What a virtual source consists of: settings, and a player of its scenario."""
+
+    def __init__(self, node: ServiceNode) -> None:
+        epoch = Epoch(node)
+        self.player, self.settings = Player(node, epoch), Settings(node, is_restart=epoch.is_past)
+
+    def follow(self, name: str, timeline: Any = None, **keep: Any) -> Observable[Any]:
+        self.kept = self.settings.keep(name, **keep)
+        return self.kept.instead_of(self.player.state(timeline))
+
+
 def set_to(node: ServiceNode, name: str, value: Any) -> bool:
     return bool(node.set_parameters([Parameter(name, value=value)])[0].successful)
 
@@ -67,10 +80,10 @@ def set_to(node: ServiceNode, name: str, value: Any) -> bool:
 
 def test_without_a_scenario_a_source_follows_its_parameter(make_source: Make, spin_for: SpinFor) -> None:
     node = make_source(value=3.0)
-    source = VirtualSource(node)
+    source = Source(node)
 
-    values = emitted(node, source.follow("value", source.scenario.configuration.get("l1")))
-    events = emitted(node, source.play(source.scenario.commands))
+    values = emitted(node, source.follow("value", source.player.scenario.configuration.get("l1")))
+    events = emitted(node, source.player.events(source.player.scenario.commands))
     set_to(node, "value", 4.0)
     spin_for(SHORT)
 
@@ -81,7 +94,7 @@ def test_error_in_a_scenario_is_a_user_error(make_source: Make) -> None:
     node = make_source(scenario="/nowhere.yaml")
 
     with pytest.raises(UserError, match=r"/nowhere\.yaml"):
-        VirtualSource(node)
+        Source(node)
 
 
 def test_restarted_source_resumes_its_scenario(
@@ -90,18 +103,18 @@ def test_restarted_source_resumes_its_scenario(
     path = tmp_path / "scenario.yaml"
     path.write_text("l1: [{at: 0, value: 1}, {at: 100, value: 2}, {at: 101, value: 3}, {at: 999, value: 4}]")
     node = make_source(scenario=str(path), scenario_epoch=time.monotonic() - 100.5)
-    source = VirtualSource(node)
+    source = Source(node)
 
-    values = emitted(node, source.follow("value", source.scenario.configuration["l1"]))
+    values = emitted(node, source.follow("value", source.player.scenario.configuration["l1"]))
 
     spin_until(lambda: values == [2.0, 3.0])
 
 
 def test_restarted_source_does_not_repeat_events(make_source: Make, spin_until: SpinUntil) -> None:
     node = make_source(scenario_epoch=time.monotonic() - 100.5)
-    source = VirtualSource(node)
+    source = Source(node)
 
-    events = emitted(node, source.play(Events(((0.0, "a"), (100.0, "b"), (101.0, "c")))))
+    events = emitted(node, source.player.events(Events(((0.0, "a"), (100.0, "b"), (101.0, "c")))))
 
     spin_until(lambda: events == ["c"])
 
@@ -113,10 +126,10 @@ def test_source_without_an_origin_starts_its_scenario_at_once(
     make_source: Make, spin_until: SpinUntil
 ) -> None:
     node = make_source()
-    source = VirtualSource(node)
+    source = Source(node)
 
     values = emitted(node, source.follow("value", Events(((0.0, 2.0), (0.01, 3.0)))))
-    events = emitted(node, source.play(Events(((0.0, "a"),))))
+    events = emitted(node, source.player.events(Events(((0.0, "a"),))))
 
     spin_until(lambda: (values[-1:], events) == ([3.0], ["a"]))
     assert values in ([2.0, 3.0], [3.0])  # a slow start skips what is over
@@ -127,10 +140,10 @@ def test_source_emits_nothing_before_its_origin_is_set(
     make_source: Make, spin_for: SpinFor, spin_until: SpinUntil, timeline: Events[float] | Sweep
 ) -> None:
     node = make_source(scenario_epoch=-1.0)
-    source = VirtualSource(node)
+    source = Source(node)
     values = emitted(node, source.follow("value", timeline))
     pressed = emitted(node, source.follow("pressed", Events(((0.0, True),))))
-    heartbeats = emitted(node, source.until_set("pressed", source.play(Events(((0.0, True),)))))
+    heartbeats = emitted(node, source.kept.until_set(source.player.events(Events(((0.0, True),)))))
 
     spin_for(SHORT)
     assert (values, pressed, heartbeats) == ([], [], [])
@@ -141,8 +154,8 @@ def test_source_emits_nothing_before_its_origin_is_set(
 
 def test_no_event_is_lost_when_the_origin_is_set_late(make_source: Make, spin_until: SpinUntil) -> None:
     node = make_source(scenario_epoch=-1.0)
-    source = VirtualSource(node)
-    events = emitted(node, source.play(Events(((0.0, "a"), (0.3, "b"), (0.7, "c")))))
+    source = Source(node)
+    events = emitted(node, source.player.events(Events(((0.0, "a"), (0.3, "b"), (0.7, "c")))))
 
     set_to(node, EPOCH, time.monotonic() - 0.5)
 
@@ -153,7 +166,7 @@ def test_source_waits_for_an_origin_to_come(
     make_source: Make, spin_for: SpinFor, spin_until: SpinUntil
 ) -> None:
     node = make_source(scenario_epoch=-1.0)
-    source = VirtualSource(node)
+    source = Source(node)
     values = emitted(node, source.follow("value", Sweep(2.0, 0.0, 1.0)))
     origin = time.monotonic() + 2 * SHORT
 
@@ -203,7 +216,7 @@ def test_start_waits_for_the_origin(make_source: Make, spin_until: SpinUntil, ah
 def test_setting_survives_a_restart(make_source: Make, spin_until: SpinUntil, tmp_path: Path) -> None:
     def source() -> tuple[ServiceNode, list[float]]:
         node = make_source(scenario_epoch=time.monotonic() - 1.0, settings=str(tmp_path / "settings"))
-        return node, emitted(node, VirtualSource(node).follow("value", Events(((0.0, 2.0),))))
+        return node, emitted(node, Source(node).follow("value", Events(((0.0, 2.0),))))
 
     first, values = source()
     spin_until(lambda: values == [2.0])
@@ -223,9 +236,7 @@ def test_source_is_given_back_to_its_scenario(
     def source() -> tuple[ServiceNode, list[float]]:
         node = make_source(scenario_epoch=time.monotonic() - 1.0, settings=str(tmp_path))
         timeline = Events(((0.0, 2.0),))
-        return node, emitted(
-            node, VirtualSource(node).follow("value", timeline, given_back="follow_scenario")
-        )
+        return node, emitted(node, Source(node).follow("value", timeline, given_back="follow_scenario"))
 
     node, values = source()
     spin_until(lambda: values == [2.0])
@@ -250,7 +261,7 @@ def test_source_without_a_timeline_is_given_back_to_its_first_value(
     make_source: Make, spin_until: SpinUntil
 ) -> None:
     node = make_source(value=3.0)
-    values = emitted(node, VirtualSource(node).follow("value", given_back="follow_scenario"))
+    values = emitted(node, Source(node).follow("value", given_back="follow_scenario"))
     spin_until(lambda: values == [3.0])
 
     set_to(node, "value", 5.0)
@@ -264,7 +275,7 @@ def test_source_that_leaves_its_scenario_keeps_its_parameter(
 ) -> None:
     node = make_source(scenario_epoch=time.monotonic() - 1.0, settings=str(tmp_path))
     timeline = Events(((0.0, 2.0),))
-    values = emitted(node, VirtualSource(node).follow("value", timeline, given_back="follow_scenario"))
+    values = emitted(node, Source(node).follow("value", timeline, given_back="follow_scenario"))
     spin_until(lambda: values == [2.0])
 
     set_to(node, "follow_scenario", False)
@@ -284,7 +295,7 @@ def test_restart_sets_no_parameter(
     spin_until(lambda: peer.count_publishers("/parameter_events") > 1)
     spin_for(SHORT)
 
-    pressed = emitted(node, VirtualSource(node).follow("pressed"))
+    pressed = emitted(node, Source(node).follow("pressed"))
     set_to(node, "value", 2.0)
     spin_until(lambda: any(each.name == "value" for event in events for each in event.changed_parameters))
 
@@ -294,7 +305,7 @@ def test_restart_sets_no_parameter(
 
 def test_setting_replaces_a_scenario_that_has_not_begun(make_source: Make, spin_for: SpinFor) -> None:
     node = make_source(scenario_epoch=-1.0)
-    pressed = emitted(node, VirtualSource(node).follow("pressed", Events(((0.0, True),))))
+    pressed = emitted(node, Source(node).follow("pressed", Events(((0.0, True),))))
 
     set_to(node, "pressed", False)
     set_to(node, EPOCH, time.monotonic())
@@ -308,10 +319,10 @@ def test_setting_ends_single_heartbeats_for_good(
 ) -> None:
     def source() -> tuple[ServiceNode, list[int]]:
         node = make_source(settings=str(tmp_path / "settings"))
-        source = VirtualSource(node)
+        source = Source(node)
         emitted(node, source.follow("pressed"))
-        played = source.play(Events(((0.0, 1), (SHORT, 2))))
-        return node, emitted(node, source.until_set("pressed", played))
+        played = source.player.events(Events(((0.0, 1), (SHORT, 2))))
+        return node, emitted(node, source.kept.until_set(played))
 
     node, heartbeats = source()
     spin_until(lambda: heartbeats == [1])
@@ -335,7 +346,7 @@ def test_setting_that_cannot_be_kept_is_reported(
     )
     (tmp_path / "file").touch()
     node = make_source(settings=str(tmp_path / "file" / "settings"))
-    values = emitted(node, VirtualSource(node).follow("value"))
+    values = emitted(node, Source(node).follow("value"))
     spin_until(lambda: messages)
 
     set_to(node, "value", 5.0)
@@ -351,9 +362,9 @@ def restart(make_source: Make, tmp_path: Path, spin_for: SpinFor) -> Callable[[]
 
     def start() -> list[bool]:
         node = make_source(settings=str(tmp_path / "settings"), scenario_epoch=time.monotonic() - 1.0)
-        source = VirtualSource(node)
+        source = Source(node)
         emits = emitted(node, source.follow("pressed", Events(((0.0, True),)), if_lost=False))
-        emitted(node, source.until_set("pressed", source.play(Events(((SHORT / 2, True),)))))
+        emitted(node, source.kept.until_set(source.player.events(Events(((SHORT / 2, True),)))))
         spin_for(SHORT)
         node.destroy_node()
         return emits
@@ -365,7 +376,7 @@ def test_restart_presses_a_switch_that_nobody_has_set(
     make_source: Make, restart: Callable[[], list[bool]], tmp_path: Path
 ) -> None:
     first = make_source(settings=str(tmp_path / "settings"), scenario_epoch=time.monotonic() + 100.0)
-    VirtualSource(first).follow("pressed", if_lost=False)
+    Source(first).follow("pressed", if_lost=False)
     first.destroy_node()
 
     assert [restart(), restart()] == [[True], [True]]
@@ -382,7 +393,7 @@ def test_setting_that_cannot_be_kept_leaves_no_old_one(
     make_source: Make, restart: Callable[[], list[bool]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     node = make_source(settings=str(tmp_path / "settings"))
-    emitted(node, VirtualSource(node).follow("pressed"))
+    emitted(node, Source(node).follow("pressed"))
     set_to(node, "pressed", True)
     with monkeypatch.context() as patch:
         patch.setattr(os, "replace", full_disk)
@@ -406,7 +417,7 @@ def test_lost_settings_are_reported(
     )
     node = make_source(settings=str(tmp_path), scenario_epoch=time.monotonic() - 1.0)
 
-    VirtualSource(node)
+    Source(node)
 
     spin_until(lambda: "settings: they are lost, with what was set by hand" in messages)
 
@@ -417,4 +428,4 @@ def test_bad_setting_is_an_error_and_not_forgotten(make_source: Make, tmp_path: 
     (tmp_path / "source.yaml").write_text(text)
 
     with pytest.raises(UserError, match=r"value was set to|\.yaml: "):
-        VirtualSource(node).follow("value")
+        Source(node).follow("value")

@@ -58,7 +58,7 @@ class Machine:
         with (
             mock.patch.object(instance, "socket", sockets),
             # Restarted sources read a file of many events again and again.
-            mock.patch("interfaces.sources.source.load", cache(scenario_file.load)),
+            mock.patch("interfaces.sources.player.load", cache(scenario_file.load)),
             mock.patch.multiple(
                 processes,
                 stat_of=self._stat_of,
