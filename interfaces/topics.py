@@ -2,7 +2,8 @@
 
 Names are relative, so a whole arm fits under a namespace (``__ns:=/arm1``). Units are SI and radians (REP
 103). Services take name, type and QoS of their topics from these rows, and the README shows :func:`markdown`.
-Messages with a :attr:`Topic.problem` are dropped at the edge of a service, counted and reported.
+Recipes work with values, see :attr:`Topic.value`. A value with a :attr:`Topic.problem` is dropped at the edge
+of a service, counted and reported.
 """
 
 from __future__ import annotations
@@ -10,14 +11,19 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from functools import cached_property
+from operator import attrgetter
+from typing import Any, NamedTuple
 
+from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import PointStamped
+from geometry_msgs.msg import Point, PointStamped
 from rclpy.duration import Duration
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64, Header, String
+
+from reactive_node import stamps
 
 try:
     from tf2_msgs.msg import TFMessage
@@ -29,6 +35,48 @@ ON, OFF = "on", "off"
 ALIVE, MISSED, INCAPACITATED = "alive", "missed", "incapacitated"
 DRIVE_TIMEOUT = 0.4  # s for which the engines' drive accepts an `on`
 FRAME = "base"
+
+Conversion = Callable[[Any], Any]
+
+
+class Position(NamedTuple):
+    """A position of the effector."""
+
+    stamp: int
+    """When it was emitted [ns since 1970]; a datetime would round it to microseconds."""
+    x: float  # [m]
+    y: float  # [m]
+    frame: str = FRAME
+
+
+def _position(message: PointStamped) -> Position:
+    header, point = message.header, message.point
+    stamp = header.stamp
+    return Position(stamp.sec * 10**9 + stamp.nanosec, point.x, point.y, header.frame_id)
+
+
+def _point(position: Position) -> PointStamped:
+    stamp, x, y, frame = position
+    seconds, nanoseconds = divmod(stamp, 10**9)
+    header = Header(stamp=Time(sec=seconds, nanosec=nanoseconds), frame_id=frame)
+    return PointStamped(header=header, point=Point(x=x, y=y))
+
+
+_CONVERSIONS: dict[Any, tuple[Conversion, Conversion]] = {
+    Bool: (attrgetter("data"), lambda value: Bool(data=value)),
+    Float64: (attrgetter("data"), lambda value: Float64(data=value)),
+    String: (attrgetter("data"), lambda value: String(data=value)),
+    PointStamped: (_position, _point),
+    Header: (
+        lambda message: stamps.from_message(message.stamp),
+        lambda time: Header(stamp=stamps.to_message(time)),
+    ),
+}
+"""From a message of a type to its value, and back. A message of another type is its own value."""
+
+
+def _unchanged(message: Any) -> Any:
+    return message
 
 
 @dataclass(frozen=True)
@@ -42,13 +90,23 @@ class Topic:
     publishers: tuple[str, ...]
     """The nodes that publish it."""
     meaning: str
-    problem: Callable[[Any], str] = lambda message: ""
-    """Return what is wrong with a message; empty for a good message."""
+    problem: Callable[[Any], str] = lambda value: ""
+    """Return what is wrong with a value; empty for a good one."""
     longest_gap: float = 0.25
     """The longest time [s] between two messages while the arm moves and its operator is present; infinite for
     a topic that reports single events."""
     follows: str = ""
     """The name of the topic without which this one falls silent; empty if there is none."""
+
+    @cached_property
+    def value(self) -> Conversion:
+        """Return the value of a message: its ``data``, a :class:`Position`, a datetime, or the message."""
+        return _CONVERSIONS.get(self.type, (_unchanged, _unchanged))[0]
+
+    @cached_property
+    def message(self) -> Conversion:
+        """Return the message of a value: the inverse of :attr:`value`."""
+        return _CONVERSIONS.get(self.type, (_unchanged, _unchanged))[1]
 
     @property
     def type_name(self) -> str:
@@ -61,27 +119,27 @@ class Topic:
         return self.name if self.name[0] == "/" else f"{namespace.rstrip('/')}/{self.name}"
 
 
-def _not_finite(message: Any) -> str:
-    return "" if math.isfinite(message.data) else f"{message.data} is not finite"
+def _not_finite(value: float) -> str:
+    return "" if math.isfinite(value) else f"{value} is not finite"
 
 
-def _not_a_length(message: Any) -> str:
-    if 0 <= message.data < math.inf:
+def _not_a_length(value: float) -> str:
+    if 0 <= value < math.inf:
         return ""
-    return _not_finite(message) or f"{message.data} is negative"
+    return _not_finite(value) or f"{value} is negative"
 
 
-def _not_a_position(message: Any) -> str:
-    x, y = message.point.x, message.point.y
+def _not_a_position(position: Position) -> str:
+    _, x, y, _ = position
     return "" if math.isfinite(x) and math.isfinite(y) else f"({x}, {y}) is not finite"
 
 
-def _not_pressed(message: Any) -> str:
-    return "" if message.data else "a released switch is no sign of life"
+def _not_pressed(beat: bool) -> str:
+    return "" if beat else "a released switch is no sign of life"
 
 
-def _not_one_of(*known: str) -> Callable[[Any], str]:
-    return lambda message: "" if message.data in known else f"{message.data[:40]!r} is unknown"
+def _not_one_of(*known: str) -> Callable[[str], str]:
+    return lambda value: "" if value in known else f"{value[:40]!r} is unknown"
 
 
 def _qos(

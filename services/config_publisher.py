@@ -47,7 +47,7 @@ def wire(node: ServiceNode, topic: Topic) -> None:
     player, settings = Player(node, epoch), Settings(node, is_restart=epoch.is_past)
     value = settings.keep("value", given_back="follow_scenario")
     track = player.state(player.scenario.configuration.get(topic.name))
-    node.publish(topic, value.instead_of(track), lambda value: topic.type(data=value))
+    node.publish(topic, value.instead_of(track))
 
 
 if __name__ == "__main__":

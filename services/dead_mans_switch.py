@@ -8,11 +8,9 @@ may also command the engines until a person takes the switch.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from operator import attrgetter
 
 import reactivex as rx
 from reactivex import Observable
-from std_msgs.msg import Bool, String
 
 from interfaces import service
 from interfaces.service import ServiceNode, parameter
@@ -81,11 +79,11 @@ def wire(node: ServiceNode) -> None:
     pressed, rate = settings.keep("pressed", if_lost=False), settings.keep("rate")
     single = pressed.until_set(player.events(scenario.heartbeats))
     beats = heartbeats(pressed.instead_of(player.state(scenario.pressed)), rate.values, single)
-    node.publish(OPERATOR_HEARTBEAT, beats, lambda beat: Bool(data=beat))
-    states, heard = (node.observe(topic, attrgetter("data")) for topic in (ENGINES_STATE, ENGINES))
+    node.publish(OPERATOR_HEARTBEAT, beats)
+    states, heard = map(node.observe, (ENGINES_STATE, ENGINES))
     commands = engine_commands(player.events(scenario.commands), states, heard)
     # A person who takes the switch replaces the virtual operator for the commands too.
-    node.publish(ENGINES, pressed.until_set(commands), lambda command: String(data=command))
+    node.publish(ENGINES, pressed.until_set(commands))
 
 
 if __name__ == "__main__":

@@ -13,12 +13,10 @@ from typing import NamedTuple
 import reactivex as rx
 from reactivex import Observable
 from reactivex.scheduler import ImmediateScheduler
-from std_msgs.msg import String
 
 from interfaces import service, topics
 from interfaces.service import Rejected, ServiceNode, parameter
 from interfaces.topics import OFF, ON
-from reactive_node import stamps
 
 CLOCK_TOLERANCE = 0.05  # s between the clocks of two hosts (deploy/SAFETY.md, A3)
 NEVER = datetime.min.replace(tzinfo=UTC)
@@ -129,11 +127,11 @@ def wire(node: ServiceNode) -> None:
     commands = node.observe(topics.ENGINES, timestamped=True).timestamp()
     presences = node.observe(topics.OPERATOR_PRESENCE).timestamp()
     states = engine_state(
-        commands.map(lambda it: Command(it.timestamp, node.age(it.value.timestamp), it.value.value.data)),
-        presences.map(lambda it: Presence(it.timestamp, node.age(stamps.from_message(it.value.stamp)))),
+        commands.map(lambda it: Command(it.timestamp, node.age(it.value.timestamp), it.value.value)),
+        presences.map(lambda it: Presence(it.timestamp, node.age(it.value))),
         node.declare(Parameters),
     )
-    node.publish(topics.ENGINES_STATE, states, lambda state: String(data=state))
+    node.publish(topics.ENGINES_STATE, states)
 
 
 if __name__ == "__main__":

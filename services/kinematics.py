@@ -7,17 +7,14 @@ effector, a pair of its x and y coordinates.
 from __future__ import annotations
 
 import math
-from operator import attrgetter
 
 import reactivex as rx
-from geometry_msgs.msg import Point, PointStamped
 from reactivex import Observable
-from std_msgs.msg import Header
 
 from interfaces import service
 from interfaces.robot_model import BASE, frame_id
 from interfaces.service import ServiceNode
-from interfaces.topics import EFFECTOR_POSITION, L1, L2, THETA1, THETA2
+from interfaces.topics import EFFECTOR_POSITION, L1, L2, THETA1, THETA2, Position
 
 
 def forward_kinematics(l1: float, l2: float, theta1: float, theta2: float) -> tuple[float, float]:
@@ -44,16 +41,12 @@ def effector_position(
 
 def wire(node: ServiceNode) -> None:
     """Connect the recipe with its topics."""
-
     frame, clock = frame_id(BASE, node.get_namespace()), node.get_clock()
-
-    def message(position: tuple[float, float]) -> PointStamped:
-        x, y = position
-        header = Header(stamp=clock.now().to_msg(), frame_id=frame)
-        return PointStamped(header=header, point=Point(x=x, y=y))
-
-    l1, l2, theta1, theta2 = (node.observe(topic, attrgetter("data")) for topic in (L1, L2, THETA1, THETA2))
-    node.publish(EFFECTOR_POSITION, effector_position(l1, l2, theta1, theta2), message)
+    l1, l2, theta1, theta2 = map(node.observe, (L1, L2, THETA1, THETA2))
+    positions = effector_position(l1, l2, theta1, theta2)
+    node.publish(
+        EFFECTOR_POSITION, positions.starmap(lambda x, y: Position(clock.now().nanoseconds, x, y, frame))
+    )
 
 
 if __name__ == "__main__":

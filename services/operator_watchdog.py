@@ -13,13 +13,11 @@ from typing import Any, NamedTuple
 
 import reactivex as rx
 from reactivex import Observable
-from std_msgs.msg import Header, String
 
 from interfaces import service, topics
 from interfaces.service import ServiceNode, UserError, parameter
 from interfaces.service.epoch import Epoch
 from interfaces.topics import ALIVE, INCAPACITATED, MISSED, TURN_OFF
-from reactive_node import stamps
 from reactive_node.stamps import Timestamp
 
 READING = 0.1  # s between two looks for a heartbeat: thousands of them cost no more than those of a switch
@@ -107,10 +105,9 @@ def wire(node: ServiceNode) -> None:
     activity = epoch.start(operator_activity(heartbeats, given, first=first)).share()
     presence, absence = activity.partition(lambda it: it.conclusion == ALIVE)
     absence.subscribe(warn, scheduler=node.scheduler)
-    node.publish(topics.OPERATOR_PRESENCE, presence, lambda it: Header(stamp=stamps.to_message(it.seen)))
-    node.publish(topics.OPERATOR_ACTIVITY, activity, lambda it: String(data=it.conclusion))
-    commands = engine_commands(activity, repeat=given.repeat)
-    node.publish(topics.ENGINES, commands, lambda command: String(data=command))
+    node.publish(topics.OPERATOR_PRESENCE, presence.map(lambda it: it.seen))
+    node.publish(topics.OPERATOR_ACTIVITY, activity.map(lambda it: it.conclusion))
+    node.publish(topics.ENGINES, engine_commands(activity, repeat=given.repeat))
 
 
 if __name__ == "__main__":

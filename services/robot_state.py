@@ -7,7 +7,6 @@ set-up.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from operator import attrgetter
 from typing import Any, NamedTuple
 
 import reactivex as rx
@@ -15,7 +14,7 @@ from builtin_interfaces.msg import Time
 from geometry_msgs.msg import TransformStamped
 from reactivex import Observable
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Header, String
+from std_msgs.msg import Header
 
 from interfaces import robot_model, service
 from interfaces.robot_model import JOINTS, frame_id, urdf
@@ -82,17 +81,14 @@ def wire(node: ServiceNode) -> None:
             ]
         )
 
-    def description(l1: float, l2: float) -> String:
-        return String(data=urdf(l1, l2, namespace))
-
-    l1, l2, theta1, theta2 = (node.observe(topic, attrgetter("data")) for topic in (L1, L2, THETA1, THETA2))
+    l1, l2, theta1, theta2 = map(node.observe, (L1, L2, THETA1, THETA2))
     states = configurations(l1, l2, theta1, theta2, node.declare(Parameters).rate)
     stamped = states.map(lambda it: (node.get_clock().now().to_msg(), it)).share()
     # Most of the time nobody looks.
     node.publish(JOINT_STATES, stamped.starmap(joint_state), on_demand=True)
     if TF in CONTRACT:
         node.publish(TF, stamped.starmap(transforms), on_demand=True)
-    node.publish(ROBOT_DESCRIPTION, lengths(l1, l2).starmap(description))
+    node.publish(ROBOT_DESCRIPTION, lengths(l1, l2).starmap(lambda l1, l2: urdf(l1, l2, namespace)))
 
 
 if __name__ == "__main__":

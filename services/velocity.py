@@ -7,23 +7,12 @@ effector: the Euclidean distance between the last two observed positions, divide
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
-from geometry_msgs.msg import PointStamped
 from reactivex import Observable
-from std_msgs.msg import Float64
 
 from interfaces import service
 from interfaces.service import Rejected, ServiceNode
-from interfaces.topics import EFFECTOR_POSITION, EFFECTOR_SPEED
-
-
-class Position(NamedTuple):
-    """A position and the time of its emission."""
-
-    stamp: int  # [ns]
-    x: float  # [m]
-    y: float  # [m]
+from interfaces.topics import EFFECTOR_POSITION, EFFECTOR_SPEED, Position
 
 
 def speed(pair: tuple[Position, Position]) -> float | Rejected:
@@ -45,15 +34,9 @@ def effector_speed(positions: Observable[Position]) -> Observable[float | Reject
     return positions.pairwise().map(speed).distinct_until_changed()
 
 
-def _position(message: PointStamped) -> Position:
-    stamp = message.header.stamp
-    return Position(stamp.sec * 10**9 + stamp.nanosec, message.point.x, message.point.y)
-
-
 def wire(node: ServiceNode) -> None:
     """Connect the recipe with its topics."""
-    speeds = effector_speed(node.observe(EFFECTOR_POSITION, _position))
-    node.publish(EFFECTOR_SPEED, speeds, lambda speed: Float64(data=speed))
+    node.publish(EFFECTOR_SPEED, effector_speed(node.observe(EFFECTOR_POSITION)))
 
 
 if __name__ == "__main__":

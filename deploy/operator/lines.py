@@ -14,7 +14,7 @@ from interfaces import topics
 from reactive_node.stamps import Timestamp
 
 Seen = Callable[[topics.Topic], Observable[Timestamp[Any]]]
-"""Gives the messages of a topic with their source times."""
+"""Gives the values of a topic with their source times."""
 Span = tuple[datetime, datetime]
 """The times just before and just after a command was published."""
 
@@ -86,9 +86,9 @@ def measurements(seen: Seen) -> Observable[Line]:
     return rx.merge(
         thinned(configuration).map(_line(Kind.DATA, lambda it: f"### Received new data: {{{_numbers(it)}}}")),
         thinned(seen(topics.EFFECTOR_POSITION)).map(
-            _line(Kind.POSITION, lambda it: f"Position x: {it.point.x:g} and y: {it.point.y:g}")
+            _line(Kind.POSITION, lambda it: f"Position x: {it.x:g} and y: {it.y:g}")
         ),
-        thinned(seen(topics.EFFECTOR_SPEED)).map(_line(Kind.SPEED, lambda it: f"Speed: {it.data:g} [m/s]")),
+        thinned(seen(topics.EFFECTOR_SPEED)).map(_line(Kind.SPEED, lambda it: f"Speed: {it:g} [m/s]")),
     )
 
 
@@ -122,8 +122,8 @@ def engines(seen: Seen, own_turn_offs: Observable[Span]) -> Observable[Line]:
         thinned(others.map(_first)).map(
             _line(Kind.OTHERS_TURN_OFF, "Turning off engines, as another node asked...")
         ),
-        thinned(seen(topics.ENGINES_STATE).distinct_until_changed(_data)).map(
-            _line(Kind.ENGINES, lambda it: f"Engines are {it.data}")
+        thinned(seen(topics.ENGINES_STATE).distinct_until_changed(lambda it: it.value)).map(
+            _line(Kind.ENGINES, lambda it: f"Engines are {it}")
         ),
     )
 
@@ -201,16 +201,12 @@ def _joined(items: Sequence[Timestamp[Any]]) -> Timestamp[list[Any]]:
     return Timestamp([item.value for item in items], max(item.timestamp for item in items))
 
 
-def _numbers(messages: Sequence[Any]) -> str:
-    return ", ".join(f"{message.data:g}" for message in messages)
+def _numbers(values: Sequence[float]) -> str:
+    return ", ".join(f"{value:g}" for value in values)
 
 
-def _data(item: Timestamp[Any]) -> Any:
-    return item.value.data
-
-
-def _says(data: object) -> Callable[[Timestamp[Any]], bool]:
-    return lambda item: bool(item.value.data == data)
+def _says(value: object) -> Callable[[Timestamp[Any]], bool]:
+    return lambda item: bool(item.value == value)
 
 
 def _is_own(command: tuple[Timestamp[Any], Span]) -> bool:

@@ -16,7 +16,6 @@ import reactivex as rx
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from reactivex import Observable
 from reactivex.subject import BehaviorSubject, Subject
-from std_msgs.msg import Bool, String
 
 from deploy.operator import hold
 from deploy.operator.lines import Span, line_batches
@@ -89,14 +88,14 @@ def wire(node: ServiceNode) -> None:
     parameter_events = is_open.switch_map(lambda it: parameter_changes(node) if it else rx.never()).share()
     hands = only(events, hold.Press, hold.Beat, hold.Release)
     switch = Switch(node, hands, parameter_events, is_open, clock.now)
-    node.publish(topics.OPERATOR_HEARTBEAT, hold.heartbeats(switch.holds), lambda beat: Bool(data=beat))
+    node.publish(topics.OPERATOR_HEARTBEAT, hold.heartbeats(switch.holds))
 
     asked = only(events, server.Request).share()
     configuration = requests.Configuration(node)
     commands = requests.engine_commands(asked).share()
     turn_offs = commands.filter(lambda command: command == TURN_OFF).share()
     signals = asked.filter(lambda it: isinstance(it.message, protocol.Process))
-    node.publish(topics.ENGINES, commands, lambda command: String(data=command))
+    node.publish(topics.ENGINES, commands)
 
     # One reader of each topic for state and lines, while they observe it.
     observed = {topic.name: node.observe(topic, timestamped=True).share() for topic in topics.CONTRACT}

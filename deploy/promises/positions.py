@@ -24,7 +24,7 @@ class PublishedValues:
     def __init__(self, history: History) -> None:
         # A service drops a value with a problem, and keeps the one before it.
         self._streams = [
-            [s for s in history.stream(topic) if not topic.problem(topic.type(data=s.value))]
+            [s for s in history.stream(topic) if not topic.problem(s.value)]
             for topic in topics.CONFIGURATION.values()
         ]
 

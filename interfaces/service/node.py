@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import datetime
 from typing import Any, TypeVar
@@ -75,7 +74,6 @@ class ServiceNode(ReactiveNode):
     def observe(
         self,
         topic: Topic,
-        item: Callable[[Any], Any] | None = None,
         *,
         timestamped: bool = False,
         sampled: float | None = None,
@@ -83,35 +81,33 @@ class ServiceNode(ReactiveNode):
         max_age: float | None = None,
     ) -> Observable[Any]:
         """
-        Return the good messages of a topic; the others are dropped and reported.
+        Return the good values of a topic (:attr:`Topic.value`); the others are dropped and reported.
 
-        :param item: turns each good message into an item: see :meth:`ReactiveNode.create_observable`.
-        :param timestamped: the same.
+        :param timestamped: see :meth:`ReactiveNode.create_observable`.
         :param sampled: the same; not for a latched topic.
         :param buffered: the same.
         :param max_age: a message that is older [s], or this much ahead of the local clock, is not good.
         """
         self._observed[self.resolve_topic_name(topic.name)] = topic
 
-        type_, problem_of = topic.type, topic.problem
+        type_, value_of, problem_of = topic.type, topic.value, topic.problem
         with_time = timestamped or max_age is not None
 
         def good(received: Any) -> Any:
-            """Return the item of a message. All in one step: every message takes this path."""
+            """Return the value of a message. All in one step: every message takes this path."""
             data = received.value if with_time else received
             try:
-                message = deserialize_message(data, type_)
+                value = value_of(deserialize_message(data, type_))
             except RuntimeError:  # RMWError, which the rclpy of ROS 2 does not export
                 self.health.drop(topic.name, f"{len(data)} octets are no {topic.type_name}")
                 return None
-            problem = problem_of(message)
+            problem = problem_of(value)
             if not problem and max_age is not None:
                 problem = self._staleness(max_age, received.timestamp)
             if problem:
                 self.health.drop(topic.name, problem)
                 return None
-            result = received._replace(value=message) if timestamped else message
-            return result if item is None else item(result)
+            return received._replace(value=value) if timestamped else value
 
         return self.create_observable(
             topic.type,
@@ -128,31 +124,33 @@ class ServiceNode(ReactiveNode):
     def publish(
         self,
         topic: Topic,
-        items: Observable[Any],
-        message: Callable[[Any], Any] = lambda item: item,
+        values: Observable[Any],
         *,
         on_demand: bool = False,
     ) -> None:
         """
-        Publish items on a topic. Bad messages and items that are :class:`Rejected` are dropped and reported.
+        Publish values on a topic (:attr:`Topic.message`). Bad ones and :class:`Rejected` are dropped and
+        reported.
 
-        :param message: makes a message of an item.
         :param on_demand: see :meth:`ReactiveNode.publish_observable`.
         """
 
-        def make(item: Any) -> Any:
-            if isinstance(item, Rejected):
-                self.health.drop(item.topic.name, item.reason)
+        message_of, problem_of = topic.message, topic.problem
+
+        def message(value: Any) -> Any:
+            if isinstance(value, Rejected):
+                self.health.drop(value.topic.name, value.reason)
                 return None
-            result = message(item)
-            problem = topic.problem(result)
+            problem = problem_of(value)
             if problem:
                 self.health.drop(topic.name, problem)
                 return None
             self.health.count_output()
-            return result
+            return message_of(value)
 
-        self.publish_observable(items, topic.type, topic.name, topic.qos, message=make, on_demand=on_demand)
+        self.publish_observable(
+            values, topic.type, topic.name, topic.qos, message=message, on_demand=on_demand
+        )
 
     def age(self, stamp: datetime) -> float:
         """

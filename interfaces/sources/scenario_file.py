@@ -148,7 +148,7 @@ def _values(item: _Item, topic: topics.Topic, repeat: float | None) -> Events[fl
 
     def value(given: _Item) -> float:
         number = given.number()
-        if problem := topic.problem(topic.type(data=number)):
+        if problem := topic.problem(number):
             raise given.error(problem)
         return number
 
@@ -161,7 +161,7 @@ def _values(item: _Item, topic: topics.Topic, repeat: float | None) -> Events[fl
     if not isinstance(item.value, dict):
         return Events(((0.0, value(item)),))
     sweep = _sweep(item)
-    if problem := topic.problem(topic.type(data=sweep.center - sweep.amplitude)):
+    if problem := topic.problem(sweep.center - sweep.amplitude):
         raise item["amplitude"].error(f"at its lowest, {problem}")
     return sweep
 

@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 from reactivex import Observable
-from std_msgs.msg import String
 
 from interfaces import service, topics
 
@@ -21,9 +20,8 @@ class Parameters:
 
 def wire(node: service.ServiceNode) -> None:
     """Connect the recipe with its topics."""
-    speeds = node.observe(topics.EFFECTOR_SPEED, lambda message: message.data)
-    commands = too_fast(speeds, node.declare(Parameters).limit)
-    node.publish(topics.ENGINES, commands, lambda command: String(data=command))
+    speeds = node.observe(topics.EFFECTOR_SPEED)
+    node.publish(topics.ENGINES, too_fast(speeds, node.declare(Parameters).limit))
 
 
 if __name__ == "__main__":

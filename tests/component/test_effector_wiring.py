@@ -43,9 +43,11 @@ def test_position_has_its_frame_and_the_time_of_emission(
 def test_speed_without_advancing_time_is_dropped_and_counted(
     make_node: MakeNode, spin_until: SpinUntil, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    read = velocity._position
+    recipe = velocity.effector_speed
     arrived: list[Any] = []
-    monkeypatch.setattr(velocity, "_position", lambda message: arrived.append(message) or read(message))
+    monkeypatch.setattr(
+        velocity, "effector_speed", lambda positions: recipe(positions.do_action(arrived.append))
+    )
     wired = Wired(make_node, spin_until, velocity.wire, inputs=[EFFECTOR_POSITION], outputs=[EFFECTOR_SPEED])
     for number, (seconds, x) in enumerate(((5, 0.0), (5, 1.0), (7, 7.0)), 1):
         header = Header(stamp=Time(sec=seconds, nanosec=500))

@@ -8,21 +8,20 @@ from pathlib import Path
 from typing import Any
 
 import reactivex as rx
-from geometry_msgs.msg import Point, PointStamped
 from reactivex import Observable
 from reactivex.scheduler import VirtualTimeScheduler
 from reactivex.subject import Subject
 from reactivex.testing import TestScheduler
-from std_msgs.msg import Bool, Float64, Header, String
 
 from deploy.operator.lines import Line, line_batches
 from interfaces import topics
 from interfaces.sources import playback, scenario_file
+from interfaces.topics import Position
 from reactive_node import stamps
 from services.engine_controller import Command, Presence, engine_state
 from services.kinematics import effector_position
 from services.operator_watchdog import engine_commands, operator_activity
-from services.velocity import Position, effector_speed
+from services.velocity import effector_speed
 
 SCENARIO = Path(__file__).parents[2] / "deploy" / "scenarios" / "listing_5_9.yaml"
 ORIGIN = datetime(1970, 1, 1, tzinfo=UTC)
@@ -86,51 +85,45 @@ class Arm:
         self.scheduler.advance_to(START)
         self.wire()
         for name, timeline in played.configuration.items():
-            self.publish(name, playback.state(timeline, START).map(lambda value: Float64(data=value)))
+            self.publish(name, playback.state(timeline, START))
         assert played.heartbeats is not None
-        self.publish(
-            "operator_heartbeat", playback.events(played.heartbeats, START).map(lambda beat: Bool(data=beat))
-        )
+        self.publish("operator_heartbeat", playback.events(played.heartbeats, START))
 
     def seen(self, topic: topics.Topic) -> Observable[Any]:
         return self.topics[topic.name].timestamp(scheduler=self.scheduler)
 
-    def publish(self, name: str, messages: Observable[Any]) -> None:
-        messages.subscribe(self.topics[name].on_next, scheduler=self.scheduler)
+    def publish(self, name: str, values: Observable[Any]) -> None:
+        values.subscribe(self.topics[name].on_next, scheduler=self.scheduler)
 
     def print(self, lines: list[Line]) -> None:
         for line in lines:
             self.lines.append(f"[{(line.time - ORIGIN) / timedelta(milliseconds=1):.0f}] {line.text}")
 
     def wire(self) -> None:
-        configuration = [self.topics[name].map(lambda m: m.data) for name in topics.CONFIGURATION]
+        configuration = [self.topics[name] for name in topics.CONFIGURATION]
         self.publish("effector/position", effector_position(*configuration).map(self.position))
-        positions = self.topics["effector/position"].map(
-            lambda m: Position(m.header.stamp.sec * 10**9 + m.header.stamp.nanosec, m.point.x, m.point.y)
-        )
-        self.publish("effector/speed", effector_speed(positions).map(lambda speed: Float64(data=speed)))
+        self.publish("effector/speed", effector_speed(self.topics["effector/position"]))
 
         heartbeats = self.seen(topics.OPERATOR_HEARTBEAT)
         begin = rx.timer(WATCH_BEGINS - START)
         activity = begin.flat_map(lambda _: operator_activity(heartbeats)).share()
         alive = activity.filter(lambda it: it.conclusion == topics.ALIVE)
-        self.publish("operator_presence", alive.map(lambda it: Header(stamp=stamps.to_message(it.seen))))
-        self.publish("operator_activity", activity.map(lambda it: String(data=it.conclusion)))
-        self.publish("engines", engine_commands(activity).map(lambda command: String(data=command)))
+        self.publish("operator_presence", alive.map(lambda it: it.seen))
+        self.publish("operator_activity", activity.map(lambda it: it.conclusion))
+        self.publish("engines", engine_commands(activity))
 
-        commands = self.topics["engines"].map(lambda m: Command(self.scheduler.now, 0.0, m.data))
+        commands = self.topics["engines"].map(lambda it: Command(self.scheduler.now, 0.0, it))
         presences = self.topics["operator_presence"].map(
-            lambda m: Presence(self.scheduler.now, self.age(stamps.from_message(m.stamp)))
+            lambda it: Presence(self.scheduler.now, self.age(it))
         )
-        states = engine_state(commands, presences)
-        self.publish("engines/state", states.map(lambda state: String(data=state)))
+        self.publish("engines/state", engine_state(commands, presences))
 
     def age(self, stamp: datetime) -> float:
         return (self.scheduler.now - stamp).total_seconds()
 
-    def position(self, position: tuple[float, float]) -> PointStamped:
-        stamp = stamps.to_message(VirtualTimeScheduler.to_datetime(self.scheduler.clock))
-        return PointStamped(header=Header(stamp=stamp), point=Point(x=position[0], y=position[1]))
+    def position(self, position: tuple[float, float]) -> Position:
+        now = VirtualTimeScheduler.to_datetime(self.scheduler.clock)
+        return Position(stamps.to_nanoseconds(now), *position)
 
 
 def test_inputs_of_the_listing_give_its_lines() -> None:

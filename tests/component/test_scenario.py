@@ -15,8 +15,9 @@ from reactivex.testing import ReactiveTest, TestScheduler
 
 from interfaces.sources import playback, scenario_file
 from interfaces.sources.timeline import Events, Sweep
+from interfaces.topics import Position
 from services.kinematics import effector_position, forward_kinematics
-from services.velocity import Position, effector_speed
+from services.velocity import effector_speed
 
 on_next, on_completed, subscribe = ReactiveTest.on_next, ReactiveTest.on_completed, ReactiveTest.subscribe
 

@@ -3,56 +3,74 @@
 from __future__ import annotations
 
 import math
+from datetime import UTC, datetime
 from typing import Any
 
 import pytest
+from builtin_interfaces.msg import Time
 from geometry_msgs.msg import Point, PointStamped
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
-from std_msgs.msg import Bool, Float64, String
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Bool, Float64, Header, String
 
 from interfaces import topics
-from interfaces.topics import Topic
-
-
-def number(value: float) -> Float64:
-    return Float64(data=value)
-
-
-def position(x: float, y: float) -> PointStamped:
-    return PointStamped(point=Point(x=x, y=y))
-
-
-def text(data: str) -> String:
-    return String(data=data)
+from interfaces.topics import Position, Topic
 
 
 @pytest.mark.parametrize(
-    ("topic", "message", "problem"),
+    ("topic", "value", "problem"),
     [
-        (topics.L1, number(0.0), ""),
-        (topics.L1, number(-0.5), "-0.5 is negative"),
-        (topics.L2, number(math.inf), "inf is not finite"),
-        (topics.L2, number(-0.5), "-0.5 is negative"),
-        (topics.THETA1, number(-0.5), ""),
-        (topics.THETA1, number(math.nan), "nan is not finite"),
-        (topics.THETA2, number(-math.inf), "-inf is not finite"),
-        (topics.EFFECTOR_SPEED, number(-0.5), "-0.5 is negative"),
-        (topics.EFFECTOR_POSITION, position(1.0, -1.0), ""),
-        (topics.EFFECTOR_POSITION, position(math.nan, 1.0), "(nan, 1.0) is not finite"),
-        (topics.EFFECTOR_POSITION, position(1.0, math.inf), "(1.0, inf) is not finite"),
-        (topics.OPERATOR_HEARTBEAT, Bool(data=True), ""),
-        (topics.OPERATOR_HEARTBEAT, Bool(data=False), "a released switch is no sign of life"),
-        *((topics.ENGINES, text(data), "") for data in ("turn_on", "turn_off")),
-        (topics.ENGINES, text("x" * 50), f"'{'x' * 40}' is unknown"),
-        *((topics.ENGINES_STATE, text(data), "") for data in ("on", "off")),
-        (topics.ENGINES_STATE, text("turn_on"), "'turn_on' is unknown"),
-        *((topics.OPERATOR_ACTIVITY, text(data), "") for data in ("alive", "missed", "incapacitated")),
-        (topics.OPERATOR_ACTIVITY, text("asleep"), "'asleep' is unknown"),
-        (topics.ROBOT_DESCRIPTION, text("anything"), ""),
+        (topics.L1, 0.0, ""),
+        (topics.L1, -0.5, "-0.5 is negative"),
+        (topics.L2, math.inf, "inf is not finite"),
+        (topics.L2, -0.5, "-0.5 is negative"),
+        (topics.THETA1, -0.5, ""),
+        (topics.THETA1, math.nan, "nan is not finite"),
+        (topics.THETA2, -math.inf, "-inf is not finite"),
+        (topics.EFFECTOR_SPEED, -0.5, "-0.5 is negative"),
+        (topics.EFFECTOR_POSITION, Position(0, 1.0, -1.0), ""),
+        (topics.EFFECTOR_POSITION, Position(0, math.nan, 1.0), "(nan, 1.0) is not finite"),
+        (topics.EFFECTOR_POSITION, Position(0, 1.0, math.inf), "(1.0, inf) is not finite"),
+        (topics.OPERATOR_HEARTBEAT, True, ""),
+        (topics.OPERATOR_HEARTBEAT, False, "a released switch is no sign of life"),
+        *((topics.ENGINES, data, "") for data in ("turn_on", "turn_off")),
+        (topics.ENGINES, "x" * 50, f"'{'x' * 40}' is unknown"),
+        *((topics.ENGINES_STATE, data, "") for data in ("on", "off")),
+        (topics.ENGINES_STATE, "turn_on", "'turn_on' is unknown"),
+        *((topics.OPERATOR_ACTIVITY, data, "") for data in ("alive", "missed", "incapacitated")),
+        (topics.OPERATOR_ACTIVITY, "asleep", "'asleep' is unknown"),
+        (topics.ROBOT_DESCRIPTION, "anything", ""),
     ],
 )
-def test_problem_of_a_message(topic: Topic, message: Any, problem: str) -> None:
-    assert topic.problem(message) == problem
+def test_problem_of_a_value(topic: Topic, value: Any, problem: str) -> None:
+    assert topic.problem(value) == problem
+
+
+@pytest.mark.parametrize(
+    ("topic", "message", "value"),
+    [
+        (topics.L1, Float64(data=2.5), 2.5),
+        (topics.OPERATOR_HEARTBEAT, Bool(data=True), True),
+        (topics.ENGINES, String(data="turn_on"), "turn_on"),
+        (
+            topics.EFFECTOR_POSITION,
+            PointStamped(
+                header=Header(stamp=Time(sec=7, nanosec=8), frame_id="arm1/base"), point=Point(x=1.0, y=-2.0)
+            ),
+            Position(7_000_000_008, 1.0, -2.0, "arm1/base"),
+        ),
+        (
+            topics.OPERATOR_PRESENCE,
+            Header(stamp=Time(sec=1, nanosec=5000)),
+            datetime(1970, 1, 1, 0, 0, 1, 5, tzinfo=UTC),
+        ),
+        (topics.JOINT_STATES, JointState(name=["theta1"]), JointState(name=["theta1"])),
+    ],
+    ids=lambda it: getattr(it, "name", ""),
+)
+def test_value_of_a_message_and_back(topic: Topic, message: Any, value: Any) -> None:
+    assert topic.value(message) == value
+    assert topic.message(value) == message
 
 
 def test_topics_that_report_single_events_may_be_silent() -> None:

@@ -11,8 +11,8 @@ from reactivex import Subject
 from reactivex.testing import ReactiveTest, TestScheduler
 
 from interfaces.service import Rejected
-from interfaces.topics import EFFECTOR_POSITION
-from services.velocity import Position, effector_speed
+from interfaces.topics import EFFECTOR_POSITION, Position
+from services.velocity import effector_speed
 
 on_next, on_error, subscribe = ReactiveTest.on_next, ReactiveTest.on_error, ReactiveTest.subscribe
 

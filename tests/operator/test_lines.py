@@ -10,13 +10,12 @@ from typing import Any
 import pytest
 import reactivex as rx
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from geometry_msgs.msg import Point, PointStamped
 from reactivex import Observable
 from reactivex.testing import ReactiveTest, TestScheduler
-from std_msgs.msg import Bool, Float64, String
 
 from deploy.operator.lines import Allowance, Line, line_batches
 from interfaces import topics
+from interfaces.topics import Position
 from reactive_node.stamps import Timestamp
 
 Message = tuple[float, topics.Topic, Any]
@@ -59,15 +58,15 @@ def play(scheduler: TestScheduler) -> Play:
 
 
 def activity(conclusion: str, *times: float) -> list[Message]:
-    return [(time, topics.OPERATOR_ACTIVITY, String(data=conclusion)) for time in times]
+    return [(time, topics.OPERATOR_ACTIVITY, conclusion) for time in times]
 
 
 def commands(command: str, *times: float) -> list[Message]:
-    return [(time, topics.ENGINES, String(data=command)) for time in times]
+    return [(time, topics.ENGINES, command) for time in times]
 
 
 def values(*changes: tuple[float, topics.Topic, float]) -> list[Message]:
-    return [(time, topic, Float64(data=value)) for time, topic, value in changes]
+    return [(time, topic, value) for time, topic, value in changes]
 
 
 def texts(lines: Iterable[Line]) -> list[str]:
@@ -88,9 +87,9 @@ def test_data_appear_when_all_four_values_are_known_and_at_each_change(play: Pla
 
 
 def test_lines_of_a_batch_are_in_the_order_of_their_source_times(play: Play) -> None:
-    sent_first = PointStamped(point=Point(x=-3.4029603, y=3.1472500))
+    sent_first = Position(0, -3.4029603, 3.1472500)
     script = [
-        (1.01, topics.EFFECTOR_SPEED, Float64(data=3.318452)),
+        (1.01, topics.EFFECTOR_SPEED, 3.318452),
         (1.02, topics.EFFECTOR_POSITION, sent_first),
     ]
     assert texts(play(script, late=sent_first)) == [
@@ -100,10 +99,7 @@ def test_lines_of_a_batch_are_in_the_order_of_their_source_times(play: Play) -> 
 
 
 def test_each_heartbeat_of_a_pressed_switch_is_shown(play: Play) -> None:
-    script = [
-        (at, topics.OPERATOR_HEARTBEAT, Bool(data=pressed))
-        for at, pressed in ((1, True), (2, False), (3, True))
-    ]
+    script = [(at, topics.OPERATOR_HEARTBEAT, pressed) for at, pressed in ((1, True), (2, False), (3, True))]
     assert texts(play(script)) == ["### Received signal from operator"] * 2
 
 
@@ -161,7 +157,7 @@ def test_turn_offs_without_any_conclusion_of_the_watchdog_are_one_line(play: Pla
 
 def test_engines_are_shown_when_they_change(play: Play) -> None:
     states = {1: "off", 2: "off", 3: "on"}
-    script = [(time, topics.ENGINES_STATE, String(data=state)) for time, state in states.items()]
+    script = [(time, topics.ENGINES_STATE, state) for time, state in states.items()]
     assert texts(play(script)) == ["Engines are off", "Engines are on"]
 
 
@@ -188,7 +184,7 @@ def test_fast_lines_are_thinned_to_one_a_second(play: Play) -> None:
 
 def test_thinned_lines_of_different_kinds_are_of_the_same_moment(play: Play) -> None:
     speeds = values(*((n / 20, topics.EFFECTOR_SPEED, n) for n in range(1, 20 * 20)))
-    positions = [(n / 20, topics.EFFECTOR_POSITION, PointStamped()) for n in range(7, 20 * 20)]
+    positions = [(n / 20, topics.EFFECTOR_POSITION, Position(0, 0.0, 0.0)) for n in range(7, 20 * 20)]
     shown = [time for time in times(play(speeds + positions)) if time >= 2.0]
     assert shown == [float(second) for second in range(2, 20) for _ in range(2)]
 
@@ -206,5 +202,5 @@ def test_clock_that_is_set_back_hides_no_lines() -> None:
 
 def test_all_heartbeats_of_the_listing_are_shown(play: Play) -> None:
     times = (1.942, 1.991, 2.041, 2.091, 2.141, 2.192, 2.242, 2.292, 2.342, 2.392, 4.444)
-    script = [(time, topics.OPERATOR_HEARTBEAT, Bool(data=True)) for time in times]
+    script = [(time, topics.OPERATOR_HEARTBEAT, True) for time in times]
     assert len(play(script)) == len(times)

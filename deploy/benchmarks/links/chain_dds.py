@@ -15,9 +15,9 @@ from reactivex.subject import Subject
 
 from deploy.benchmarks.link import Job
 from deploy.benchmarks.links import chain
-from interfaces.topics import EFFECTOR_POSITION, EFFECTOR_SPEED, L1, L2, THETA1, THETA2, Topic
+from interfaces.topics import EFFECTOR_POSITION, EFFECTOR_SPEED, L1, L2, THETA1, THETA2, Position, Topic
 from services.kinematics import effector_position
-from services.velocity import Position, effector_speed
+from services.velocity import effector_speed
 
 _HEADER = b"\0\1\0\0"  # CDR, little endian
 _NUMBER = struct.Struct("<4sd")

@@ -190,16 +190,17 @@ def _forget(state: PageState) -> PageState:
 
 def _configuration(name: str) -> Callable[[PageState, Any, Clock], PageState]:
     def change(state: PageState, message: Timestamp[Any], clock: Clock) -> PageState:
-        return state._replace(configuration={**state.configuration, name: message.value.data})
+        return state._replace(configuration={**state.configuration, name: message.value})
 
     return change
 
 
 def _position(state: PageState, message: Timestamp[Any], clock: Clock) -> PageState:
-    position, now = (message.value.point.x, message.value.point.y), clock.now()
+    stamp, x, y, _ = message.value
+    position, now = (x, y), clock.now()
     if now - state.sampled < SAMPLE_PERIOD:
         return state._replace(position=position)
-    at = clock.elapsed() - clock.age(stamps.from_message(message.value.header.stamp))
+    at = clock.elapsed() - clock.age(stamps.from_nanoseconds(stamp))
     sample = (round(at, 3), *position, state.speed)
     return state._replace(
         position=position,
@@ -210,7 +211,7 @@ def _position(state: PageState, message: Timestamp[Any], clock: Clock) -> PageSt
 
 
 def _speed(state: PageState, message: Timestamp[Any], clock: Clock) -> PageState:
-    return state._replace(speed=message.value.data)
+    return state._replace(speed=message.value)
 
 
 # The operator
@@ -222,7 +223,7 @@ def _heartbeat(state: PageState, message: Timestamp[Any], clock: Clock) -> PageS
 
 
 def _presence(state: PageState, message: Timestamp[Any], clock: Clock) -> PageState:
-    age = clock.age(stamps.from_message(message.value.stamp))
+    age = clock.age(message.value)
     return state._replace(seen=clock.now() - max(age, 0.0))
 
 
@@ -231,7 +232,7 @@ def _new_watchdog(state: PageState, begins: bool) -> PageState:
 
 
 def _activity(state: PageState, message: Timestamp[Any], clock: Clock) -> PageState:
-    activity, left, now = message.value.data, state.strikes_left, clock.now()
+    activity, left, now = message.value, state.strikes_left, clock.now()
     if activity == MISSED and left is not None:
         left = max(0, left - 1)
     elif activity == INCAPACITATED:
@@ -247,7 +248,7 @@ def _activity(state: PageState, message: Timestamp[Any], clock: Clock) -> PageSt
 
 def _command(state: PageState, message: Timestamp[Any], clock: Clock) -> PageState:
     now = clock.now()
-    if message.value.data != TURN_OFF:
+    if message.value != TURN_OFF:
         return state
     if now - state.own_turn_off < TOGETHER:
         return _explain(state, BY_PAGE, now)
@@ -268,7 +269,7 @@ def _explain(state: PageState, cause: str, now: float) -> PageState:
 
 def _engines(controllers: Callable[[], frozenset[Any]]) -> Callable[[PageState, Any, Clock], PageState]:
     def change(state: PageState, message: Timestamp[Any], clock: Clock) -> PageState:
-        engines, now = message.value.data, clock.now()
+        engines, now = message.value, clock.now()
         if engines == ON:
             # A repeated `on` may come after the command that ends it.
             cause = state.cause if state.engines == ON and now - state.caused < TOGETHER else ""

@@ -20,6 +20,7 @@ from deploy.operator.output import say
 from deploy.operator.terminal.display import open_terminal
 from interfaces import topics
 from reactive_node import ReactiveNode, stamps
+from reactive_node.stamps import Timestamp
 
 PERIOD = 0.25  # s between two batches of lines
 BACKLOG = 50  # messages of a topic that wait for the next batch
@@ -89,8 +90,11 @@ class Console:
 
     def _observed(self, topic: topics.Topic) -> Observable[Any]:
         # A service wants the last message, the operator all of them.
+        def valued(received: Timestamp[Any]) -> Timestamp[Any]:
+            return received._replace(value=topic.value(received.value))
+
         qos = QoSProfile(depth=BACKLOG, reliability=topic.qos.reliability, durability=topic.qos.durability)
-        return self._node.create_observable(topic.type, topic.name, qos, timestamped=True)
+        return self._node.create_observable(topic.type, topic.name, qos, timestamped=True, item=valued)
 
     def _seen(self, topic: topics.Topic) -> Observable[Any]:
         return self._topics[topic.name]
@@ -110,8 +114,8 @@ class Console:
 
     def _settled(self, sent: Span) -> Observable[Any]:
         """Emit when the engines are off after a `turn_off`, or somebody wants them on again."""
-        off = self._seen(topics.ENGINES_STATE).filter(lambda it: it.value.data == topics.OFF)
-        wanted_on = self._seen(topics.ENGINES).filter(lambda it: it.value.data == topics.TURN_ON)
+        off = self._seen(topics.ENGINES_STATE).filter(lambda it: it.value == topics.OFF)
+        wanted_on = self._seen(topics.ENGINES).filter(lambda it: it.value == topics.TURN_ON)
         return rx.merge(off, wanted_on).filter(lambda it: it.timestamp >= sent[0])
 
     def _command_engines(self, command: str) -> None:

@@ -10,9 +10,7 @@ import pytest
 import reactivex as rx
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from geometry_msgs.msg import Point, PointStamped
 from reactivex.testing import ReactiveTest, TestScheduler
-from std_msgs.msg import Bool, Float64, Header, String
 
 from deploy.operator.hold import OTHER_PAGE, Hold
 from deploy.operator.page import state
@@ -88,8 +86,8 @@ def stamp(time: float) -> Time:
     return stamps.to_message(START + timedelta(seconds=time))
 
 
-def position(time: float, x: float, y: float) -> PointStamped:
-    return PointStamped(header=Header(stamp=stamp(time)), point=Point(x=x, y=y))
+def position(time: float, x: float, y: float) -> topics.Position:
+    return topics.Position(stamps.to_nanoseconds(START + timedelta(seconds=time)), x, y)
 
 
 # The arm
@@ -97,9 +95,9 @@ def position(time: float, x: float, y: float) -> PointStamped:
 
 def test_arm_position_and_speed(play: Play) -> None:
     for time, name, value in ((210, "l1", 2.0), (211, "theta1", 0.5), (212, "theta1", 0.6)):
-        play.say(time, topics.CONFIGURATION[name], Float64(data=value))
+        play.say(time, topics.CONFIGURATION[name], value)
     play.say(213, topics.EFFECTOR_POSITION, position(213, 1.0, 2.0))
-    play.say(214, topics.EFFECTOR_SPEED, Float64(data=0.25))
+    play.say(214, topics.EFFECTOR_SPEED, 0.25)
 
     shown = view(play.run(215), "page", 215)
 
@@ -135,11 +133,11 @@ def test_new_page_shows_nothing_of_the_last_one(play: Play) -> None:
 
 def conclude(play: Play, *conclusions: tuple[float, str]) -> None:
     for time, conclusion in conclusions:
-        play.say(time, topics.OPERATOR_ACTIVITY, String(data=conclusion))
+        play.say(time, topics.OPERATOR_ACTIVITY, conclusion)
 
 
 def test_operator_is_seen_as_long_ago_as_the_stamp_says(play: Play) -> None:
-    play.say(210, topics.OPERATOR_PRESENCE, Header(stamp=stamp(209.7)))
+    play.say(210, topics.OPERATOR_PRESENCE, START + timedelta(seconds=209.7))
     found = play.run(211)
 
     assert view(found, "page", 210.0)["operator"]["age"] == 0.3
@@ -219,7 +217,7 @@ def test_page_that_holds_the_switch_is_shown_to_all_pages(play: Play) -> None:
 
 def test_heartbeat_of_a_page_is_not_that_of_the_scenario(play: Play) -> None:
     play.note(210, state.held(Hold("one", 210.0, alive=True)))
-    play.say(210.01, topics.OPERATOR_HEARTBEAT, Bool(data=True))
+    play.say(210.01, topics.OPERATOR_HEARTBEAT, True)
     play.note(210.02, state.held(Hold()))
 
     assert switch(play.run(211), "one", 210.1) == {"held": False, "by": None}
@@ -228,13 +226,13 @@ def test_heartbeat_of_a_page_is_not_that_of_the_scenario(play: Play) -> None:
 def test_heartbeat_of_a_page_may_come_after_its_release(play: Play) -> None:
     play.note(210, state.held(Hold("one", 210.0, alive=True)))
     play.note(210.01, state.held(Hold()))
-    play.say(210.02, topics.OPERATOR_HEARTBEAT, Bool(data=True))
+    play.say(210.02, topics.OPERATOR_HEARTBEAT, True)
 
     assert switch(play.run(211), "one", 210.1) == {"held": False, "by": None}
 
 
 def test_heartbeat_of_scenario_and_terminal_is_shown(play: Play) -> None:
-    play.say(210, topics.OPERATOR_HEARTBEAT, Bool(data=True))
+    play.say(210, topics.OPERATOR_HEARTBEAT, True)
     found = play.run(211)
 
     assert switch(found, "one", 210.2) == {"held": True, "by": "scenario"}
@@ -258,7 +256,7 @@ def test_refused_press_is_told_to_its_page(play: Play) -> None:
 
 def engines(play: Play, *states: tuple[float, str]) -> None:
     for time, engines in states:
-        play.say(time, topics.ENGINES_STATE, String(data=engines))
+        play.say(time, topics.ENGINES_STATE, engines)
 
 
 def test_engines_that_were_never_on_say_so(play: Play) -> None:
@@ -290,8 +288,8 @@ def test_watchdog_turned_them_off_whatever_arrives_first(
 ) -> None:
     concluded, commanded, turned = order
     conclude(play, (205, ALIVE), (concluded, INCAPACITATED))
-    play.say(commanded, topics.ENGINES, String(data=TURN_OFF))
-    play.say(commanded + 0.5, topics.ENGINES, String(data=TURN_OFF))
+    play.say(commanded, topics.ENGINES, TURN_OFF)
+    play.say(commanded + 0.5, topics.ENGINES, TURN_OFF)
     engines(play, (210, ON), (210.9, ON), (turned, OFF), (211.9, OFF))
 
     assert view(play.run(212), "page", 212)["engines"]["why"] == state.BY_WATCHDOG
@@ -299,7 +297,7 @@ def test_watchdog_turned_them_off_whatever_arrives_first(
 
 def test_repeated_on_after_the_command_keeps_its_reason(play: Play) -> None:
     conclude(play, (205, ALIVE))
-    play.say(210.0, topics.ENGINES, String(data=TURN_OFF))
+    play.say(210.0, topics.ENGINES, TURN_OFF)
     engines(play, (209, OFF), (209.5, ON), (210.01, ON), (210.02, OFF))
 
     assert view(play.run(211), "page", 210.1)["engines"]["why"] == state.BY_COMMAND
@@ -307,9 +305,9 @@ def test_repeated_on_after_the_command_keeps_its_reason(play: Play) -> None:
 
 def test_page_turned_them_off(play: Play) -> None:
     play.note(210.0, state.turned_off(210.0))
-    play.say(210.01, topics.ENGINES, String(data=TURN_OFF))
+    play.say(210.01, topics.ENGINES, TURN_OFF)
     conclude(play, (220, INCAPACITATED))
-    play.say(220, topics.ENGINES, String(data=TURN_OFF))
+    play.say(220, topics.ENGINES, TURN_OFF)
     engines(play, (209, ON), (210.02, OFF), (221, OFF))
 
     assert view(play.run(222), "page", 221.1)["engines"]["why"] == state.BY_PAGE
@@ -342,7 +340,7 @@ def test_controller_that_was_killed_before_turns_them_off_itself(play: Play) -> 
 
 
 def test_old_reason_is_forgotten_when_they_are_on_again(play: Play) -> None:
-    play.say(210.0, topics.ENGINES, String(data=TURN_OFF))
+    play.say(210.0, topics.ENGINES, TURN_OFF)
     engines(play, (209, ON), (210.01, OFF), (210.5, ON), (210.6, ON), (210.7, OFF))
 
     assert view(play.run(211), "page", 210.8)["engines"]["why"] == BY_CONTROLLER
@@ -356,7 +354,7 @@ def test_restarted_console_does_not_guess(play: Play) -> None:
 
 
 def test_restarted_console_recognizes_the_watchdog(play: Play) -> None:
-    play.say(210, topics.ENGINES, String(data=TURN_OFF))
+    play.say(210, topics.ENGINES, TURN_OFF)
     engines(play, (209, OFF), (211, OFF))
 
     found = play.run(212, PageState(since_when=state.OLDER))
