@@ -60,7 +60,7 @@ help:
 	@echo "                                                  for its rclpy, TESTS=tests/operator/page for its page)"
 	@echo "make mutants  change the safety path in every small way: do the tests notice?  (MODULES= for a part)"
 	@echo "make bench    compare the costs with those of the alternatives  (BENCH=\"--rounds 5\", minutes each)"
-	@echo "make tables   write the tables of interfaces/README.md from the code"
+	@echo "make tables   write the tables and the graph of the READMEs from the code"
 	@echo "make check    ruff, mypy, import rules, shellcheck, yamllint"
 	@echo "make setup    only set up .venv                   (PYTHON= chooses the interpreter, 3.11 to 3.13)"
 	@echo "All of them run on ROS 2's own rclpy from PyPI, or on a sourced ROS 2. RUNTIME=embedded takes our lighter one."

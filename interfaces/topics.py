@@ -89,6 +89,8 @@ class Topic:
     unit: str
     publishers: tuple[str, ...]
     """The nodes that publish it."""
+    subscribers: tuple[str, ...]
+    """The nodes of the arm that read it, then tools for which it is made."""
     meaning: str
     problem: Callable[[Any], str] = lambda value: ""
     """Return what is wrong with a value; empty for a good one."""
@@ -161,16 +163,35 @@ def _qos(
 _STATE = _qos(1, latched=True)
 _EVENTS = _qos(10)
 
-L1 = Topic("l1", Float64, _STATE, "m", ("config_l1",), "length of the first link", _not_a_length)
-L2 = Topic("l2", Float64, _STATE, "m", ("config_l2",), "length of the second link", _not_a_length)
-THETA1 = Topic("theta1", Float64, _STATE, "rad", ("config_theta1",), "angle of the first joint", _not_finite)
-THETA2 = Topic("theta2", Float64, _STATE, "rad", ("config_theta2",), "angle of the second joint", _not_finite)
+OPERATOR_NODES = ("console", "operator_page")
+"""The nodes that show the arm to its operator."""
+_VIEWERS = ("RViz", "Foxglove")
+_CONFIGURED = ("kinematics", "robot_state", *OPERATOR_NODES)
+
+L1 = Topic("l1", Float64, _STATE, "m", ("config_l1",), _CONFIGURED, "length of the first link", _not_a_length)
+L2 = Topic(
+    "l2", Float64, _STATE, "m", ("config_l2",), _CONFIGURED, "length of the second link", _not_a_length
+)
+THETA1 = Topic(
+    "theta1", Float64, _STATE, "rad", ("config_theta1",), _CONFIGURED, "angle of the first joint", _not_finite
+)
+THETA2 = Topic(
+    "theta2",
+    Float64,
+    _STATE,
+    "rad",
+    ("config_theta2",),
+    _CONFIGURED,
+    "angle of the second joint",
+    _not_finite,
+)
 EFFECTOR_POSITION = Topic(
     "effector/position",
     PointStamped,
     _STATE,
     "m",
     ("kinematics",),
+    ("velocity", *OPERATOR_NODES),
     f"x, y in frame `{FRAME}`; `header.stamp` is the time of emission",
     _not_a_position,
 )
@@ -180,6 +201,7 @@ EFFECTOR_SPEED = Topic(
     _EVENTS,
     "m/s",
     ("velocity",),
+    OPERATOR_NODES,
     "never negative",
     _not_a_length,
     follows=EFFECTOR_POSITION.name,
@@ -190,6 +212,7 @@ JOINT_STATES = Topic(
     _EVENTS,
     "rad",
     ("robot_state",),
+    _VIEWERS,
     "angles of the joints `theta1` and `theta2`",
 )
 ROBOT_DESCRIPTION = Topic(
@@ -198,6 +221,7 @@ ROBOT_DESCRIPTION = Topic(
     _STATE,
     "m",
     ("robot_state",),
+    _VIEWERS,
     "URDF of the arm; a new one when `l1` or `l2` has changed",
     longest_gap=math.inf,
 )
@@ -207,6 +231,7 @@ TF = Topic(
     _qos(100),  # as of tf2_ros
     "m, rad",
     ("robot_state",),
+    _VIEWERS,
     f"from `{FRAME}` to `link1`, `link2` and `effector`; only where the package tf2_msgs is installed",
 )
 OPERATOR_HEARTBEAT = Topic(
@@ -214,7 +239,8 @@ OPERATOR_HEARTBEAT = Topic(
     Bool,
     _qos(1, reliable=False, lifespan=0.5),
     "",
-    ("dead_mans_switch", "console", "operator_page"),
+    ("dead_mans_switch", *OPERATOR_NODES),
+    ("operator_watchdog", *OPERATOR_NODES),
     "`true` while the switch is pressed, at 20 Hz or much faster. Neither `false` nor a heartbeat that "
     "waited in a queue is a sign of life",
     _not_pressed,
@@ -225,6 +251,7 @@ OPERATOR_PRESENCE = Topic(
     _qos(1, lifespan=1.0),
     "",
     ("operator_watchdog",),
+    ("engine_controller", "operator_page"),
     "the operator was seen alive; `stamp` is the source time of that heartbeat. At most 2 Hz",
     longest_gap=1.0,
     follows=OPERATOR_HEARTBEAT.name,
@@ -235,6 +262,7 @@ OPERATOR_ACTIVITY = Topic(
     _EVENTS,
     "",
     ("operator_watchdog",),
+    OPERATOR_NODES,
     f"`{ALIVE}`, `{MISSED}`, `{INCAPACITATED}`: the watchdog's conclusions, for display only",
     _not_one_of(ALIVE, MISSED, INCAPACITATED),
     longest_gap=math.inf,
@@ -244,7 +272,8 @@ ENGINES = Topic(
     String,
     _EVENTS,
     "",
-    ("operator_watchdog", "dead_mans_switch", "console", "operator_page"),
+    ("operator_watchdog", "dead_mans_switch", *OPERATOR_NODES),
+    ("engine_controller", "dead_mans_switch", *OPERATOR_NODES),
     f"command `{TURN_OFF}` or `{TURN_ON}`",
     _not_one_of(TURN_OFF, TURN_ON),
     longest_gap=math.inf,
@@ -255,6 +284,7 @@ ENGINES_STATE = Topic(
     _qos(1, latched=True, lifespan=DRIVE_TIMEOUT),
     "",
     ("engine_controller",),
+    ("dead_mans_switch", *OPERATOR_NODES),
     f"`{ON}` or `{OFF}`, on every change and at 10 Hz: the drive accepts an `{ON}` for "
     f"{1000 * DRIVE_TIMEOUT:.0f} ms",
     _not_one_of(ON, OFF),
@@ -265,6 +295,7 @@ DIAGNOSTICS = Topic(
     _EVENTS,
     "",
     ("every service",),
+    ("sentinel", *OPERATOR_NODES),
     "health, at 1 Hz, and at once to a new subscriber",
     longest_gap=1.0,
 )
@@ -309,7 +340,8 @@ def _describe(qos: QoSProfile) -> str:
 
 def markdown() -> str:
     """Return the contract as the table that the README shows."""
-    lines = ["| topic | type | QoS | unit | published by | meaning |", "|---|---|---|---|---|---|"]
+    head = "| topic | type | QoS | unit | published by | read by | meaning |"
+    lines = [head, "|---|---|---|---|---|---|---|"]
     for topic in CONTRACT:
         row = (
             f"`{topic.name}`",
@@ -317,7 +349,23 @@ def markdown() -> str:
             _describe(topic.qos),
             topic.unit,
             ", ".join(topic.publishers),
+            ", ".join(topic.subscribers),
             topic.meaning,
         )
         lines.append(f"| {' | '.join(row)} |")
+    return "\n".join(lines) + "\n"
+
+
+def mermaid() -> str:
+    """
+    Return the graph of nodes and topics, without health, in the language of Mermaid.
+
+    What a node of the arm reads, the operator sees as well: those arrows are not drawn.
+    """
+    lines = ["flowchart LR"]
+    for topic in CONTRACT:
+        if topic is not DIAGNOSTICS:
+            readers = [node for node in topic.subscribers if node not in OPERATOR_NODES]
+            ends = (" & ".join(topic.publishers), " & ".join(readers or topic.subscribers))
+            lines.append(f"    {ends[0]} -- {topic.name} --> {ends[1]}")
     return "\n".join(lines) + "\n"

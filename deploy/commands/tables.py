@@ -1,4 +1,4 @@
-"""`make tables`: writes the tables of topics and parameters into interfaces/README.md."""
+"""`make tables`: writes the tables of topics and parameters, and the graph of the nodes, into the READMEs."""
 
 from __future__ import annotations
 
@@ -8,23 +8,26 @@ from pathlib import Path
 from deploy.running.parameter_file import USE_SIM_TIME, declared
 from interfaces import topics
 
-README = Path(__file__).resolve().parents[2] / "interfaces" / "README.md"
+ROOT = Path(__file__).resolve().parents[2]
 HEAD = (
     "| service | parameter | default | range | unit | settable | meaning |\n|---|---|---|---|---|---|---|\n"
 )
 
 
 def main() -> None:
-    """Bring the tables up to date."""
-    README.write_text(updated(README.read_text(encoding="utf-8")), encoding="utf-8")
+    """Bring tables and graph up to date."""
+    for page in PAGES:
+        path = ROOT / page
+        path.write_text(updated(page, path.read_text(encoding="utf-8")), encoding="utf-8")
 
 
-def updated(text: str) -> str:
-    """Return the text with the tables that the code states."""
-    for table in (topics.markdown(), parameters()):
-        head = re.escape(table[: table.index("\n") + 1])
-        text, count = re.subn(rf"{head}(\|.*\n)+", lambda _, table=table: table, text)  # type: ignore[misc]
-        assert count == 1, f"{README} has no table that begins with {table.splitlines()[0]}"
+def updated(page: str, text: str) -> str:
+    """Return the text of a page with what the code states."""
+    for part in PAGES[page]:
+        stated = part()
+        head, _, _ = stated.partition("\n")
+        text, count = re.subn(rf"{re.escape(head)}\n([| ].*\n)+", lambda _, new=stated: new, text)  # type: ignore[misc]
+        assert count == 1, f"{page} needs one part that begins with {head}"
     return text
 
 
@@ -38,6 +41,10 @@ def parameters() -> str:
         if each != USE_SIM_TIME
     ]
     return HEAD + "".join(rows)
+
+
+PAGES = {"interfaces/README.md": (topics.markdown, parameters), "services/README.md": (topics.mermaid,)}
+"""What is generated on each page."""
 
 
 def _shown(value: object) -> str:

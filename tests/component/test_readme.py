@@ -39,16 +39,10 @@ def test_first_page_is_one_screen() -> None:
     assert text_of("README.md").count("\n") <= 120
 
 
-def test_tables_are_current() -> None:
-    shown = text_of("interfaces/README.md")
-    assert shown == tables.updated(shown)
-
-
-def test_graph_shows_the_publishers_of_each_topic() -> None:
-    arrows = re.findall(r"^ +(\w+) -- (\S+) -->", text_of("services/README.md"), re.MULTILINE)
-    drawn = {(topic, publisher) for publisher, topic in arrows}
-    promised = {(topic.name, name) for topic in topics.CONTRACT for name in topic.publishers}
-    assert drawn == {pair for pair in promised if pair[0] != topics.DIAGNOSTICS.name}
+@pytest.mark.parametrize("page", tables.PAGES)
+def test_tables_and_graph_are_current(page: str) -> None:
+    shown = text_of(page)
+    assert shown == tables.updated(page, shown)
 
 
 @pytest.mark.parametrize("page", RECIPES)

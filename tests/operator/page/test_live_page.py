@@ -53,6 +53,7 @@ class Observer:
         self.heartbeats: list[float] = []
         self.engines = ""
         self._peer = Peer(domain)
+        self.node = self._peer.node
         self._subscribe(topics.OPERATOR_HEARTBEAT, lambda _: self.heartbeats.append(time.monotonic()))
         self._subscribe(topics.ENGINES_STATE, self._on_state)
 
@@ -104,6 +105,20 @@ def hold(hand: Hand, observer: Observer) -> None:
 
     observer.until(is_held)
     observer.watch(0.5)  # until the virtual switch is released as well
+
+
+def test_page_reads_and_publishes_what_the_contract_says(hand: Hand, observer: Observer) -> None:
+    hold(hand, observer)
+    node, names = observer.node, {topic.full_name("/"): topic for topic in topics.CONTRACT}
+    endpoints = {
+        "subscribers": node.get_subscriber_names_and_types_by_node,
+        "publishers": node.get_publisher_names_and_types_by_node,
+    }
+    for role, ask in endpoints.items():
+        named = {name for name, topic in names.items() if {PAGE, "every service"} & set(getattr(topic, role))}
+        observer.until(
+            lambda ask=ask, named=named: {name for name, _ in ask(PAGE, "/") if name in names} == named
+        )
 
 
 def test_release_is_visible_at_once(hand: Hand, observer: Observer) -> None:
