@@ -14,7 +14,6 @@ from interfaces.robot_model import BASE, frame_id
 from interfaces.topics import (
     CONFIGURATION,
     CONTRACT,
-    EFFECTOR_POSITION,
     EFFECTOR_SPEED,
     ENGINES,
     ENGINES_STATE,
@@ -32,15 +31,6 @@ from interfaces.topics import (
 
 WATCHDOG = OPERATOR_PRESENCE.publishers[0]
 CONTROLLER = ENGINES_STATE.publishers[0]
-
-HEARD: dict[str, tuple[Topic, ...]] = {
-    "kinematics": tuple(CONFIGURATION.values()),
-    "velocity": (EFFECTOR_POSITION,),
-    WATCHDOG: (OPERATOR_HEARTBEAT,),
-    CONTROLLER: (ENGINES, OPERATOR_PRESENCE),
-    "robot_state": tuple(CONFIGURATION.values()),
-}
-"""The topics that each replayed service hears."""
 
 Chain = tuple[str, ...]
 CHAINS: tuple[Chain, ...] = (
@@ -70,7 +60,7 @@ def inputs(record: Record, namespace: str, chain: Chain) -> list[tuple[Topic, li
     """
     made = outputs(chain)
     found = []
-    for topic in (topic for service in chain for topic in HEARD[service]):
+    for topic in (each for each in CONTRACT if set(each.subscribers) & set(chain)):
         if topic is ENGINES or topic not in made:
             sent = commands(record, namespace)[0] if topic is ENGINES else record.of(topic, namespace)
             heard = [each for each in sent if each.sent >= record.begin or is_latched(topic.qos)]
