@@ -97,8 +97,8 @@ def wire(node: ServiceNode) -> None:
 
     # Samples come equally long after a look, or the jitter would add to a silence.
     reading = given.sampling / math.ceil(given.sampling / min(READING, given.lifespan / 2))
-    heartbeats = node.observe(
-        topics.OPERATOR_HEARTBEAT, timestamped=True, sampled=reading, max_age=given.lifespan
+    heartbeats = node.observe_sampled(
+        topics.OPERATOR_HEARTBEAT, reading, timestamped=True, max_age=given.lifespan
     )
     first = min(FIRST_SAMPLE_AFTER_RESTART, given.sampling) if epoch.is_past else given.sampling
     # Silences count from the origin of the scenario: before it, no operator is expected.

@@ -103,7 +103,7 @@ def wire(node: ServiceNode) -> None:
     def seen(topic: topics.Topic) -> Observable[Any]:
         return observed[topic.name]
 
-    unseen = node.observe(UNSEEN, timestamped=True, sampled=UNSEEN_PERIOD)
+    unseen = node.observe_sampled(UNSEEN, UNSEEN_PERIOD, timestamped=True)
     engines = is_open.start_with(False).switch_map(lambda it: seen(topics.ENGINES_STATE) if it else unseen)
 
     def always_seen(topic: topics.Topic) -> Observable[Any]:

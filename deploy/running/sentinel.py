@@ -123,7 +123,7 @@ def wire(node: ServiceNode) -> None:
 
     # One wake-up for all reports and the processes: a dozen services report each second.
     looks = rx.timer(0.0, timeouts.period, node.scheduler).share()
-    reports = node.observe(DIAGNOSTICS, buffered=looks).map(lambda array: healths(array, namespace))
+    reports = node.observe_buffered(DIAGNOSTICS, looks).map(lambda array: healths(array, namespace))
     attempts = looks.map(observe).share()
     observations = attempts.filter(lambda it: it is not None)
     programs = observations.map(lambda observation: observation.programs)

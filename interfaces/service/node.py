@@ -76,18 +76,41 @@ class ServiceNode(ReactiveNode):
         topic: Topic,
         *,
         timestamped: bool = False,
-        sampled: float | None = None,
-        buffered: Observable[Any] | None = None,
-        max_age: float | None = None,
     ) -> Observable[Any]:
         """
         Return the good values of a topic (:attr:`Topic.value`); the others are dropped and reported.
 
         :param timestamped: see :meth:`ReactiveNode.create_observable`.
-        :param sampled: the same; not for a latched topic.
-        :param buffered: the same.
+        """
+        options = self._reading(topic, timestamped, None)
+        return self.create_observable(topic.type, topic.name, topic.qos, every_publisher=True, **options)
+
+    def observe_sampled(
+        self,
+        topic: Topic,
+        ticks: float | Observable[Any],
+        *,
+        timestamped: bool = False,
+        max_age: float | None = None,
+    ) -> Observable[Any]:
+        """
+        Return the newest value at each tick, if it is good.
+
+        See :meth:`ReactiveNode.create_sampled_observable`.
+
+        :param topic: not a latched one.
         :param max_age: a message that is older [s], or this much ahead of the local clock, is not good.
         """
+        options = self._reading(topic, timestamped, max_age)
+        return self.create_sampled_observable(topic.type, topic.name, ticks, topic.qos, **options)
+
+    def observe_buffered(self, topic: Topic, ticks: float | Observable[Any]) -> Observable[Any]:
+        """Return all good values at each tick: see :meth:`ReactiveNode.create_buffered_observable`."""
+        options = self._reading(topic, False, None)
+        return self.create_buffered_observable(topic.type, topic.name, ticks, topic.qos, **options)
+
+    def _reading(self, topic: Topic, timestamped: bool, max_age: float | None) -> dict[str, Any]:
+        """Return the options of an observable of the good values of a topic."""
         self._observed[self.resolve_topic_name(topic.name)] = topic
 
         type_, value_of, problem_of = topic.type, topic.value, topic.problem
@@ -109,17 +132,8 @@ class ServiceNode(ReactiveNode):
                 return None
             return received._replace(value=value) if timestamped else value
 
-        return self.create_observable(
-            topic.type,
-            topic.name,
-            topic.qos,
-            timestamped=with_time,
-            sampled=sampled,
-            buffered=buffered,
-            item=good,
-            every_publisher=sampled is None and buffered is None,
-            raw=True,  # rclpy on Cyclone DDS would deliver a truncated message as one of zeros
-        )
+        # Raw: rclpy on Cyclone DDS would deliver a truncated message as one of zeros.
+        return {"timestamped": with_time, "item": good, "raw": True}
 
     def publish(
         self,

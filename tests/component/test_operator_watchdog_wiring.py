@@ -101,11 +101,11 @@ def test_of_a_burst_of_heartbeats_the_newest_is_judged(
 def test_heartbeats_are_read_by_the_clock_before_they_are_old(
     wired: Any, monkeypatch: pytest.MonkeyPatch, sampling: float, lifespan: float, period: float
 ) -> None:
-    observe = mock.Mock(wraps=ServiceNode.observe)
-    monkeypatch.setattr(ServiceNode, "observe", lambda *given, **options: observe(*given, **options))
+    observe = mock.Mock(wraps=ServiceNode.observe_sampled)
+    monkeypatch.setattr(ServiceNode, "observe_sampled", lambda *given, **options: observe(*given, **options))
     wired(sampling=sampling, lifespan=lifespan)
     (call,) = (each for each in observe.mock_calls if each.args[1] is OPERATOR_HEARTBEAT)
-    assert call.kwargs["sampled"] == pytest.approx(period)
+    assert call.args[2] == pytest.approx(period)
     assert call.kwargs["max_age"] == lifespan
 
 

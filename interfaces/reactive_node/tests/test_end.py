@@ -23,8 +23,8 @@ except ModuleNotFoundError:  # ROS 2's wheels
 Create = Callable[[ReactiveNode], Observable[object]]
 OBSERVABLES: dict[str, Create] = {
     "topic": lambda node: node.create_observable(String, "topic"),
-    "sampled": lambda node: node.create_observable(String, "topic", sampled=0.1),
-    "buffered": lambda node: node.create_observable(String, "topic", buffered=0.1),
+    "sampled": lambda node: node.create_sampled_observable(String, "topic", 0.1),
+    "buffered": lambda node: node.create_buffered_observable(String, "topic", 0.1),
     "parameter": lambda node: node.create_parameter_observable("use_sim_time").ignore_elements(),
     "event": lambda node: node.create_event_observable(String, "topic", 10, "matched"),
     "call": lambda node: node.create_call(SetBool, "switch")(SetBool.Request()),

@@ -145,10 +145,10 @@ def test_tick_makes_items(
 ) -> None:
     ticks: Subject[None] = Subject()
     received: list[Any] = []
-    options = {reading: ticks}
-    node.create_observable(
-        Float64, "topic", timestamped=True, item=lambda it: half(it.value), **options
-    ).subscribe(received.append)
+    create = getattr(node, f"create_{reading}_observable")
+    create(Float64, "topic", ticks, timestamped=True, item=lambda it: half(it.value)).subscribe(
+        received.append
+    )
     publisher = peer.create_publisher(Float64, "topic", 10)
     spin_until(lambda: publisher.get_subscription_count() == 1)
     for data in (-1.0, 4.0):

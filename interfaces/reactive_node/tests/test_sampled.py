@@ -58,7 +58,7 @@ def test_tick_reads_the_newest_message_once(
     node: ReactiveNode, talker: Talker, ticks: Subject[None], spin_until: SpinUntil
 ) -> None:
     received: list[float] = []
-    topic = node.create_observable(Float64, "topic", sampled=ticks)
+    topic = node.create_sampled_observable(Float64, "topic", ticks)
     topic.map(lambda message: message.data).subscribe(received.append)
     talker.await_readers(2)
 
@@ -79,7 +79,7 @@ def test_tick_of_a_buffer_reads_all_messages_once(
     node: ReactiveNode, talker: Talker, ticks: Subject[None], spin_until: SpinUntil
 ) -> None:
     received: list[float] = []
-    topic = node.create_observable(Float64, "topic", 3, buffered=ticks)
+    topic = node.create_buffered_observable(Float64, "topic", ticks, 3)
     topic.map(lambda message: message.data).subscribe(received.append)
     talker.await_readers(2)
 
@@ -102,7 +102,7 @@ def test_period_ticks_at_once_and_by_the_scheduler_of_the_node(
     subscription.handle.take_message.return_value = (Float64(), {"source_timestamp": 0})
     reads: list[float] = []
     with mock.patch.multiple(node, create_subscription=lambda *_, **__: subscription, scheduler=scheduler):
-        topic = node.create_observable(Float64, "topic", sampled=0.2)
+        topic = node.create_sampled_observable(Float64, "topic", 0.2)
         topic.subscribe(lambda _: reads.append(scheduler.clock))
         scheduler.advance_to(0.5)
     assert reads == pytest.approx([0.0, 0.2, 0.4])
@@ -112,7 +112,7 @@ def test_message_comes_with_its_source_time(
     node: ReactiveNode, talker: Talker, ticks: Subject[None], spin_until: SpinUntil
 ) -> None:
     received: list[Any] = []
-    node.create_observable(Float64, "topic", sampled=ticks, timestamped=True).subscribe(received.append)
+    node.create_sampled_observable(Float64, "topic", ticks, timestamped=True).subscribe(received.append)
     talker.await_readers(2)
     before = datetime.now(UTC)
     talker.say(1.0)
@@ -127,7 +127,7 @@ def test_raw_message_stays_serialized(
     node: ReactiveNode, talker: Talker, ticks: Subject[None], spin_until: SpinUntil
 ) -> None:
     received: list[Any] = []
-    node.create_observable(Float64, "topic", sampled=ticks, raw=True).subscribe(received.append)
+    node.create_sampled_observable(Float64, "topic", ticks, raw=True).subscribe(received.append)
     talker.await_readers(2)
     talker.say(1.0)
     spin_until(lambda: ticks.on_next(NOW) or received)
@@ -137,7 +137,7 @@ def test_raw_message_stays_serialized(
 def test_observers_share_a_reader_that_ends_with_the_last(
     node: ReactiveNode, talker: Talker, ticks: Subject[None], spin_until: SpinUntil
 ) -> None:
-    topic = node.create_observable(Float64, "topic", sampled=ticks)
+    topic = node.create_sampled_observable(Float64, "topic", ticks)
     assert node.count_subscribers("topic") <= 1, "none but the talker's own"
     received: tuple[list[Any], list[Any]] = ([], [])
     first, second = (topic.subscribe(each.append) for each in received)
@@ -161,7 +161,7 @@ def test_observers_share_a_reader_that_ends_with_the_last(
 
 def test_end_of_the_node_completes_it(node: ReactiveNode, ticks: Subject[None]) -> None:
     ended: list[str] = []
-    topic = node.create_observable(Float64, "topic", sampled=ticks)
+    topic = node.create_sampled_observable(Float64, "topic", ticks)
     topic.subscribe(on_completed=lambda: ended.append("early"))
     node.destroy_node()
     topic.subscribe(on_completed=lambda: ended.append("late"))
@@ -172,7 +172,7 @@ def test_end_of_the_node_completes_it(node: ReactiveNode, ticks: Subject[None]) 
 @pytest.mark.parametrize("end", ["on_completed", "on_error"])
 def test_end_of_the_ticks_is_its_end(node: ReactiveNode, ticks: Subject[None], end: str) -> None:
     ended: list[str] = []
-    node.create_observable(Float64, "topic", sampled=ticks).subscribe(
+    node.create_sampled_observable(Float64, "topic", ticks).subscribe(
         on_error=lambda _: ended.append("on_error"), on_completed=lambda: ended.append("on_completed")
     )
     assert list(node.subscriptions)
@@ -189,7 +189,7 @@ def test_topic_is_read_again_after_the_end_of_the_ticks(
     last: Subject[None] = Subject()
     first: Subject[None] = Subject()
     remaining = [first, last]
-    topic = node.create_observable(Float64, "topic", sampled=rx.defer(lambda _: remaining.pop(0)))
+    topic = node.create_sampled_observable(Float64, "topic", rx.defer(lambda _: remaining.pop(0)))
     received: list[float] = []
     again = topic.catch(lambda _, source: source) if end == "on_error" else topic.concat(topic)
     give_end = partial(getattr(first, end), *([ValueError()] if end == "on_error" else []))
@@ -208,10 +208,10 @@ def test_topic_is_read_again_after_the_end_of_the_ticks(
 def test_retry_reads_on_after_an_error_of_the_item(
     node: ReactiveNode, talker: Talker, ticks: Subject[None], spin_until: SpinUntil, how: str
 ) -> None:
-    options: dict[str, Any] = {how: ticks, "item": lambda message: 1.0 / message.data}
+    create = getattr(node, f"create_{how}_observable")
     received: list[float] = []
     errors: list[Exception] = []
-    topic = node.create_observable(Float64, "topic", **options)
+    topic = create(Float64, "topic", ticks, item=lambda message: 1.0 / message.data)
     topic.do_action(on_error=errors.append).retry().subscribe(received.append)
     talker.await_readers(2)
     talker.say(0.0)
@@ -225,7 +225,7 @@ def test_item_of_none_is_no_item(
     node: ReactiveNode, talker: Talker, ticks: Subject[None], spin_until: SpinUntil
 ) -> None:
     received: list[float] = []
-    topic = node.create_observable(Float64, "topic", buffered=ticks, item=lambda it: it.data or None)
+    topic = node.create_buffered_observable(Float64, "topic", ticks, item=lambda it: it.data or None)
     topic.subscribe(received.append)
     talker.await_readers(2)
     talker.say(0.0, 1.0)
@@ -237,32 +237,18 @@ def test_reader_that_cannot_be_created_is_an_error_of_each_observer(
     node: ReactiveNode, ticks: Subject[None]
 ) -> None:
     errors: list[Exception] = []
-    topic = node.create_observable(int, "topic", sampled=ticks)
+    topic = node.create_sampled_observable(int, "topic", ticks)
     topic.subscribe(on_error=errors.append)
     topic.subscribe(on_error=errors.append)
     assert [type(error) for error in errors] == [AttributeError, AttributeError]
     assert errors[0] is not errors[1], "each observer tries again"
 
 
-@pytest.mark.parametrize(
-    ("options", "problem"),
-    [
-        ({"sampled": 0.1, "buffered": 0.1}, "sampled, buffered and every_publisher exclude each other"),
-        (
-            {"sampled": 0.1, "every_publisher": True},
-            "sampled, buffered and every_publisher exclude each other",
-        ),
-        ({"sampled": 0.0}, "a period of 0.0 s is no positive number"),
-        ({"buffered": -1}, "a period of -1 s is no positive number"),
-        ({"sampled": float("nan")}, "a period of nan s is no positive number"),
-        ({"buffered": float("inf")}, "a period of inf s is no positive number"),
-    ],
-)
-def test_arguments_that_would_be_ignored_are_refused(
-    node: ReactiveNode, options: dict[str, Any], problem: str
-) -> None:
-    with pytest.raises(ValueError, match=f"^topic: {problem}$"):
-        node.create_observable(Float64, "topic", **options)
+@pytest.mark.parametrize("period", [0.0, -1, float("nan"), float("inf")])
+@pytest.mark.parametrize("how", ["sampled", "buffered"])
+def test_period_must_be_a_positive_number(node: ReactiveNode, how: str, period: float) -> None:
+    with pytest.raises(ValueError, match=f"^topic: a period of {period} s is no positive number$"):
+        getattr(node, f"create_{how}_observable")(Float64, "topic", period)
 
 
 @pytest.mark.parametrize("option", ["callback_group", "event_callbacks"])
@@ -270,7 +256,7 @@ def test_options_that_would_attend_the_reader_are_refused(
     node: ReactiveNode, ticks: Subject[None], option: str
 ) -> None:
     errors: list[Exception] = []
-    topic = node.create_observable(Float64, "topic", sampled=ticks, **{option: mock.Mock()})
+    topic = node.create_sampled_observable(Float64, "topic", ticks, **{option: mock.Mock()})
     topic.subscribe(on_error=errors.append)
     assert option in str(errors[0])
 
@@ -278,7 +264,7 @@ def test_options_that_would_attend_the_reader_are_refused(
 def test_other_thread_may_dispose_while_it_is_read(node: ReactiveNode, talker: Talker) -> None:
     for _ in range(50):
         ticks: Subject[None] = Subject()
-        subscription = node.create_observable(Float64, "topic", sampled=ticks).subscribe()
+        subscription = node.create_sampled_observable(Float64, "topic", ticks).subscribe()
         reader = threading.Thread(target=lambda ticks=ticks: [ticks.on_next(NOW) for _ in range(20)])
         reader.start()
         subscription.dispose()
@@ -304,7 +290,7 @@ def test_reading_goes_on_after_a_malformed_message(
     node: ReactiveNode, peer: Node, ticks: Subject[None], spin_until: SpinUntil
 ) -> None:
     received: list[Any] = []
-    node.create_observable(String, "text", sampled=ticks).subscribe(received.append)
+    node.create_sampled_observable(String, "text", ticks).subscribe(received.append)
     publisher = peer.create_publisher(String, "text", 10)
     spin_until(lambda: publisher.get_subscription_count() == 1)
     publisher.publish(b"\x00\x01\x00\x00\xff\xff\xff\x7f")
@@ -316,7 +302,7 @@ def test_reading_goes_on_after_a_malformed_message(
 def test_flood_wakes_no_executor(
     node: ReactiveNode, talker: Talker, ticks: Subject[None], executor: SingleThreadedExecutor
 ) -> None:
-    node.create_observable(Float64, "topic", sampled=ticks).subscribe()
+    node.create_sampled_observable(Float64, "topic", ticks).subscribe()
     talker.await_readers(2)
     (subscription,) = (each for each in node.subscriptions if each.topic_name == "/topic")
     subscription.callback = lambda _: pytest.fail("the executor has taken a message")
@@ -342,7 +328,7 @@ def test_ticks_of_the_user_run_on_the_scheduler_of_the_observer(
     node: ReactiveNode, talker: Talker, spin_until: SpinUntil
 ) -> None:
     threads: list[int] = []
-    topic = node.create_observable(Float64, "topic", sampled=rx.interval(0.01))
+    topic = node.create_sampled_observable(Float64, "topic", rx.interval(0.01))
     topic.subscribe(lambda _: threads.append(threading.get_ident()), scheduler=node.scheduler)
     talker.await_readers(2)
     spin_until(lambda: talker.publisher.publish(Float64()) or threads)
@@ -358,7 +344,7 @@ def test_reader_keeps_the_other_policies_of_its_topic_and_has_no_events(
         reliability=ReliabilityPolicy.BEST_EFFORT,
         durability=DurabilityPolicy.TRANSIENT_LOCAL,
     )
-    node.create_observable(Float64, "topic", qos, sampled=ticks).subscribe()
+    node.create_sampled_observable(Float64, "topic", ticks, qos).subscribe()
     (subscription,) = (each for each in node.subscriptions if each.topic_name == "/topic")
     used = subscription.qos_profile
     assert (used.history, used.depth) == (HistoryPolicy.KEEP_LAST, 1)

@@ -29,7 +29,7 @@ from reactivex.subject import BehaviorSubject
 from reactive_node import calls
 from reactive_node.end import End
 from reactive_node.message_reader import MessageReader
-from reactive_node.sampled_reader import BUFFER, SampledReader, newest
+from reactive_node.sampled_reader import BUFFER, SampledReader, keep_last
 from reactive_node.scheduler import NodeScheduler
 from reactive_node.services import Requests
 from reactive_node.shared_reader import SharedReader
@@ -57,8 +57,6 @@ class ReactiveNode(Node):
         qos_profile: QoSProfile | int = 10,
         *,
         timestamped: bool = False,
-        sampled: float | Observable[Any] | None = None,
-        buffered: float | Observable[Any] | None = None,
         item: Callable[[Any], Any] | None = None,
         every_publisher: bool = False,
         **options: Any,
@@ -78,31 +76,15 @@ class ReactiveNode(Node):
 
         :param timestamped: whether items are :class:`Timestamp` s of a message and its DDS source time,
             instead of messages.
-        :param sampled: like the argument of the operator ``sample``, a period [s] or an observable of ticks.
-            At each tick the newest message becomes an item, if it has come since the tick before. What comes
-            in between costs no Python: the reader keeps one message, and only a tick reads it. Late observers
-            get no retained samples, and QoS events are not warned of.
-        :param buffered: the same for topics where each message counts: at each tick, all messages become
-            items that have come since the tick before, one after the other. The reader keeps 1000.
         :param item: turns each message, with ``timestamped`` each Timestamp, into the item, once for all
             observers and at less cost than the operator ``map``; if it returns ``None``, there is none.
         :param every_publisher: whether a transient-local topic also delivers the messages of volatile
             publishers, such as those of ``ros2 topic pub``: from the first one on, a second reader listens to
             them. Without effect on other topics.
-        :param options: further arguments of :meth:`rclpy.node.Node.create_subscription`; with ``sampled`` or
-            ``buffered`` without ``callback_group`` and ``event_callbacks``, with ``every_publisher`` without
-            ``event_callbacks`` and, as by default, with a mutually exclusive callback group.
-        :raises ValueError: if more than one of ``sampled``, ``buffered`` and ``every_publisher`` is given, or
-            a period that is no positive number.
+        :param options: further arguments of :meth:`rclpy.node.Node.create_subscription`; with
+            ``every_publisher`` without ``event_callbacks`` and, as by default, with a mutually exclusive
+            callback group.
         """
-        if sum([sampled is not None, buffered is not None, every_publisher]) > 1:
-            raise ValueError(f"{topic}: sampled, buffered and every_publisher exclude each other")
-        if sampled is not None:
-            qos = newest(qos_profile, 1)
-            return self._create_sampled(msg_type, topic, qos, timestamped, item, sampled, options)
-        if buffered is not None:
-            qos = newest(qos_profile, BUFFER)
-            return self._create_sampled(msg_type, topic, qos, timestamped, item, buffered, options)
 
         def create_reader(callback: Callable[..., None], qos: QoSProfile | int, **given: Any) -> Subscription:
             return self.create_subscription(msg_type, topic, callback, qos, **given, **options)
@@ -119,22 +101,61 @@ class ReactiveNode(Node):
         )
         return Observable(reader.subscribe)
 
-    def _create_sampled(
+    def create_sampled_observable(
         self,
         msg_type: Any,
         topic: str,
-        qos: QoSProfile,
-        timestamped: bool,
-        item: Callable[[Any], Any] | None,
-        period: float | Observable[Any],
-        options: dict[str, Any],
+        ticks: float | Observable[Any],
+        qos_profile: QoSProfile | int = 10,
+        **options: Any,
     ) -> Observable[Any]:
-        if isinstance(period, Observable):
-            ticks = period
-        elif 0 < period < math.inf:
-            ticks = rx.timer(0.0, period, self.scheduler)
-        else:
-            raise ValueError(f"{topic}: a period of {period} s is no positive number")
+        """
+        Return the newest message of a topic at each tick, if it has come since the tick before.
+
+        It is for topics where only the latest message counts (``sample`` of thesis 4.2). What comes between
+        two ticks costs no Python: the reader keeps one message, and only a tick reads it. Cold and shared
+        like :meth:`create_observable`; but late observers get no retained messages, and QoS events are not
+        warned of. It ends as the ticks do.
+
+        :param ticks: a period [s] on :attr:`scheduler`, with a tick at once, or an observable of ticks.
+        :param qos_profile: its history is replaced.
+        :param options: ``timestamped`` and ``item`` of :meth:`create_observable`, and further arguments of
+            :meth:`rclpy.node.Node.create_subscription`, without ``callback_group`` and ``event_callbacks``.
+        :raises ValueError: for a period that is no positive number.
+        """
+        return self._read_at(ticks, msg_type, topic, keep_last(qos_profile, 1), **options)
+
+    def create_buffered_observable(
+        self,
+        msg_type: Any,
+        topic: str,
+        ticks: float | Observable[Any],
+        qos_profile: QoSProfile | int = 10,
+        **options: Any,
+    ) -> Observable[Any]:
+        """
+        Return at each tick all messages of a topic that have come since the tick before, one by one.
+
+        It is for topics where each message counts, but not at once. The reader keeps 1000 messages. All else,
+        errors included, is as of :meth:`create_sampled_observable`.
+        """
+        return self._read_at(ticks, msg_type, topic, keep_last(qos_profile, BUFFER), **options)
+
+    def _read_at(
+        self,
+        ticks: float | Observable[Any],
+        msg_type: Any,
+        topic: str,
+        qos: QoSProfile,
+        *,
+        timestamped: bool = False,
+        item: Callable[[Any], Any] | None = None,
+        **options: Any,
+    ) -> Observable[Any]:
+        if not isinstance(ticks, Observable):
+            if not 0 < ticks < math.inf:
+                raise ValueError(f"{topic}: a period of {ticks} s is no positive number")
+            ticks = rx.timer(0.0, ticks, self.scheduler)
 
         def create_reader(**given: Any) -> Subscription:
             return self.create_subscription(msg_type, topic, lambda _: None, qos, **given, **options)

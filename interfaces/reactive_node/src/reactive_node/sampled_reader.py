@@ -37,7 +37,7 @@ class Unattended(CallbackGroup):
         """Do nothing."""
 
 
-def newest(qos_profile: QoSProfile | int, count: int) -> QoSProfile:
+def keep_last(qos_profile: QoSProfile | int, count: int) -> QoSProfile:
     """Return a QoS whose reader keeps so many messages."""
     qos = QoSProfile(depth=qos_profile) if isinstance(qos_profile, int) else copy.copy(qos_profile)
     qos.history = HistoryPolicy.KEEP_LAST
