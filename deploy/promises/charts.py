@@ -21,9 +21,9 @@ from deploy.promises.history import (
     History,
     InjectedFault,
     Sample,
+    running,
     target_name,
 )
-from deploy.promises.safety import running
 
 LEFT, ROW, BAR = 150, 26, 14  # px: labels, rows, bars
 PER_SECOND, PER_SECOND_LONG, NARROWEST = 8.0, 3.0, 1000.0  # px of a timeline

@@ -195,6 +195,17 @@ def last_sent(samples: Sequence[Sample], time: float) -> Sample | None:
     return samples[index - 1] if index else None
 
 
+def running(history: History) -> Iterator[tuple[float, float]]:
+    """Yield when the engines run: from each `on` until the next state, at most until the drive stops them."""
+    states = history.stream(topics.ENGINES_STATE)
+    stuck = [(fault.begin, fault.end) for fault in history.faults if fault.kind == STUCK_DRIVE]
+    for state, following in itertools.zip_longest(states, states[1:]):
+        if state.value == topics.ON:
+            stop = state.sent + topics.DRIVE_TIMEOUT
+            stop = next((end for begin, end in stuck if begin <= stop < end), stop)
+            yield state.sent, min(following.sent if following else history.end, stop)
+
+
 def gaps(times: Iterable[float], begin: float, end: float) -> Iterable[tuple[float, float]]:
     """Yield the intervals into which the sorted ``times`` divide the one from ``begin`` to ``end``."""
     last = begin

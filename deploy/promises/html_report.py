@@ -8,8 +8,8 @@ from html import escape
 from deploy.promises.charts import COLORS, STYLE, histograms, timeline
 from deploy.promises.findings import UNKNOWN, VIOLATED, Finding, count, overall
 from deploy.promises.history import ALL, NO_TARGET, History, InjectedFault, Life, target_name
-from deploy.promises.liveness import HUNG, MEDIAN, SLOWEST
-from deploy.promises.promises import DURATIONS, meaning
+from deploy.promises.limits import DURATIONS
+from deploy.promises.promises import meaning
 
 SHOWN = 10  # pieces of evidence of a promise
 EFFECT = 5.0  # s after a fault in which the end of a process is its effect, unless another fault follows
@@ -62,9 +62,9 @@ def page(title: str, remarks: Sequence[str], findings: Sequence[Finding], histor
     ]
     for finding in findings:
         if finding.times:
-            bounds = (MEDIAN, SLOWEST) if finding.promise == "L1" else (HUNG,)
-            picture = histograms(finding.times, bounds)
-            lines.append(f"<h2>{DURATIONS[finding.promise]}</h2><div class=card>{picture}</div>")
+            durations = DURATIONS[finding.promise]
+            picture = histograms(finding.times, durations.limits)
+            lines.append(f"<h2>{durations.title}</h2><div class=card>{picture}</div>")
     return "\n".join(lines) + "\n"
 
 

@@ -23,15 +23,12 @@ from deploy.promises.history import (
     InjectedFault,
     between,
 )
+from deploy.promises.limits import GAP, GONE, HUNG, MEDIAN, SLOWEST
 from deploy.promises.positions import PublishedValues, may_have_missed_values, may_have_reached_only_some
 from interfaces import topics
 
-MEDIAN, SLOWEST = 1.0, 2.0  # s, L1
 SAMPLES = 3  # the least number of cases for a median
 KILLING = 1.0  # s from the injection to the death of the process
-GAP = 0.25  # s, L2
-HUNG = 5.0  # s, L4
-GONE = 10.0  # s of silence that nothing excuses
 SETTLED = 0.5  # s after a recovery until all programs downstream are right
 FLOWING = 1.2  # s before a fault in which a program must have had output, or the fault is no case
 

@@ -21,9 +21,6 @@ CHECKERS: dict[str, Callable[[History], Finding]] = {
     "L4": liveness.hung_is_replaced,
 }
 
-DURATIONS = {"L1": "Silence after SIGKILL [s]", "L4": "Silence after a hang [s]"}
-"""The titles of the durations that a finding on these promises lists."""
-
 
 def overloads(history: History, findings: Sequence[Finding]) -> str:
     """Return how often the machine or the observer was overloaded, and which verdicts that weakens."""

@@ -17,7 +17,6 @@ from deploy.promises.history import (
     OVERLOAD,
     PARTITION,
     REDISCOVERY,
-    STUCK_DRIVE,
     SUSPENDING,
     SWITCH,
     WATCHDOG,
@@ -28,16 +27,14 @@ from deploy.promises.history import (
     gaps,
     last_sent,
     merged,
+    running,
 )
+from deploy.promises.limits import MAX_PRESENCE_AGE, OFF_WITHIN, PRESENCE_TIMEOUT, STRIKE, STRIKES
 from deploy.promises.marks import SPREAD, STEP
 from deploy.promises.positions import LONGEST_PAUSE, PublishedValues, may_have_missed_values
 from interfaces import topics
 from interfaces.topics import DRIVE_TIMEOUT, INCAPACITATED, OFF, ON, TURN_OFF, TURN_ON
 
-OFF_WITHIN = 10.5  # s, S1
-MAX_PRESENCE_AGE = 1.0  # s, S3
-PRESENCE_TIMEOUT = 10.0  # s without a presence after which the controller turns the engines off
-STRIKE, STRIKES = 3.0, 3  # s; silences after which the operator watchdog turns the engines off
 SAMPLING = 0.5  # s by which the watchdog may date the beginning of a silence too early
 TRANSPORT = 0.15  # s that a message may take on a busy machine
 BAD_TRANSPORT = 0.6  # s that it may take on a bad line
@@ -161,17 +158,6 @@ def single_instances(history: History) -> Finding:
         cases += len(lives) - 1
         evidence += [_two(a, b) for a, b in _overlapping(history, lives)]
     return Finding("S5", cases, f"restarts and duplicates: {cases}", sorted(evidence), unknown)
-
-
-def running(history: History) -> Iterator[tuple[float, float]]:
-    """Yield when the engines run: from each `on` until the next state, at most until the drive stops them."""
-    states = history.stream(topics.ENGINES_STATE)
-    stuck = [(fault.begin, fault.end) for fault in history.faults if fault.kind == STUCK_DRIVE]
-    for state, following in itertools.zip_longest(states, states[1:]):
-        if state.value == ON:
-            stop = state.sent + DRIVE_TIMEOUT
-            stop = next((end for begin, end in stuck if begin <= stop < end), stop)
-            yield state.sent, min(following.sent if following else history.end, stop)
 
 
 def _overlapping_part(

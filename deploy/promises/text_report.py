@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from deploy.promises.findings import VIOLATED, Finding, percentile
-from deploy.promises.promises import DURATIONS, meaning
+from deploy.promises.limits import DURATIONS
+from deploy.promises.promises import meaning
 from deploy.running.columns import table
 
 SHOWN = 5  # pieces of evidence of a promise
@@ -25,7 +26,7 @@ def text(findings: Sequence[Finding]) -> str:
     for finding in findings:
         if finding.times:
             rows = table([DURATIONS_HEADER, *_durations(finding)])
-            blocks.append(f"{DURATIONS[finding.promise]}\n{rows}")
+            blocks.append(f"{DURATIONS[finding.promise].title}\n{rows}")
     return "\n\n".join(blocks)
 
 

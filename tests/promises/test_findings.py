@@ -26,9 +26,10 @@ from deploy.promises.history import (
     Life,
     Sample,
 )
+from deploy.promises.limits import PRESENCE_TIMEOUT
 from deploy.promises.marks import STEP
 from deploy.promises.promises import CHECKERS
-from deploy.promises.safety import PRESENCE_TIMEOUT, SAMPLING, TRANSPORT
+from deploy.promises.safety import SAMPLING, TRANSPORT
 from interfaces.topics import ALIVE, DRIVE_TIMEOUT, INCAPACITATED, MISSED, OFF, ON, TURN_OFF, TURN_ON
 
 TOPICS = {

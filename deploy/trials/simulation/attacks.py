@@ -37,9 +37,11 @@ from deploy.promises.history import (
     between,
     gaps,
     last_sent,
+    running,
 )
+from deploy.promises.limits import OFF_WITHIN, STRIKE, STRIKES
 from deploy.promises.marks import STEP
-from deploy.promises.safety import OFF_WITHIN, SAMPLING, STRIKE, STRIKES, running
+from deploy.promises.safety import SAMPLING
 from deploy.trials.chaos.schedule import PlannedFault
 from deploy.trials.chaos.schedule_file import Shift
 from interfaces import topics

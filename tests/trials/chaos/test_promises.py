@@ -5,11 +5,11 @@ from __future__ import annotations
 import pytest
 
 from deploy.promises.findings import HOLDS
-from deploy.promises.history import PROGRAMS, SILENCE, Sample, between
-from deploy.promises.liveness import SLOWEST
+from deploy.promises.history import PROGRAMS, SILENCE, Sample, between, running
+from deploy.promises.limits import OFF_WITHIN, SLOWEST
 from deploy.promises.marks import STEP
 from deploy.promises.promises import CHECKERS
-from deploy.promises.safety import OFF_WITHIN, TRANSPORT, running
+from deploy.promises.safety import TRANSPORT
 from deploy.trials.chaos.clock import missing
 from interfaces.topics import DRIVE_TIMEOUT, ENGINES, OPERATOR_HEARTBEAT, OPERATOR_PRESENCE
 

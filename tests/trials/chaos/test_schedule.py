@@ -7,7 +7,7 @@ from itertools import pairwise
 import pytest
 
 from deploy.promises.history import PROGRAMS
-from deploy.promises.liveness import MEDIAN
+from deploy.promises.limits import MEDIAN
 from deploy.trials.chaos import schedule
 from deploy.trials.chaos.faults import FAULT_KINDS
 
