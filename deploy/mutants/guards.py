@@ -90,6 +90,7 @@ GUARDS: dict[str, tuple[str, ...]] = {
         "tests/component/test_readme.py",
     ),
     "deploy/promises/history.py": ("tests/promises/test_history.py", *_CHECKERS),
+    "deploy/promises/effects.py": ("tests/promises/test_effects.py", *_CHECKERS),
     "deploy/promises/promises.py": ("tests/promises/test_checkers.py", "tests/promises/test_reports.py"),
     "deploy/promises/safety.py": _CHECKERS,
     "deploy/promises/liveness.py": _CHECKERS,

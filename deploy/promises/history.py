@@ -16,11 +16,11 @@ from deploy.running import manifest
 from interfaces import topics
 
 PROGRAMS = tuple(program.name for program in manifest.programs())
-SWITCH = topics.OPERATOR_HEARTBEAT.publishers[0]
-WATCHDOG = topics.OPERATOR_PRESENCE.publishers[0]
-CONTROLLER = topics.ENGINES_STATE.publishers[0]
-KINEMATICS = topics.EFFECTOR_POSITION.publishers[0]
-SOURCES = tuple(topic.publishers[0] for topic in topics.CONFIGURATION.values())
+SWITCH, WATCHDOG, CONTROLLER = "dead_mans_switch", "operator_watchdog", "engine_controller"
+KINEMATICS, ROBOT_STATE = "kinematics", "robot_state"
+SENTINEL = manifest.SENTINEL
+SOURCES = tuple(f"config_{name}" for name in topics.CONFIGURATION)
+"""The publishers of the configuration, in its order."""
 
 OPERATOR, ALL, NO_TARGET = "operator", "all", "nothing"
 """Targets of faults besides programs: the operator, the whole arm, and no part of the arm."""
@@ -40,7 +40,6 @@ STUCK_DRIVE = "stuck_drive"
 """The drive keeps its last command, whether it is repeated or not (F3)."""
 HOLD = "hold"
 """The messages that are sent on a topic in this time arrive together at its end; the topic is the target."""
-REDISCOVERY = 10.0  # s after a partition until the hosts have discovered each other again
 
 SUSPENDING = ("stop", "hang", "hog", "slow")
 """Faults in which a process receives nothing until it continues or is replaced."""
@@ -70,7 +69,6 @@ DEPENDENTS = {
 """The programs whose output stops when that of a program stops, or when the operator releases the switch."""
 
 
-ROBOT_STATE = topics.JOINT_STATES.publishers[0]
 NEEDED_AT_START = dict.fromkeys((KINEMATICS, ROBOT_STATE), SOURCES)
 """The programs without which a program has no output after a restart: it needs a value from each of them."""
 
@@ -109,10 +107,6 @@ class InjectedFault(NamedTuple):
     """The process that was hit; 0 if the target is not a program, or had no process."""
     ahead: float = 0.0
     """By how much the arm's time of day is ahead of the machine's from then on [s]."""
-
-    def overlaps(self, begin: float, end: float) -> bool:
-        """Return whether the fault was active at any time between two times."""
-        return self.begin < end and self.end > begin
 
 
 @dataclass(frozen=True)
@@ -158,23 +152,6 @@ class History:
         target = (fault.target, fault.pid)
         ends = [life.ended for life in self.lives if (life.program, life.pid) == target and life.ended]
         return min([fault.end, *ends])
-
-    def may_have_missed(self, begin: float, end: float) -> bool:
-        """Return whether the observer may have missed messages between two times."""
-        return any(True for _ in self._blind(begin, end))
-
-    def missed(self, begin: float, end: float) -> float:
-        """Return how long [s] between two times the observer may have missed messages."""
-        blind = merged((max(begin, f.begin), min(end, f.end)) for f in self._blind(begin, end))
-        return sum(two - one for one, two in blind)
-
-    @property
-    def overloads(self) -> list[tuple[float, float]]:
-        """Begin and end of each time in which the machine or the observer was overloaded."""
-        return merged((fault.begin, fault.end) for fault in self.faults if fault.kind == OVERLOAD)
-
-    def _blind(self, begin: float, end: float) -> Iterator[InjectedFault]:
-        return (f for f in self.faults if f.kind in (OVERLOAD, LOSS) and f.overlaps(begin, end))
 
 
 def target_name(target: str) -> str:

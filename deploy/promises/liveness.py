@@ -5,51 +5,58 @@ from __future__ import annotations
 import itertools
 import math
 from bisect import bisect_left, bisect_right
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
+from deploy.promises.effects import (
+    BEFORE,
+    CUT_OFF,
+    FLOWING,
+    KILLING,
+    LASTING,
+    MISSED,
+    SETTLED,
+    SILENT,
+    UNWATCHED,
+    WAITING,
+    Effect,
+    disturbed_for,
+    effects,
+    undisturbed,
+)
 from deploy.promises.findings import Evidence, Finding, count, percentile
 from deploy.promises.history import (
     ALL,
     DEPENDENTS,
     KINEMATICS,
-    NEEDED_AT_START,
     OUTPUTS,
-    PARTITION,
     PROGRAMS,
-    REDISCOVERY,
     SOURCES,
-    SWITCH,
     History,
     InjectedFault,
     between,
+    last_sent,
 )
 from deploy.promises.limits import GAP, GONE, HUNG, MEDIAN, SLOWEST
-from deploy.promises.positions import PublishedValues, may_have_missed_values, may_have_reached_only_some
+from deploy.promises.positions import PublishedValues, may_lack_values
 from interfaces import topics
 
 SAMPLES = 3  # the least number of cases for a median
-KILLING = 1.0  # s from the injection to the death of the process
-SETTLED = 0.5  # s after a recovery until all programs downstream are right
-FLOWING = 1.2  # s before a fault in which a program must have had output, or the fault is no case
 
-SENTINEL = "sentinel"  # replaces hung processes
 STREAMS = tuple(program for program, topic in OUTPUTS.items() if topic.longest_gap <= GAP)
-OBSCURED = dict.fromkeys(("flood", "babble"), (SWITCH, *DEPENDENTS[SWITCH]))
-"""The programs whose output cannot be distinguished from injected messages, by kind of fault."""
 MOMENTARY = ("kill", "terminate", "raise")
-LASTING = ("stop", "hang", "hog", "slow", "crash_loop", "kill_all", "kill_supervisor")
 
 
 def output_resumes(history: History) -> Finding:
     """L1: after SIGKILL of any service its output flows again: p50 ≤ 1.0 s, p99 ≤ 2.0 s."""
     times: dict[str, list[float]] = {}
+    found = effects(history)
     evidence, unknown = [], 0
     for fault in _kills(history):
         time = _recovery(history, fault)
         if (
             time is None
-            or _is_disturbed(history, fault, fault.begin, fault.begin + min(time, SLOWEST))
-            or any(_paused(history, fault, time, bound) for bound in (MEDIAN, SLOWEST))
+            or not _is_alone(found, fault, fault.begin, fault.begin + min(time, SLOWEST))
+            or any(_paused(found, fault, time, bound) for bound in (MEDIAN, SLOWEST))
         ):
             unknown += 1
         else:
@@ -60,7 +67,7 @@ def output_resumes(history: History) -> Finding:
     for program, values in times.items():
         if len(values) >= SAMPLES and (median := percentile(values, 50)) > MEDIAN:
             evidence.append(Evidence(0.0, f"{program}: the median silence after SIGKILL is {median:.2f} s"))
-    evidence += _silent_for_good(history)
+    evidence += _silent_for_good(history, found)
     every = [time for values in times.values() for time in values]
     measured = f"p50 {percentile(every, 50):.2f} s, p99 {percentile(every, 99):.2f} s" if every else ""
     return Finding("L1", len(every), measured, evidence, unknown, times, max(every, default=math.nan))
@@ -70,7 +77,7 @@ def _kills(history: History) -> Iterator[InjectedFault]:
     return (fault for fault in history.faults if fault.kind == "kill")
 
 
-def _silent_for_good(history: History) -> Iterator[Evidence]:
+def _silent_for_good(history: History, found: Sequence[Effect]) -> Iterator[Evidence]:
     """Yield programs without output after a fault of any kind, unless another fault explains it."""
     for fault in history.injected:
         begin, end = fault.end, fault.end + GONE
@@ -83,23 +90,24 @@ def _silent_for_good(history: History) -> Iterator[Evidence]:
                 or between(history.output(program), begin, end)
             ):
                 continue
-            if not _is_disturbed(history, fault, begin, end, program):
+            if _is_alone(found, fault, begin, end, program):
                 yield Evidence(end, f"{program} is silent for {GONE:g} s after {fault.kind}")
 
 
 def other_streams_flow(history: History) -> Finding:
     """L2: meanwhile the other services' streams show no gap over 250 ms."""
+    found = effects(history)
     evidence, cases, unknown, longest = [], 0, 0, 0.0
     for fault in _kills(history):
         end = fault.begin + min(_recovery(history, fault) or SLOWEST, SLOWEST)
         for program in STREAMS:
             if not _flowed(history, program, fault.begin, GAP):
                 continue
-            if any(_disturbs(history, f, program, fault.begin - 1.0, end + GAP) for f in history.faults):
+            if not undisturbed(found, program, fault.begin - BEFORE, end + GAP, SILENT):
                 continue
             excused = 0
             for one, two in _intervals(history, program, fault.begin - GAP, end):
-                if two - one > GAP >= two - one - history.missed(one, two):
+                if two - one > GAP >= two - one - disturbed_for(found, ALL, one, two, *MISSED):
                     excused = 1  # the observer may have missed messages
                     continue
                 longest = max(longest, two - one)
@@ -123,6 +131,7 @@ def _intervals(history: History, program: str, begin: float, end: float) -> Iter
 
 def right_after_restart(history: History) -> Finding:
     """L3: values that changed while a service was dead are right after its return."""
+    found = effects(history)
     published = PublishedValues(history)
     evidence, cases, unknown = [], 0, 0
     for fault in history.faults:
@@ -132,12 +141,11 @@ def right_after_restart(history: History) -> Finding:
         if time is None:
             continue
         begin = fault.begin + time + SETTLED
-        others = (other for other in history.faults if other is not fault)
-        if any(_disturbs(history, other, KINEMATICS, begin, begin + 1.0) for other in others):
+        if not undisturbed(found, KINEMATICS, begin, begin + 1.0, SILENT, but=fault):
             continue
         positions = between(history.stream(topics.EFFECTOR_POSITION), begin, begin + 1.0)
         right = bool(positions) and published.explain(positions[-1], within=SETTLED)
-        if positions and not right and _is_undecided(history, positions[-1].sent):
+        if positions and not right and _is_undecided(history, found, positions[-1].sent):
             unknown += 1
             continue
         cases += bool(positions)
@@ -148,14 +156,20 @@ def right_after_restart(history: History) -> Finding:
     return Finding("L3", cases, measured, evidence, unknown)
 
 
-def _is_undecided(history: History, time: float) -> bool:
+def _is_undecided(history: History, found: Sequence[Effect], time: float) -> bool:
     """Return whether the observer and kinematics may have received different values before a time."""
-    return may_have_missed_values(history, time) or may_have_reached_only_some(history, time)
+    newest = {source: last_sent(history.output(source), time) for source in SOURCES}
+    return may_lack_values(found, time) or not all(
+        undisturbed(found, source, value.sent, value.sent, CUT_OFF)
+        for source, value in newest.items()
+        if value
+    )
 
 
 def hung_is_replaced(history: History) -> Finding:
     """L4: a hung service is replaced within 5 s."""
     times: dict[str, list[float]] = {}
+    found = effects(history)
     evidence, unknown = [], 0
     for fault in history.faults:
         lasted = fault.end - fault.begin
@@ -163,21 +177,11 @@ def hung_is_replaced(history: History) -> Finding:
             continue
         time = _recovery(history, fault)
         until = fault.begin + (0.0 if time is None else min(time, HUNG))
-        sentinel_was_hit = any(
-            other.target in (SENTINEL, ALL) and other.overlaps(fault.begin - 1.0, until + 0.001)
-            for other in history.faults
-            if other is not fault
-        )
-        # It does not know yet how long the others have been silent.
-        sentinel_was_new = fault.target != SENTINEL and any(
-            fault.begin - 1.0 < life.began < until for life in history.lives_of(SENTINEL)
-        )
         if (
             time is None
-            or sentinel_was_hit
-            or sentinel_was_new
-            or _is_disturbed(history, fault, fault.begin, until)
-            or _paused(history, fault, time, HUNG)
+            or not undisturbed(found, fault.target, fault.begin - BEFORE, until, UNWATCHED, but=fault)
+            or not _is_alone(found, fault, fault.begin, until)
+            or _paused(found, fault, time, HUNG)
         ):
             unknown += 1
             continue
@@ -202,9 +206,10 @@ def _recovery(history: History, fault: InjectedFault) -> float | None:
     return math.inf if history.end - begin > HUNG else None
 
 
-def _paused(history: History, fault: InjectedFault, time: float, bound: float) -> bool:
+def _paused(found: Sequence[Effect], fault: InjectedFault, time: float, bound: float) -> bool:
     """Return whether a silence after a fault is above a bound only because the whole machine paused."""
-    return time > bound >= time - history.missed(fault.begin, fault.begin + time)
+    missed = disturbed_for(found, ALL, fault.begin, fault.begin + time, *MISSED)
+    return time > bound >= time - missed
 
 
 def _death(history: History, fault: InjectedFault) -> float:
@@ -223,35 +228,17 @@ def _flowed(history: History, program: str, time: float, within: float) -> bool:
     return bool(between(history.output(program), time - within, time))
 
 
-def _is_disturbed(
-    history: History, fault: InjectedFault, begin: float, end: float, program: str = ""
+def _is_alone(
+    found: Sequence[Effect], fault: InjectedFault, begin: float, end: float, program: str = ""
 ) -> bool:
-    """Return whether another fault disturbs a program's return (default: the target's)."""
+    """Return whether only this fault disturbs the return of a program (default: of the target)."""
     program = program or fault.target
-    needed = [source for source, dependents in DEPENDENTS.items() if program in dependents]
     # If all were hit, those that it follows had to start as well.
-    starting = (program, *needed) if fault.target == ALL else (program,)
-    silent = (
-        not _flowed(history, source, time, FLOWING)
-        for each in starting
-        for source in NEEDED_AT_START.get(each, ())
-        for time in (begin, end)
+    followed = [each for each, dependents in DEPENDENTS.items() if program in dependents]
+    starting = (program, *followed) if fault.target == ALL else (program,)
+    return undisturbed(found, program, begin, end, SILENT, but=fault) and all(
+        undisturbed(found, each, time, time, WAITING) for each in starting for time in (begin, end)
     )
-    return any(silent) or any(
-        _disturbs(history, other, each, begin, end)
-        for other in history.faults
-        if other is not fault
-        for each in (program, *needed)
-    )
-
-
-def _disturbs(history: History, fault: InjectedFault, program: str, begin: float, end: float) -> bool:
-    """Return whether a fault, or the recovery from it, affects a program's output between two times."""
-    recovery = HUNG if fault.kind in LASTING else REDISCOVERY if fault.kind == PARTITION else SLOWEST
-    if history.effect_end(fault) + recovery < begin or fault.begin > end:
-        return False
-    affected = (fault.target, *DEPENDENTS.get(fault.target, ()), *OBSCURED.get(fault.kind, ()))
-    return program in affected or fault.target == ALL
 
 
 def _duration(time: float) -> str:

@@ -13,13 +13,11 @@ from mcap_files import McapFile, UnreadableError
 from rclpy.serialization import deserialize_message
 from std_msgs.msg import String
 
+from deploy.promises.effects import LATE, LATE_LINE, LATE_START, Effect, effects, undisturbed
 from deploy.promises.history import (
-    BAD_LINE,
-    LOSS,
+    ALL,
     NO_TARGET,
     OVERLOAD,
-    PARTITION,
-    REDISCOVERY,
     History,
     InjectedFault,
     Life,
@@ -32,8 +30,6 @@ from deploy.running.system import DeploymentError
 from interfaces import topics
 
 PROCESSES, FAULTS = "/chaos/processes", "/chaos/faults"  # topics
-LATE = 0.1  # s between sending and reception of a message; above it, machine or observer are overloaded
-MATCHED = 2.0  # s from the start of a process until every reader knows its publishers
 EARLY = 0.001  # s by which a message may seem to be sent after its reception: clocks are read one by one
 
 
@@ -108,30 +104,20 @@ def late_receptions(history: History) -> list[tuple[float, float]]:
     Messages that a fault of the network may have delayed do not count, nor those of a publisher that the
     observer may not have discovered yet.
     """
-    lines = [
-        (fault.begin, fault.end + REDISCOVERY)
-        for fault in history.faults
-        # A loss that lasts beyond the record was planned: DDS sends again what was lost.
-        if fault.kind in (PARTITION, BAD_LINE) or (fault.kind == LOSS and fault.end > history.end)
-    ]
-    late = (
+    found = [each for each in effects(history) if each.why in (LATE_LINE, LATE_START)]
+    return merged(
         (sample.sent, sample.received)
         for topic in topics.CONTRACT
         for sample in history.stream(topic)
-        if sample.received - sample.sent > LATE and not _is_new(history, topic, sample)
-    )
-    return merged(
-        (sent, received)
-        for sent, received in late
-        if not any(begin < received and sent < end for begin, end in lines)
+        if sample.received - sample.sent > LATE and _shows_overload(found, topic, sample)
     )
 
 
-def _is_new(history: History, topic: topics.Topic, sample: Sample) -> bool:
-    """Return whether the observer may not have known the publisher of a message when that was sent."""
-    programs = topic.publishers if topic is not topics.DIAGNOSTICS else sample.value[:1]
-    return any(
-        life.program in programs and life.began < sample.sent < life.began + MATCHED for life in history.lives
+def _shows_overload(found: Iterable[Effect], topic: topics.Topic, sample: Sample) -> bool:
+    """Return whether nothing else explains that a message was late."""
+    publishers = topic.publishers if topic is not topics.DIAGNOSTICS else sample.value[:1]
+    return undisturbed(found, ALL, sample.sent, sample.received, LATE_LINE) and all(
+        undisturbed(found, each, sample.sent, sample.sent, LATE_START) for each in publishers
     )
 
 

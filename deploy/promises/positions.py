@@ -5,17 +5,14 @@ from __future__ import annotations
 import itertools
 import math
 from bisect import bisect_left, bisect_right
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
-from deploy.promises.history import SOURCES, History, Sample, last_sent
+from deploy.promises.effects import DISCOVERY, LONGEST_PAUSE, MISSED, UNDISCOVERED, Effect, undisturbed
+from deploy.promises.history import SOURCES, History, Sample
 from interfaces import topics
 
 ROUNDING = 1e-8  # m
 PRECISION = 4e-15  # of the lengths, 18 times the precision of float64: the rounding of links beyond 1000 km
-LONGEST_PAUSE = 20.0  # s for which a process may be suspended, and its values become old
-ORDER = 0.1  # s by which the observer may receive a value later than a position that follows from it
-SENDING = 0.02  # s between the begin of a fault and a value that its process was sending
-DISCOVERY = 1.0  # s from the first message that the observer received until every reader knows the publisher
 
 
 class PublishedValues:
@@ -49,34 +46,10 @@ class PublishedValues:
         return [s.value for s in reversed(stream[max(0, oldest - 1) : newest])]
 
 
-def may_have_missed_values(history: History, time: float) -> bool:
-    """
-    Return whether the record may lack values that a reader received.
-
-    It does before the observer has discovered their publisher, and at its end.
-    """
-    if history.may_have_missed(time - DISCOVERY, time) or time > history.end - ORDER:
-        return True
-    for life in history.lives:
-        if life.program in SOURCES and life.began < time:
-            output = history.output(life.program)
-            first = bisect_right(output, life.began, key=lambda s: s.sent)
-            if first == len(output) or time < output[first].sent + DISCOVERY:
-                return True
-    return False
-
-
-def may_have_reached_only_some(history: History, time: float) -> bool:
-    """
-    Return whether a value that the record has as the newest one may be missing elsewhere.
-
-    A source sends a value to one reader after the other. A fault may end or suspend it in between.
-    """
-    newest = {program: last_sent(history.output(program), time) for program in SOURCES}
-    return any(
-        (value := newest.get(fault.target)) is not None and abs(value.sent - fault.begin) < SENDING
-        for fault in history.faults
-    )
+def may_lack_values(found: Iterable[Effect], time: float) -> bool:
+    """Return whether the record may lack values that kinematics had received before a time."""
+    begin = time - DISCOVERY
+    return not all(undisturbed(found, each, begin, time, *MISSED, UNDISCOVERED) for each in SOURCES)
 
 
 def _any_fits(candidates: list[list[float]], x: float, y: float) -> bool:

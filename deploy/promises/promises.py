@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from deploy.promises import liveness, safety
 from deploy.promises.findings import Finding, count
-from deploy.promises.history import OVERLOAD, History
+from deploy.promises.history import OVERLOAD, History, merged
 
 CHECKERS: dict[str, Callable[[History], Finding]] = {
     "S1": safety.engines_off_in_time,
@@ -24,7 +24,7 @@ CHECKERS: dict[str, Callable[[History], Finding]] = {
 
 def overloads(history: History, findings: Sequence[Finding]) -> str:
     """Return how often the machine or the observer was overloaded, and which verdicts that weakens."""
-    intervals = history.overloads
+    intervals = merged((each.begin, each.end) for each in history.faults if each.kind == OVERLOAD)
     if not intervals:
         return "No overload of the machine or the observer"
     rested = replace(history, faults=[fault for fault in history.faults if fault.kind != OVERLOAD])

@@ -8,16 +8,30 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Iterator, Sequence
 from operator import itemgetter
 
+from deploy.promises.effects import (
+    BAD_TRANSPORT,
+    BEFORE,
+    DEAF,
+    DELAYED,
+    LONGEST_PAUSE,
+    MISSED,
+    OVERLOADED,
+    REPLACED,
+    SAME,
+    SAMPLING,
+    STARTING,
+    SUSPENDED,
+    TRANSPORT,
+    UNDISCOVERED,
+    Effect,
+    disturbing,
+    effects,
+    undisturbed,
+)
 from deploy.promises.findings import Evidence, Finding, count, how_often
 from deploy.promises.history import (
     ALL,
-    BAD_LINE,
     CONTROLLER,
-    HOLD,
-    OVERLOAD,
-    PARTITION,
-    REDISCOVERY,
-    SUSPENDING,
     SWITCH,
     WATCHDOG,
     History,
@@ -30,15 +44,9 @@ from deploy.promises.history import (
     running,
 )
 from deploy.promises.limits import MAX_PRESENCE_AGE, OFF_WITHIN, PRESENCE_TIMEOUT, STRIKE, STRIKES
-from deploy.promises.marks import SPREAD, STEP
-from deploy.promises.positions import LONGEST_PAUSE, PublishedValues, may_have_missed_values
+from deploy.promises.positions import PublishedValues, may_lack_values
 from interfaces import topics
 from interfaces.topics import DRIVE_TIMEOUT, INCAPACITATED, OFF, ON, TURN_OFF, TURN_ON
-
-SAMPLING = 0.5  # s by which the watchdog may date the beginning of a silence too early
-TRANSPORT = 0.15  # s that a message may take on a busy machine
-BAD_TRANSPORT = 0.6  # s that it may take on a bad line
-STARTING = 2.0  # s within which a process has become an instance, or has ended because there is one
 
 
 def engines_off_in_time(history: History) -> Finding:
@@ -46,7 +54,7 @@ def engines_off_in_time(history: History) -> Finding:
     alive = [s.sent for s in history.signs_of_life()]
     evidence, longest, cases, unknown = [], 0.0, 0, 0
     on = list(running(history))
-    overloads = history.overloads
+    overloads = merged((each.begin, each.end) for each in effects(history) if each.why == OVERLOADED)
     for begin, end in gaps(alive, -math.inf, history.end):
         late = _overlapping_part(on, begin, end)
         if not late:
@@ -77,10 +85,11 @@ def engines_off_in_time(history: History) -> Finding:
 def engines_stay_on(history: History) -> Finding:
     """S2: while the operator is alive, killing any service but the controller keeps the engines on."""
     evidence, permitted, kills, unknown = [], 0, 0, 0
+    found = effects(history)
     for on, off in _changes(history, ON, OFF):
-        if _controller_was_away(history, on, off) or _commanded(history, off) or _abandoned(history, off):
+        if _was_away(found, on, off) or _commanded(history, found, off) or _abandoned(history, found, off):
             permitted += 1
-        elif history.may_have_missed(off.sent - 1.0, off.sent):
+        elif not undisturbed(found, ALL, off.sent - BEFORE, off.sent, *MISSED):
             unknown += 1  # the observer may have missed the command
         else:
             evidence.append(Evidence(off.sent, "engines turned off although the operator was present"))
@@ -99,21 +108,22 @@ def turned_on_with_operator(history: History) -> Finding:
     """S3: engines turn on only by a `turn_on` with the operator present."""
     commands = [s for s in history.stream(topics.ENGINES) if s.value == TURN_ON]
     heartbeats = history.signs_of_life()
+    found = effects(history)
     evidence, cases, unknown, oldest = [], 0, 0, 0.0
     before = -math.inf
     for stopped, on in _starts(history):
         # A command turns the engines on once; the next start needs another one.
-        command = between(commands, max(before, on.sent - MAX_PRESENCE_AGE - TRANSPORT), on.sent + 0.01)
-        before = on.sent + 0.011
-        seen = between(heartbeats, on.sent - MAX_PRESENCE_AGE - TRANSPORT, on.sent + 0.01)
+        command = between(commands, max(before, on.sent - MAX_PRESENCE_AGE - TRANSPORT), on.sent + SAME)
+        before = on.sent + SAME + 0.001
+        seen = between(heartbeats, on.sent - MAX_PRESENCE_AGE - TRANSPORT, on.sent + SAME)
         if command and seen:
             cases += 1
             oldest = max(oldest, on.sent - seen[-1].sent)
-        elif _was_present(history, on.sent) and any(
-            on.sent - 3.0 < life.began <= on.sent for life in history.lives_of(SWITCH)
+        elif _was_present(history, on.sent) and not undisturbed(
+            found, SWITCH, on.sent, on.sent, UNDISCOVERED
         ):
-            unknown += 1  # the observer may not have discovered the new publisher yet
-        elif history.may_have_missed(max(stopped, on.sent - MAX_PRESENCE_AGE), on.sent):
+            unknown += 1
+        elif not undisturbed(found, ALL, max(stopped, on.sent - MAX_PRESENCE_AGE), on.sent, *MISSED):
             unknown += 1  # the observer may have missed the command, or the states that kept them on
         else:
             missing = "a turn_on" if not command else "a sign of life"
@@ -130,11 +140,12 @@ def valid_speeds_and_positions(history: History) -> Finding:
     ]
     published = PublishedValues(history)
     positions = history.stream(topics.EFFECTOR_POSITION)
+    found = effects(history)
     unknown = 0
     for position in positions:
         if published.explain(position, within=LONGEST_PAUSE):
             continue
-        if may_have_missed_values(history, position.sent):
+        if may_lack_values(found, position.sent):
             unknown += 1
         else:
             evidence.append(Evidence(position.sent, f"no published values give {position.value}"))
@@ -144,9 +155,10 @@ def valid_speeds_and_positions(history: History) -> Finding:
 
 def single_instances(history: History) -> Finding:
     """S5: never two live instances of one service."""
+    found = effects(history)
     evidence, unknown, cases = [], 0, 0
     for second, life in _reports_beside_another(history):
-        if life.ended is not None and history.may_have_missed(second.sent, life.ended):
+        if life.ended is not None and not undisturbed(found, ALL, second.sent, life.ended, *MISSED):
             unknown += 1  # the observer may have noted the end too late
         else:
             name, pid = second.value
@@ -156,7 +168,7 @@ def single_instances(history: History) -> Finding:
             (life for life in history.lives if life.program == program), key=lambda life: life.began
         )
         cases += len(lives) - 1
-        evidence += [_two(a, b) for a, b in _overlapping(history, lives)]
+        evidence += [_two(a, b) for a, b in _overlapping(history, found, lives)]
     return Finding("S5", cases, f"restarts and duplicates: {cases}", sorted(evidence), unknown)
 
 
@@ -196,33 +208,31 @@ def _changes(history: History, before: str, after: str) -> Iterator[tuple[Sample
             yield one, two
 
 
-def _controller_was_away(history: History, on: Sample, off: Sample) -> bool:
+def _was_away(found: Sequence[Effect], on: Sample, off: Sample) -> bool:
     """Return whether the controller was replaced or suspended between its `on` and its `off`."""
-    died = any(on.sent - 0.02 < life.began <= off.sent for life in history.lives_of(CONTROLLER))
-    paused = history.may_have_missed(on.sent, off.sent) or any(
-        fault.kind in SUSPENDING and fault.target in (CONTROLLER, ALL) and fault.overlaps(on.sent, off.sent)
-        for fault in history.faults
-    )
-    return died or (paused and off.sent - on.sent > DRIVE_TIMEOUT)
+    if not undisturbed(found, CONTROLLER, on.sent, off.sent, REPLACED):
+        return True
+    paused = not undisturbed(found, CONTROLLER, on.sent, off.sent, SUSPENDED, *MISSED)
+    return paused and off.sent - on.sent > DRIVE_TIMEOUT
 
 
 def _was_present(history: History, time: float) -> bool:
     """Return whether the operator watchdog reported the operator's presence in the second before."""
     presences = history.stream(topics.OPERATOR_PRESENCE)
-    return bool(between(presences, time - MAX_PRESENCE_AGE - TRANSPORT, time + 0.01))
+    return bool(between(presences, time - MAX_PRESENCE_AGE - TRANSPORT, time + SAME))
 
 
-def _commanded(history: History, off: Sample) -> bool:
+def _commanded(history: History, found: Sequence[Effect], off: Sample) -> bool:
     """
     Return whether `turn_off` was commanded just before.
 
     The watchdog needs as many strikes for it as that takes; the other publishers of the contract need none.
     """
     commands = [s for s in history.stream(topics.ENGINES) if s.value == TURN_OFF]
-    just_before = between(commands, off.sent - _transport(history, off.sent), off.sent + 0.01)
+    just_before = between(commands, off.sent - _transport(found, off.sent), off.sent + SAME)
     if not all(_is_of_watchdog(history, command) for command in just_before):
         return True
-    return bool(just_before) and _strikes(history, off.sent) >= STRIKES
+    return bool(just_before) and _strikes(history, found, off.sent) >= STRIKES
 
 
 def _is_of_watchdog(history: History, command: Sample) -> bool:
@@ -231,13 +241,13 @@ def _is_of_watchdog(history: History, command: Sample) -> bool:
     return conclusion is None or conclusion.value == INCAPACITATED
 
 
-def _transport(history: History, time: float) -> float:
+def _transport(found: Sequence[Effect], time: float) -> float:
     """Return how long a message may have taken that arrived then [s]."""
-    lines = (fault for fault in history.faults if fault.kind == BAD_LINE)
-    return BAD_TRANSPORT if any(line.overlaps(time - BAD_TRANSPORT, time) for line in lines) else TRANSPORT
+    quick = undisturbed(found, ALL, time - BAD_TRANSPORT, time, DELAYED)
+    return TRANSPORT if quick else BAD_TRANSPORT
 
 
-def _strikes(history: History, time: float) -> float:
+def _strikes(history: History, found: Sequence[Effect], time: float) -> float:
     """Return how many strikes the watchdog may have counted since its start or its last command."""
     commands = (
         s.sent
@@ -249,45 +259,37 @@ def _strikes(history: History, time: float) -> float:
     heartbeats = [s.sent for s in history.signs_of_life()]
     begin = max((t for t in heartbeats if t <= since), default=0.0)
     # A suspended watchdog receives no heartbeat either; S2 does not cover that.
-    deaf = [(max(one, begin), min(two, time)) for one, two in _deaf(history) if one < time and two > begin]
+    deaf = [
+        (max(effect.begin, begin), min(effect.end, time))
+        for effect in disturbing(found, WATCHDOG, begin, time, DEAF)
+    ]
     # Intervals that only touch have a heartbeat in between.
     silences = merged([*gaps(heartbeats, begin, time), *deaf])
     return sum((end - begin + SAMPLING) // STRIKE for begin, end in silences)
 
 
-def _abandoned(history: History, off: Sample) -> bool:
+def _abandoned(history: History, found: Sequence[Effect], off: Sample) -> bool:
     """Return whether the operator or a suspended watchdog left the controller without presence for 10 s."""
     begin = off.sent - PRESENCE_TIMEOUT + SAMPLING + TRANSPORT  # a presence is as old as its stamp
-    deaf = [(one, two) for one, two in _deaf(history) if one < off.sent and two > begin]
+    deaf = list(disturbing(found, WATCHDOG, begin, off.sent, DEAF))
     for presence in between(history.stream(topics.OPERATOR_PRESENCE), begin, off.sent - TRANSPORT):
         # A presence sent right after resuming may stem from an older heartbeat.
-        if not any(one < presence.sent <= two + TRANSPORT for one, two in deaf):
+        if not any(each.begin < presence.sent <= each.end + TRANSPORT for each in deaf):
             return False
     heartbeats = [s.sent for s in history.signs_of_life()]
     silent = any(two - one > MAX_PRESENCE_AGE for one, two in gaps(heartbeats, begin, off.sent))
     return silent or bool(deaf)
 
 
-def _deaf(history: History) -> Iterator[tuple[float, float]]:
-    """Yield when no heartbeat counted: watchdog suspended or cut off, clocks that differ, late heartbeats."""
-    for fault in history.faults:
-        if fault.kind in SUSPENDING and fault.target in (WATCHDOG, ALL):
-            yield fault.begin, history.effect_end(fault)
-        elif fault.kind == PARTITION:
-            yield fault.begin, fault.end + REDISCOVERY
-        elif (fault.kind, fault.target) == (HOLD, topics.OPERATOR_HEARTBEAT.name):
-            yield fault.begin, fault.end + SAMPLING  # until then, the watchdog may report one of them
-        elif fault.kind == STEP:
-            yield fault.begin, fault.begin + SPREAD
-
-
-def _overlapping(history: History, lives: Sequence[Life]) -> Iterator[tuple[Life, Life]]:
+def _overlapping(
+    history: History, found: Sequence[Effect], lives: Sequence[Life]
+) -> Iterator[tuple[Life, Life]]:
     """
     Yield two processes that live together for longer than one of them may need to start.
 
     After each overload of the machine, it may need as long again. One that reports has started anyway.
     """
-    overloads = [fault.end for fault in history.faults if fault.kind == OVERLOAD]
+    overloads = sorted(effect.end for effect in found if effect.why == OVERLOADED)
     for one, two in itertools.combinations(lives, 2):
         last = min(history.end if life.ended is None else life.ended for life in (one, two))
         together = gaps(overloads, max(one.began, two.began), last)

@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from deploy.promises.effects import SAMPLING, TRANSPORT
 from deploy.promises.findings import Evidence, Finding
 from deploy.promises.history import (
     ALL,
@@ -29,7 +30,6 @@ from deploy.promises.history import (
 from deploy.promises.limits import PRESENCE_TIMEOUT
 from deploy.promises.marks import STEP
 from deploy.promises.promises import CHECKERS
-from deploy.promises.safety import SAMPLING, TRANSPORT
 from interfaces.topics import ALIVE, DRIVE_TIMEOUT, INCAPACITATED, MISSED, OFF, ON, TURN_OFF, TURN_ON
 
 TOPICS = {

@@ -110,33 +110,10 @@ def test_target_has_a_name_for_a_reader() -> None:
     assert names == ["(whole arm)", "(no target)", "velocity"]
 
 
-@pytest.mark.parametrize(
-    ("begin", "end", "overlaps"),
-    [(1.0, 2.0, False), (1.0, 2.5, True), (2.5, 3.0, True), (3.5, 5.0, True), (4.0, 5.0, False)],
-)
-def test_fault_overlaps_an_interval_with_which_it_has_time_in_common(
-    begin: float, end: float, overlaps: bool
-) -> None:
-    assert InjectedFault("stop", "velocity", 2.0, 4.0).overlaps(begin, end) is overlaps
-
-
-def test_observer_misses_messages_by_overload_and_loss() -> None:
-    faults = [
-        InjectedFault("overload", NO_TARGET, 1.0, 3.0),
-        InjectedFault("loss", NO_TARGET, 5.0, 6.0),
-        InjectedFault("stop", "velocity", 7.0, 8.0),
-    ]
-    history = History(10.0, faults=faults)
-    assert history.missed(2.0, 5.5) == 1.5
-    assert history.missed(0.0, 10.0) == 3.0
-    assert not history.may_have_missed(3.0, 5.0)
-    assert history.may_have_missed(2.5, 4.0)
-    assert history.injected == faults[2:]
-    assert history.overloads == [(1.0, 3.0)]
-    again = [InjectedFault("overload", NO_TARGET, 2.0, 4.0), InjectedFault("loss", NO_TARGET, 3.5, 4.5)]
-    history = History(10.0, faults=[*faults, *again])
-    assert history.missed(0.0, 4.75) == 3.5
-    assert history.overloads == [(1.0, 4.0)]
+def test_conditions_are_not_injected() -> None:
+    stop = InjectedFault("stop", "velocity", 7.0, 8.0)
+    faults = [InjectedFault("overload", NO_TARGET, 1.0, 3.0), stop]
+    assert History(10.0, faults=faults).injected == [stop]
 
 
 def test_merged_intervals_that_touch_stay_apart() -> None:

@@ -17,7 +17,7 @@ from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 from std_msgs.msg import Bool, Float64, String
 
-from deploy.promises.history import NO_TARGET, InjectedFault, Life
+from deploy.promises.history import NO_TARGET, OVERLOAD, InjectedFault, Life
 from deploy.promises.marks import STEP
 from deploy.promises.observations import FAULTS, PROCESSES, load, values
 from deploy.running import processes
@@ -142,7 +142,8 @@ def overloads_of(path: Path, lateness: float, *events: Life | InjectedFault) -> 
         received = sent + (int(lateness * 1e9) if second == 10 else 2_000_000)
         recorder.message("/effector/speed", topics.EFFECTOR_SPEED.type_name, "", data, received, sent)
     recorder.close()
-    return [(round(begin, 6), round(end, 6)) for begin, end in load(path).overloads]
+    found = (fault for fault in load(path).faults if fault.kind == OVERLOAD)
+    return [(round(fault.begin, 6), round(fault.end, 6)) for fault in found]
 
 
 @pytest.mark.parametrize(

@@ -19,6 +19,7 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
 
+from deploy.promises.effects import REDISCOVERY, SAMPLING
 from deploy.promises.history import (
     ALL,
     BAD_LINE,
@@ -28,7 +29,6 @@ from deploy.promises.history import (
     NO_TARGET,
     OPERATOR,
     PARTITION,
-    REDISCOVERY,
     STUCK_DRIVE,
     SWITCH,
     WATCHDOG,
@@ -41,7 +41,6 @@ from deploy.promises.history import (
 )
 from deploy.promises.limits import OFF_WITHIN, STRIKE, STRIKES
 from deploy.promises.marks import STEP
-from deploy.promises.safety import SAMPLING
 from deploy.trials.chaos.schedule import PlannedFault
 from deploy.trials.chaos.schedule_file import Shift
 from interfaces import topics

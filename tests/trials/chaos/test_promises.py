@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import pytest
 
+from deploy.promises.effects import MISSED, TRANSPORT, effects, undisturbed
 from deploy.promises.findings import HOLDS
-from deploy.promises.history import PROGRAMS, SILENCE, Sample, between, running
+from deploy.promises.history import ALL, PROGRAMS, SILENCE, Sample, between, running
 from deploy.promises.limits import OFF_WITHIN, SLOWEST
 from deploy.promises.marks import STEP
 from deploy.promises.promises import CHECKERS
-from deploy.promises.safety import TRANSPORT
 from deploy.trials.chaos.clock import missing
 from interfaces.topics import DRIVE_TIMEOUT, ENGINES, OPERATOR_HEARTBEAT, OPERATOR_PRESENCE
 
@@ -37,7 +37,7 @@ def test_killed_program_is_back_within_two_seconds(play: Experiment, program: st
 def unknown_after(play: Experiment, kind: str, program: str) -> bool:
     """Return whether the observer may have missed what became of a program after a fault."""
     fault = next(each for each in play.history.injected if (each.kind, each.target) == (kind, program))
-    return play.history.may_have_missed(fault.begin, fault.end + SLOWEST)
+    return not undisturbed(effects(play.history), ALL, fault.begin, fault.end + SLOWEST, *MISSED)
 
 
 def test_engines_turn_off_in_time_with_a_stopped_controller(play: Experiment) -> None:

@@ -1,0 +1,180 @@
+"""What excuses a violation: one table, which every checker asks.
+
+All verdicts rest on it: a violation is excused, or its outcome unknown, only if an effect covers it. An
+effect concerns programs, from one time to another, for one reason. A fault does not excuse itself.
+"""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_right
+from collections.abc import Collection, Iterable, Iterator
+from typing import NamedTuple
+
+from deploy.promises import history as names
+from deploy.promises.history import ALL, CONTROLLER, SENTINEL, SOURCES, SWITCH, WATCHDOG, History
+from deploy.promises.limits import HUNG, SLOWEST
+from deploy.promises.marks import SPREAD, STEP
+from interfaces import topics
+
+# What an effect does to a program.
+SILENT = "its output stops until it has recovered, or is mixed with injected messages"
+WAITING = "it cannot start, because it needs the value of a silent program"
+SUSPENDED = "it does nothing"
+REPLACED = "a new process takes over, without the state of the old one"
+DEAF = "no heartbeat counts"
+UNWATCHED = "the sentinel may not notice that it hangs"
+CUT_OFF = "a value that it was sending may have reached only some readers"
+DELAYED = "its messages take longer"
+OVERLOADED = "the machine was too busy: it pauses, and the observer may miss its messages"
+LOST = "the network may lose its messages to the observer"
+UNDISCOVERED = "the observer may miss its messages, because it may not know their publisher yet"
+LATE_LINE = "its messages are late without an overload, because the network delays them"
+LATE_START = "its messages are late without an overload, because readers may not know it yet"
+MISSED = (OVERLOADED, LOST)
+
+# How long an effect lasts. All in seconds.
+RESTARTED = 0.02  # a process may be noted to start so long before the last message of the one before
+AT_ONCE = 0.001  # a fault so soon after a recovery may have come first
+REDISCOVERY = 10.0  # after a partition until the hosts have discovered each other again
+SENDING = 0.02  # a fault may interrupt what was sent so shortly before or after
+SAMPLING = 0.5  # the watchdog samples: it may date a silence too early, or use a heartbeat late, by so much
+MATCHED = 2.0  # from the start of a process until every reader knows its publishers
+NEW_SWITCH = 3.0  # from the start of a switch until the observer surely knows its publishers
+FLOWING = 1.2  # a program without a message for so long is silent: the slowest output has 1 Hz
+ORDER = 0.1  # the observer may receive a value so much later than a position that follows from it
+
+# What checkers tolerate besides. All in seconds.
+BEFORE = 1.0  # a fault or a missed message so long before a case may matter
+DISCOVERY = 1.0  # from the observer's first message of a publisher until every reader knows that publisher
+TRANSPORT, BAD_TRANSPORT = 0.15, 0.6  # a message may take so long on a busy machine, on a bad line
+LATE = 0.1  # a message that takes longer shows an overload
+SAME = 0.01  # what happens at once may be sent in either order
+STARTING = 2.0  # within it, a process has become an instance, or has ended because there is one
+KILLING = 1.0  # from the injection of a kill to the death of the process
+SETTLED = 0.5  # after a recovery until all programs downstream are right
+LONGEST_PAUSE = 20.0  # a process may be suspended for so long, and its values become old
+
+LASTING = ("stop", "hang", "hog", "slow", "crash_loop", "kill_all", "kill_supervisor")
+"""After these faults, programs may be silent for as long as after a hang."""
+
+
+class Effect(NamedTuple):
+    """What a fault, a recorded condition or a start does to programs."""
+
+    programs: Collection[str]
+    """:data:`~deploy.promises.history.ALL` stands for every program."""
+    begin: float
+    end: float
+    """[s]. Both times are excluded."""
+    why: str
+    cause: object
+    """The fault, the process that starts, or the history."""
+
+    def concerns(self, program: str) -> bool:
+        """Return whether it concerns a program."""
+        return program in self.programs or ALL in self.programs
+
+
+def effects(history: History) -> list[Effect]:
+    """Return everything that may excuse a violation."""
+    return [*_of_faults(history), *_of_starts(history), *_of_silence(history)]
+
+
+def _of_faults(history: History) -> Iterator[Effect]:
+    for fault in history.faults:
+        kind, target, begin, end = fault.kind, fault.target, fault.begin, fault.end
+        replaced = history.effect_end(fault)  # the end, or earlier if the process was replaced
+        recovery = HUNG if kind in LASTING else REDISCOVERY if kind == names.PARTITION else SLOWEST
+        silent = (target, *names.DEPENDENTS.get(target, ()))
+        yield Effect(silent, _from(begin), _to(replaced + recovery), SILENT, fault)
+        if kind in ("flood", "babble"):
+            silent = (SWITCH, *names.DEPENDENTS[SWITCH])
+            yield Effect(silent, _from(begin), _to(end + recovery), SILENT, fault)
+        if kind in names.SUSPENDING:
+            yield Effect((target,), begin, end, SUSPENDED, fault)
+            if target in (WATCHDOG, ALL):
+                yield Effect((WATCHDOG,), begin, replaced, DEAF, fault)
+        if kind == names.PARTITION:
+            yield Effect((WATCHDOG,), begin, end + REDISCOVERY, DEAF, fault)
+        if (kind, target) == (names.HOLD, topics.OPERATOR_HEARTBEAT.name):
+            # They are too old when they arrive.
+            yield Effect((WATCHDOG,), begin, end + SAMPLING, DEAF, fault)
+        if kind == STEP:  # while it spreads, clocks differ, and the age of a heartbeat is wrong
+            yield Effect((WATCHDOG,), begin, begin + SPREAD, DEAF, fault)
+        if target in (SENTINEL, ALL):
+            yield Effect((ALL,), begin - AT_ONCE, end, UNWATCHED, fault)
+        if target in SOURCES:  # it sends a value to one reader after the other
+            yield Effect((target,), begin - SENDING, begin + SENDING, CUT_OFF, fault)
+        if kind == names.BAD_LINE:
+            yield Effect((ALL,), begin, end, DELAYED, fault)
+        if kind == names.OVERLOAD:
+            yield Effect((ALL,), begin, end, OVERLOADED, fault)
+        if kind == names.LOSS:
+            yield Effect((ALL,), begin, end, LOST, fault)
+        # A loss that lasts beyond the record was planned: DDS sends again what was lost.
+        planned = kind == names.LOSS and end > history.end
+        if kind in (names.PARTITION, names.BAD_LINE) or planned:
+            yield Effect((ALL,), begin, end + REDISCOVERY, LATE_LINE, fault)
+
+
+def _of_starts(history: History) -> Iterator[Effect]:
+    for life in history.lives:
+        yield Effect((life.program,), life.began, life.began + MATCHED, LATE_START, life)
+        if life.program in SOURCES:
+            output = history.output(life.program)
+            first = bisect_right(output, life.began, key=lambda s: s.sent)
+            seen = output[first].sent if first < len(output) else math.inf
+            yield Effect((life.program,), life.began, seen, UNDISCOVERED, life)
+    for life in history.lives_of(SWITCH):
+        yield Effect((SWITCH,), _from(life.began), life.began + NEW_SWITCH, UNDISCOVERED, life)
+    for life in history.lives_of(CONTROLLER):
+        yield Effect((CONTROLLER,), _from(life.began), life.began + RESTARTED, REPLACED, life)
+    for life in history.lives_of(SENTINEL):  # it does not know yet how long the others have been silent
+        others = {*names.PROGRAMS} - {SENTINEL}
+        yield Effect(others, life.began, life.began, UNWATCHED, life)
+
+
+def _of_silence(history: History) -> Iterator[Effect]:
+    yield Effect(SOURCES, history.end - ORDER, math.inf, UNDISCOVERED, history)
+    for source in SOURCES:
+        waiting = [program for program, needed in names.NEEDED_AT_START.items() if source in needed]
+        times = (sample.sent for sample in history.output(source))
+        for last, following in names.gaps(times, -math.inf, math.inf):
+            if following - last > FLOWING:
+                yield Effect(waiting, last + FLOWING, following, WAITING, history)
+
+
+def _from(time: float) -> float:
+    """Return the begin of an effect that includes this time."""
+    return math.nextafter(time, -math.inf)
+
+
+def _to(time: float) -> float:
+    """Return the end of an effect that includes this time."""
+    return math.nextafter(time, math.inf)
+
+
+def disturbing(
+    found: Iterable[Effect], program: str, begin: float, end: float, *why: str, but: object = None
+) -> Iterator[Effect]:
+    """Yield the effects on a program between two times for some reasons, without those of one cause."""
+    for effect in found:
+        overlaps = effect.begin < end and begin < effect.end
+        if overlaps and effect.why in why and effect.cause is not but and effect.concerns(program):
+            yield effect
+
+
+def undisturbed(
+    found: Iterable[Effect], program: str, begin: float, end: float, *why: str, but: object = None
+) -> bool:
+    """Return whether a program has no effect between two times for some reasons, but for one cause."""
+    return next(disturbing(found, program, begin, end, *why, but=but), None) is None
+
+
+def disturbed_for(found: Iterable[Effect], program: str, begin: float, end: float, *why: str) -> float:
+    """Return how long [s] a program has effects between two times for some reasons."""
+    parts = (
+        (max(begin, each.begin), min(end, each.end)) for each in disturbing(found, program, begin, end, *why)
+    )
+    return sum(two - one for one, two in names.merged(parts))

@@ -1,0 +1,219 @@
+"""The table of effects: what excuses a violation, on which programs, from when to when, and why."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import pytest
+
+from deploy.promises.effects import (
+    CUT_OFF,
+    DEAF,
+    DELAYED,
+    LATE_LINE,
+    LATE_START,
+    LOST,
+    MISSED,
+    OVERLOADED,
+    REPLACED,
+    SILENT,
+    SUSPENDED,
+    UNDISCOVERED,
+    UNWATCHED,
+    WAITING,
+    Effect,
+    disturbed_for,
+    effects,
+    undisturbed,
+)
+from deploy.promises.history import (
+    ALL,
+    CONTROLLER,
+    DEPENDENTS,
+    KINEMATICS,
+    NO_TARGET,
+    OPERATOR,
+    PROGRAMS,
+    ROBOT_STATE,
+    SENTINEL,
+    SOURCES,
+    SWITCH,
+    WATCHDOG,
+    History,
+    InjectedFault,
+    Life,
+    Sample,
+)
+from interfaces import topics
+
+HEARTBEATS = {SWITCH, *DEPENDENTS[SWITCH]}
+Row = tuple[set[str], float, float, str]
+
+
+def rows(faults: Sequence[InjectedFault] = (), lives: Sequence[Life] = ()) -> list[Row]:
+    """Return the effects of faults and starts in a record of 100 s."""
+    values = [Sample(float(second), float(second), 0.0) for second in range(101)]
+    history = History(100.0, dict.fromkeys(topics.CONFIGURATION, values), [*lives], [*faults])
+    return [
+        ({*each.programs}, round(each.begin, 6), round(each.end, 6), each.why)
+        for each in effects(history)
+        if each.cause is not history
+    ]
+
+
+@pytest.mark.parametrize(
+    ("kind", "target", "expected"),
+    [
+        ("kill", KINEMATICS, [({KINEMATICS, "velocity"}, 10.0, 16.0, SILENT)]),
+        ("kill", "config_l1", [({"config_l1"}, 10.0, 16.0, SILENT), ({"config_l1"}, 9.98, 10.02, CUT_OFF)]),
+        ("kill", SENTINEL, [({SENTINEL}, 10.0, 16.0, SILENT), ({ALL}, 9.999, 14.0, UNWATCHED)]),
+        ("kill_all", ALL, [({ALL}, 10.0, 19.0, SILENT), ({ALL}, 9.999, 14.0, UNWATCHED)]),
+        ("crash_loop", "velocity", [({"velocity"}, 10.0, 19.0, SILENT)]),
+        *(
+            (kind, CONTROLLER, [({CONTROLLER}, 10.0, 19.0, SILENT), ({CONTROLLER}, 10.0, 14.0, SUSPENDED)])
+            for kind in ("stop", "hang", "hog", "slow")
+        ),
+        (
+            "stop",
+            WATCHDOG,
+            [
+                ({WATCHDOG, *DEPENDENTS[WATCHDOG]}, 10.0, 19.0, SILENT),
+                ({WATCHDOG}, 10.0, 14.0, SUSPENDED),
+                ({WATCHDOG}, 10.0, 14.0, DEAF),
+            ],
+        ),
+        *(
+            (kind, NO_TARGET, [({NO_TARGET}, 10.0, 16.0, SILENT), (HEARTBEATS, 10.0, 16.0, SILENT)])
+            for kind in ("flood", "babble")
+        ),
+        (
+            "partition",
+            OPERATOR,
+            [
+                ({OPERATOR, *HEARTBEATS}, 10.0, 24.0, SILENT),
+                ({WATCHDOG}, 10.0, 24.0, DEAF),
+                ({ALL}, 10.0, 24.0, LATE_LINE),
+            ],
+        ),
+        (
+            "bad_line",
+            ALL,
+            [
+                ({ALL}, 10.0, 16.0, SILENT),
+                ({ALL}, 9.999, 14.0, UNWATCHED),
+                ({ALL}, 10.0, 14.0, DELAYED),
+                ({ALL}, 10.0, 24.0, LATE_LINE),
+            ],
+        ),
+        (
+            "hold",
+            "operator_heartbeat",
+            [({"operator_heartbeat"}, 10.0, 16.0, SILENT), ({WATCHDOG}, 10.0, 14.5, DEAF)],
+        ),
+        ("hold", "operator_presence", [({"operator_presence"}, 10.0, 16.0, SILENT)]),
+        ("step_clock", NO_TARGET, [({NO_TARGET}, 10.0, 16.0, SILENT), ({WATCHDOG}, 10.0, 11.0, DEAF)]),
+        ("overload", NO_TARGET, [({NO_TARGET}, 10.0, 16.0, SILENT), ({ALL}, 10.0, 14.0, OVERLOADED)]),
+        ("loss", NO_TARGET, [({NO_TARGET}, 10.0, 16.0, SILENT), ({ALL}, 10.0, 14.0, LOST)]),
+    ],
+)
+def test_effects_of_a_fault_from_10_to_14_s(kind: str, target: str, expected: list[Row]) -> None:
+    assert rows([InjectedFault(kind, target, 10.0, 14.0)]) == expected
+
+
+def test_loss_that_lasts_beyond_the_record_makes_messages_late() -> None:
+    planned = rows([InjectedFault("loss", NO_TARGET, 10.0, 101.0)])
+    assert ({ALL}, 10.0, 111.0, LATE_LINE) in planned
+
+
+def test_replaced_process_is_no_longer_suspended() -> None:
+    lives = [Life(WATCHDOG, 7, 0.0, 12.0)]
+    found = rows([InjectedFault("hang", WATCHDOG, 10.0, 25.0, 7)], lives)
+    assert ({WATCHDOG}, 10.0, 12.0, DEAF) in found
+    assert ({WATCHDOG, *DEPENDENTS[WATCHDOG]}, 10.0, 17.0, SILENT) in found
+
+
+@pytest.mark.parametrize(
+    ("program", "expected"),
+    [
+        ("velocity", []),
+        ("config_l1", [({"config_l1"}, 10.25, 11.0, UNDISCOVERED)]),
+        (SWITCH, [({SWITCH}, 10.25, 13.25, UNDISCOVERED)]),
+        (CONTROLLER, [({CONTROLLER}, 10.25, 10.27, REPLACED)]),
+        (SENTINEL, [({*PROGRAMS} - {SENTINEL}, 10.25, 10.25, UNWATCHED)]),
+    ],
+)
+def test_effects_of_a_start(program: str, expected: list[Row]) -> None:
+    found = rows(lives=[Life(program, 7, 10.25, None)])
+    assert found == [({program}, 10.25, 12.25, LATE_START), *expected]
+
+
+def test_source_without_a_message_stays_undiscovered() -> None:
+    (found,) = (
+        each
+        for each in effects(History(9.0, lives=[Life("config_l1", 7, 1.0, None)]))
+        if each.why == UNDISCOVERED and "config_l2" not in each.programs
+    )
+    assert (found.begin, found.end) == (1.0, math.inf)
+
+
+def test_silent_source_keeps_a_new_program_waiting() -> None:
+    values = [Sample(at, at, 0.0) for at in (1.0, 2.125, 4.0)]  # a shorter pause is no silence
+    flowing = [Sample(float(at), float(at), 0.0) for at in range(10)]
+    streams = dict.fromkeys(topics.CONFIGURATION, flowing) | {"l1": values}
+    history = History(9.0, streams)
+    found = [each for each in effects(history) if each.why == WAITING and each.end < 9.0]
+    assert [(each.begin, each.end) for each in found] == [
+        (-math.inf, 1.0),
+        pytest.approx((3.325, 4.0)),
+        *[(-math.inf, 0.0)] * 3,
+    ]
+    assert {*found[1].programs} == {KINEMATICS, ROBOT_STATE}
+
+
+def test_last_values_of_a_record_may_be_missing() -> None:
+    (last,) = (each for each in effects(History(9.0)) if each.why == UNDISCOVERED)
+    assert last == Effect(SOURCES, 8.9, math.inf, UNDISCOVERED, last.cause)
+
+
+@pytest.mark.parametrize(
+    ("begin", "end", "overlaps"),
+    [(1.0, 2.0, False), (1.0, 2.5, True), (2.5, 3.0, True), (3.5, 5.0, True), (4.0, 5.0, False)],
+)
+def test_effect_disturbs_an_interval_with_which_it_has_time_in_common(
+    begin: float, end: float, overlaps: bool
+) -> None:
+    effect = Effect((KINEMATICS,), 2.0, 4.0, DEAF, "a fault")
+    assert undisturbed([effect], KINEMATICS, begin, end, DEAF) is not overlaps
+
+
+def test_recovery_includes_its_ends() -> None:
+    found = effects(History(99.0, faults=[InjectedFault("kill", "velocity", 10.0, 10.0)]))
+    times = (8.0, 9.75), (8.0, 10.0), (12.0, 13.0), (12.25, 13.0)
+    disturbed = [not undisturbed(found, "velocity", *each, SILENT) for each in times]
+    assert disturbed == [False, True, True, False]
+
+
+def test_effect_disturbs_only_its_programs_for_its_reason_and_not_its_cause() -> None:
+    fault = InjectedFault("stop", KINEMATICS, 2.0, 4.0)
+    one, every = (Effect((name,), 2.0, 4.0, DEAF, fault) for name in (KINEMATICS, ALL))
+    assert not undisturbed([one], KINEMATICS, 1.0, 3.0, SILENT, DEAF)
+    assert undisturbed([one], KINEMATICS, 1.0, 3.0, SILENT)
+    assert undisturbed([one], "velocity", 1.0, 3.0, DEAF)
+    assert not undisturbed([every], "velocity", 1.0, 3.0, DEAF)
+    assert undisturbed([one, every], KINEMATICS, 1.0, 3.0, DEAF, but=fault)
+
+
+def test_observer_misses_messages_by_overload_and_loss() -> None:
+    faults = [
+        InjectedFault("overload", NO_TARGET, 1.0, 3.0),
+        InjectedFault("loss", NO_TARGET, 5.0, 6.0),
+        InjectedFault("stop", "velocity", 7.0, 8.0),
+    ]
+    found = effects(History(10.0, faults=faults))
+    assert disturbed_for(found, ALL, 2.0, 5.5, *MISSED) == 1.5
+    assert disturbed_for(found, ALL, 0.0, 10.0, *MISSED) == 3.0
+    assert undisturbed(found, ALL, 3.0, 5.0, *MISSED)
+    assert not undisturbed(found, ALL, 2.5, 4.0, *MISSED)
+    again = [InjectedFault("overload", NO_TARGET, 2.0, 4.0), InjectedFault("loss", NO_TARGET, 3.5, 4.5)]
+    assert disturbed_for(effects(History(10.0, faults=[*faults, *again])), ALL, 0.0, 4.75, *MISSED) == 3.5
