@@ -24,8 +24,8 @@ from deploy.trials.chaos.plan import names, number
 from deploy.trials.chaos.schedule_file import Shift
 from deploy.trials.simulation import plan, systematic
 from deploy.trials.simulation.attacks import FAIL_SAFES
-from deploy.trials.simulation.experiment import Outcome, play
 from deploy.trials.simulation.faults import FAULT_KINDS
+from deploy.trials.simulation.outcome import Outcome, play
 from deploy.trials.simulation.shrink import shrink
 from deploy.trials.simulation.summary import Summary
 from deploy.trials.simulation.workers import summaries

@@ -12,7 +12,7 @@ from multiprocessing.pool import IMapIterator
 
 from deploy.running import interruption
 from deploy.trials.chaos.schedule_file import Shift
-from deploy.trials.simulation.experiment import play
+from deploy.trials.simulation.outcome import play
 from deploy.trials.simulation.summary import Summary
 
 POLL = 0.2  # s between two looks for Ctrl-C

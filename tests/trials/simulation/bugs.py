@@ -22,8 +22,8 @@ from deploy.promises.history import CONTROLLER, WATCHDOG
 from deploy.running.manifest import Program
 from deploy.running.processes import ROOT
 from deploy.trials.simulation import arm, plan
-from deploy.trials.simulation.experiment import play
 from deploy.trials.simulation.faults import FAULT_KINDS
+from deploy.trials.simulation.outcome import play
 
 SEEDS = ("1", "2", "3")
 EVERY = 5.0  # s between two random faults, as by default

@@ -13,8 +13,8 @@ from deploy.trials.chaos.schedule_file import Shift
 from deploy.trials.simulation import __main__ as simulate
 from deploy.trials.simulation import attacks, people, plan
 from deploy.trials.simulation.attacks import FAIL_SAFES, JUDGED
-from deploy.trials.simulation.experiment import Outcome, play
 from deploy.trials.simulation.faults import ATTACK_KINDS, FAULT_KINDS
+from deploy.trials.simulation.outcome import Outcome, play
 from deploy.trials.simulation.summary import Summary
 from interfaces import topics
 

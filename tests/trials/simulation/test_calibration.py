@@ -10,7 +10,7 @@ from deploy.trials.chaos.schedule_file import Shift
 from deploy.trials.chaos.testbed import SCENARIO
 from deploy.trials.simulation.arm import NAMES
 from deploy.trials.simulation.calibration import load
-from deploy.trials.simulation.experiment import play
+from deploy.trials.simulation.outcome import play
 
 S1_BOUND = 0.6  # s: a silence is sampled every 500 ms, from a moment that differs
 L1_BOUNDS = (0.1, 0.3)  # s, of median and 99th percentile: the longest of some 36 restarts varies

@@ -17,8 +17,8 @@ from deploy.trials.chaos.schedule import PlannedFault
 from deploy.trials.chaos.schedule_file import Shift, save
 from deploy.trials.chaos.testbed import SCENARIO
 from deploy.trials.simulation import plan
-from deploy.trials.simulation.experiment import play
 from deploy.trials.simulation.faults import FAULT_KINDS
+from deploy.trials.simulation.outcome import play
 from deploy.trials.simulation.summary import Summary
 
 

@@ -21,8 +21,8 @@ from deploy.trials.chaos.schedule import AWAKE, DAY, PlannedFault
 from deploy.trials.chaos.schedule_file import Shift
 from deploy.trials.chaos.testbed import SCENARIO, sources
 from deploy.trials.simulation import arm, people, plan
-from deploy.trials.simulation.experiment import Outcome, play
 from deploy.trials.simulation.faults import BAD_LINE, FAULT_KINDS
+from deploy.trials.simulation.outcome import Outcome, play
 from interfaces import topics
 from services.examples import speed_guard
 
@@ -82,7 +82,7 @@ def test_a_quiet_shift_has_output_from_every_program() -> None:
 
 def test_equal_shifts_give_equal_records_in_any_interpreter() -> None:
     program = (
-        "from deploy.trials.simulation import plan; from deploy.trials.simulation.experiment import play; "
+        "from deploy.trials.simulation import plan; from deploy.trials.simulation.outcome import play; "
         f"print(play(plan.shift('equal', {LENGTH}, 1.0, list(plan.FAULT_KINDS))).digest)"
     )
     runs = [

@@ -12,7 +12,7 @@ from deploy.trials.chaos import schedule_file
 from deploy.trials.chaos.schedule import PlannedFault
 from deploy.trials.chaos.schedule_file import Shift
 from deploy.trials.chaos.testbed import SCENARIO
-from deploy.trials.simulation.experiment import play
+from deploy.trials.simulation.outcome import play
 from deploy.trials.simulation.shrink import minimal, shrink
 from tests.trials.simulation.test_shift import ASLEEP, BRIEF, with_a_bug
 

@@ -13,7 +13,7 @@ from deploy.trials.chaos.schedule import DAY
 from deploy.trials.chaos.schedule_file import Shift
 from deploy.trials.simulation import systematic
 from deploy.trials.simulation.arm import NAMES
-from deploy.trials.simulation.experiment import play
+from deploy.trials.simulation.outcome import play
 
 
 class Day(NamedTuple):
