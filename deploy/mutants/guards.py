@@ -97,7 +97,7 @@ GUARDS: dict[str, tuple[str, ...]] = {
 }
 """Paths of modules, and of the tests that run for each mutant of the module, quick ones first."""
 
-_SHIFT = "tests/trials/simulation/test_shift.py::test_"
+_SHIFT = "tests/trials/simulation/test_experiment.py::test_"
 SIMULATION = (
     f"{_SHIFT}a_quiet_shift_has_output_from_every_program",
     f"{_SHIFT}the_promises_hold_in_the_scenarios_of_the_chaos_monkey",

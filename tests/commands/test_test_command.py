@@ -14,7 +14,7 @@ from deploy.commands import test as command
 HERE = command.Part("", "", ["tests/system", "-x"])
 """Tests for one rclpy."""
 IGNORED = "--ignore=tests/mutants"
-ONE = "tests/trials/simulation/test_shift.py::test"
+ONE = "tests/trials/simulation/test_experiment.py::test"
 
 
 @pytest.mark.parametrize(

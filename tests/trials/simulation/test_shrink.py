@@ -14,7 +14,7 @@ from deploy.trials.chaos.schedule_file import Shift
 from deploy.trials.chaos.testbed import SCENARIO
 from deploy.trials.simulation.outcome import play
 from deploy.trials.simulation.shrink import minimal, shrink
-from tests.trials.simulation.test_shift import ASLEEP, BRIEF, with_a_bug
+from tests.trials.simulation.test_experiment import ASLEEP, BRIEF, with_a_bug
 
 
 @pytest.mark.parametrize("needed", [set(), {0}, {3}, {2, 7}, {0, 5, 9}, set(range(10))])
