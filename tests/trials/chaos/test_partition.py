@@ -15,7 +15,7 @@ from deploy.running import processes
 from deploy.trials.chaos.partition import missing, namespaces
 from interfaces.topics import ENGINES_STATE, OFF, ON, OPERATOR_HEARTBEAT
 
-from .experiments import experiment
+from .chaos_runs import experiment
 
 DISCOVERY = 10.0  # s until a lost host is discovered again
 pytestmark = [pytest.mark.timed, pytest.mark.timeout(120)]

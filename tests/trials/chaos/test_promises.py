@@ -13,7 +13,7 @@ from deploy.promises.promises import CHECKERS
 from deploy.trials.chaos.clock import missing
 from interfaces.topics import DRIVE_TIMEOUT, ENGINES, OPERATOR_HEARTBEAT, OPERATOR_PRESENCE
 
-from .experiments import Experiment, experiment
+from .chaos_runs import Experiment, experiment
 
 pytestmark = [pytest.mark.timed, pytest.mark.timeout(180)]
 
