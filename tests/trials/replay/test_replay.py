@@ -1,6 +1,6 @@
 """Replay of a real arm's record, made by `ros2 bag record --storage-preset-profile zstd_small`.
 
-In the 38 s of play.mcap the engines are turned on, the watchdog and kinematics are killed, the operator falls
+In the 38 s of arm.mcap the engines are turned on, the watchdog and kinematics are killed, the operator falls
 asleep until the watchdog turns the engines off, comes back, and turns them on again.
 """
 
@@ -36,7 +36,7 @@ from interfaces import topics
 from interfaces.robot_model import BASE, LINK1, frame_id
 
 ROOT = Path(__file__).parents[3]
-PLAY = Path(__file__).parent / "play.mcap"
+PLAY = Path(__file__).parent / "arm.mcap"
 SECOND = 10**9
 BY_NAME = {topic.full_name("/"): topic for topic in topics.CONTRACT}
 
