@@ -22,7 +22,7 @@ from deploy.running import interruption
 from deploy.running.processes import ROOT
 from deploy.running.rclpy_choice import sourced_rclpy
 from deploy.running.system import NAMESPACE, System
-from deploy.trials.chaos.arm import Arm
+from deploy.trials.chaos.arm import RealArm
 from deploy.trials.chaos.cost import Cost
 from reactive_node.domains import reserved_domain
 
@@ -55,7 +55,7 @@ class Fleet:
 
     def __init__(self, directory: Path, *, shared: bool) -> None:
         """:param shared: whether all arms are in one ROS domain."""
-        self.arms: list[Arm] = []
+        self.arms: list[RealArm] = []
         self._directory = directory
         self._shared = shared
         self._domain = 0
@@ -74,7 +74,7 @@ class Fleet:
         :raises MeasurementFailed: if it does not start.
         """
         name = f"arm{len(self.arms) + 1}"
-        arm = Arm(f"/{name}", System(self._directory / name))
+        arm = RealArm(f"/{name}", System(self._directory / name))
         if not self._domain or not self._shared:
             self._domain = self._stack.enter_context(reserved_domain())
         environment = os.environ | {

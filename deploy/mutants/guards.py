@@ -97,12 +97,12 @@ GUARDS: dict[str, tuple[str, ...]] = {
 }
 """Paths of modules, and of the tests that run for each mutant of the module, quick ones first."""
 
-_SHIFT = "tests/trials/simulation/test_experiment.py::test_"
+_EXPERIMENT = "tests/trials/simulation/test_experiment.py::test_"
 SIMULATION = (
-    f"{_SHIFT}a_quiet_shift_has_output_from_every_program",
-    f"{_SHIFT}the_promises_hold_in_the_scenarios_of_the_chaos_monkey",
-    f"{_SHIFT}the_promises_hold_under_each_kind_of_fault[kill]",
-    f"{_SHIFT}the_promises_hold_under_each_kind_of_fault[hang]",
-    f"{_SHIFT}a_bug_of_a_service_violates_a_promise",
+    f"{_EXPERIMENT}a_quiet_experiment_has_output_from_every_program",
+    f"{_EXPERIMENT}the_promises_hold_in_the_scenarios_of_the_chaos_monkey",
+    f"{_EXPERIMENT}the_promises_hold_under_each_kind_of_fault[kill]",
+    f"{_EXPERIMENT}the_promises_hold_under_each_kind_of_fault[hang]",
+    f"{_EXPERIMENT}a_bug_of_a_service_violates_a_promise",
 )
 """Tests that run only for the mutants that survive component tests: the quickest part of the simulation."""

@@ -11,19 +11,19 @@ from deploy.promises.marks import BABBLER
 from deploy.running import processes
 from deploy.running.system import DeploymentError, System
 from deploy.trials.chaos.clock import Clock
-from deploy.trials.chaos.nested_faults import Overlaps
+from deploy.trials.chaos.nested_faults import NestedFaults
 
 PID_TIMEOUT = 2.0  # s to wait for a program that is being restarted
 
 
-class Arm:
+class RealArm:
     """An arm into which faults are injected."""
 
     def __init__(self, namespace: str, system: System) -> None:
         self.namespace = namespace
         self.system = system
         self.domain = 0  # ROS_DOMAIN_ID
-        self.overlaps = Overlaps()
+        self.nested = NestedFaults()
         self.clock = Clock(system.run.parent / f"clock{file_suffix(namespace)}")
         self._environment: dict[str, str] = {}
         self._spent = 0.0  # s of processor time of processes for whose end no supervisord waits

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from deploy.promises.marks import BABBLER
-from deploy.trials.chaos.arm import Arm
+from deploy.trials.chaos.arm import RealArm
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class Cost:
     threads: int
 
     @classmethod
-    def now(cls, arms: Sequence[Arm]) -> Cost:
+    def now(cls, arms: Sequence[RealArm]) -> Cost:
         """Measure the arms now."""
         processes = threads = 0
         memory = 0.0

@@ -20,7 +20,7 @@ from deploy.promises.marks import BABBLER
 from deploy.running import parameter_file, processes
 from deploy.running.system import KEY
 from deploy.trials.chaos import clock
-from deploy.trials.chaos.arm import Arm
+from deploy.trials.chaos.arm import RealArm
 
 INJECTED = Path(__file__).parent / "inject"
 """On the PYTHONPATH of an arm under test; the faults `hang`, `raise` and `hog` need it."""
@@ -44,32 +44,32 @@ Undo = Callable[[], None]
 class FaultKind(NamedTuple):
     """A kind of fault."""
 
-    inject: Callable[[Arm, str], Undo | None]
+    inject: Callable[[RealArm, str], Undo | None]
     """Injects the fault into an arm and a target; returns how to end it, or ``None`` if it is momentary."""
     targets: tuple[str, ...]
     duration: tuple[float, float] = (0.0, 0.0)
     """The shortest and the longest duration [s]."""
 
 
-def _send(arm: Arm, pid: int, number: int) -> None:
+def _send(arm: RealArm, pid: int, number: int) -> None:
     for handle in processes.open_handles(arm.system.run, [pid] if pid else []):
         with suppress(ProcessLookupError):
             signal.pidfd_send_signal(handle, number)
         processes.close([handle])
 
 
-def _signal(number: int) -> Callable[[Arm, str], None]:
+def _signal(number: int) -> Callable[[RealArm, str], None]:
     return lambda arm, program: _send(arm, arm.pid(program), number)
 
 
-def stop(arm: Arm, program: str) -> Undo:
+def stop(arm: RealArm, program: str) -> Undo:
     """Suspend a process by SIGSTOP; at the end, continue it if it is still alive."""
     pid = arm.pid(program)
     _send(arm, pid, signal.SIGSTOP)
-    return arm.overlaps.begin(("stop", pid), lambda: _send(arm, pid, signal.SIGCONT))
+    return arm.nested.begin(("stop", pid), lambda: _send(arm, pid, signal.SIGCONT))
 
 
-def hog(arm: Arm, program: str) -> None:
+def hog(arm: RealArm, program: str) -> None:
     """Let a process allocate memory up to a limit."""
     pid = arm.pid(program)
     with suppress(OSError):
@@ -79,7 +79,7 @@ def hog(arm: Arm, program: str) -> None:
         _send(arm, pid, signal.SIGRTMIN)
 
 
-def kill_all(arm: Arm, target: str) -> None:
+def kill_all(arm: RealArm, target: str) -> None:
     """SIGKILL all programs at once."""
     pids = [process.pid for process in arm.system.members() if process.program not in ("", BABBLER)]
     handles = processes.open_handles(arm.system.run, pids)
@@ -89,7 +89,7 @@ def kill_all(arm: Arm, target: str) -> None:
     processes.close(handles)
 
 
-def kill_supervisor(arm: Arm, target: str) -> Undo:
+def kill_supervisor(arm: RealArm, target: str) -> Undo:
     """SIGKILL supervisord; at the end, start the system again over its orphans."""
     supervisor = arm.system.supervisor() or 0
     arm.remember_processor_time([supervisor])
@@ -100,10 +100,10 @@ def kill_supervisor(arm: Arm, target: str) -> Undo:
         arm.remember_processor_time(orphans)
         arm.system.start_again()
 
-    return arm.overlaps.begin("kill_supervisor", start_again)
+    return arm.nested.begin("kill_supervisor", start_again)
 
 
-def double(arm: Arm, program: str) -> Undo:
+def double(arm: RealArm, program: str) -> Undo:
     """Start a second instance of a program."""
     command = []
     with suppress(OSError):  # it has just ended
@@ -121,7 +121,7 @@ def double(arm: Arm, program: str) -> Undo:
     return _kill(process)
 
 
-def crash_loop(arm: Arm, program: str) -> Undo:
+def crash_loop(arm: RealArm, program: str) -> Undo:
     """SIGKILL a program after giving a parameter the wrong type: the program refuses to start."""
     path = arm.system.parameters
     node = f"{arm.namespace.rstrip('/')}/{program}"
@@ -136,10 +136,10 @@ def crash_loop(arm: Arm, program: str) -> Undo:
             left.pop(node, None)
             arm.system.write_parameters(left)
 
-    return arm.overlaps.begin(("crash_loop", program), repair)
+    return arm.nested.begin(("crash_loop", program), repair)
 
 
-def full_disk(arm: Arm, target: str) -> Undo:
+def full_disk(arm: RealArm, target: str) -> Undo:
     """Let every write of supervisord to a log fail."""
     supervisor = arm.system.supervisor()
     if supervisor is None:
@@ -151,16 +151,16 @@ def full_disk(arm: Arm, target: str) -> Undo:
             resource.prlimit(supervisor, resource.RLIMIT_FSIZE, (hard if size is None else size, hard))
 
     limit(1)
-    return arm.overlaps.begin(("full_disk", supervisor), lambda: limit(None))
+    return arm.nested.begin(("full_disk", supervisor), lambda: limit(None))
 
 
-def step_clock(arm: Arm, target: str) -> None:
+def step_clock(arm: RealArm, target: str) -> None:
     """Step the time of day of all processes of an arm, within a second; it stays so."""
     arm.clock.step()
 
 
-def _babbler(mode: str) -> Callable[[Arm, str], Undo]:
-    def start(arm: Arm, target: str) -> Undo:
+def _babbler(mode: str) -> Callable[[RealArm, str], Undo]:
+    def start(arm: RealArm, target: str) -> Undo:
         process = subprocess.Popen(
             [sys.executable, "-m", "deploy.trials.chaos.babbler", mode],
             cwd=processes.ROOT,

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Hashable
 
 
-class Overlaps:
+class NestedFaults:
     """Counts the faults that are under way."""
 
     def __init__(self) -> None:

@@ -20,7 +20,7 @@ from deploy.promises.history import OPERATOR
 from deploy.promises.history import SWITCH as PROGRAM
 from deploy.running import manifest, processes
 from deploy.running.system import System
-from deploy.trials.chaos.arm import Arm
+from deploy.trials.chaos.arm import RealArm
 from deploy.trials.chaos.faults import FAULT_KINDS, FaultKind, Undo
 from deploy.trials.chaos.schedule import PlannedFault
 from deploy.trials.chaos.testbed import SCENARIO, Testbed
@@ -130,13 +130,13 @@ class TwoHosts(Testbed):
         self._full = stack.enter_context(namespaces())
         within = {name: ("ip", "netns", "exec", self._full(name)) for name in (ROBOT, CONTROL)}
         self.observe_within = within[ROBOT]
-        self.arms = [Arm("/", System(self._runs / "run", within[ROBOT]))]
+        self.arms = [RealArm("/", System(self._runs / "run", within[ROBOT]))]
         self._on_operators_host = within[CONTROL]
         self._operator = System(self._runs / "run_operator")
         self._operator.run.mkdir()  # lets the next start of the chaos monkey find and end the switch
         stack.callback(self._operator.stop)
 
-    def start(self, arm: Arm, parameters: Mapping[str, object]) -> None:
+    def start(self, arm: RealArm, parameters: Mapping[str, object]) -> None:
         """Start the arm without its switch, and the switch alone on the operator's host."""
         arm.system.start(parameters)
         arm.system.halt(PROGRAM)
@@ -152,7 +152,7 @@ class TwoHosts(Testbed):
             start_new_session=True,  # Ctrl-C at the terminal must not end it
         )
 
-    def _cut(self, arm: Arm, target: str) -> Undo:
+    def _cut(self, arm: RealArm, target: str) -> Undo:
         """Take the operator's port of the bridge down; at the end, up again."""
         _ip("-n", self._full(BRIDGE), "link", "set", CONTROL, "down")
 
@@ -162,7 +162,7 @@ class TwoHosts(Testbed):
 
         return heal
 
-    def _degrade(self, arm: Arm, target: str) -> Undo:
+    def _degrade(self, arm: RealArm, target: str) -> Undo:
         """Lose, delay and reorder packets between the hosts."""
         _queue(self._full(BRIDGE), "replace", *NETEM)
 

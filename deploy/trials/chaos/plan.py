@@ -58,7 +58,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     add("--scenario", choices=(RANDOM, *NAMED), default=RANDOM, metavar="NAME", help=scenarios)
     add("--arms", type=int, default=1, help="they share the random faults; each gets a whole scenario")
     add("--loss", type=number(0, 100), default=0.0, help="percent of all DDS packets that are lost")
-    add("--schedule", type=Path, metavar="FILE", help="play a schedule, such as `make simulate` writes")
+    add("--schedule", type=Path, metavar="FILE", help="run a schedule, such as `make simulate` writes")
     add("--replay", type=Path, metavar="RECORD", help="only judge a record")
     options = parser.parse_args(arguments)
     if not 1 <= options.arms <= len(DOMAINS):
@@ -109,13 +109,13 @@ def plan(options: argparse.Namespace) -> Plan:
 
 
 def _scheduled(path: Path) -> Plan:
-    shift = schedule_file.load(path)
-    kinds = {each.kind for each in shift.faults}
+    experiment = schedule_file.load(path)
+    kinds = {each.kind for each in experiment.faults}
     _require_clock(kinds)
     if unknown := sorted(kinds - FAULT_KINDS.keys()):
         raise DeploymentError(f"{path}: only make simulate can inject {', '.join(unknown)}")
-    title = f"Schedule {path}, {shift.length:.0f} s"
-    return Plan(title, [shift.faults], shift.length, partial(Testbed, scenario=shift.scenario))
+    title = f"Schedule {path}, {experiment.length:.0f} s"
+    return Plan(title, [experiment.faults], experiment.length, partial(Testbed, scenario=experiment.scenario))
 
 
 def _require_clock(kinds: Collection[str]) -> None:

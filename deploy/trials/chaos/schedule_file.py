@@ -1,4 +1,4 @@
-"""Schedule files: what happens to an arm, in YAML. `make simulate` and `make chaos` play them.
+"""Schedule files: what happens to an arm, in YAML. `make simulate` and `make chaos` run them.
 
 .. code-block:: yaml
 
@@ -25,8 +25,8 @@ from deploy.trials.chaos.schedule import PlannedFault, Schedule
 
 
 @dataclass(frozen=True)
-class Shift:
-    """What happens to an arm. In a simulation, equal shifts give equal records."""
+class Experiment:
+    """What happens to an arm. In a simulation, equal experiments give equal records."""
 
     seed: str
     """Of all chance in a simulation: in the network and the processes."""
@@ -36,24 +36,24 @@ class Shift:
     faults: Schedule
 
 
-def save(shift: Shift, path: Path) -> None:
-    """Write a shift to a file."""
+def save(experiment: Experiment, path: Path) -> None:
+    """Write an experiment to a file."""
     document = {
-        "seed": shift.seed,
-        "length": shift.length,
-        "scenario": dict(shift.scenario),
-        "faults": [each._asdict() for each in shift.faults],
+        "seed": experiment.seed,
+        "length": experiment.length,
+        "scenario": dict(experiment.scenario),
+        "faults": [each._asdict() for each in experiment.faults],
     }
     path.write_text(yaml.safe_dump(document, sort_keys=False, default_flow_style=None), encoding="utf-8")
 
 
-def load(path: Path) -> Shift:
-    """Read a shift from a file. Raises DeploymentError: one line with the file and the reason."""
+def load(path: Path) -> Experiment:
+    """Read an experiment from a file. Raises DeploymentError: one line with the file and the reason."""
     try:
         document: Any = yaml.safe_load(path.read_text(encoding="utf-8"))
         scenario = _checked(document, "scenario", dict, "mapping")
         faults = [_fault(each) for each in _checked(document, "faults", list, "list")]
-        return Shift(str(document["seed"]), _seconds("length", document["length"]), scenario, faults)
+        return Experiment(str(document["seed"]), _seconds("length", document["length"]), scenario, faults)
     except OSError as error:
         raise DeploymentError(f"{path}: {error.strerror}") from None
     except (yaml.YAMLError, UnicodeDecodeError, KeyError, TypeError, ValueError) as error:

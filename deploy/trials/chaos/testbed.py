@@ -41,7 +41,7 @@ from deploy.promises.history import (
 from deploy.running import interruption, processes
 from deploy.running.system import NAMESPACE, DeploymentError, System, scenario_parameters
 from deploy.trials.chaos import clock
-from deploy.trials.chaos.arm import Arm, file_suffix
+from deploy.trials.chaos.arm import RealArm, file_suffix
 from deploy.trials.chaos.faults import FAULT_KINDS, INJECTED, Undo
 from deploy.trials.chaos.schedule import AWAKE, DAY, FIRST_FAULT, PlannedFault, Schedule
 from interfaces import topics
@@ -94,7 +94,7 @@ class Testbed:
         :param steps_clock: whether the fault `step_clock` can be injected.
         """
         self.record = directory / "record.mcap"
-        self.arms = [Arm(name, System(directory / f"run{file_suffix(name)}")) for name in namespaces]
+        self.arms = [RealArm(name, System(directory / f"run{file_suffix(name)}")) for name in namespaces]
         self.lead += FURTHER_ARM * (len(namespaces) - 1)
         self.faults = FAULT_KINDS
         self.observe_within: Sequence[str] = ()  # a command in front of the observer's
@@ -140,7 +140,7 @@ class Testbed:
     def prepare(self, stack: ExitStack) -> None:
         """Prepare the hosts of the arms."""
 
-    def start(self, arm: Arm, parameters: Mapping[str, object]) -> None:
+    def start(self, arm: RealArm, parameters: Mapping[str, object]) -> None:
         """Start an arm."""
         arm.system.start(parameters)
 
@@ -171,7 +171,7 @@ class Testbed:
                     undone.callback(once)
                     heapq.heappush(actions, (end, next(order), once))
 
-    def _inject(self, arm: Arm, planned: PlannedFault) -> tuple[float, Undo] | None:
+    def _inject(self, arm: RealArm, planned: PlannedFault) -> tuple[float, Undo] | None:
         """Inject a fault; return when to end it, and how."""
         _, kind, target, duration = planned
         pid = arm.pid(target) if target in PROGRAMS else 0
@@ -181,7 +181,7 @@ class Testbed:
         self._report(InjectedFault(kind, target, now, now + duration, pid, arm.clock.ahead), arm)
         return (now + duration, undo) if undo else None
 
-    def _report(self, fault: InjectedFault, arm: Arm) -> None:
+    def _report(self, fault: InjectedFault, arm: RealArm) -> None:
         """Let the observer record a fault."""
         assert self._observer.stdin is not None
         self._observer.stdin.write(json.dumps(fault._asdict() | {"namespace": arm.namespace}) + "\n")
@@ -227,7 +227,7 @@ class Testbed:
         return lines
 
     def _await_messages(
-        self, arms: Sequence[Arm], awaited: Sequence[topics.Topic], lines: queue.Queue[str]
+        self, arms: Sequence[RealArm], awaited: Sequence[topics.Topic], lines: queue.Queue[str]
     ) -> None:
         """Wait until the observer has seen a message on each topic of each arm; most follow the scenario."""
         names = {topic.full_name(arm.namespace) for arm in arms for topic in awaited}

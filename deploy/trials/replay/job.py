@@ -15,7 +15,7 @@ from deploy.running import interruption
 from deploy.trials.replay import chains
 from deploy.trials.replay.chains import Chain
 from deploy.trials.replay.comparison import BOUNDS, Comparison, Interval, compare
-from deploy.trials.replay.playback import Playback, play
+from deploy.trials.replay.playback import Playback, replay
 from deploy.trials.replay.record import Message, Record
 from interfaces.topics import ENGINES, Topic
 
@@ -75,7 +75,7 @@ def _run(job: Job) -> Outcome:
 def run(record: Record, job: Job) -> Outcome:
     """Replay a chain, and compare its output."""
     record = record.of_arm(job.namespace)
-    playback = play(record, job.namespace, job.chain, job.parameters)
+    playback = replay(record, job.namespace, job.chain, job.parameters)
     comparisons = []
     for topic in chains.outputs(job.chain):
         recorded = chains.recorded(record, job.namespace, topic)

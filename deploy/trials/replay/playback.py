@@ -1,4 +1,4 @@
-"""Plays recorded messages to unmodified services, in virtual time."""
+"""Replays recorded messages to unmodified services, in virtual time."""
 
 from __future__ import annotations
 
@@ -47,9 +47,9 @@ class Playback:
     """When a service ended by itself [ns since 1970], and its last words."""
 
 
-def play(record: Record, namespace: str, chain: Chain, parameters: Path | None = None) -> Playback:
+def replay(record: Record, namespace: str, chain: Chain, parameters: Path | None = None) -> Playback:
     """
-    Play a record to the services of a chain.
+    Replay a record to the services of a chain.
 
     :param parameters: a ROS parameter file.
     """

@@ -21,11 +21,11 @@ from deploy.running import interruption, processes
 from deploy.running.system import DeploymentError, make_directory
 from deploy.trials.chaos import schedule_file
 from deploy.trials.chaos.plan import names, number
-from deploy.trials.chaos.schedule_file import Shift
+from deploy.trials.chaos.schedule_file import Experiment
 from deploy.trials.simulation import plan, systematic
 from deploy.trials.simulation.attacks import FAIL_SAFES
 from deploy.trials.simulation.faults import FAULT_KINDS
-from deploy.trials.simulation.outcome import Outcome, play
+from deploy.trials.simulation.outcome import Outcome, simulate
 from deploy.trials.simulation.shrink import shrink
 from deploy.trials.simulation.summary import Summary
 from deploy.trials.simulation.workers import summaries
@@ -61,7 +61,7 @@ def _parse(arguments: Sequence[str]) -> argparse.Namespace:
         f"of {', '.join(FAULT_KINDS)}"
     )
     add("--faults", type=names(FAULT_KINDS), default=tuple(FAULT_KINDS), help=of_kinds)
-    add("--schedule", type=Path, metavar="FILE", help="play this schedule instead")
+    add("--schedule", type=Path, metavar="FILE", help="run this schedule instead")
     minutes = "for so many minutes, inject faults at every message and timer of an operator's day instead"
     add("--systematic", type=number(0.01, 100_000), metavar="MINUTES", help=minutes)
     return parser.parse_args(arguments)
@@ -69,34 +69,34 @@ def _parse(arguments: Sequence[str]) -> argparse.Namespace:
 
 def _run(options: argparse.Namespace) -> int:
     if options.schedule:
-        return _conclude(play(schedule_file.load(options.schedule)), f"Schedule {options.schedule}")
+        return _conclude(simulate(schedule_file.load(options.schedule)), f"Schedule {options.schedule}")
     seed = options.seed or str(random.randrange(10**6))
     if options.systematic:
-        shifts, title = systematic.cases(seed)
-        return _play(shifts, title, 60 * options.systematic)
-    shifts = plan.shifts(seed, options.hours, options.every, options.faults)
+        experiments, title = systematic.cases(seed)
+        return _run_all(experiments, title, 60 * options.systematic)
+    experiments = plan.experiments(seed, options.hours, options.every, options.faults)
     title = f"Simulated arm, seed {seed}, {options.hours:g} h, a fault every {options.every:g} s"
-    return _play(shifts, title, math.inf)
+    return _run_all(experiments, title, math.inf)
 
 
-def _play(shifts: Sequence[Shift], title: str, limit: float) -> int:
-    """Play shifts, at most for so many seconds, and report; return the exit code."""
+def _run_all(experiments: Sequence[Experiment], title: str, limit: float) -> int:
+    """Run experiments, at most for so many seconds, and report; return the exit code."""
     print(title, flush=True)
-    hours = sum(shift.length for shift in shifts) / 3600.0
-    summary, broken = Summary(), list[Shift]()
+    hours = sum(experiment.length for experiment in experiments) / 3600.0
+    summary, broken = Summary(), list[Experiment]()
     began = time.monotonic()
     interrupted = False
     try:
-        for shift, part in zip(shifts, summaries(shifts), strict=False):
+        for experiment, part in zip(experiments, summaries(experiments), strict=False):
             summary.add(part)
             if part.violated():
-                broken.append(shift)
+                broken.append(experiment)
             _show(summary, hours, time.monotonic() - began, len(broken))
             if time.monotonic() - began > limit:
                 break
     except interruption.Interrupted:
         interrupted = True
-    if not summary.shifts:
+    if not summary.experiments:
         raise interruption.Interrupted
     print(report(summary, time.monotonic() - began))
     if broken and not interrupted:
@@ -111,12 +111,12 @@ def _show(summary: Summary, hours: float, seconds: float, broken: int) -> None:
     done = BAR * min(1.0, summary.hours / hours)
     bar = "#" * int(done) + "." * (BAR - int(done))
     speed = 3600.0 * summary.hours / seconds
-    state = f"{count(broken, 'shift')} with a violation" if broken else "no violation"
+    state = f"{count(broken, 'experiment')} with a violation" if broken else "no violation"
     print(f"\r[{bar}] {summary.hours:.1f} of {hours:g} h, {speed:.0f} times real time, {state} ", end="")
 
 
 def report(summary: Summary, seconds: float) -> str:
-    """Return what shifts have shown, in so many seconds of this machine."""
+    """Return what experiments have shown, in so many seconds of this machine."""
     kinds = ", ".join(f"{kind} {number}" for kind, number in sorted(summary.injected.items()))
     speed = 3600.0 * summary.hours / seconds
     return (
@@ -125,7 +125,7 @@ def report(summary: Summary, seconds: float) -> str:
         f"{_alone(summary)}"
         f"{count(summary.restarts, 'restart')}, {count(summary.messages, 'message')}; "
         f"record {summary.digest}\n"
-        f"{count(summary.shifts, 'run')}, {summary.hours:.2f} h in {seconds:.0f} s: "
+        f"{count(summary.experiments, 'experiment')}, {summary.hours:.2f} h in {seconds:.0f} s: "
         f"{speed:.0f} times real time"
     )
 
@@ -138,10 +138,11 @@ def _alone(summary: Summary) -> str:
     return f"Fail-safes that turned the engines off alone: {numbers}\n"
 
 
-def _explain(shift: Shift, title: str) -> int:
-    """Shrink a shift that violates a promise, and report on it."""
-    outcome = play(shift)
-    print(f"\nLooking for the fewest faults that violate {outcome.violated()[0]}, of {len(shift.faults)}")
+def _explain(experiment: Experiment, title: str) -> int:
+    """Shrink an experiment that violates a promise, and report on it."""
+    outcome = simulate(experiment)
+    faults = len(experiment.faults)
+    print(f"\nLooking for the fewest faults that violate {outcome.violated()[0]}, of {faults}")
 
     def tell(faults: int) -> None:
         interruption.check()
@@ -151,16 +152,17 @@ def _explain(shift: Shift, title: str) -> int:
 
 
 def _conclude(outcome: Outcome, title: str) -> int:
-    """Report on one shift; return the exit code."""
+    """Report on one experiment; return the exit code."""
+    experiment = outcome.experiment
     directory = processes.run_directory() / "simulation"
-    name = "".join(each if each.isalnum() else "-" for each in outcome.shift.seed)
+    name = "".join(each if each.isalnum() else "-" for each in experiment.seed)
     schedule, html = directory / f"{name}.yaml", directory / f"{name}.html"
     make_directory(directory)
-    schedule_file.save(outcome.shift, schedule)
-    remarks = [f"{title} · {count(len(outcome.shift.faults), 'fault')} in {outcome.shift.length:.0f} s"]
+    schedule_file.save(experiment, schedule)
+    remarks = [f"{title} · {count(len(experiment.faults), 'fault')} in {experiment.length:.0f} s"]
     html.write_text(page(title, remarks, outcome.findings, outcome.history), encoding="utf-8")
     print(f"\n{text(outcome.findings)}\n\n{verdict(outcome.findings)}")
-    print(f"Report: {html}\nPlay it again: make simulate SCHEDULE={schedule}")
+    print(f"Report: {html}\nRun it again: make simulate SCHEDULE={schedule}")
     return int(bool(outcome.violated()))
 
 

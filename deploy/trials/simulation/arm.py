@@ -16,7 +16,7 @@ from deploy.promises.history import SWITCH, Life
 from deploy.running import manifest
 from deploy.running.processes import MARK
 from deploy.running.system import SERVICE_GRACE, SETTINGS, DeploymentError, scenario_parameters
-from deploy.trials.chaos.nested_faults import Overlaps
+from deploy.trials.chaos.nested_faults import NestedFaults
 from deploy.trials.simulation.calibration import Calibration, load
 from deploy.trials.simulation.machine import simulated_services
 from deploy.trials.simulation.supervisor import Supervisor
@@ -31,7 +31,7 @@ ROBOT, CONTROL = "robot", "operator"
 LEAD = 1.0  # s from the start of the arm to the origin of the scenario
 
 
-class Arm:
+class SimulatedArm:
     """The processes of one arm."""
 
     def __init__(
@@ -54,7 +54,7 @@ class Arm:
         """Packet loss and latency without faults."""
         self.skew = 0.0
         """By which the clock of the operator's host is ahead of the robot's [s]."""
-        self.overlaps = Overlaps()
+        self.nested = NestedFaults()
         self._directory = directory
         file = directory / "scenario.yaml"
         file.write_text(yaml.safe_dump(dict(scenario)))
@@ -136,7 +136,7 @@ def simulated_arm(
     directory: Path,
     scenario: Mapping[str, Any],
     durations: Calibration | None = None,
-) -> Iterator[Arm]:
+) -> Iterator[SimulatedArm]:
     """
     Simulate an arm until the end of the ``with``.
 
@@ -144,7 +144,7 @@ def simulated_arm(
     """
     given = durations or load()
     network = Network(latency=given.latency, discovery=given.discovery)
-    arm: Arm
+    arm: SimulatedArm
     with simulated_services(seed, network, lambda: arm.supervisor) as simulation:
-        arm = Arm(simulation, directory, scenario, given.start_up)
+        arm = SimulatedArm(simulation, directory, scenario, given.start_up)
         yield arm

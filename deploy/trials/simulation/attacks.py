@@ -42,7 +42,7 @@ from deploy.promises.history import (
 from deploy.promises.limits import OFF_WITHIN, STRIKE, STRIKES
 from deploy.promises.marks import STEP
 from deploy.trials.chaos.schedule import PlannedFault
-from deploy.trials.chaos.schedule_file import Shift
+from deploy.trials.chaos.schedule_file import Experiment
 from interfaces import topics
 
 FAIL_SAFES = ("F1", "F2", "F3")
@@ -55,18 +55,18 @@ CRITICAL = (WATCHDOG, CONTROLLER, SWITCH, OPERATOR, ALL, NO_TARGET)
 """The targets of random faults that would harm the fail-safe that is left."""
 
 
-def attacked(shift: Shift) -> Shift:
-    """Return a shift in which most of the long silences are attacked, each fail-safe in turn."""
-    rng = random.Random(f"attacks {shift.seed}")
+def attacked(experiment: Experiment) -> Experiment:
+    """Return an experiment in which most of the long silences are attacked, each fail-safe in turn."""
+    rng = random.Random(f"attacks {experiment.seed}")
     turns = itertools.islice(itertools.cycle(FAIL_SAFES), rng.randrange(len(FAIL_SAFES)), None)
-    releases = [each for each in _releases(shift) if rng.random() < SHARE]
-    commands = [*shift.scenario["engines"]]
+    releases = [each for each in _releases(experiment) if rng.random() < SHARE]
+    commands = [*experiment.scenario["engines"]]
     commands += [{"at": round(at - rng.uniform(1.2, 2.0), 3), "command": topics.TURN_ON} for at in releases]
-    faults = [each for each in shift.faults if not any(_harms(each, release) for release in releases)]
+    faults = [each for each in experiment.faults if not any(_harms(each, release) for release in releases)]
     for release, fail_safe in zip(releases, turns, strict=False):
         faults += attack(fail_safe, release, rng)
-    scenario = {**shift.scenario, "engines": sorted(commands, key=lambda each: float(each["at"]))}
-    return replace(shift, scenario=scenario, faults=sorted(faults))
+    scenario = {**experiment.scenario, "engines": sorted(commands, key=lambda each: float(each["at"]))}
+    return replace(experiment, scenario=scenario, faults=sorted(faults))
 
 
 def attack(fail_safe: str, release: float, rng: random.Random) -> list[PlannedFault]:
@@ -79,10 +79,10 @@ def attack(fail_safe: str, release: float, rng: random.Random) -> list[PlannedFa
     ]
 
 
-def _releases(shift: Shift) -> Iterator[float]:
+def _releases(experiment: Experiment) -> Iterator[float]:
     """Yield each release after a long hold that begins a long silence."""
-    pressed = shift.scenario["operator"]["pressed"]
-    for one, two in itertools.pairwise([*pressed, {"from": shift.length}]):
+    pressed = experiment.scenario["operator"]["pressed"]
+    for one, two in itertools.pairwise([*pressed, {"from": experiment.length}]):
         if one["to"] - one["from"] > HELD and two["from"] - one["to"] > JUDGED:
             yield one["to"]
 

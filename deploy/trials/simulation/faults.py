@@ -15,7 +15,7 @@ from deploy.running.system import KEY
 from deploy.trials.chaos import clock
 from deploy.trials.chaos.faults import PARAMETERS, Undo
 from deploy.trials.simulation import people
-from deploy.trials.simulation.arm import CONTROL, NAMES, ROBOT, Arm
+from deploy.trials.simulation.arm import CONTROL, NAMES, ROBOT, SimulatedArm
 from interfaces import topics
 
 CLOCK_TOLERANCE = 0.045  # s between the clocks of the hosts (deploy/SAFETY.md, A3)
@@ -28,29 +28,29 @@ HELD = (topics.OPERATOR_HEARTBEAT.name, topics.OPERATOR_PRESENCE.name)
 class FaultKind(NamedTuple):
     """A kind of fault."""
 
-    inject: Callable[[Arm, str, float], Undo | None]
+    inject: Callable[[SimulatedArm, str, float], Undo | None]
     """Injects the fault into a target, for a duration; returns how to end it, or ``None``."""
     targets: tuple[str, ...]
     duration: tuple[float, float] = (0.0, 0.0)
     """The shortest and the longest duration [s]."""
 
 
-def _process(act: Callable[[Process], Any]) -> Callable[[Arm, str, float], None]:
+def _process(act: Callable[[Process], Any]) -> Callable[[SimulatedArm, str, float], None]:
     """Return a fault that does something to the process of a program, if it has one."""
 
-    def inject(arm: Arm, program: str, duration: float) -> None:
+    def inject(arm: SimulatedArm, program: str, duration: float) -> None:
         if process := arm.process(program):
             act(process)
 
     return inject
 
 
-def _stop(arm: Arm, program: str, duration: float) -> Undo | None:
+def _stop(arm: SimulatedArm, program: str, duration: float) -> Undo | None:
     process = arm.process(program)
     if process is None:
         return None
     process.stop()
-    return arm.overlaps.begin(("stop", process), process.proceed)
+    return arm.nested.begin(("stop", process), process.proceed)
 
 
 def _fail(error: type[BaseException]) -> Callable[[Process], None]:
@@ -60,27 +60,27 @@ def _fail(error: type[BaseException]) -> Callable[[Process], None]:
     return lambda process: process.interrupt(fail)
 
 
-def _slow(arm: Arm, program: str, duration: float) -> None:
+def _slow(arm: SimulatedArm, program: str, duration: float) -> None:
     """Let a callback take long; DDS continues meanwhile."""
     if process := arm.process(program):
         process.interrupt(lambda: time.sleep(duration))
 
 
-def _kill_all(arm: Arm, target: str, duration: float) -> None:
+def _kill_all(arm: SimulatedArm, target: str, duration: float) -> None:
     for process in arm.processes():
         process.kill()
 
 
-def _kill_supervisor(arm: Arm, target: str, duration: float) -> Undo:
+def _kill_supervisor(arm: SimulatedArm, target: str, duration: float) -> Undo:
     arm.supervisor.die()
-    return arm.overlaps.begin("kill_supervisor", arm.start_again)
+    return arm.nested.begin("kill_supervisor", arm.start_again)
 
 
-def _double(arm: Arm, program: str, duration: float) -> Undo:
+def _double(arm: SimulatedArm, program: str, duration: float) -> Undo:
     return arm.spawn(program, 1).kill
 
 
-def _crash_loop(arm: Arm, program: str, duration: float) -> Undo:
+def _crash_loop(arm: SimulatedArm, program: str, duration: float) -> Undo:
     node = f"/{program}"
     arm.parameters[node] = {KEY: {PARAMETERS[program]: "not a number"}}
     arm.write_parameters()
@@ -91,14 +91,14 @@ def _crash_loop(arm: Arm, program: str, duration: float) -> Undo:
         del arm.parameters[node]
         arm.write_parameters()
 
-    return arm.overlaps.begin(("crash_loop", program), repair)
+    return arm.nested.begin(("crash_loop", program), repair)
 
 
-def _stranger(program: Callable[[], None]) -> Callable[[Arm, str, float], Undo]:
+def _stranger(program: Callable[[], None]) -> Callable[[SimulatedArm, str, float], Undo]:
     return lambda arm, target, duration: arm.simulation.start(program, name="stranger", host=ROBOT).kill
 
 
-def _step_clock(arm: Arm, target: str, duration: float) -> None:
+def _step_clock(arm: SimulatedArm, target: str, duration: float) -> None:
     """Set the time of day of both hosts, one after the other."""
     seconds = arm.simulation.random.uniform(-clock.LARGEST, clock.LARGEST)
     arm.simulation.host(ROBOT).step(seconds)
@@ -106,14 +106,14 @@ def _step_clock(arm: Arm, target: str, duration: float) -> None:
     arm.simulation.after(pause, lambda: arm.simulation.host(CONTROL).step(seconds))
 
 
-def _skew_clock(arm: Arm, target: str, duration: float) -> None:
+def _skew_clock(arm: SimulatedArm, target: str, duration: float) -> None:
     """Let the clock of the operator's host be off, within the tolerance of assumption A3."""
     skew = arm.simulation.random.uniform(-CLOCK_TOLERANCE, CLOCK_TOLERANCE)
     arm.simulation.host(CONTROL).step(skew - arm.skew)
     arm.skew = skew
 
 
-def _drift_clock(arm: Arm, target: str, duration: float) -> Undo:
+def _drift_clock(arm: SimulatedArm, target: str, duration: float) -> Undo:
     """Let the time of day of both hosts run at another rate."""
     rate = arm.simulation.random.uniform(-0.01, 0.01)
 
@@ -122,25 +122,25 @@ def _drift_clock(arm: Arm, target: str, duration: float) -> Undo:
             arm.simulation.set_drift(arm.simulation.host(name), rate)
 
     drift(rate)
-    return arm.overlaps.begin("drift_clock", lambda: drift(0.0))
+    return arm.nested.begin("drift_clock", lambda: drift(0.0))
 
 
-def _partition(arm: Arm, target: str, duration: float) -> Undo:
+def _partition(arm: SimulatedArm, target: str, duration: float) -> Undo:
     arm.simulation.cut(ROBOT, CONTROL)
-    return arm.overlaps.begin(PARTITION, lambda: arm.simulation.heal(ROBOT, CONTROL))
+    return arm.nested.begin(PARTITION, lambda: arm.simulation.heal(ROBOT, CONTROL))
 
 
-def _bad_line(arm: Arm, target: str, duration: float) -> Undo:
+def _bad_line(arm: SimulatedArm, target: str, duration: float) -> Undo:
     network = arm.simulation.network
     network.loss, network.latency = BAD_LINE
 
     def heal() -> None:
         network.loss, network.latency = arm.good_line
 
-    return arm.overlaps.begin("bad_line", heal)
+    return arm.nested.begin("bad_line", heal)
 
 
-def _hold(arm: Arm, topic: str, duration: float) -> None:
+def _hold(arm: SimulatedArm, topic: str, duration: float) -> None:
     arm.simulation.hold(f"rt/{topic}", duration)
 
 

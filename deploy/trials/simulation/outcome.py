@@ -1,4 +1,4 @@
-"""A shift: one simulated run of an arm, with its operator and its faults, judged by the promises."""
+"""An experiment: one simulated run of an arm, with its operator and its faults, judged by the promises."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from deploy.promises.history import OPERATOR, PROGRAMS, SILENCE, History, Inject
 from deploy.promises.promises import CHECKERS
 from deploy.running.system import DeploymentError
 from deploy.trials.chaos.schedule import PlannedFault
-from deploy.trials.chaos.schedule_file import Shift
+from deploy.trials.chaos.schedule_file import Experiment
 from deploy.trials.simulation import people
-from deploy.trials.simulation.arm import NAMES, ROBOT, Arm, simulated_arm
+from deploy.trials.simulation.arm import NAMES, ROBOT, SimulatedArm, simulated_arm
 from deploy.trials.simulation.attacks import alone
 from deploy.trials.simulation.calibration import Calibration
 from deploy.trials.simulation.faults import ATTACK_KINDS, FAULT_KINDS
@@ -27,9 +27,9 @@ KINDS = FAULT_KINDS | ATTACK_KINDS
 
 @dataclass(frozen=True)
 class Outcome:
-    """The result of a shift."""
+    """The result of an experiment."""
 
-    shift: Shift
+    experiment: Experiment
     findings: list[Finding]
     history: History
     digest: str
@@ -51,38 +51,38 @@ class Outcome:
         return [finding.promise for finding in self.findings if finding.evidence]
 
 
-def play(shift: Shift, durations: Calibration | None = None) -> Outcome:
+def simulate(experiment: Experiment, durations: Calibration | None = None) -> Outcome:
     """
-    Simulate a shift, and check the promises.
+    Simulate an experiment, and check the promises.
 
     :param durations: of a real arm; by default, those of ``calibration.json``.
-    :raises DeploymentError: if the shift has a fault that cannot be simulated, or a bad scenario.
+    :raises DeploymentError: if the experiment has a fault that cannot be simulated, or a bad scenario.
     """
-    for planned in shift.faults:
+    for planned in experiment.faults:
         if planned.kind not in KINDS or planned.target not in KINDS[planned.kind].targets:
             raise DeploymentError(f"a simulation has no fault {planned.kind} of {planned.target}")
     with tempfile.TemporaryDirectory(prefix="reactive-arm-") as directory:
-        with simulated_arm(shift.seed, Path(directory), shift.scenario, durations) as arm:
+        with simulated_arm(experiment.seed, Path(directory), experiment.scenario, durations) as arm:
             observer = Observer(arm.simulation, arm.origin)
             arm.simulation.start(view, name="viewer", host=ROBOT)
             injected: list[InjectedFault] = []
-            for planned in shift.faults:
+            for planned in experiment.faults:
                 arm.simulation.at(arm.origin + planned.at, _injection(arm, planned, injected))
-            arm.simulation.run(arm.origin + shift.length)
+            arm.simulation.run(arm.origin + experiment.length)
             lives = arm.lives()
         conditions = [
             InjectedFault(SILENCE, OPERATOR, begin, until)
-            for begin, until in people.silences(shift.scenario, shift.length)
+            for begin, until in people.silences(experiment.scenario, experiment.length)
             if until > begin
         ]
         history = observer.history(
-            lives, [*injected, *conditions], shift.length, frozenset(PROGRAMS) - set(NAMES)
+            lives, [*injected, *conditions], experiment.length, frozenset(PROGRAMS) - set(NAMES)
         )
     findings = [check(history) for check in CHECKERS.values()]
-    return Outcome(shift, findings, history, observer.digest, observer.messages)
+    return Outcome(experiment, findings, history, observer.digest, observer.messages)
 
 
-def _injection(arm: Arm, planned: PlannedFault, injected: list[InjectedFault]) -> Any:
+def _injection(arm: SimulatedArm, planned: PlannedFault, injected: list[InjectedFault]) -> Any:
     def inject() -> None:
         _, kind, target, duration = planned
         process = arm.process(target) if target in NAMES else None

@@ -9,8 +9,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TypeVar
 
-from deploy.trials.chaos.schedule_file import Shift
-from deploy.trials.simulation.outcome import Outcome, play
+from deploy.trials.chaos.schedule_file import Experiment
+from deploy.trials.simulation.outcome import Outcome, simulate
 
 T = TypeVar("T")
 MARGIN = 15.0  # s after the first evidence: the checkers need to see what follows
@@ -37,30 +37,30 @@ def minimal(items: Sequence[T], fails: Callable[[Sequence[T]], bool]) -> Sequenc
 
 def shrink(outcome: Outcome, tell: Callable[[int], None] = lambda faults: None) -> Outcome:
     """
-    Return the outcome of a smaller shift that breaks the first promise that this one breaks.
+    Return the outcome of a smaller experiment that breaks the first promise that this one breaks.
 
     :param tell: receives the number of faults that are left, after each success.
     """
     promise = outcome.violated()[0]
     best = outcome
 
-    def breaks(shift: Shift) -> bool:
+    def breaks(experiment: Experiment) -> bool:
         nonlocal best
-        found = play(shift)
+        found = simulate(experiment)
         if promise not in found.violated():
             return False
         best = found
-        tell(len(shift.faults))
+        tell(len(experiment.faults))
         return True
 
     at = min(
         each.time for finding in outcome.findings for each in finding.evidence if finding.promise == promise
     )
     until = replace(
-        outcome.shift,
-        length=min(outcome.shift.length, round(at + MARGIN, 3)),
-        faults=[each for each in outcome.shift.faults if each.at <= at],
+        outcome.experiment,
+        length=min(outcome.experiment.length, round(at + MARGIN, 3)),
+        faults=[each for each in outcome.experiment.faults if each.at <= at],
     )
-    whole = until if breaks(until) else outcome.shift
+    whole = until if breaks(until) else outcome.experiment
     minimal(whole.faults, lambda faults: breaks(replace(whole, faults=list(faults))))
     return best

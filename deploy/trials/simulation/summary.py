@@ -1,4 +1,4 @@
-"""What many shifts have shown together."""
+"""What many experiments have shown together."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from deploy.trials.simulation.outcome import Outcome
 
 @dataclass
 class Summary:
-    """The sum of the outcomes of shifts."""
+    """The sum of the outcomes of experiments."""
 
     hours: float = 0.0
-    shifts: int = 0
+    experiments: int = 0
     messages: int = 0
     restarts: int = 0
     injected: Counter[str] = field(default_factory=Counter)
@@ -28,23 +28,23 @@ class Summary:
 
     @classmethod
     def of(cls, outcome: Outcome) -> Summary:
-        """Return the summary of one shift."""
+        """Return the summary of one experiment."""
         history = outcome.history
         return cls(
-            outcome.shift.length / 3600.0,
+            outcome.experiment.length / 3600.0,
             1,
             outcome.messages,
             len(history.lives) - len({life.program for life in history.lives}),
             outcome.injected,
             outcome.alone,
-            {finding.promise: [_named(finding, outcome.shift.seed)] for finding in outcome.findings},
+            {finding.promise: [_named(finding, outcome.experiment.seed)] for finding in outcome.findings},
             [outcome.digest],
         )
 
     def add(self, other: Summary) -> None:
-        """Add the shifts of another summary."""
+        """Add the experiments of another summary."""
         self.hours += other.hours
-        self.shifts += other.shifts
+        self.experiments += other.experiments
         self.messages += other.messages
         self.restarts += other.restarts
         self.injected += other.injected
@@ -68,7 +68,7 @@ class Summary:
 
 
 def _named(finding: Finding, seed: str) -> Finding:
-    """Let the evidence name the shift."""
+    """Let the evidence name the experiment."""
     evidence = [Evidence(each.time, f"{each.text} ({seed})") for each in finding.evidence]
     return replace(finding, evidence=evidence)
 

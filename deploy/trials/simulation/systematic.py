@@ -18,7 +18,7 @@ from rclpy_simulation import Process
 from deploy.promises.history import CONTROLLER, SWITCH, WATCHDOG
 from deploy.trials.chaos import testbed
 from deploy.trials.chaos.schedule import AWAKE, DAY, FIRST_FAULT, SETTLE, PlannedFault
-from deploy.trials.chaos.schedule_file import Shift
+from deploy.trials.chaos.schedule_file import Experiment
 from deploy.trials.simulation import people
 from deploy.trials.simulation.arm import NAMES, simulated_arm
 
@@ -58,7 +58,7 @@ def points(seed: str) -> list[Point]:
     return list(found)
 
 
-def cases(seed: str) -> tuple[Sequence[Shift], str]:
+def cases(seed: str) -> tuple[Sequence[Experiment], str]:
     """
     Return all cases and a title.
 
@@ -79,7 +79,7 @@ def cases(seed: str) -> tuple[Sequence[Shift], str]:
         f"Systematic faults, seed {seed}: {len(every)} moments, {len(singles)} cases with one fault; "
         f"around the release {len(critical)} moments, {possible} cases with two"
     )
-    return [_shift(seed, faults) for faults in mixed if faults is not None], title
+    return [_experiment(seed, faults) for faults in mixed if faults is not None], title
 
 
 def _fault(point: Point, kind: str) -> PlannedFault:
@@ -92,8 +92,8 @@ def _pair(rng: random.Random, critical: Sequence[Point]) -> list[PlannedFault]:
     return [_fault(point, rng.choice(list(FAULTS))) for point in (one, two)]
 
 
-def _shift(seed: str, faults: list[PlannedFault]) -> Shift:
+def _experiment(seed: str, faults: list[PlannedFault]) -> Experiment:
     last = max(fault.at for fault in faults)
     # A fault that may delay the engines' stop is watched until they must be off, another until it is healed.
     length = DAY if last > AWAKE - 2 * SETTLE else last + SETTLE
-    return Shift(seed, length, SCENARIO, faults)
+    return Experiment(seed, length, SCENARIO, faults)

@@ -1,4 +1,4 @@
-"""Plays shifts on all processors."""
+"""Runs experiments on all processors."""
 
 from __future__ import annotations
 
@@ -11,23 +11,23 @@ from collections.abc import Iterator, Sequence
 from multiprocessing.pool import IMapIterator
 
 from deploy.running import interruption
-from deploy.trials.chaos.schedule_file import Shift
-from deploy.trials.simulation.outcome import play
+from deploy.trials.chaos.schedule_file import Experiment
+from deploy.trials.simulation.outcome import simulate
 from deploy.trials.simulation.summary import Summary
 
 POLL = 0.2  # s between two looks for Ctrl-C
 
 
-def summaries(shifts: Sequence[Shift]) -> Iterator[Summary]:
-    """Play shifts; yield their summaries in order. Raises Interrupted on Ctrl-C."""
+def summaries(experiments: Sequence[Experiment]) -> Iterator[Summary]:
+    """Run experiments; yield their summaries in order. Raises Interrupted on Ctrl-C."""
     context = multiprocessing.get_context("spawn")
-    workers = min(os.cpu_count() or 1, len(shifts))
+    workers = min(os.cpu_count() or 1, len(experiments))
     with (
         tempfile.TemporaryDirectory(prefix="reactive-arm-") as directory,
         context.Pool(workers, _prepare, (directory,)) as pool,
     ):
-        results = pool.imap(_summarize, shifts)
-        for _ in shifts:
+        results = pool.imap(_summarize, experiments)
+        for _ in experiments:
             yield _next(results)
 
 
@@ -47,5 +47,5 @@ def _prepare(directory: str) -> None:
     gc.freeze()  # looking through all that was imported, again and again, would take a seventh of the time
 
 
-def _summarize(shift: Shift) -> Summary:
-    return Summary.of(play(shift))
+def _summarize(experiment: Experiment) -> Summary:
+    return Summary.of(simulate(experiment))

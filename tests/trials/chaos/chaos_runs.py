@@ -17,8 +17,8 @@ from deploy.trials.chaos.arm import file_suffix
 TIMEOUT = 150.0  # s
 
 
-class Experiment:
-    """The result of an experiment with one arm."""
+class ChaosRun:
+    """The result of `make chaos` with one arm."""
 
     def __init__(self, directory: Path, output: str, code: int, namespace: str = "/") -> None:
         self.output = output
@@ -34,9 +34,9 @@ class Experiment:
         return finding
 
 
-def experiment(run: Path, *options: str) -> Experiment:
-    """Run an experiment with one arm; its files are in a directory."""
-    return Experiment(run, *unleash(run, *options))
+def chaos_run(run: Path, *options: str) -> ChaosRun:
+    """Run `make chaos` with one arm; its files are in a directory."""
+    return ChaosRun(run, *unleash(run, *options))
 
 
 def unleash(run: Path, *options: str) -> tuple[str, int]:

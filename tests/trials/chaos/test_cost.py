@@ -13,7 +13,7 @@ import pytest
 from deploy.promises.history import ALL
 from deploy.running import processes
 from deploy.running.system import System
-from deploy.trials.chaos.arm import Arm
+from deploy.trials.chaos.arm import RealArm
 from deploy.trials.chaos.cost import Cost
 from deploy.trials.chaos.faults import FAULT_KINDS
 
@@ -32,7 +32,7 @@ signal.pause()
 """
 
 
-class Supervised(Arm):
+class Supervised(RealArm):
     """An arm with a process that has waited for a busy child."""
 
     def __init__(self, run: Path) -> None:

@@ -25,13 +25,13 @@ from deploy.running import processes
 from deploy.running.system import ALL as ALL_NODES
 from deploy.running.system import KEY, NAMESPACE, System
 from deploy.trials.chaos import process_monitor
-from deploy.trials.chaos.arm import Arm
+from deploy.trials.chaos.arm import RealArm
 from deploy.trials.chaos.faults import FAULT_KINDS, PARAMETERS, Undo
 from deploy.trials.chaos.process_monitor import ProcessMonitor, Rounds
 from interfaces import topics
 
 
-class StoppedArm(Arm):
+class StoppedArm(RealArm):
     """An arm that does not run."""
 
     def pid(self, program: str) -> int:
@@ -42,11 +42,11 @@ class StoppedArm(Arm):
 
 
 @pytest.fixture
-def arm(tmp_path: Path) -> Arm:
+def arm(tmp_path: Path) -> RealArm:
     return StoppedArm("/arm1", System(tmp_path))
 
 
-def test_full_disk_without_supervisord_changes_nothing(arm: Arm) -> None:
+def test_full_disk_without_supervisord_changes_nothing(arm: RealArm) -> None:
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     undo = FAULT_KINDS["full_disk"].inject(arm, NO_TARGET)
     assert resource.getrlimit(resource.RLIMIT_FSIZE) == before
@@ -55,13 +55,13 @@ def test_full_disk_without_supervisord_changes_nothing(arm: Arm) -> None:
     assert resource.getrlimit(resource.RLIMIT_FSIZE) == before
 
 
-def test_duplicate_of_a_stopped_program_starts_nothing(arm: Arm) -> None:
+def test_duplicate_of_a_stopped_program_starts_nothing(arm: RealArm) -> None:
     undo = FAULT_KINDS["double"].inject(arm, "sentinel")
     assert undo is not None
     undo()
 
 
-def test_two_crash_loops_restore_the_parameters(arm: Arm) -> None:
+def test_two_crash_loops_restore_the_parameters(arm: RealArm) -> None:
     good = {ALL_NODES: {KEY: {"scenario": "demo"}}}
     arm.system.parameters.write_text(yaml.safe_dump(good))
     first = FAULT_KINDS["crash_loop"].inject(arm, "config_l1")
@@ -75,7 +75,7 @@ def test_two_crash_loops_restore_the_parameters(arm: Arm) -> None:
     assert yaml.safe_load(arm.system.parameters.read_text()) == good
 
 
-def test_overlapping_crash_loops_of_a_program_last_until_the_last_one_ends(arm: Arm) -> None:
+def test_overlapping_crash_loops_of_a_program_last_until_the_last_one_ends(arm: RealArm) -> None:
     good = {ALL_NODES: {KEY: {"scenario": "demo"}}}
     arm.system.parameters.write_text(yaml.safe_dump(good))
     first, second = (FAULT_KINDS["crash_loop"].inject(arm, "sentinel") for _ in range(2))
@@ -88,7 +88,7 @@ def test_overlapping_crash_loops_of_a_program_last_until_the_last_one_ends(arm: 
 
 
 def test_supervisord_stays_dead_although_an_overlapping_fault_ends(
-    arm: Arm, monkeypatch: pytest.MonkeyPatch
+    arm: RealArm, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     starts: list[System] = []
     monkeypatch.setattr(System, "start_again", lambda system: starts.append(system))
@@ -111,7 +111,7 @@ def is_full(pid: int) -> bool:
 
 @pytest.mark.parametrize(("kind", "is_wrong"), [("stop", is_stopped), ("full_disk", is_full)])
 def test_a_fault_lasts_although_an_overlapping_one_ends(
-    kind: str, is_wrong: Callable[[int], bool], arm: Arm, monkeypatch: pytest.MonkeyPatch
+    kind: str, is_wrong: Callable[[int], bool], arm: RealArm, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def await_wrong(pid: int, wrong: bool) -> None:
         """Wait for the kernel: it stops a process a moment after the signal."""
@@ -151,7 +151,7 @@ def await_members(system: System, count: int) -> list[processes.Process]:
 
 
 @pytest.fixture
-def babbler(arm: Arm, domain_id: int) -> Iterator[int]:
+def babbler(arm: RealArm, domain_id: int) -> Iterator[int]:
     """Start a babbler next to the arm."""
     undo: Undo | None = FAULT_KINDS["babble"].inject(arm, NO_TARGET)
     assert undo is not None
@@ -163,7 +163,7 @@ def babbler(arm: Arm, domain_id: int) -> Iterator[int]:
 
 
 @pytest.fixture
-def velocity(arm: Arm, babbler: int) -> Iterator[subprocess.Popen[bytes]]:
+def velocity(arm: RealArm, babbler: int) -> Iterator[subprocess.Popen[bytes]]:
     """Start a process of the arm next to the babbler."""
     environment = arm.environment() | {"SUPERVISOR_PROCESS_NAME": "velocity"}
     with subprocess.Popen(
@@ -176,7 +176,7 @@ def velocity(arm: Arm, babbler: int) -> Iterator[subprocess.Popen[bytes]]:
             process.kill()
 
 
-def test_babbler_is_not_supervisord_but_ends_with_its_system(arm: Arm, babbler: int) -> None:
+def test_babbler_is_not_supervisord_but_ends_with_its_system(arm: RealArm, babbler: int) -> None:
     assert arm.system.members() == [(babbler, BABBLER)]
     assert arm.system.supervisor() is None
     arm.system.stop()
@@ -184,7 +184,7 @@ def test_babbler_is_not_supervisord_but_ends_with_its_system(arm: Arm, babbler: 
 
 
 def test_babbler_ends_without_a_traceback(
-    arm: Arm,
+    arm: RealArm,
     capfd: pytest.CaptureFixture[str],  # first, to capture the babbler's output
     babbler: int,
     make_node: Callable[..., Node],
@@ -204,7 +204,9 @@ def test_babbler_ends_without_a_traceback(
     assert "Traceback" not in capfd.readouterr().err  # the reader of this test may report the babble
 
 
-def run_until_end(arm: Arm, program: subprocess.Popen[bytes], report: Callable[[Life], None]) -> list[float]:
+def run_until_end(
+    arm: RealArm, program: subprocess.Popen[bytes], report: Callable[[Life], None]
+) -> list[float]:
     """Monitor a process until its end; return how long each overload lasted."""
     overloads: list[float] = []
     ended = threading.Event()
@@ -222,7 +224,7 @@ def run_until_end(arm: Arm, program: subprocess.Popen[bytes], report: Callable[[
 
 
 def test_a_stall_while_an_end_is_reported_is_an_overload(
-    arm: Arm, velocity: subprocess.Popen[bytes], monkeypatch: pytest.MonkeyPatch
+    arm: RealArm, velocity: subprocess.Popen[bytes], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     ahead = 0.0
 
@@ -245,7 +247,7 @@ def test_a_late_round_is_an_overload() -> None:
 
 
 def test_a_process_that_is_reaped_while_it_is_found_leaves_no_handle(
-    arm: Arm, velocity: subprocess.Popen[bytes], monkeypatch: pytest.MonkeyPatch
+    arm: RealArm, velocity: subprocess.Popen[bytes], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def handles() -> int:
         return len(os.listdir("/proc/self/fd"))
@@ -267,7 +269,7 @@ def test_a_process_that_is_reaped_while_it_is_found_leaves_no_handle(
     assert handles() == before
 
 
-def monitor_of(arm: Arm, seen: list[Life]) -> ProcessMonitor:
+def monitor_of(arm: RealArm, seen: list[Life]) -> ProcessMonitor:
     """Return a monitor that lists the processes of an arm."""
     return ProcessMonitor({arm.system.run: "/"}, lambda _, life: seen.append(life), lambda *_: None)
 
@@ -286,7 +288,7 @@ os.execve(sys.executable, [sys.executable, "-c", "print(flush=True); input()"], 
 
 
 def test_slow_child_of_supervisord_is_identified_by_its_program(
-    arm: Arm, monkeypatch: pytest.MonkeyPatch
+    arm: RealArm, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(process_monitor, "FORK_TIME", 0.0)
     monkeypatch.setattr(process_monitor, "NAMING_TIMEOUT", 0.0)
@@ -322,7 +324,7 @@ def test_slow_child_of_supervisord_is_identified_by_its_program(
 
 
 def test_babbler_is_not_a_program_of_the_arm(
-    arm: Arm, babbler: int, velocity: subprocess.Popen[bytes], monkeypatch: pytest.MonkeyPatch
+    arm: RealArm, babbler: int, velocity: subprocess.Popen[bytes], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     seen: list[Life] = []
     monitor = monitor_of(arm, seen)

@@ -15,7 +15,7 @@ from deploy.running import processes
 from deploy.trials.chaos.partition import missing, namespaces
 from interfaces.topics import ENGINES_STATE, OFF, ON, OPERATOR_HEARTBEAT
 
-from .chaos_runs import experiment
+from .chaos_runs import chaos_run
 
 DISCOVERY = 10.0  # s until a lost host is discovered again
 pytestmark = [pytest.mark.timed, pytest.mark.timeout(120)]
@@ -26,7 +26,7 @@ def history(tmp_path_factory: pytest.TempPathFactory) -> History:
     """The history on the robot's side."""
     if reason := missing():
         pytest.skip(reason)
-    return experiment(tmp_path_factory.mktemp("partition"), "--scenario", "partition").history
+    return chaos_run(tmp_path_factory.mktemp("partition"), "--scenario", "partition").history
 
 
 @pytest.fixture(scope="module")
@@ -68,7 +68,7 @@ def test_bad_line_violates_no_promise_and_engines_stay_on(
         # An error of the kernel; an error in the use of tc would read differently.
         assert "Specified qdisc kind is unknown" in reason or reason == missing()
         pytest.skip(f"platform: {reason}")
-    bad = experiment(tmp_path_factory.mktemp("bad_line"), "--scenario", "bad_line")
+    bad = chaos_run(tmp_path_factory.mktemp("bad_line"), "--scenario", "bad_line")
     (fault,) = (fault for fault in bad.history.faults if fault.kind == "bad_line")
     assert {s.value for s in between(bad.history.stream(ENGINES_STATE), fault.begin, fault.end)} == {ON}
     for promise in CHECKERS:

@@ -9,12 +9,12 @@ import pytest
 from deploy.running.system import DeploymentError
 from deploy.trials.chaos import clock, plan
 from deploy.trials.chaos.schedule import PlannedFault
-from deploy.trials.chaos.schedule_file import Shift, save
+from deploy.trials.chaos.schedule_file import Experiment, save
 from deploy.trials.chaos.testbed import SCENARIO, Testbed
 
 
 def schedule(path: Path, kind: str = "kill", target: str = "velocity") -> str:
-    save(Shift("7", 30.0, SCENARIO, [PlannedFault(6.0, kind, target)]), path)
+    save(Experiment("7", 30.0, SCENARIO, [PlannedFault(6.0, kind, target)]), path)
     return str(path)
 
 

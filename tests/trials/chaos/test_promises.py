@@ -1,4 +1,4 @@
-"""The promises in one short play with a real system: every kind of fault, and every program killed."""
+"""The promises in one short run of a real system: every kind of fault, and every program killed."""
 
 from __future__ import annotations
 
@@ -13,35 +13,35 @@ from deploy.promises.promises import CHECKERS
 from deploy.trials.chaos.clock import missing
 from interfaces.topics import DRIVE_TIMEOUT, ENGINES, OPERATOR_HEARTBEAT, OPERATOR_PRESENCE
 
-from .chaos_runs import Experiment, experiment
+from .chaos_runs import ChaosRun, chaos_run
 
 pytestmark = [pytest.mark.timed, pytest.mark.timeout(180)]
 
 
 @pytest.fixture(scope="module")
-def play(tmp_path_factory: pytest.TempPathFactory) -> Experiment:
-    return experiment(tmp_path_factory.mktemp("variously"), "--scenario", "variously")
+def run(tmp_path_factory: pytest.TempPathFactory) -> ChaosRun:
+    return chaos_run(tmp_path_factory.mktemp("variously"), "--scenario", "variously")
 
 
 @pytest.mark.parametrize("promise", CHECKERS)
-def test_promise_is_exercised_and_holds(play: Experiment, promise: str) -> None:
-    assert play.finding(promise).verdict == HOLDS
+def test_promise_is_exercised_and_holds(run: ChaosRun, promise: str) -> None:
+    assert run.finding(promise).verdict == HOLDS
 
 
 @pytest.mark.parametrize("program", PROGRAMS)
-def test_killed_program_is_back_within_two_seconds(play: Experiment, program: str) -> None:
-    times = play.finding("L1").times.get(program)
-    assert max(times) <= 2.0 if times else unknown_after(play, "kill", program)
+def test_killed_program_is_back_within_two_seconds(run: ChaosRun, program: str) -> None:
+    times = run.finding("L1").times.get(program)
+    assert max(times) <= 2.0 if times else unknown_after(run, "kill", program)
 
 
-def unknown_after(play: Experiment, kind: str, program: str) -> bool:
+def unknown_after(run: ChaosRun, kind: str, program: str) -> bool:
     """Return whether the observer may have missed what became of a program after a fault."""
-    fault = next(each for each in play.history.injected if (each.kind, each.target) == (kind, program))
-    return not undisturbed(effects(play.history), ALL, fault.begin, fault.end + SLOWEST, *MISSED)
+    fault = next(each for each in run.history.injected if (each.kind, each.target) == (kind, program))
+    return not undisturbed(effects(run.history), ALL, fault.begin, fault.end + SLOWEST, *MISSED)
 
 
-def test_engines_turn_off_in_time_with_a_stopped_controller(play: Experiment) -> None:
-    history = play.history
+def test_engines_turn_off_in_time_with_a_stopped_controller(run: ChaosRun) -> None:
+    history = run.history
     sleep = next(fault for fault in history.faults if fault.kind == SILENCE and fault.begin > 0.0)
     begin = between(history.stream(OPERATOR_HEARTBEAT), 0.0, sleep.begin + 1.0)[-1].sent
     off = max(off for on, off in running(history) if on < sleep.end)
@@ -51,18 +51,18 @@ def test_engines_turn_off_in_time_with_a_stopped_controller(play: Experiment) ->
     assert off - begin <= OFF_WITHIN
 
 
-def test_hung_programs_and_a_stopped_sentinel_are_replaced(play: Experiment) -> None:
+def test_hung_programs_and_a_stopped_sentinel_are_replaced(run: ChaosRun) -> None:
     hung = {"kinematics": "hang", "config_l1": "stop", "sentinel": "stop"}
-    replaced = set(play.finding("L4").times)
+    replaced = set(run.finding("L4").times)
     assert replaced <= set(hung)
-    assert all(unknown_after(play, hung[program], program) for program in set(hung) - replaced)
+    assert all(unknown_after(run, hung[program], program) for program in set(hung) - replaced)
 
 
 @pytest.mark.skipif(bool(missing()), reason=f"platform: {missing()}")
-def test_time_of_day_of_the_arm_steps_forward_and_back(play: Experiment) -> None:
-    steps = [fault for fault in play.history.faults if fault.kind == STEP]
+def test_time_of_day_of_the_arm_steps_forward_and_back(run: ChaosRun) -> None:
+    steps = [fault for fault in run.history.faults if fault.kind == STEP]
     assert len(steps) == 2
-    presences = play.history.stream(OPERATOR_PRESENCE)
+    presences = run.history.stream(OPERATOR_PRESENCE)
 
     def ahead(presence: Sample) -> float:  # its value is its stamp
         return float(presence.value) - presence.sent - (presences[0].value - presences[0].sent)
@@ -73,22 +73,22 @@ def test_time_of_day_of_the_arm_steps_forward_and_back(play: Experiment) -> None
     assert steps[0].ahead < 0.0 < steps[1].ahead - steps[0].ahead
 
 
-def test_killed_supervisord_leaves_no_second_instance(play: Experiment) -> None:
-    supervisors = [life for life in play.history.lives if not life.program]
+def test_killed_supervisord_leaves_no_second_instance(run: ChaosRun) -> None:
+    supervisors = [life for life in run.history.lives if not life.program]
     assert len(supervisors) == 2
-    assert play.finding("S5").cases >= len(PROGRAMS)
+    assert run.finding("S5").cases >= len(PROGRAMS)
 
 
-def test_every_output_flows_at_the_end(play: Experiment) -> None:
-    history = play.history
+def test_every_output_flows_at_the_end(run: ChaosRun) -> None:
+    history = run.history
     silent = {p for p in PROGRAMS if history.output(p)[-1].received < history.end - 3.0}
     assert not silent
 
 
-def test_exit_code_output_and_page_show_cost_and_verdict(play: Experiment) -> None:
-    assert play.code == 0, play.output
-    assert f") in {len(PROGRAMS) + 1} processes per arm" in play.output
-    page = play.page.read_text(encoding="utf-8")
+def test_exit_code_output_and_page_show_cost_and_verdict(run: ChaosRun) -> None:
+    assert run.code == 0, run.output
+    assert f") in {len(PROGRAMS) + 1} processes per arm" in run.output
+    page = run.page.read_text(encoding="utf-8")
     assert "All exercised promises hold" in page
     assert page.count("<svg") >= 2
     page = page.replace("http://www.w3.org/2000/svg", "")  # a name, not an address

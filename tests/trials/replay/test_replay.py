@@ -36,7 +36,7 @@ from interfaces import topics
 from interfaces.robot_model import BASE, LINK1, frame_id
 
 ROOT = Path(__file__).parents[3]
-PLAY = Path(__file__).parent / "arm.mcap"
+RECORD = Path(__file__).parent / "arm.mcap"
 SECOND = 10**9
 BY_NAME = {topic.full_name("/"): topic for topic in topics.CONTRACT}
 
@@ -72,7 +72,7 @@ def verdicts(done: subprocess.CompletedProcess[str]) -> dict[str, str]:
 def test_replay_of_a_real_play_is_equal_and_the_same_each_time(tmp_path: Path) -> None:
     outputs = [tmp_path / "one.mcap", tmp_path / "two.mcap"]
     for seed, output in enumerate(outputs):
-        done = replay(PLAY, "--output", str(output), PYTHONHASHSEED=str(seed))
+        done = replay(RECORD, "--output", str(output), PYTHONHASHSEED=str(seed))
         assert (done.returncode, done.stderr) == (0, ""), done.stdout
         assert verdicts(done) == {
             "effector/position": "equal",
@@ -116,7 +116,7 @@ def test_changed_recipe_differs(changes: list[tuple[str, str, str, str]], tmp_pa
         source = changed.read_text()
         assert text in source
         changed.write_text(source.replace(text, other))
-    done = replay(PLAY, "--output", str(tmp_path / "out.mcap"), directory=tmp_path)
+    done = replay(RECORD, "--output", str(tmp_path / "out.mcap"), directory=tmp_path)
     assert done.returncode == 1, done.stderr
     for *_, topic in changes:
         assert verdicts(done)[topic] == "DIFFERENT"
@@ -126,7 +126,7 @@ def test_changed_recipe_differs(changes: list[tuple[str, str, str, str]], tmp_pa
 def test_changed_parameter_differs(tmp_path: Path) -> None:
     parameters = tmp_path / "parameters.yaml"
     parameters.write_text("operator_watchdog: {ros__parameters: {silence: 1.0}}")
-    done = replay(PLAY, "--output", str(tmp_path / "out.mcap"), "--parameters", str(parameters))
+    done = replay(RECORD, "--output", str(tmp_path / "out.mcap"), "--parameters", str(parameters))
     assert done.returncode == 1
     assert verdicts(done)["engines/state"] == "DIFFERENT"
 
@@ -134,7 +134,7 @@ def test_changed_parameter_differs(tmp_path: Path) -> None:
 def test_service_that_fails_is_reported(tmp_path: Path) -> None:
     shutil.copytree(ROOT / "services", tmp_path / "services")
     (tmp_path / "services" / "velocity.py").write_text("raise ValueError('no velocity')")
-    done = replay(PLAY, "--output", str(tmp_path / "out.mcap"), directory=tmp_path)
+    done = replay(RECORD, "--output", str(tmp_path / "out.mcap"), directory=tmp_path)
     assert done.returncode == 1
     assert "velocity ended: ValueError: no velocity" in done.stdout
 
@@ -157,7 +157,7 @@ def test_bad_file_is_refused_in_one_line(
     change: Callable[[bytes], bytes], reason: str, tmp_path: Path
 ) -> None:
     record = tmp_path / "record.mcap"
-    record.write_bytes(change(PLAY.read_bytes()))
+    record.write_bytes(change(RECORD.read_bytes()))
     with pytest.raises(DeploymentError) as error:
         load(record)
     assert str(error.value).startswith(f"{record} {reason}")
@@ -170,24 +170,23 @@ def derived(
     *others: tuple[str, int],
 ) -> Path:
     """
-    Write a record like that of the play.
+    Write a record like arm.mcap.
 
     :param change: returns what is written in the place of a message; ``None`` for nothing.
-    :param others: topics that are not the arm's, and when a message of them was received [ns after the play's
-        begin].
+    :param others: topics that are not the arm's, and when a message of them was received [ns of the record].
     """
-    with McapFile(PLAY) as play:
+    with McapFile(RECORD) as record:
         writer = FileWriter(path, "test")
         numbers = {
             channel.topic: writer.register_channel(
                 channel.topic,
                 "cdr",
-                writer.register_schema(play.type_name(channel), "ros2msg", b""),
+                writer.register_schema(record.type_name(channel), "ros2msg", b""),
                 channel.metadata,
             )
-            for channel in play.channels.values()
+            for channel in record.channels.values()
         }
-        for channel, message in play.messages():
+        for channel, message in record.messages():
             received = Received(message.log_time, message.publish_time, message.data)
             if (changed := change(channel.topic, received)) is not None:
                 writer.add_message(
@@ -195,7 +194,7 @@ def derived(
                 )
         string = writer.register_schema("std_msgs/msg/String", "ros2msg", b"")
         for topic, time in others:
-            at = play.start + time
+            at = record.start + time
             other = writer.register_channel(topic, "cdr", string)
             writer.add_message(other, at, serialize_message(String(data="x")), at)
         writer.close()
@@ -203,12 +202,12 @@ def derived(
 
 
 def late(path: Path, begin: float, end: float = 60.0) -> Path:
-    """Write what a recorder receives that begins later and ends earlier [s after the play's begin]."""
-    with McapFile(PLAY) as play:
-        first, last = (play.start + round(time * SECOND) for time in (begin, end))
+    """Write what a recorder receives that begins later and ends earlier [s after the record's begin]."""
+    with McapFile(RECORD) as record:
+        first, last = (record.start + round(time * SECOND) for time in (begin, end))
         kept = {
             channel.topic: message
-            for channel, message in play.messages(end=first - 1)
+            for channel, message in record.messages(end=first - 1)
             if topics.is_latched(BY_NAME[channel.topic].qos)
         }
 
@@ -296,7 +295,7 @@ def test_foreign_commands_after_the_arm_do_not_prolong_its_life(tmp_path: Path) 
 
 
 def test_parameters_are_those_that_the_health_shows(tmp_path: Path) -> None:
-    """The play is that of a watchdog with a silence of three seconds."""
+    """The record is that of a watchdog with a silence of three seconds."""
 
     def shown(topic: str, it: Received) -> Received:
         if topic != topics.DIAGNOSTICS.name:
@@ -313,7 +312,7 @@ def test_parameters_are_those_that_the_health_shows(tmp_path: Path) -> None:
 
 def test_whole_part_of_a_record_without_an_end_is_replayed(tmp_path: Path) -> None:
     path = tmp_path / "cut.mcap"
-    path.write_bytes(PLAY.read_bytes()[:-10])
+    path.write_bytes(RECORD.read_bytes()[:-10])
     done = replay(path)
     assert (done.returncode, done.stderr) == (0, ""), done.stdout
     assert done.stdout.startswith(f"{path} has no end: its ")
@@ -337,8 +336,8 @@ def test_missing_file_and_missing_arm_are_one_line(tmp_path: Path) -> None:
     recorder.close()
     with pytest.raises(DeploymentError, match=f"^{record} contains no topic of an arm$"):
         load(record)
-    done = replay(PLAY, "--namespace", "/arm2")
-    assert (done.returncode, done.stderr) == (2, f"{PLAY} has no arm /arm2; it has /\n")
+    done = replay(RECORD, "--namespace", "/arm2")
+    assert (done.returncode, done.stderr) == (2, f"{RECORD} has no arm /arm2; it has /\n")
 
 
 def text(*items: tuple[float, str]) -> list[Message]:

@@ -2,7 +2,7 @@
 
     .venv/bin/python -m tests.trials.simulation.bugs
 
-plays an hour of `make simulate` with each bug and each of three seeds, and says when a promise is violated.
+runs an hour of `make simulate` with each bug and each of three seeds, and says when a promise is violated.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from deploy.running.manifest import Program
 from deploy.running.processes import ROOT
 from deploy.trials.simulation import arm, plan
 from deploy.trials.simulation.faults import FAULT_KINDS
-from deploy.trials.simulation.outcome import play
+from deploy.trials.simulation.outcome import simulate
 
 SEEDS = ("1", "2", "3")
 EVERY = 5.0  # s between two random faults, as by default
@@ -94,12 +94,12 @@ def first_violation(name: str, seed: str) -> str:
     """Return which promises an hour of a seed with a bug violates first, and when; empty if none."""
     minutes = 0.0
     with planted(BUGS[name]):
-        for shift in plan.shifts(seed, 1.0, EVERY, tuple(FAULT_KINDS)):
-            outcome = play(shift)
+        for experiment in plan.experiments(seed, 1.0, EVERY, tuple(FAULT_KINDS)):
+            outcome = simulate(experiment)
             if promises := outcome.violated():
                 first = min(each.time for finding in outcome.findings for each in finding.evidence)
                 return f"{', '.join(promises)} after {minutes + first / 60.0:.0f} min"
-            minutes += shift.length / 60.0
+            minutes += experiment.length / 60.0
     return ""
 
 

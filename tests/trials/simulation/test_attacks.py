@@ -9,12 +9,12 @@ import pytest
 
 from deploy.promises.history import CONTROLLER, FALSE_PRESENCE, STUCK_DRIVE
 from deploy.trials.chaos.schedule import PlannedFault
-from deploy.trials.chaos.schedule_file import Shift
-from deploy.trials.simulation import __main__ as simulate
+from deploy.trials.chaos.schedule_file import Experiment
+from deploy.trials.simulation import __main__ as command_line
 from deploy.trials.simulation import attacks, people, plan
 from deploy.trials.simulation.attacks import FAIL_SAFES, JUDGED
 from deploy.trials.simulation.faults import ATTACK_KINDS, FAULT_KINDS
-from deploy.trials.simulation.outcome import Outcome, play
+from deploy.trials.simulation.outcome import Outcome, simulate
 from deploy.trials.simulation.summary import Summary
 from interfaces import topics
 
@@ -24,7 +24,7 @@ RELEASE = 14.0  # s
 DAYS = 30  # within which a bug must be found
 
 
-def day(seed: str, fail_safe: str) -> Shift:
+def day(seed: str, fail_safe: str) -> Experiment:
     """Return a day in which the controller pauses while it runs, and a fail-safe has to act alone later."""
     scenario = {
         **people.sources(people.RATE),
@@ -33,7 +33,7 @@ def day(seed: str, fail_safe: str) -> Shift:
     }
     pause = PlannedFault(6.0, "stop", CONTROLLER, 1.5)
     faults = attacks.attack(fail_safe, RELEASE, random.Random(f"{seed} {fail_safe}"))
-    return Shift(seed, RELEASE + JUDGED + 3.0, scenario, [pause, *faults])
+    return Experiment(seed, RELEASE + JUDGED + 3.0, scenario, [pause, *faults])
 
 
 def evidence(outcome: Outcome) -> list[object]:
@@ -44,7 +44,7 @@ def evidence(outcome: Outcome) -> list[object]:
 def test_each_fail_safe_turns_the_engines_off_in_time_alone(fail_safe: str) -> None:
     counted = 0
     for seed in range(6):
-        outcome = play(day(str(seed), fail_safe))
+        outcome = simulate(day(str(seed), fail_safe))
         assert evidence(outcome) == []
         assert set(outcome.alone) <= {fail_safe}
         counted += outcome.alone[fail_safe]
@@ -53,44 +53,44 @@ def test_each_fail_safe_turns_the_engines_off_in_time_alone(fail_safe: str) -> N
 
 
 def test_the_report_says_how_often_each_fail_safe_stood_alone() -> None:
-    summary = Summary.of(play(day("1", "F1")))
-    summary.add(Summary.of(play(day("1", "F2"))))
-    summary.add(Summary.of(play(day("2", "F2"))))
+    summary = Summary.of(simulate(day("1", "F1")))
+    summary.add(Summary.of(simulate(day("1", "F2"))))
+    summary.add(Summary.of(simulate(day("2", "F2"))))
     line = "Fail-safes that turned the engines off alone: F1 once, F2 2 times, F3 0 times"
-    assert line in simulate.report(summary, 1.0).splitlines()
-    assert "alone" not in simulate.report(Summary(hours=1.0), 1.0)
+    assert line in command_line.report(summary, 1.0).splitlines()
+    assert "alone" not in command_line.report(Summary(hours=1.0), 1.0)
 
 
 @pytest.mark.parametrize("name", BUGS)
 def test_a_bug_in_one_fail_safe_is_found(name: str) -> None:
     with planted(BUGS[name]):
         for number, fail_safe in zip(range(DAYS), itertools.cycle(FAIL_SAFES), strict=False):
-            if evidence(play(day(f"{name} {number}", fail_safe))):
+            if evidence(simulate(day(f"{name} {number}", fail_safe))):
                 return
     pytest.fail(f"{DAYS} attacks have not found that {name}")
 
 
-def test_random_shifts_attack_each_fail_safe_in_turn() -> None:
-    shifts = plan.shifts("1", 2.0, 5.0, list(FAULT_KINDS))
-    faults = [each for shift in shifts for each in shift.faults]
+def test_random_experiments_attack_each_fail_safe_in_turn() -> None:
+    experiments = plan.experiments("1", 2.0, 5.0, list(FAULT_KINDS))
+    faults = [each for experiment in experiments for each in experiment.faults]
     stuck, deceived = (sum(each.kind == kind for each in faults) for kind in (STUCK_DRIVE, FALSE_PRESENCE))
     assert 15 < deceived < 40  # F1
-    assert abs(stuck - 2 * deceived) <= len(shifts)  # F1 and F2
+    assert abs(stuck - 2 * deceived) <= len(experiments)  # F1 and F2
     assert {each.kind for each in faults} == {*FAULT_KINDS, *ATTACK_KINDS}
 
 
 def test_chosen_kinds_of_faults_are_without_attacks() -> None:
     kinds = list(FAULT_KINDS)[1:]
-    faults = [each for shift in plan.shifts("1", 1.0, 5.0, kinds) for each in shift.faults]
+    faults = [each for experiment in plan.experiments("1", 1.0, 5.0, kinds) for each in experiment.faults]
     assert {each.kind for each in faults} <= set(kinds)
 
 
 def test_random_faults_leave_the_attacked_fail_safe_unharmed() -> None:
     for seed in range(5):
-        bare = Shift(str(seed), 600.0, people.operator(str(seed), 600.0), [])
+        bare = Experiment(str(seed), 600.0, people.operator(str(seed), 600.0), [])
         targets = ("operator_watchdog", "engine_controller", "all", "operator", "nothing", "velocity")
         faults = [PlannedFault(float(at), "kill", target, 2.0) for at in range(600) for target in targets]
-        whole = attacks.attacked(Shift(bare.seed, bare.length, bare.scenario, faults))
+        whole = attacks.attacked(Experiment(bare.seed, bare.length, bare.scenario, faults))
         planned = attacks.attacked(bare).faults
         releases = [each.at for each in planned if each.kind == STUCK_DRIVE]
         assert releases

@@ -1,4 +1,4 @@
-"""The durations of the simulation come from a real arm, and the simulated play agrees with the real one."""
+"""The durations of the simulation come from a real arm, and the simulated run agrees with the real one."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ import pytest
 
 from deploy.promises.findings import percentile
 from deploy.trials.chaos import schedule
-from deploy.trials.chaos.schedule_file import Shift
+from deploy.trials.chaos.schedule_file import Experiment
 from deploy.trials.chaos.testbed import SCENARIO
 from deploy.trials.simulation.arm import NAMES
 from deploy.trials.simulation.calibration import load
-from deploy.trials.simulation.outcome import play
+from deploy.trials.simulation.outcome import simulate
 
 S1_BOUND = 0.6  # s: a silence is sampled every 500 ms, from a moment that differs
 L1_BOUNDS = (0.1, 0.3)  # s, of median and 99th percentile: the longest of some 36 restarts varies
@@ -19,7 +19,7 @@ L1_BOUNDS = (0.1, 0.3)  # s, of median and 99th percentile: the longest of some 
 def test_the_simulated_play_agrees_with_the_real_one() -> None:
     planned = schedule.briefly()
     faults = [each for each in planned if each.target in NAMES]
-    outcome = play(Shift("briefly", schedule.duration(planned), SCENARIO, faults))
+    outcome = simulate(Experiment("briefly", schedule.duration(planned), SCENARIO, faults))
     assert not outcome.violated()
     findings = {finding.promise: finding for finding in outcome.findings}
     real = load().measured

@@ -14,15 +14,15 @@ import pytest
 
 from deploy.running.processes import ROOT
 from deploy.trials.chaos.schedule import PlannedFault
-from deploy.trials.chaos.schedule_file import Shift, save
+from deploy.trials.chaos.schedule_file import Experiment, save
 from deploy.trials.chaos.testbed import SCENARIO
 from deploy.trials.simulation import plan
 from deploy.trials.simulation.faults import FAULT_KINDS
-from deploy.trials.simulation.outcome import play
+from deploy.trials.simulation.outcome import simulate
 from deploy.trials.simulation.summary import Summary
 
 
-def simulate(run: Path, *arguments: str, **environment: str) -> subprocess.Popen[str]:
+def make_simulate(run: Path, *arguments: str, **environment: str) -> subprocess.Popen[str]:
     return subprocess.Popen(
         [sys.executable, "-m", "deploy.trials.simulation", *arguments],
         cwd=ROOT,
@@ -34,19 +34,19 @@ def simulate(run: Path, *arguments: str, **environment: str) -> subprocess.Popen
 
 
 def test_the_same_seed_gives_the_same_record(tmp_path: Path) -> None:
-    run = simulate(tmp_path, "--hours", "0.01", "--seed", "7")
+    run = make_simulate(tmp_path, "--hours", "0.01", "--seed", "7")
     output, _ = run.communicate()
     assert run.returncode == 0
-    (shift,) = plan.shifts("7", 0.01, 5.0, tuple(FAULT_KINDS))
-    assert f"record {Summary.of(play(shift)).digest}\n" in output
+    (experiment,) = plan.experiments("7", 0.01, 5.0, tuple(FAULT_KINDS))
+    assert f"record {Summary.of(simulate(experiment)).digest}\n" in output
     assert "seed 7" in output
     assert "times real time" in output
 
 
 def test_a_schedule_is_played_and_reported(tmp_path: Path) -> None:
     path = tmp_path / "schedule.yaml"
-    save(Shift("1", 10.0, SCENARIO, [PlannedFault(5.0, "kill", "operator_watchdog")]), path)
-    run = simulate(tmp_path, "--schedule", str(path))
+    save(Experiment("1", 10.0, SCENARIO, [PlannedFault(5.0, "kill", "operator_watchdog")]), path)
+    run = make_simulate(tmp_path, "--schedule", str(path))
     output, errors = run.communicate()
     assert (run.returncode, errors) == (0, "")
     report = re.search(r"Report: (.*)", output)
@@ -63,7 +63,7 @@ def test_a_schedule_is_played_and_reported(tmp_path: Path) -> None:
     ],
 )
 def test_a_users_mistake_is_one_line(arguments: list[str], reason: str, tmp_path: Path) -> None:
-    run = simulate(tmp_path, *arguments)
+    run = make_simulate(tmp_path, *arguments)
     _, errors = run.communicate()
     assert run.returncode in (1, 2)
     assert reason in errors.splitlines()[-1]
@@ -71,7 +71,7 @@ def test_a_users_mistake_is_one_line(arguments: list[str], reason: str, tmp_path
 
 
 def test_ctrl_c_gives_the_verdict_so_far_or_ends(tmp_path: Path) -> None:
-    run = simulate(tmp_path, "--hours", "24", "--seed", "1")
+    run = make_simulate(tmp_path, "--hours", "24", "--seed", "1")
     assert run.stdout is not None
     assert "seed 1" in run.stdout.readline()
     run.send_signal(signal.SIGINT)
@@ -94,12 +94,12 @@ def test_a_missing_simulation_is_one_line(module: str) -> None:
 
 
 def test_ctrl_c_leaves_nothing_behind(tmp_path: Path) -> None:
-    run = simulate(tmp_path / "run", "--hours", "24", "--seed", "1", TMPDIR=str(tmp_path))
+    run = make_simulate(tmp_path / "run", "--hours", "24", "--seed", "1", TMPDIR=str(tmp_path))
     assert run.stdout is not None
     assert "seed 1" in run.stdout.readline()
     deadline = time.monotonic() + 60.0
     while not any(path.is_dir() for path in tmp_path.glob("reactive-arm-*/reactive-arm-*")):
-        assert time.monotonic() < deadline, "no shift has begun"
+        assert time.monotonic() < deadline, "no experiment has begun"
         time.sleep(0.05)
     run.send_signal(signal.SIGINT)
     run.communicate(timeout=30)

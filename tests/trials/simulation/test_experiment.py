@@ -1,4 +1,4 @@
-"""Simulated shifts of the whole arm: repeatable, and judged by the same checkers as real ones."""
+"""Simulated experiments of the whole arm: repeatable, and judged by the same checkers as real ones."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from deploy.running.manifest import Program
 from deploy.running.processes import ROOT
 from deploy.trials.chaos import schedule
 from deploy.trials.chaos.schedule import AWAKE, DAY, PlannedFault
-from deploy.trials.chaos.schedule_file import Shift
+from deploy.trials.chaos.schedule_file import Experiment
 from deploy.trials.chaos.testbed import SCENARIO, sources
 from deploy.trials.simulation import arm, people, plan
 from deploy.trials.simulation.faults import BAD_LINE, FAULT_KINDS
-from deploy.trials.simulation.outcome import Outcome, play
+from deploy.trials.simulation.outcome import Outcome, simulate
 from interfaces import topics
 from services.examples import speed_guard
 
@@ -36,7 +36,7 @@ def violations(outcome: Outcome) -> dict[str, Sequence[object]]:
 
 @pytest.mark.parametrize("kind", FAULT_KINDS)
 def test_the_promises_hold_under_each_kind_of_fault(kind: str) -> None:
-    outcome = play(plan.shift(f"only {kind}", LENGTH, EVERY, [kind]))
+    outcome = simulate(plan.experiment(f"only {kind}", LENGTH, EVERY, [kind]))
     assert outcome.injected[kind] >= 4
     assert not violations(outcome)
 
@@ -49,7 +49,7 @@ def test_the_promises_hold_in_the_scenarios_of_the_chaos_monkey(name: str) -> No
         if each.target in FAULT_KINDS[each.kind].targets or each.target == NO_TARGET
     ]
     length = max(schedule.duration(faults), DAY)
-    outcome = play(Shift(name, length, {**SCENARIO, **sources(people.RATE)}, faults))
+    outcome = simulate(Experiment(name, length, {**SCENARIO, **sources(people.RATE)}, faults))
     assert not violations(outcome)
     assert next(finding for finding in outcome.findings if finding.promise == "S1").cases
 
@@ -66,24 +66,24 @@ def test_the_promises_hold_in_the_scenarios_of_the_chaos_monkey(name: str) -> No
         (1201.0, [600.0, 601.0]),
     ],
 )
-def test_no_shift_is_too_short_for_an_operator(seconds: float, lengths: list[float]) -> None:
-    shifts = plan.shifts("1", seconds / 3600.0, 5.0, list(FAULT_KINDS))
-    assert [each.length for each in shifts] == pytest.approx(lengths)
-    assert all(each.scenario["engines"] for each in shifts)
+def test_no_experiment_is_too_short_for_an_operator(seconds: float, lengths: list[float]) -> None:
+    experiments = plan.experiments("1", seconds / 3600.0, 5.0, list(FAULT_KINDS))
+    assert [each.length for each in experiments] == pytest.approx(lengths)
+    assert all(each.scenario["engines"] for each in experiments)
 
 
-def test_a_quiet_shift_has_output_from_every_program() -> None:
-    outcome = play(Shift("quiet", 10.0, SCENARIO, []))
+def test_a_quiet_experiment_has_output_from_every_program() -> None:
+    outcome = simulate(Experiment("quiet", 10.0, SCENARIO, []))
     assert not violations(outcome)
     assert len(outcome.history.lives) == len(arm.NAMES)
     for program in arm.NAMES:
         assert outcome.history.output(program), program
 
 
-def test_equal_shifts_give_equal_records_in_any_interpreter() -> None:
+def test_equal_experiments_give_equal_records_in_any_interpreter() -> None:
     program = (
-        "from deploy.trials.simulation import plan; from deploy.trials.simulation.outcome import play; "
-        f"print(play(plan.shift('equal', {LENGTH}, 1.0, list(plan.FAULT_KINDS))).digest)"
+        "from deploy.trials.simulation import plan; from deploy.trials.simulation.outcome import simulate; "
+        f"print(simulate(plan.experiment('equal', {LENGTH}, 1.0, list(plan.FAULT_KINDS))).digest)"
     )
     runs = [
         subprocess.Popen(
@@ -101,7 +101,7 @@ def test_equal_shifts_give_equal_records_in_any_interpreter() -> None:
 
 
 def test_another_seed_gives_another_record() -> None:
-    one, two = (play(Shift(seed, 2.0, SCENARIO, [])) for seed in ("one", "two"))
+    one, two = (simulate(Experiment(seed, 2.0, SCENARIO, [])) for seed in ("one", "two"))
     assert one.digest != two.digest
 
 
@@ -128,14 +128,14 @@ def with_a_bug(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_bug_of_a_service_violates_a_promise(monkeypatch: pytest.MonkeyPatch) -> None:
     with_a_bug(monkeypatch)
     kills = [PlannedFault(ASLEEP + 1.0 + n, "kill", "operator_watchdog") for n in range(11)]
-    assert "S1" in violations(play(Shift("bug", ASLEEP + 12.0, BRIEF, kills)))
+    assert "S1" in violations(simulate(Experiment("bug", ASLEEP + 12.0, BRIEF, kills)))
 
 
 def test_the_example_of_a_service_violates_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     guard = Program("speed_guard", speed_guard.__name__, ())
     monkeypatch.setattr(arm, "PROGRAMS", (*arm.PROGRAMS, guard))
     monkeypatch.setattr(arm, "NAMES", (*arm.NAMES, "speed_guard"))
-    outcome = play(Shift("guard", 40.0, {**SCENARIO, **sources(people.RATE)}, []))
+    outcome = simulate(Experiment("guard", 40.0, {**SCENARIO, **sources(people.RATE)}, []))
     offs = [each for each in outcome.history.stream(topics.ENGINES) if each.value == topics.TURN_OFF]
     assert offs
     assert offs[0].sent < AWAKE
@@ -144,23 +144,23 @@ def test_the_example_of_a_service_violates_nothing(monkeypatch: pytest.MonkeyPat
     assert re.search(r"turned off ([2-9] times|once) for a permitted reason", measured)
 
 
-def is_stopped(simulated: arm.Arm) -> bool:
+def is_stopped(simulated: arm.SimulatedArm) -> bool:
     process = simulated.process("velocity")
     assert process is not None
     return process.is_stopped
 
 
-def is_cut(simulated: arm.Arm) -> bool:
+def is_cut(simulated: arm.SimulatedArm) -> bool:
     hosts = [simulated.simulation.host(name) for name in (arm.ROBOT, arm.CONTROL)]
     return simulated.simulation.network.is_cut(*hosts)
 
 
-def is_bad(simulated: arm.Arm) -> bool:
+def is_bad(simulated: arm.SimulatedArm) -> bool:
     network = simulated.simulation.network
     return (network.loss, network.latency) == BAD_LINE
 
 
-def drifts(simulated: arm.Arm) -> bool:
+def drifts(simulated: arm.SimulatedArm) -> bool:
     host, boot = simulated.simulation.host(arm.ROBOT), BOOT
     return host.time_of_day(boot + SECOND) - host.time_of_day(boot) != SECOND
 
@@ -175,7 +175,7 @@ def drifts(simulated: arm.Arm) -> bool:
     ],
 )
 def test_a_fault_lasts_although_an_overlapping_one_ends(
-    kind: str, target: str, is_wrong: Callable[[arm.Arm], bool], tmp_path: Path
+    kind: str, target: str, is_wrong: Callable[[arm.SimulatedArm], bool], tmp_path: Path
 ) -> None:
     with arm.simulated_arm("1", tmp_path, SCENARIO) as simulated:
         simulated.simulation.run(3.0)

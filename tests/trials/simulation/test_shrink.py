@@ -10,9 +10,9 @@ import pytest
 from deploy.running.system import DeploymentError
 from deploy.trials.chaos import schedule_file
 from deploy.trials.chaos.schedule import PlannedFault
-from deploy.trials.chaos.schedule_file import Shift
+from deploy.trials.chaos.schedule_file import Experiment
 from deploy.trials.chaos.testbed import SCENARIO
-from deploy.trials.simulation.outcome import play
+from deploy.trials.simulation.outcome import simulate
 from deploy.trials.simulation.shrink import minimal, shrink
 from tests.trials.simulation.test_experiment import ASLEEP, BRIEF, with_a_bug
 
@@ -36,17 +36,17 @@ def test_a_schedule_is_shrunk_to_the_faults_that_violate_the_promise(
     with_a_bug(monkeypatch)
     others = [PlannedFault(2.0, "kill", "velocity"), PlannedFault(3.0, "terminate", "config_l1")]
     kills = [PlannedFault(ASLEEP + 1.0 + 4 * n, "kill", "operator_watchdog") for n in range(3)]
-    outcome = play(Shift("bug", ASLEEP + 15.0, BRIEF, [*others, *kills]))
+    outcome = simulate(Experiment("bug", ASLEEP + 15.0, BRIEF, [*others, *kills]))
     assert "S1" in outcome.violated()
     left: list[int] = []
     small = shrink(outcome, left.append)
     assert "S1" in small.violated()
-    assert {each.target for each in small.shift.faults} == {"operator_watchdog"}
-    assert left[-1] == len(small.shift.faults) < len(kills) + 1
+    assert {each.target for each in small.experiment.faults} == {"operator_watchdog"}
+    assert left[-1] == len(small.experiment.faults) < len(kills) + 1
 
     path = tmp_path / "small.yaml"
-    schedule_file.save(small.shift, path)
-    again = play(schedule_file.load(path))
+    schedule_file.save(small.experiment, path)
+    again = simulate(schedule_file.load(path))
     assert again.digest == small.digest
 
 
@@ -89,10 +89,10 @@ def test_a_bad_schedule_is_one_line(content: str, reason: str, tmp_path: Path) -
 @pytest.mark.parametrize(("kind", "target"), [("magic", "all"), ("kill", "moon"), ("full_disk", "nothing")])
 def test_a_fault_that_cannot_be_simulated_is_named(kind: str, target: str) -> None:
     with pytest.raises(DeploymentError, match=f"no fault {kind} of {target}"):
-        play(Shift("1", 5.0, SCENARIO, [PlannedFault(1.0, kind, target)]))
+        simulate(Experiment("1", 5.0, SCENARIO, [PlannedFault(1.0, kind, target)]))
 
 
 def test_an_error_of_the_scenario_is_one_line() -> None:
     with pytest.raises(DeploymentError, match=r"the scenario has an error: .*theta1") as error:
-        play(Shift("1", 5.0, {"theta1": "much"}, []))
+        simulate(Experiment("1", 5.0, {"theta1": "much"}, []))
     assert "\n" not in str(error.value)

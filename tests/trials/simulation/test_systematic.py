@@ -10,23 +10,23 @@ from unittest import mock
 import pytest
 
 from deploy.trials.chaos.schedule import DAY
-from deploy.trials.chaos.schedule_file import Shift
+from deploy.trials.chaos.schedule_file import Experiment
 from deploy.trials.simulation import systematic
 from deploy.trials.simulation.arm import NAMES
-from deploy.trials.simulation.outcome import play
+from deploy.trials.simulation.outcome import simulate
 
 
 class Day(NamedTuple):
     """The moments of a day, and the cases at them."""
 
     moments: list[systematic.Point]
-    cases: Sequence[Shift]
+    cases: Sequence[Experiment]
     title: str
 
 
 @pytest.fixture(scope="module")
 def day() -> Day:
-    """The day of a seed, played once."""
+    """The day of a seed, simulated once."""
     moments = systematic.points("1")
     with mock.patch.object(systematic, "points", {"1": moments}.__getitem__):
         return Day(moments, *systematic.cases("1"))
@@ -35,7 +35,7 @@ def day() -> Day:
 def test_the_cases_cover_every_service_each_kind_and_the_whole_day(day: Day) -> None:
     moments, cases, title = day
     assert {program for _, program in moments} == set(NAMES)
-    singles = [shift.faults[0] for shift in cases if len(shift.faults) == 1]
+    singles = [experiment.faults[0] for experiment in cases if len(experiment.faults) == 1]
     assert len(singles) == len(moments) * len(systematic.FAULTS)
     assert f"{len(singles)} cases" in title
     kinds = Counter((fault.target, fault.kind) for fault in singles)
@@ -46,8 +46,8 @@ def test_the_cases_cover_every_service_each_kind_and_the_whole_day(day: Day) -> 
 
 
 def test_pairs_hit_the_programs_that_stop_the_engines_around_the_release(day: Day) -> None:
-    pairs = [shift.faults for shift in day.cases if len(shift.faults) == 2]
-    assert len(pairs) == len([shift for shift in day.cases if len(shift.faults) == 1]) // 3
+    pairs = [experiment.faults for experiment in day.cases if len(experiment.faults) == 2]
+    assert len(pairs) == len([experiment for experiment in day.cases if len(experiment.faults) == 1]) // 3
     for one, two in pairs:
         assert {one.target, two.target} <= set(systematic.CRITICAL)
         assert systematic.RELEASE[0] - 0.1 < one.at <= two.at < systematic.RELEASE[1]
@@ -55,9 +55,9 @@ def test_pairs_hit_the_programs_that_stop_the_engines_around_the_release(day: Da
 
 def test_a_fault_is_injected_just_before_its_moment(day: Day) -> None:
     at, program = next(point for point in day.moments if point[1] == "velocity" and point[0] > 9.0)
-    shift = day.cases[0]
+    experiment = day.cases[0]
     fault = systematic.PlannedFault(at - systematic.JUST_BEFORE, "kill", program)
-    outcome = play(systematic.Shift(shift.seed, at + 3.0, shift.scenario, [fault]))
+    outcome = simulate(systematic.Experiment(experiment.seed, at + 3.0, experiment.scenario, [fault]))
     life = next(life for life in outcome.history.lives if life.program == program)
     assert life.ended is not None
     assert 0.0 < at - life.ended < 1e-7
