@@ -99,12 +99,12 @@ class Testbed:
         self.faults = FAULT_KINDS
         self.observe_within: Sequence[str] = ()  # a command in front of the observer's
         self._directory = directory
-        self._scenario = scenario
+        self.scenario = scenario
         self._say = say
         self._loss = loss
         self._steps_clock = steps_clock
         self._stack = ExitStack()
-        self._epoch = 0.0  # origin of the scenario
+        self.epoch = 0.0  # origin of the scenario, on the monotonic clock
         self._origin = 0.0  # of the record
         self._seen: set[str] = set()  # topics with a message
 
@@ -127,8 +127,8 @@ class Testbed:
                     self.start(arm, parameters)
                 arm.environment()
                 # One arm after the other: starting together would take each of them too long.
-                self._await_messages([arm], [topics.ENGINES_STATE], lines)
-            self._await_messages(self.arms, [*OUTPUTS.values()], lines)
+                self.await_messages([arm], [topics.ENGINES_STATE], lines)
+            self.await_messages(self.arms, [*OUTPUTS.values()], lines)
             self._stack = stack.pop_all()
         return self
 
@@ -146,7 +146,7 @@ class Testbed:
 
     def inject(self, schedules: Sequence[Schedule], until: float = 0.0) -> None:
         """Inject the faults of a schedule into each arm; wait until ``until`` [s] of the scenario."""
-        begin = self._epoch
+        begin = self.epoch
         while time.monotonic() > begin + FIRST_FAULT - 1.0:
             begin += DAY  # the start took so long: wait for the operator's next day
         planned = [fault for schedule in schedules for fault in schedule]
@@ -191,12 +191,12 @@ class Testbed:
         """Let the observer record the packet loss and the operator's sleep: the checkers have to know."""
         conditions = []
         if self._loss:
-            conditions.append(InjectedFault(LOSS, NO_TARGET, self._epoch - self.lead, begin + duration))
-        pressed, day = self._scenario["operator"]["pressed"][-1], self._scenario.get("repeat")
+            conditions.append(InjectedFault(LOSS, NO_TARGET, self.epoch - self.lead, begin + duration))
+        pressed, day = self.scenario["operator"]["pressed"][-1], self.scenario.get("repeat")
         if day and "to" in pressed:
             # A day may begin at `begin`, but for the error of floating point.
-            first, last = (int((time - self._epoch + 0.001) // day) for time in (begin, begin + duration))
-            for morning in (self._epoch + number * day for number in range(first, last + 1)):
+            first, last = (int((time - self.epoch + 0.001) // day) for time in (begin, begin + duration))
+            for morning in (self.epoch + number * day for number in range(first, last + 1)):
                 asleep = InjectedFault(SILENCE, OPERATOR, morning + pressed["to"], morning + day)
                 conditions.append(asleep)
         for arm, condition in itertools.product(self.arms, conditions):
@@ -205,9 +205,9 @@ class Testbed:
     def _parameters(self) -> dict[str, object]:
         """Return the parameters of all arms, with an origin of the scenario that they share."""
         scenario = self._directory / "scenario.yaml"
-        scenario.write_text(yaml.safe_dump(dict(self._scenario)))
-        self._epoch = time.monotonic() + self.lead
-        return scenario_parameters(scenario, round(self._epoch, 3))
+        scenario.write_text(yaml.safe_dump(dict(self.scenario)))
+        self.epoch = time.monotonic() + self.lead
+        return scenario_parameters(scenario, round(self.epoch, 3))
 
     def _start_observer(self, stack: ExitStack, environment: Mapping[str, str]) -> queue.Queue[str]:
         """Start the observer; return the lines that it prints from now on."""
@@ -226,12 +226,12 @@ class Testbed:
         self._origin = float(origin.removeprefix("observing "))
         return lines
 
-    def _await_messages(
+    def await_messages(
         self, arms: Sequence[RealArm], awaited: Sequence[topics.Topic], lines: queue.Queue[str]
     ) -> None:
         """Wait until the observer has seen a message on each topic of each arm; most follow the scenario."""
         names = {topic.full_name(arm.namespace) for arm in arms for topic in awaited}
-        deadline = max(time.monotonic(), self._epoch) + START_TIMEOUT
+        deadline = max(time.monotonic(), self.epoch) + START_TIMEOUT
         while missing := names - self._seen:
             line = self._next(lines, deadline, _no_message(sorted(missing), len(arms)))
             self._seen.add(line.removeprefix("seen "))

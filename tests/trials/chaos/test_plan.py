@@ -25,7 +25,7 @@ def test_a_schedule_is_played_with_its_operator_and_its_length(tmp_path: Path) -
     assert planned.length == 30.0
     assert path in planned.title
     testbed = planned.testbed(tmp_path)
-    assert testbed._scenario == SCENARIO
+    assert testbed.scenario == SCENARIO
 
 
 def test_a_fault_that_only_a_simulation_has_is_refused(tmp_path: Path) -> None:

@@ -35,7 +35,7 @@ class Observer:
 @pytest.fixture
 def fleet(tmp_path: Path) -> Any:
     testbed: Any = Testbed(tmp_path / "fleet", ARMS)
-    testbed._epoch = testbed.lead
+    testbed.epoch = testbed.lead
     assert testbed.lead > START_TIMEOUT, "a fleet starts longer than an arm may be silent"
     return testbed
 
@@ -48,14 +48,14 @@ def test_waits_for_the_output_of_all_arms_until_after_the_origin(
     fleet: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     lines = seen(list(ARMS))
-    fleet._await_messages(fleet.arms, list(OUTPUTS.values()), Observer(monkeypatch, lines, fleet.lead))
+    fleet.await_messages(fleet.arms, list(OUTPUTS.values()), Observer(monkeypatch, lines, fleet.lead))
     assert not lines
 
 
 def test_names_the_topics_without_a_message(fleet: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     observer = Observer(monkeypatch, seen([*ARMS[1:]]), fleet.lead)
     with pytest.raises(DeploymentError) as error:
-        fleet._await_messages(fleet.arms, list(OUTPUTS.values()), observer)
+        fleet.await_messages(fleet.arms, list(OUTPUTS.values()), observer)
     topics = "/arm1/effector/position, /arm1/effector/speed, /arm1/engines/state and 7 more topics"
     assert str(error.value) == f"No message on {topics} within 60 s: try fewer --arms"
     assert observer.now == pytest.approx(fleet.lead + START_TIMEOUT, abs=1.0)
@@ -63,6 +63,6 @@ def test_names_the_topics_without_a_message(fleet: Any, monkeypatch: pytest.Monk
 
 def test_topics_that_were_seen_before_are_not_awaited(fleet: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     observer = Observer(monkeypatch, seen([ARMS[0]]), 1.0)
-    fleet._await_messages(fleet.arms[:1], list(OUTPUTS.values()), observer)
-    fleet._await_messages(fleet.arms[:1], list(OUTPUTS.values()), observer)
+    fleet.await_messages(fleet.arms[:1], list(OUTPUTS.values()), observer)
+    fleet.await_messages(fleet.arms[:1], list(OUTPUTS.values()), observer)
     assert observer.now < 10.0
