@@ -58,17 +58,9 @@ def test_health_without_a_pid_says_nothing_about_processes(pid: str) -> None:
 @pytest.mark.parametrize(
     ("options", "code", "reason"),
     [
-        (
-            "--faults crash_loop --targets kinematics",
-            1,
-            "No fault is planned: the time is too short, or none of the faults applies to the targets",
-        ),
+        ("--minutes 0.1", 1, "No fault is planned: the time is too short"),
         ("--arms 73", 2, "--arms must be from 1 to 72: each arm needs a ROS domain"),
-        (
-            "--scenario kill_each --faults kill",
-            2,
-            "--every, --faults and --targets apply to random faults, not to a --scenario",
-        ),
+        ("--scenario partition --arms 2", 2, "--scenario partition allows only one arm"),
     ],
 )
 def test_impossible_options_are_refused(tmp_path: Path, options: str, code: int, reason: str) -> None:

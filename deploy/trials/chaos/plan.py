@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import argparse
 import random
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
 from deploy.promises import marks
-from deploy.promises.history import PROGRAMS
 from deploy.running.system import DeploymentError
 from deploy.trials.chaos import clock, partition, schedule, schedule_file
 from deploy.trials.chaos.faults import FAULT_KINDS
@@ -49,11 +48,6 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     add = parser.add_argument
     add("--minutes", type=number(0.01, 10_000), default=5.0, help="length of the random faults, default 5")
     add("--seed", help="the same seed gives the same random faults")
-    add("--every", type=number(0.01, 3600), default=5.0, help="seconds between two random faults, default 5")
-    kinds = tuple(dict.fromkeys((*FAULT_KINDS, marks.STEP)))
-    of_kinds = f"separated by commas, of {', '.join(kinds)}; {marks.STEP} needs {clock.PACKAGE}"
-    add("--faults", type=names(kinds), default=tuple(FAULT_KINDS), help=of_kinds)
-    add("--targets", type=names(PROGRAMS), default=(), help=f"separated by commas, of {', '.join(PROGRAMS)}")
     scenarios = f"instead of random faults: {', '.join(NAMED)}"
     add("--scenario", choices=(RANDOM, *NAMED), default=RANDOM, metavar="NAME", help=scenarios)
     add("--arms", type=int, default=1, help="they share the random faults; each gets a whole scenario")
@@ -67,10 +61,6 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         parser.error(f"--scenario {options.scenario} allows only one arm")
     if options.schedule and (options.scenario != RANDOM or options.arms > 1):
         parser.error("--schedule has faults of its own, for one arm")
-    if options.scenario != RANDOM and any(
-        getattr(options, name) != parser.get_default(name) for name in ("every", "faults", "targets")
-    ):
-        parser.error("--every, --faults and --targets apply to random faults, not to a --scenario")
     return options
 
 
@@ -93,34 +83,24 @@ def plan(options: argparse.Namespace) -> Plan:
         length = schedule.duration(planned)
         title = f"Scenario {options.scenario}, {length:.0f} s{several}"
         return Plan(title, [planned] * options.arms, length, testbed)
-    _require_clock(options.faults)
     seed = options.seed or str(random.randrange(10**6))
     length = 60 * options.minutes
-    planned = schedule.random_faults(
-        seed, length, every=options.every, kinds=options.faults, targets=options.targets
-    )
+    planned = schedule.random_faults(seed, length)
     if not planned:
-        reason = "the time is too short, or none of the faults applies to the targets"
-        raise DeploymentError(f"No fault is planned: {reason}")
-    title = f"Random faults, seed {seed}, {options.minutes:g} min, every {options.every:g} s{several}"
-    if options.faults != tuple(FAULT_KINDS) or options.targets:
-        title += f", only {', '.join(options.faults)} of {', '.join(options.targets) or 'all programs'}"
+        raise DeploymentError("No fault is planned: the time is too short")
+    title = f"Random faults, seed {seed}, {options.minutes:g} min{several}"
     return Plan(title, [planned[arm :: options.arms] for arm in range(options.arms)], length, testbed)
 
 
 def _scheduled(path: Path) -> Plan:
     experiment = schedule_file.load(path)
     kinds = {each.kind for each in experiment.faults}
-    _require_clock(kinds)
+    if marks.STEP in kinds and (reason := clock.missing()):
+        raise DeploymentError(f"{marks.STEP} is not possible on this machine: {reason}")
     if unknown := sorted(kinds - FAULT_KINDS.keys()):
         raise DeploymentError(f"{path}: only make simulate can inject {', '.join(unknown)}")
     title = f"Schedule {path}, {experiment.length:.0f} s"
     return Plan(title, [experiment.faults], experiment.length, partial(Testbed, scenario=experiment.scenario))
-
-
-def _require_clock(kinds: Collection[str]) -> None:
-    if marks.STEP in kinds and (reason := clock.missing()):
-        raise DeploymentError(f"{marks.STEP} is not possible on this machine: {reason}")
 
 
 def _fleet(arms: int) -> Callable[..., Testbed]:

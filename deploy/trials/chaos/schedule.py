@@ -45,26 +45,21 @@ def random_faults(
     *,
     every: float = 5.0,
     kinds: Iterable[str] = tuple(FAULT_KINDS),
-    targets: Iterable[str] = (),
     table: Mapping[str, Any] = FAULT_KINDS,
 ) -> Schedule:
     """
     Return one random fault in each interval of ``every`` [s]. The same seed gives the same schedule.
 
-    :param targets: hit only these programs; empty for all. Faults of the whole arm are not affected.
     :param table: the kinds, each with its targets and durations.
     """
     rng = random.Random(seed)
     kinds = [kind for kind in sorted(kinds) for _ in range(WEIGHTS.get(kind, 1))]
-    wanted = set(targets)
     planned = []
     for step in range(int((duration - FIRST_FAULT) / every)):
         kind = rng.choice(kinds)
-        allowed = [t for t in table[kind].targets if not wanted or t in wanted or t not in PROGRAMS]
         at = FIRST_FAULT + every * (step + rng.uniform(0.0, 0.5))
-        if allowed:
-            lasting = rng.uniform(*table[kind].duration)
-            planned.append(PlannedFault(round(at, 3), kind, rng.choice(allowed), round(lasting, 3)))
+        lasting = rng.uniform(*table[kind].duration)
+        planned.append(PlannedFault(round(at, 3), kind, rng.choice(table[kind].targets), round(lasting, 3)))
     return planned
 
 

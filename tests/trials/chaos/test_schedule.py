@@ -29,11 +29,9 @@ def test_random_faults_cover_all_kinds_and_programs() -> None:
     assert {each.target for each in planned} >= set(PROGRAMS)
 
 
-def test_random_faults_have_only_the_given_kinds_and_targets() -> None:
-    planned = schedule.random_faults(3, 600.0, kinds=["kill", "stop"], targets=["kinematics", "velocity"])
-    assert {(each.kind, each.target) for each in planned} == {
-        (kind, target) for kind in ("kill", "stop") for target in ("kinematics", "velocity")
-    }
+def test_random_faults_have_only_the_given_kinds() -> None:
+    planned = schedule.random_faults(3, 600.0, kinds=["kill", "stop"])
+    assert {each.kind for each in planned} == {"kill", "stop"}
 
 
 @pytest.mark.parametrize("name", schedule.SCENARIOS)
