@@ -14,13 +14,13 @@ from deploy.benchmarks.link import HEARTBEATS, Job
 from deploy.running.processes import ROOT
 from deploy.running.rclpy_choice import RUNTIME
 
-BENCH_PYTHON = ROOT / ".venv-bench" / "bin" / "python"
-SYSTEM_PYTHON = ROOT / "deploy" / "commands" / "venv.sh"
-_EMBEDDED = [ROOT, ROOT / "interfaces/reactive_node/src", ROOT / "deploy/runtime/src"]
-_NEEDS_ROS = (
-    "import importlib.util, sys; "
-    "importlib.util.find_spec('rosidl_runtime_embedded') and sys.exit('.venv has no rclpy of ROS 2')"
-)
+PYTHON = ROOT / "deploy" / "commands" / "venv.sh"
+_CHECK = """
+import importlib.util, sys
+if bool(importlib.util.find_spec("rosidl_runtime_embedded")) == {ros}:
+    sys.exit("this environment has the {other}")
+import deploy.benchmarks.links.{link}
+"""
 
 Commands = Callable[["Alternative", Sequence[Job]], list[list[str]]]
 
@@ -29,7 +29,7 @@ def job_command(alternative: Alternative, job: Job) -> list[str]:
     """Return the command of a process; its job goes to a file."""
     file = Path(job.directory, f"{job.role}.json")
     file.write_text(json.dumps(asdict(job)))
-    return [str(alternative.python), "-m", "deploy.benchmarks.worker", str(file)]
+    return [str(PYTHON), "-m", "deploy.benchmarks.worker", str(file)]
 
 
 def processes(alternative: Alternative, jobs: Sequence[Job]) -> list[list[str]]:
@@ -69,30 +69,17 @@ class Alternative:
     """Compiles its program, and returns why that is not possible here; none if it is in Python."""
 
     @property
-    def python(self) -> Path:
-        """The interpreter of its processes."""
-        return SYSTEM_PYTHON if self.ros else BENCH_PYTHON
-
-    @property
     def environment(self) -> dict[str, str]:
-        """The environment of its processes; what is not ROS 2 must not see it."""
-        if not self.ros:
-            return os.environ | {"PYTHONPATH": os.pathsep.join(map(str, _EMBEDDED))}
-        embedded = set(map(str, _EMBEDDED))
-        inherited = [
-            path for path in os.environ.get("PYTHONPATH", "").split(os.pathsep) if path not in embedded
-        ]
-        paths = os.pathsep.join([str(ROOT), *filter(None, inherited)])
-        return os.environ | {"PYTHONPATH": paths, RUNTIME: ""}
+        """The environment of its processes."""
+        paths = filter(None, (str(ROOT), os.environ.get("PYTHONPATH")))
+        return os.environ | {"PYTHONPATH": os.pathsep.join(paths), RUNTIME: "" if self.ros else "embedded"}
 
     def missing(self) -> str:
         """Return why it cannot be measured here; '' if it can."""
         if self.build:
             return self.build()
-        check = f"import deploy.benchmarks.links.{self.link}"
-        if self.ros:
-            check = f"{_NEEDS_ROS}; {check}"
-        command = [str(self.python), "-c", check]
+        other = "embedded rclpy" if self.ros else "rclpy of ROS 2"
+        command = [str(PYTHON), "-c", _CHECK.format(ros=self.ros, other=other, link=self.link)]
         done = subprocess.run(
             command, env=self.environment, capture_output=True, text=True, start_new_session=True
         )

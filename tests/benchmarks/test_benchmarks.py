@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import random
-import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -17,12 +16,6 @@ from deploy.benchmarks.alternatives import Alternative
 from deploy.benchmarks.link import LAST, MIDDLE, SINK, SOURCE, Job
 from deploy.benchmarks.measurement import MeasurementFailed, Scenario
 from deploy.running.rclpy_choice import sourced_rclpy
-
-
-@pytest.fixture(autouse=True)
-def _installs_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(alternatives, "BENCH_PYTHON", Path(sys.executable))
-    monkeypatch.setattr(alternatives, "SYSTEM_PYTHON", Path(sys.executable))
 
 
 @pytest.mark.parametrize(
@@ -60,7 +53,7 @@ def test_a_comparison_without_a_round_is_refused(rounds: str, capsys: pytest.Cap
 def test_absent_alternatives_are_named_with_the_reason(capsys: pytest.CaptureFixture[str]) -> None:
     on_ros = bool(sourced_rclpy())
     here = Alternative("here", "callbacks", ros=on_ros)
-    unknown = Alternative("unknown", "nothing")
+    unknown = Alternative("unknown", "nothing", ros=on_ros)
 
     assert command.present([here, unknown]) == [here]
 
@@ -69,10 +62,12 @@ def test_absent_alternatives_are_named_with_the_reason(capsys: pytest.CaptureFix
     )
 
 
-def test_embedded_rclpy_is_not_measured_as_that_of_ros(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(alternatives, "SYSTEM_PYTHON", Path(sys.executable))
-    monkeypatch.setattr(Alternative, "environment", Alternative("embedded", "callbacks").environment)
-    assert Alternative("ROS 2", "callbacks", ros=True).missing() == ".venv has no rclpy of ROS 2"
+def test_no_rclpy_is_measured_as_the_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    here = Alternative("here", "callbacks", ros=bool(sourced_rclpy()))
+    other = Alternative("other", "callbacks", ros=not here.ros)
+    monkeypatch.setattr(Alternative, "environment", here.environment)
+    expected = "embedded rclpy" if other.ros else "rclpy of ROS 2"
+    assert other.missing() == f"this environment has the {expected}"
 
 
 def test_failed_measurement_leaves_the_others_their_figures(

@@ -9,7 +9,7 @@ from unittest import mock
 import pytest
 
 from deploy.benchmarks import __main__ as command
-from deploy.benchmarks import alternatives, measurement, scale
+from deploy.benchmarks import measurement, scale
 from deploy.benchmarks.alternatives import Alternative
 from deploy.benchmarks.measurement import MeasurementFailed
 from deploy.running.rclpy_choice import sourced_rclpy
@@ -78,8 +78,7 @@ def test_fleet_grows_until_the_machine_is_full(monkeypatch: pytest.MonkeyPatch) 
     assert numbers == ["1", "5", "10"]
 
 
-def test_item_costs_its_publisher_and_its_subscribers(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(alternatives, "BENCH_PYTHON", alternatives.SYSTEM_PYTHON)
+def test_item_costs_its_publisher_and_its_subscribers() -> None:
     here = Alternative("ReactiveNode", "reactive", ros=bool(sourced_rclpy()))
     scenario = measurement.Scenario("subscribers", 8, 200.0, warm_up=0.2, seconds=0.3)
     figures = measurement.measure_subscribers(here, scenario, 3)
@@ -96,7 +95,6 @@ def test_kinds_are_measured_one_after_the_other(
 
     monkeypatch.setattr(scale, "fleet", fleet)
     monkeypatch.setattr(scale, "subscribers", lambda: iter([("5", {"publisher_us": 30.0})]))
-    monkeypatch.setattr(command.environment, "prepare", lambda: None)
     results: dict[str, dict[str, dict[str, list[float]]]] = {}
     command._scale(results)
     assert results == {
