@@ -13,7 +13,7 @@ from typing import Any
 from unittest import mock
 
 from rclpy_simulation import Network, Process, Simulation
-from rclpy_simulation.kernel import running
+from rclpy_simulation.process import running_process
 
 from deploy.running import processes
 from deploy.running.processes import MARK
@@ -78,7 +78,7 @@ class Machine:
 
         The one supervisor and its sentinel stand for those of both hosts.
         """
-        host, network = running().process.host, self._simulation.network
+        host, network = running_process().host, self._simulation.network
         return [each for each in self._simulation.processes if not network.is_cut(each.host, host)]
 
     def _find(self, pid: int) -> Process | None:
@@ -129,7 +129,7 @@ class _Claim:
         self._key: tuple[str, str] | None = None
 
     def bind(self, address: str) -> None:
-        process = running().process
+        process = running_process()
         key = (process.host.name, address)
         owner = self._claims.get(key)
         if owner is not None and not owner.ended:

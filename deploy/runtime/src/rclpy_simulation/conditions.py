@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from rclpy._dds import INFINITY
-from rclpy_simulation import kernel
+from rclpy_simulation.process import running
 from rclpy_simulation.thread import BUSY_WAITS, Thread
 
 
@@ -93,10 +93,10 @@ class WaitSet:
             self._immediate += 1
             if self._immediate > BUSY_WAITS:  # a busy loop lets time pass
                 self._immediate = 0
-                kernel.running().pause()
+                running().pause()
         else:
             self._immediate = 0
-            thread = self._waiting = kernel.running()
+            thread = self._waiting = running()
             now = thread.process.kernel.now
             try:
                 thread.wait(None if timeout >= INFINITY - now else now + timeout)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 from rclpy._dds import INFINITY, Sample, entities, qos
 from rclpy._dds.discovery import Endpoint as EndpointInfo
@@ -12,19 +12,31 @@ from rclpy._handle import Handle
 from rclpy.duration import Duration
 from rclpy.exceptions import InvalidHandle
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, LivelinessPolicy, QoSProfile, ReliabilityPolicy
-from rclpy_simulation import kernel
 from rclpy_simulation.conditions import Condition
 from rclpy_simulation.host import SECOND
-from rclpy_simulation.link import Link
+from rclpy_simulation.kernel import Kernel
+from rclpy_simulation.link import Link, Place, Sender
+from rclpy_simulation.network import Network
+from rclpy_simulation.process import running
 from rclpy_simulation.statuses import Statuses
 from rclpy_simulation.watchdog import Watchdog
 from rosidl_runtime_embedded.pieces import Pieces
 
-if TYPE_CHECKING:
-    from rclpy_simulation.participant import Participant
-
 # The identifiers of DDS policies (DDS 1.4, 2.3.3).
 _DURABILITY, _DEADLINE, _LIVELINESS, _RELIABILITY = 2, 4, 8, 11
+
+
+class Owner(Place, Protocol):
+    """The participant of an endpoint, as the endpoint sees it."""
+
+    gid: bytes
+    kernel: Kernel
+    network: Network
+    taps: list[Callable[[Writer, Sample], None]]
+
+    def next_gid(self, kind: int) -> bytes: ...
+
+    def remove(self, endpoint: Endpoint) -> None: ...
 
 
 class Endpoint(Handle):
@@ -34,7 +46,7 @@ class Endpoint(Handle):
     incompatible_status = ""
 
     def __init__(
-        self, participant: Participant, topic: str, type_name: str, profile: QoSProfile, user_data: str
+        self, participant: Owner, topic: str, type_name: str, profile: QoSProfile, user_data: str
     ) -> None:
         qos.check(profile)
         self.participant = participant
@@ -147,7 +159,7 @@ class Writer(Endpoint):
             data += bytes(-len(data) & 3)
         now = participant.kernel.now
         sample = Sample(data, process.host.time_of_day(now), self.instance_handle)
-        if taps := participant.domains.taps:
+        if taps := participant.taps:
             for tap in taps:
                 tap(self, sample)
             process.settle()  # a tap may have killed or stopped it
@@ -163,8 +175,8 @@ class Writer(Endpoint):
         """Return the link to a reader."""
         link = self._links.get(reader)
         if link is None:
-            domains = self.participant.domains
-            link = self._links[reader] = Link(domains.kernel, domains.network, self, reader)
+            place = self.participant
+            link = self._links[reader] = Link(place.kernel, place.network, self, reader)
         return link
 
     def _connect(self, other: Reader, link: Link) -> None:
@@ -187,13 +199,13 @@ class Writer(Endpoint):
         """Return the USER_DATA of every matched reader."""
         return [reader.user_data for reader in self._matched]
 
-    def links_to(self, participant: Participant) -> list[Link]:
+    def links_to(self, participant: Place) -> list[Link]:
         """Return the links to the readers of a participant."""
         return [link for reader, link in self._matched.items() if reader.participant is participant]
 
     def wait_for_acks(self, timeout: int) -> bool:
         """Wait at most ``timeout`` [ns] until all reliable readers have acknowledged all samples."""
-        thread = kernel.running()
+        thread = running()
         deadline = self.participant.kernel.now + timeout
         while any(link.is_unacknowledged for link in self._matched.values()):
             if self.participant.kernel.now >= deadline:
@@ -286,18 +298,18 @@ class Reader(Endpoint):
             self._change_liveliness(other, link.is_alive, -1)
         return link is not None
 
-    def note_liveliness(self, writer: Writer, is_alive: bool) -> None:
+    def note_liveliness(self, writer: Sender, is_alive: bool) -> None:
         """Note that a matched writer has lost its liveliness, or has got it again."""
         self._change_liveliness(writer, not is_alive, -1)
         self._change_liveliness(writer, is_alive, 1)
 
-    def _change_liveliness(self, writer: Writer, is_alive: bool, change: int) -> None:
+    def _change_liveliness(self, writer: Sender, is_alive: bool, change: int) -> None:
         count = "alive_count" if is_alive else "not_alive_count"
         self.statuses.change(
             "liveliness_changed", **{count: change}, last_instance_handle=writer.instance_handle
         )
 
-    def links_from(self, participant: Participant) -> Iterator[Link]:
+    def links_from(self, participant: Place) -> Iterator[Link]:
         """Yield the links from the writers of a participant."""
         for writer, link in self._writers.items():
             if writer.participant is participant:

@@ -3,17 +3,55 @@
 from __future__ import annotations
 
 from collections import deque
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 from rclpy._dds import INFINITY, Sample
-from rclpy_simulation.kernel import Kernel, running
+from rclpy_simulation.host import Host
+from rclpy_simulation.kernel import Kernel
+from rclpy_simulation.network import Network
+from rclpy_simulation.process import Process, running
 from rclpy_simulation.watchdog import Watchdog
 
-if TYPE_CHECKING:
-    from rclpy_simulation.endpoints import Reader, Writer
-    from rclpy_simulation.network import Network
-
 _STOPPED_QUEUE = 256  # samples of a best-effort writer that the kernel of a stopped process keeps
+
+
+class Place(Protocol):
+    """A participant, as links see it."""
+
+    process: Process
+    host: Host
+
+
+class End(Protocol):
+    """A writer or reader, as links see it."""
+
+    is_reliable: bool
+
+    @property
+    def participant(self) -> Place: ...
+
+
+class Sender(End, Protocol):
+    """A writer, as links see it."""
+
+    topic: str
+    instance_handle: int
+    depth: int | None
+    lifespan: int
+    lease: int
+    sent: int
+    is_alive: bool
+    is_manual: bool
+
+
+class Receiver(End, Protocol):
+    """A reader, as links see it."""
+
+    is_closed: bool
+
+    def receive(self, sample: Sample, lifespan: int) -> None: ...
+
+    def note_liveliness(self, writer: Sender, is_alive: bool) -> None: ...
 
 
 class Link:
@@ -37,7 +75,7 @@ class Link:
         "writer",
     )
 
-    def __init__(self, kernel: Kernel, network: Network, writer: Writer, reader: Reader) -> None:
+    def __init__(self, kernel: Kernel, network: Network, writer: Sender, reader: Receiver) -> None:
         self.kernel = kernel
         self.network = network
         self.writer = writer

@@ -1,30 +1,35 @@
-"""Simulated participants of ``rclpy._dds``, and what they know of each other."""
+"""Simulated participants of ``rclpy._dds``, and how they discover each other."""
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 
-from rclpy._dds.discovery import Endpoint as EndpointInfo
+from rclpy._dds import Sample
 from rclpy.qos import QoSProfile
-from rclpy_simulation import kernel
-from rclpy_simulation.conditions import Condition
+from rclpy_simulation.discovery import Discovery
 from rclpy_simulation.endpoints import Endpoint, Reader, Writer
+from rclpy_simulation.host import SECOND
+from rclpy_simulation.kernel import Kernel
 from rclpy_simulation.link import Link
-from rclpy_simulation.network import Domains
+from rclpy_simulation.network import Delay, Network
+from rclpy_simulation.process import running_process
 
 
 class Participant:
     """A simulated participant of the process that creates it."""
 
-    def __init__(self, domain_id: int, user_data: str) -> None:
-        process = kernel.running().process
+    def __init__(self, domains: Domains, domain_id: int, user_data: str) -> None:
+        process = running_process()
         self.domain_id = domain_id
         self.user_data = user_data
         self.process = process
         self.host = process.host
         self.kernel = process.kernel
-        self.domains: Domains = process.kernel.domains
+        self.domains = domains
+        self.network = domains.network
+        self.taps = domains.taps
         self.has_left = False
         self.version = 0  # of the endpoints
         self.silent_since: int | None = None  # [ns], while its process is stopped
@@ -144,8 +149,15 @@ class Participant:
     def create_discovery(self) -> Discovery:
         """Return the entities that this participant discovers."""
         if self._discovery is None:
-            self._discovery = Discovery(self)
+            self._discovery = Discovery(self._participants, self._everyone)
         return self._discovery
+
+    def _participants(self) -> dict[bytes, str]:
+        return {each.gid: each.user_data for each in (self, *self.known)}
+
+    def _everyone(self) -> Iterator[Endpoint]:
+        for endpoints in (self.endpoints, *self.known.values()):
+            yield from endpoints.values()
 
     def _note_news(self) -> None:
         if self._discovery is not None:
@@ -184,55 +196,134 @@ class Participant:
         self.domains.speak_again(self)
 
 
-class Discovery:
-    """The DDS entities that a participant has discovered."""
+class Domains:
+    """Discovery between the participants of all DDS domains."""
 
-    def __init__(self, participant: Participant) -> None:
-        self._participant = participant
-        self._news = Condition()
-        self._news.set()
-        self._writers: list[EndpointInfo] | None = None
-        self._readers: list[EndpointInfo] = []
+    def __init__(self, kernel: Kernel, network: Network) -> None:
+        self.kernel = kernel
+        self.network = network
+        self.participants: dict[Participant, None] = {}  # in the order of their creation
+        self.taps: list[Callable[[Writer, Sample], None]] = []
+        """Are called with every sample that is written."""
 
-    def note(self) -> None:
-        """Note that there are changes."""
-        self._writers = None
-        self._news.set()
+    def join(self, participant: Participant) -> None:
+        """Let a new participant and the others of its domain discover each other."""
+        for other in self.participants:
+            if other.domain_id == participant.domain_id:
+                self._introduce(participant, other)
+        self.participants[participant] = None
 
-    @property
-    def news(self) -> list[Condition]:
-        """The conditions that are true while there are unread changes."""
-        return [self._news]
+    def _introduce(self, one: Participant, other: Participant) -> None:
+        for listener, speaker in ((one, other), (other, one)):
+            self._later(self.network.discovery, listener, speaker, listener.discover)
 
-    @property
-    def gone(self) -> list[Condition]:
-        """No conditions: entities that are gone are forgotten at once."""
-        return []
+    def _later(
+        self, delay: Delay, listener: Participant, speaker: Participant, action: Callable[[Participant], None]
+    ) -> None:
+        """Let a participant hear of another one after a delay, unless the network is cut."""
+        if listener.process is speaker.process:  # Cyclone DDS needs no messages within a process
+            action(speaker)
+            return
 
-    def forget_gone(self) -> None:
-        """Do nothing."""
+        def hear() -> None:
+            if self.network.is_cut(listener.host, speaker.host) or listener.has_left:
+                return
+            for process in (listener.process, speaker.process):
+                if process.is_stopped:
+                    process.postpone(hear)
+                    return
+            action(speaker)
 
-    def refresh(self) -> None:
-        """Read all changes: only later ones trigger the condition."""
-        self._news.clear()
+        duration = delay.draw(self.kernel)
+        while self.network.loss and self.kernel.random.random() < self.network.loss:
+            duration += self.network.retransmission.draw(self.kernel)
+        self.kernel.after(duration, hear)
 
-    def participants(self) -> dict[bytes, str]:
-        """Return the GUID and USER_DATA of every participant."""
-        found = [self._participant, *self._participant.known]
-        return {each.gid: each.user_data for each in found}
+    def announce(self, participant: Participant) -> None:
+        """Tell the participants that know this one about its endpoints."""
+        participant.version += 1
+        for other in self.participants:
+            if participant in other.known:
+                self._tell(other, participant)
 
-    def writers(self) -> list[EndpointInfo]:
-        """Return every writer."""
-        return self._all()[0]
+    def _tell(self, listener: Participant, speaker: Participant) -> None:
+        endpoints = tuple(speaker.endpoints.values())
+        news = partial(listener.learn, endpoints=endpoints, version=speaker.version)
+        self._later(self.network.matching, listener, speaker, news)
 
-    def readers(self) -> list[EndpointInfo]:
-        """Return every reader."""
-        return self._all()[1]
+    def leave(self, participant: Participant) -> None:
+        """Remove a participant that says goodbye. Those that do not hear it find out when its lease ends."""
 
-    def _all(self) -> tuple[list[EndpointInfo], list[EndpointInfo]]:
-        if self._writers is None:
-            known = [self._participant.endpoints, *self._participant.known.values()]
-            everyone = list(itertools.chain.from_iterable(each.values() for each in known))
-            self._writers = [each.info for each in everyone if isinstance(each, Writer)]
-            self._readers = [each.info for each in everyone if isinstance(each, Reader)]
-        return self._writers, self._readers
+        def tell(other: Participant) -> None:
+            self._later(self.network.matching, other, participant, other.forget)
+            self._expire(other, participant, lambda: True)
+
+        self._remove(participant, tell)
+
+    def vanish(self, participant: Participant) -> None:
+        """Remove a participant that was killed; the others find out when its lease ends."""
+        self._remove(participant, lambda other: self._expire(other, participant, lambda: True))
+
+    def _remove(self, participant: Participant, tell: Callable[[Participant], None]) -> None:
+        if participant in self.participants:
+            del self.participants[participant]
+            for other in self.participants:
+                if participant in other.known:
+                    tell(other)
+
+    def fall_silent(self, participant: Participant) -> None:
+        """Let the others forget a participant whose process is stopped for longer than its lease."""
+        since = self.kernel.now
+        for other in self.participants:
+            if participant in other.known:
+                self._expire(other, participant, lambda: participant.silent_since == since)
+
+    def speak_again(self, participant: Participant) -> None:
+        """Let a participant whose process runs again meet those that have forgotten it."""
+        for other in self.participants:
+            if other is not participant and other.domain_id == participant.domain_id:
+                self._meet_again(participant, other)
+
+    def _expire(self, one: Participant, other: Participant, is_silent: Callable[[], bool]) -> None:
+        """Let a participant forget another one after its lease, if that is still silent."""
+        if one.process is other.process:
+            return
+        for link in one.links_from(other):
+            if (lease := link.automatic_lease) is not None:
+                self.kernel.after(lease, lambda it=link: it.set_alive(False) if is_silent() else None)  # type: ignore[misc]
+        self.kernel.after(
+            int(self.network.lease * SECOND), lambda: one.forget(other) if is_silent() else None
+        )
+
+    def _meet_again(self, one: Participant, other: Participant) -> None:
+        """Let participants meet again with the next announcement, if one has forgotten the other."""
+        if other not in one.known or one not in other.known:
+            announcement = int(self.kernel.random.uniform(0.0, self.network.announcement) * SECOND)
+            self.kernel.after(announcement, lambda: self._introduce(one, other))
+
+    def cut(self, one: str, other: str) -> None:
+        """Let no packet pass between two hosts."""
+        pair = frozenset((one, other))
+        since = self.network.cuts.setdefault(pair, self.kernel.now)
+        for first, second in self._across(pair):
+            for listener, speaker in ((first, second), (second, first)):
+                self._expire(listener, speaker, lambda: self.network.cuts.get(pair) == since)
+
+    def heal(self, one: str, other: str) -> None:
+        """Let packets pass between two hosts again."""
+        pair = frozenset((one, other))
+        self.network.cuts.pop(pair, None)
+        for first, second in self._across(pair):
+            for link in (*first.links_to(second), *second.links_to(first)):
+                link.release()
+            for listener, speaker in ((first, second), (second, first)):
+                if speaker in listener.known:  # what it said during the partition
+                    self._tell(listener, speaker)
+            self._meet_again(first, second)
+
+    def _across(self, pair: frozenset[str]) -> Iterator[tuple[Participant, Participant]]:
+        """Yield the pairs of participants of one domain on both hosts."""
+        members = [each for each in self.participants if each.host.name in pair]
+        for one, other in itertools.combinations(members, 2):
+            if one.host is not other.host and one.domain_id == other.domain_id:
+                yield one, other

@@ -20,11 +20,10 @@ from functools import partial
 from typing import Any
 
 from rclpy import _dds
-from rclpy_simulation import kernel
 from rclpy_simulation.conditions import GuardCondition, WaitSet
 from rclpy_simulation.host import SECOND
-from rclpy_simulation.participant import Participant
-from rclpy_simulation.process import Process
+from rclpy_simulation.participant import Domains, Participant
+from rclpy_simulation.process import Process, here, running
 from rclpy_simulation.thread import ProcessExit, Thread
 
 
@@ -32,7 +31,7 @@ def _in_process(simulated: Callable[..., Any], real: Callable[..., Any]) -> Call
     """Return a function that does one thing in a simulated process, and the real one elsewhere."""
 
     def call(*arguments: Any, **options: Any) -> Any:
-        process = kernel.here.process
+        process = here.process
         if process is None:
             return real(*arguments, **options)
         return simulated(process, *arguments, **options)
@@ -44,7 +43,7 @@ def _clock(read: Callable[[Process], Any], real: Callable[[], Any]) -> Callable[
     """As :func:`_in_process`, without arguments: clocks are read often."""
 
     def call() -> Any:
-        process = kernel.here.process
+        process = here.process
         return real() if process is None else read(process)
 
     return call
@@ -56,7 +55,7 @@ def _clock(read: Callable[[Process], Any], real: Callable[[], Any]) -> Callable[
 def _sleep(process: Process, seconds: float) -> None:
     if seconds < 0:
         raise ValueError("sleep length must be non-negative")
-    thread = kernel.running()
+    thread = running()
     deadline = process.kernel.now + int(seconds * SECOND)
     if deadline == process.kernel.now:
         thread.note_empty_wait()
@@ -86,7 +85,7 @@ class _Waiter:
     """Stands in the place of the lock for which a thread waits in ``Condition.wait``."""
 
     def __init__(self) -> None:
-        self.thread = kernel.running()
+        self.thread = running()
         self.is_released = False
 
     def release(self) -> None:
@@ -126,12 +125,12 @@ def _of_thread(simulated: Callable[..., Any], real: Callable[..., Any]) -> Calla
 
 
 def _join(thread: Thread, timeout: float | None = None) -> None:
-    thread.join(timeout)
+    thread.join(running(), timeout)
 
 
 def _get_ident(real: Callable[[], int]) -> Callable[[], int]:
     def call() -> int:
-        thread = kernel.here.thread
+        thread = here.thread
         return real() if thread is None else thread.ident
 
     return call
@@ -153,7 +152,7 @@ def _set_handler(process: Process, number: int, handler: Any) -> Any:
 
 
 def _kill(process: Process, pid: int, number: int) -> None:
-    target = process.kernel.processes.get(pid)
+    target = process.processes.alive.get(pid)
     if target is None:
         raise ProcessLookupError(f"no simulated process {pid}")
     target.send_signal(number)
@@ -180,7 +179,7 @@ def _random_bytes(process: Process, size: int) -> bytes:
     return process.kernel.random.randbytes(size)
 
 
-def _replacements() -> list[tuple[Any, str, Any]]:
+def _replacements(domains: Domains) -> list[tuple[Any, str, Any]]:
     def monotonic(it: Process) -> float:
         return it.kernel.now / 1e9
 
@@ -189,7 +188,7 @@ def _replacements() -> list[tuple[Any, str, Any]]:
 
     condition, thread = threading.Condition, threading.Thread
     return [
-        (_dds, "Participant", Participant),
+        (_dds, "Participant", partial(Participant, domains)),
         (_dds, "WaitSet", WaitSet),
         (_dds, "GuardCondition", GuardCondition),
         (time, "monotonic_ns", _clock(lambda it: it.kernel.now, time.monotonic_ns)),
@@ -239,20 +238,20 @@ def _method_in_process(simulated: Callable[..., Any], real: Callable[..., Any]) 
 
 def _names_of(functions: dict[int, Any]) -> list[tuple[Any, str, Any]]:
     """Return where modules have bound one of these functions by name, as ``from time import sleep`` does."""
-    here = sys.modules[__name__]
+    patches = sys.modules[__name__]
     return [
         (module, name, functions[id(value)])
         for module in list(sys.modules.values())
-        if module is not here
+        if module is not patches
         for name, value in list(getattr(module, "__dict__", {}).items())
         if id(value) in functions
     ]
 
 
 @contextmanager
-def installed() -> Iterator[None]:
-    """Replace the functions until the end of the ``with``."""
-    new = _replacements()
+def installed(domains: Domains) -> Iterator[None]:
+    """Replace the functions until the end of the ``with``; new participants join ``domains``."""
+    new = _replacements(domains)
     by_identity = {id(vars(owner)[name]): function for owner, name, function in new}
     replaced = [
         (owner, name, vars(owner)[name], function)

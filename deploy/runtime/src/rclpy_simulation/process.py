@@ -2,54 +2,63 @@
 
 from __future__ import annotations
 
-import io
 import signal
 import threading
 from collections import deque
 from collections.abc import Callable, Mapping
 from concurrent.futures.thread import _threads_queues
-from typing import TYPE_CHECKING, Any
+from typing import Any, NamedTuple, Protocol
 
 from greenlet import GreenletExit
 
-from rclpy_simulation import kernel
 from rclpy_simulation.host import Host
+from rclpy_simulation.kernel import Kernel
+from rclpy_simulation.output import Output
 from rclpy_simulation.thread import ProcessExit, Thread, trace
 
-if TYPE_CHECKING:
-    from rclpy_simulation.kernel import Kernel
-    from rclpy_simulation.participant import Participant
-
-_OUTPUT = 64 * 1024  # characters of a process's output that are kept
+_LAST_ENDS = 8
 _UNWILLING = 100  # waits of a killed thread that catches every exception
 _IGNORED = (signal.SIGCHLD, signal.SIGURG, signal.SIGWINCH, signal.SIGPIPE)  # by default, in Python
 
 
-class Output(io.TextIOBase):
-    """Standard output and error of a process; the latest part is kept."""
+class Member(Protocol):
+    """A DDS participant, as its process sees it."""
 
-    def __init__(self) -> None:
-        self._parts: deque[str] = deque()
-        self._length = 0
-        self._has_ended = False
+    def vanish(self) -> None: ...
 
-    def write(self, text: str) -> int:
-        """Add text, unless the process has ended."""
-        if not self._has_ended:
-            self._parts.append(text[-_OUTPUT:])
-            self._length += len(self._parts[-1])
-            while self._length > _OUTPUT and len(self._parts) > 1:
-                self._length -= len(self._parts.popleft())
-        return len(text)
+    def fall_silent(self) -> None: ...
 
-    def end(self) -> None:
-        """Ignore all later text."""
-        self._has_ended = True
+    def speak_again(self) -> None: ...
 
-    @property
-    def text(self) -> str:
-        """What the process has written."""
-        return "".join(self._parts)
+
+class End(NamedTuple):
+    """What is left of a process that has ended."""
+
+    name: str
+    pid: int
+    exit_code: int
+    output: str
+
+
+class Processes:
+    """The processes of a simulation."""
+
+    def __init__(self, kernel: Kernel, at_exit: Callable[[], Any]) -> None:
+        """
+        Begin without a process.
+
+        :param at_exit: runs in a process that ends in order.
+        """
+        self.kernel = kernel
+        self.at_exit = at_exit
+        self.listeners: list[Callable[[Process], Any]] = []
+        """Are called with a process before it runs: because of a message, a timer, or another event."""
+        self.alive: dict[int, Process] = {}
+        """Those that live, by pid."""
+        self.ends: deque[End] = deque(maxlen=_LAST_ENDS)
+        """The last processes that have ended."""
+        self.unwilling: list[Thread] = []
+        """Threads of killed processes that catch every exception: they wait forever."""
 
 
 class Process:
@@ -57,14 +66,15 @@ class Process:
 
     def __init__(
         self,
-        kernel: Kernel,
+        processes: Processes,
         name: str,
         main: Callable[[], Any],
         host: Host,
         parent: int,
         environment: Mapping[str, str],
     ) -> None:
-        self.kernel = kernel
+        self.processes = processes
+        self.kernel = kernel = processes.kernel
         self.name = name
         self.host = host
         self.pid = kernel.next_pid()
@@ -75,7 +85,7 @@ class Process:
         self.output = Output()
         self.exit_code: int | None = None
         """``None`` while it is alive, the negative signal number if a signal has killed it."""
-        self.participants: list[Participant] = []
+        self.participants: list[Member] = []
         self.handlers: dict[int, Any] = {}
         """Its signal handlers."""
         self.exit_functions: list[Callable[[], Any]] = []
@@ -94,7 +104,7 @@ class Process:
         self._threads: list[Thread] = []
         self._postponed: list[Callable[[], Any]] = []
         self._refused = 0
-        kernel.processes[self.pid] = self
+        processes.alive[self.pid] = self
 
     def __repr__(self) -> str:
         return f"<{self.name} {self.pid}>"
@@ -124,14 +134,30 @@ class Process:
         self._threads.append(thread)
         thread.wake()
 
+    def is_about_to_run(self) -> bool:
+        """Tell the listeners that it is about to run; return whether it may: they can kill or stop it."""
+        if listeners := self.processes.listeners:
+            for listener in listeners:
+                listener(self)
+            return self.exit_code is None and not self.is_suspended
+        return True
+
+    def switch(self, thread: Thread, enter: Callable[[], Any]) -> None:
+        """Run a thread until it waits or ends."""
+        here.process, here.thread = self, thread
+        try:
+            self.kernel.switch(self.saved, enter)
+        finally:
+            here.process = here.thread = None
+
     def _run(self) -> None:
         code = self._code_of(self._main)
         for thread in self._threads[1:]:
             if not thread.face.daemon and thread.face not in _threads_queues:  # Python ends pools itself
-                code = self._code_of(lambda it=thread: it.join(None)) or code  # type: ignore[misc]
+                code = self._code_of(lambda it=thread: it.join(running(), None)) or code  # type: ignore[misc]
         while self.exit_functions:
             self._code_of(self.exit_functions.pop())
-        self._code_of(self.kernel.at_exit)
+        self._code_of(self.processes.at_exit)
         self.exit(code)
 
     def _code_of(self, work: Callable[[], Any]) -> int:
@@ -154,7 +180,7 @@ class Process:
         """Raise in a killed process: it must not run on."""
         self._refused += 1
         if self._refused > _UNWILLING:  # it catches every exception: leave it where it is
-            self.kernel.unwilling.append(thread)
+            self.processes.unwilling.append(thread)
             self.kernel.hub.switch()
         raise GreenletExit
 
@@ -164,12 +190,18 @@ class Process:
             return
         self.exit_code = code
         self.output.end()
-        kernel = self.kernel
-        kernel.note_end(self, code)
+        self.processes.ends.append(End(self.name, self.pid, code, self.output.text))
         for participant in list(self.participants):
             participant.vanish()
-        del kernel.processes[self.pid]
-        kernel.schedule(kernel.now, self._clear)
+        del self.processes.alive[self.pid]
+        self.kernel.schedule(self.kernel.now, self._clear)
+
+    def end_with(self, error: BaseException, name: str) -> None:
+        """Note what has ended the thread of a name: ``os._exit``, or an error of the program."""
+        if isinstance(error, ProcessExit):
+            self.exit(error.code)
+        else:
+            self.output.write(f"Exception in thread {name}:\n{trace(error)}")
 
     def _clear(self) -> None:
         """Unwind the threads, and forget all that the process had."""
@@ -269,7 +301,32 @@ class Process:
 
     def settle(self) -> None:
         """Let the running thread note what has just happened to its process: end, stop, signals."""
-        thread = kernel.running()
+        thread = running()
         if self.is_suspended and not self.ended:
             thread.wait(self.kernel.now)
         self.handle_interrupts(thread)
+
+
+class _Here(threading.local):
+    """What runs now in the real thread of the simulation; other real threads run nothing simulated."""
+
+    process: Process | None = None
+    """The process whose code runs; ``None`` for the code of the simulation itself."""
+    thread: Thread | None = None
+
+
+here = _Here()
+
+
+def running() -> Thread:
+    """Return the thread that runs now. Raises RuntimeError outside of simulated programs."""
+    if here.thread is None:
+        raise RuntimeError("only simulated programs can do this: start them with Simulation.start")
+    return here.thread
+
+
+def running_process() -> Process:
+    """Return the process that runs now. Raises RuntimeError outside of simulated programs."""
+    if here.process is None:
+        raise RuntimeError("only simulated programs can do this: start them with Simulation.start")
+    return here.process

@@ -18,9 +18,10 @@ from rclpy._listeners import Listeners
 from rclpy.impl import _logging_levels, _logging_output
 from rclpy_simulation import patches
 from rclpy_simulation.host import BOOT, SECOND, Host
-from rclpy_simulation.kernel import End, Kernel, State
-from rclpy_simulation.network import Delay, Domains, Network
-from rclpy_simulation.process import Process
+from rclpy_simulation.kernel import Kernel, State
+from rclpy_simulation.network import Delay, Network
+from rclpy_simulation.participant import Domains
+from rclpy_simulation.process import End, Process, Processes
 
 Variable = State | tuple[MutableMapping[str, Any], str, Callable[[], Any]]
 """A mapping and a key, and what makes the first value; else each process begins with the present one."""
@@ -86,14 +87,14 @@ class Simulation:
         names += [(vars(os), "environ"), (sys.modules, _MAIN), (vars(threading), "_main_thread")]
         self._first = [make for _, make in own]
         self._kernel = Kernel(seed, [*names, *(name for name, _ in own)])
-        self._kernel.at_exit = context._leave_domains
-        self._domains = self._kernel.domains = Domains(self._kernel, self.network)
+        self._processes = Processes(self._kernel, context._leave_domains)
+        self._domains = Domains(self._kernel, self.network)
         self._hosts: dict[str, Host] = {}
         self._code: dict[str, CodeType] = {}
         self._stack = ExitStack()
 
     def __enter__(self) -> Simulation:
-        self._stack.enter_context(patches.installed())
+        self._stack.enter_context(patches.installed(self._domains))
         state = random.getstate()
         self._stack.callback(random.setstate, state)
         random.seed(self.seed)
@@ -102,7 +103,7 @@ class Simulation:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        for process in list(self._kernel.processes.values()):
+        for process in list(self._processes.alive.values()):
             process.abandon()
             process.kill()
         self._kernel.run_until(self._kernel.now)
@@ -173,7 +174,7 @@ class Simulation:
         title = name or (program if isinstance(program, str) else program.__name__)
         main = ModuleType(_MAIN)
         run = self._module(program, main) if isinstance(program, str) else program
-        process = Process(self._kernel, title, run, self.host(host), parent, dict(environment or {}))
+        process = Process(self._processes, title, run, self.host(host), parent, dict(environment or {}))
         output = process.output
         process.saved = [[title, *arguments], output, output, _Environment(environment or {}), main]
         process.saved += [process.face, *(make() for make in self._first)]
@@ -202,12 +203,12 @@ class Simulation:
     @property
     def processes(self) -> list[Process]:
         """The live processes."""
-        return list(self._kernel.processes.values())
+        return list(self._processes.alive.values())
 
     @property
     def ends(self) -> list[End]:
         """The last processes that have ended, with their exit codes and output."""
-        return list(self._kernel.ends)
+        return list(self._processes.ends)
 
     # Network
 
@@ -230,7 +231,7 @@ class Simulation:
 
     def listen(self, listener: Callable[[Process], Any]) -> None:
         """Call a function with a process each time before it runs: at each message, timer and other event."""
-        self._kernel.listeners.append(listener)
+        self._processes.listeners.append(listener)
 
     def tap(self, listener: Callable[[Any, Any], None]) -> None:
         """

@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import threading
 import traceback
+from collections import deque
 from collections.abc import Callable
 from concurrent.futures.thread import _threads_queues
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 from greenlet import GreenletExit, greenlet
 
-from rclpy_simulation import kernel
 from rclpy_simulation.host import SECOND
-
-if TYPE_CHECKING:
-    from rclpy_simulation.process import Process
+from rclpy_simulation.kernel import Kernel
 
 BUSY_WAITS = 1000  # without waiting in between: then a thread is taken for a busy loop
 _BUSY_PAUSE = SECOND // 1000
@@ -31,6 +29,29 @@ class ProcessExit(BaseException):
         self.code = code
 
 
+class Owner(Protocol):
+    """The process of a thread, as the thread sees it."""
+
+    kernel: Kernel
+    exit_code: int | None
+    interrupts: deque[Callable[[], Any]]
+
+    @property
+    def is_suspended(self) -> bool: ...
+
+    def postpone(self, action: Callable[[], Any]) -> None: ...
+
+    def is_about_to_run(self) -> bool: ...
+
+    def switch(self, thread: Thread, enter: Callable[[], Any]) -> None: ...
+
+    def refuse(self, thread: Thread) -> None: ...
+
+    def handle_interrupts(self, thread: Thread) -> None: ...
+
+    def end_with(self, error: BaseException, name: str) -> None: ...
+
+
 class Thread:
     """
     A thread of a simulated process.
@@ -39,7 +60,7 @@ class Thread:
     event of ``threading``.
     """
 
-    def __init__(self, process: Process, work: Callable[[], Any], face: threading.Thread) -> None:
+    def __init__(self, process: Owner, work: Callable[[], Any], face: threading.Thread) -> None:
         """
         Prepare a thread.
 
@@ -69,10 +90,8 @@ class Thread:
             self._work()
         except (GreenletExit, SystemExit):
             pass
-        except ProcessExit as error:
-            self.process.exit(error.code)
         except BaseException as error:
-            self.process.output.write(f"Exception in thread {self.face.name}:\n{trace(error)}")
+            self.process.end_with(error, self.face.name)
         finally:
             self._end()
 
@@ -92,19 +111,16 @@ class Thread:
 
     def _resume(self) -> None:
         process = self.process
-        if process.is_stopped or process.is_hung:
+        if process.is_suspended:
             process.postpone(self._resume)
             return
         self._is_due = False
         if self._waits and not self.done and process.exit_code is None:
-            if listeners := process.kernel.listeners:
-                for listener in listeners:
-                    listener(process)
-                if process.exit_code is not None or process.is_suspended:
-                    self.wake()  # a listener has killed or stopped it
-                    return
+            if not process.is_about_to_run():
+                self.wake()
+                return
             self._waits = False
-            process.kernel.switch(process, self, self._greenlet.switch)
+            process.switch(self, self._greenlet.switch)
 
     def wait(self, deadline: int | None) -> None:
         """Let other threads run until this one is woken, or until a time of the monotonic clock [ns]."""
@@ -153,9 +169,8 @@ class Thread:
         while not condition() and (deadline is None or kernel.now < deadline):
             self.wait(deadline)
 
-    def join(self, timeout: float | None) -> None:
+    def join(self, waiting: Thread, timeout: float | None) -> None:
         """Let the running thread wait for the end of this one, at most ``timeout`` [s]."""
-        waiting = kernel.running()
         if waiting is self:
             raise RuntimeError("cannot join current thread")
         self._waiters.append(waiting)
@@ -169,7 +184,7 @@ class Thread:
         if not self.done:
             if self._greenlet:
                 self._waits = False
-                self.process.kernel.switch(self.process, self, self._greenlet.throw)
+                self.process.switch(self, self._greenlet.throw)
             self._end()
 
 

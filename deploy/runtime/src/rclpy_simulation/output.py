@@ -1,0 +1,35 @@
+"""What simulated processes print."""
+
+from __future__ import annotations
+
+import io
+from collections import deque
+
+_KEPT = 64 * 1024  # characters
+
+
+class Output(io.TextIOBase):
+    """Standard output and error of a process; the latest part is kept."""
+
+    def __init__(self) -> None:
+        self._parts: deque[str] = deque()
+        self._length = 0
+        self._has_ended = False
+
+    def write(self, text: str) -> int:
+        """Add text, unless the process has ended."""
+        if not self._has_ended:
+            self._parts.append(text[-_KEPT:])
+            self._length += len(self._parts[-1])
+            while self._length > _KEPT and len(self._parts) > 1:
+                self._length -= len(self._parts.popleft())
+        return len(text)
+
+    def end(self) -> None:
+        """Ignore all later text."""
+        self._has_ended = True
+
+    @property
+    def text(self) -> str:
+        """What the process has written."""
+        return "".join(self._parts)
