@@ -23,6 +23,7 @@ SHARE = f"share/{PACKAGE}"
 ELSEWHERE = (
     "interfaces/reactive_node",
     "deploy/runtime",
+    "deploy/simulation_kit",
     "deploy/tools",
     "deploy/package",
     "deploy/benchmarks",

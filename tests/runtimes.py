@@ -7,7 +7,7 @@ import importlib.util
 EMBEDDED_ONLY = (
     "deploy/runtime/tests/interop",
     "deploy/runtime/tests/runtime",
-    "deploy/runtime/tests/simulation",
+    "deploy/simulation_kit/tests",
     "tests/mutants",
     "tests/trials/replay",
     "tests/trials/simulation",

@@ -39,7 +39,8 @@ REQUIREMENTS = ROOT / "deploy" / "requirements"
 PIP = [str(PYTHON), "-m", "pip", "install", "--no-deps", "--no-input", "--progress-bar=off"]
 SOURCES = [ROOT / "interfaces" / "reactive_node" / "src", ROOT / "deploy" / "tools" / "src"]
 """Packages of this checkout that Python finds after those of an installed ROS 2."""
-EMBEDDED = ROOT / "deploy" / "runtime" / "src"
+EMBEDDED = [ROOT / "deploy" / "runtime" / "src", ROOT / "deploy" / "simulation_kit" / "src"]
+"""Packages that Python finds first if RUNTIME=embedded."""
 FAST_DDS = "rmw_fastrtps_cpp"
 SCRIPTS = {
     "supervisord": "-m supervisor.supervisord",
@@ -165,7 +166,7 @@ def _requirements(*names: str) -> list[str]:
 def _write_pth(embedded: bool) -> None:
     """Tell Python of .venv where the packages of this checkout are; it reads the .pth of the wheels later."""
     chosen = f'import os, sys; os.environ.get("{RUNTIME}") == "embedded" and '
-    first = f"sys.path.insert(0, {str(EMBEDDED)!r})"
+    first = f"sys.path.__setitem__(slice(0), {list(map(str, EMBEDDED))!r})"
     without_libraries = 'os.environ.update(_ROS_WHEELS_BOOTSTRAP_COMPLETE="1")'
     with_workspace = '"AMENT_PREFIX_PATH" in os.environ and __import__("rosidl_runtime_embedded")'
     lines = [chosen + what for what in (first, without_libraries, with_workspace)] if embedded else []

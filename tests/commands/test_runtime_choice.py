@@ -14,12 +14,13 @@ from deploy.commands import setup
 from deploy.running import rclpy_choice
 
 ROOT = Path(__file__).parents[2]
-EMBEDDED = ROOT / "deploy" / "runtime" / "src"
-PACKAGES = sorted(path.name for path in EMBEDDED.iterdir() if (path / "__init__.py").exists())
+EMBEDDED = setup.EMBEDDED[0]
+FOLDERS = tuple(map(str, setup.EMBEDDED))
+PACKAGES = sorted(path.parent.name for folder in setup.EMBEDDED for path in folder.glob("*/__init__.py"))
 FIND = f"""
 from importlib.util import find_spec
 specs = {{name: find_spec(name) for name in {PACKAGES}}}
-print(*(name for name, spec in specs.items() if spec and spec.origin.startswith({str(EMBEDDED)!r})))
+print(*(name for name, spec in specs.items() if spec and spec.origin.startswith({FOLDERS})))
 """
 CYCLONE = {"RMW_IMPLEMENTATION": "rmw_cyclonedds_cpp"}
 ROS = "/opt/ros/jazzy/lib/python3.12/site-packages/rclpy/__init__.py"

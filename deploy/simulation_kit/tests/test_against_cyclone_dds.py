@@ -9,7 +9,7 @@ import sys
 from typing import Any
 
 import pytest
-from deploy.runtime.tests.simulation import programs
+from deploy.simulation_kit.tests import programs
 
 from rclpy_simulation import Simulation
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import rclpy_simulation
 
-README = Path(__file__).parents[2] / "src" / "rclpy_simulation" / "README.md"
+README = Path(__file__).parents[1] / "README.md"
 
 
 def test_the_example_of_the_readme_passes(tmp_path: Path) -> None:
