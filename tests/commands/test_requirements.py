@@ -17,7 +17,7 @@ PROJECTS = {
     "deploy/simulation_kit": ("develop",),
     "deploy/tools": ("system", "ros"),
 }
-OWN = "reactive-arm-runtime"
+OWN = "rclpy-cyclonedds"
 """Distributions of this repository, and the files with what they need."""
 
 

@@ -46,4 +46,4 @@ def test_a_missing_greenlet_is_a_clear_error(tmp_path: Path) -> None:
 
 def test_a_real_ros_2_is_a_clear_error(tmp_path: Path) -> None:
     error = _error_without("rclpy._dds", tmp_path)
-    assert error.startswith("ImportError: rclpy_simulation needs the rclpy of reactive-arm-runtime, not")
+    assert error.startswith("ImportError: rclpy_simulation needs the rclpy of rclpy-cyclonedds, not")

@@ -6,7 +6,7 @@ import rclpy
 
 if find_spec("rclpy._dds") is None:
     raise ImportError(
-        f"rclpy_simulation needs the rclpy of reactive-arm-runtime, not that of {rclpy.__path__[0]}"
+        f"rclpy_simulation needs the rclpy of rclpy-cyclonedds, not that of {rclpy.__path__[0]}"
     )
 if find_spec("greenlet") is None:
     raise ImportError("rclpy_simulation needs greenlet: pip install 'greenlet>=3.1,<4'")

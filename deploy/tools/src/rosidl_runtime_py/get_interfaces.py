@@ -1,7 +1,7 @@
 """
 Finds the interfaces of packages by their definition files: ``msg/*.msg``, ``srv/*.srv``, ``action/*.action``.
 
-The folder of a package lies next to rclpy (reactive-arm-runtime), below ``share`` of a prefix in
+The folder of a package lies next to rclpy (rclpy-cyclonedds), below ``share`` of a prefix in
 AMENT_PREFIX_PATH, or below ``share`` of the prefix into which rclpy is installed (ROS 2's wheels). The first
 definition that is found in this order counts.
 """

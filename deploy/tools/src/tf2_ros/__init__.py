@@ -15,7 +15,7 @@ try:
 except ModuleNotFoundError as error:
     raise ModuleNotFoundError(
         "tf2_ros needs the messages of tf2_msgs, which ROS 2's wheels on PyPI do not have:"
-        " use an installed ROS 2 or reactive-arm-runtime, or build tf2_msgs",
+        " use an installed ROS 2 or rclpy-cyclonedds, or build tf2_msgs",
         name=error.name,
     ) from None
 from tf2_py import (

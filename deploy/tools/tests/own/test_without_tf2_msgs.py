@@ -11,7 +11,7 @@ pytestmark = pytest.mark.own
 
 ERROR = (
     "ModuleNotFoundError: tf2_ros needs the messages of tf2_msgs, which ROS 2's wheels on PyPI do not have:"
-    " use an installed ROS 2 or reactive-arm-runtime, or build tf2_msgs"
+    " use an installed ROS 2 or rclpy-cyclonedds, or build tf2_msgs"
 )
 
 
