@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 import rclpy
-from rclpy import executors
+from rclpy import _executor_entities
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
 from rclpy.context import Context
 from rclpy.executors import Executor, MultiThreadedExecutor, SingleThreadedExecutor
@@ -219,8 +219,8 @@ def test_a_reader_is_asked_again_only_in_a_flood(
     waits: int,
     looks: int,
 ) -> None:
-    monkeypatch.setattr(executors, "_BURST", 10**12)
-    monkeypatch.setattr(executors, "_BREAK", break_)  # ns: every break is shorter, or every break is longer
+    monkeypatch.setattr(_executor_entities, "_BURST", 10**12)
+    monkeypatch.setattr(_executor_entities, "_BREAK", break_)  # ns: each break is shorter, or longer
     received: list[float] = []
     subscription = node.create_subscription(Float64, "x", lambda message: received.append(message.data), 10)
     publisher = node.create_publisher(Float64, "x", 10)
