@@ -13,7 +13,8 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo, TopicEndpointTypeEnum
 from rclpy.type_hash import TypeHash
 
 if TYPE_CHECKING:
-    from rclpy._graph import Graph, NamesAndTypes
+    from rclpy._graph import Graph
+    from rclpy._graph_queries import NamesAndTypes
 
 
 class NodeGraph(NodeNames):

@@ -20,7 +20,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from rclpy._graph import NodeEntities, decode, encode
+from rclpy._discovery_info import NodeEntities, decode, encode
 from rclpy._parameter_scalars import plain_scalar
 from rosidl_runtime_embedded import message_class
 from rosidl_runtime_embedded.definition_files import message_definition

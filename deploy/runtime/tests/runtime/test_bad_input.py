@@ -16,7 +16,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.srv import SetParameters
 from rclpy._dds import Participant, Writer
 from rclpy._dds.library import blocking
-from rclpy._graph import NodeEntities, encode
+from rclpy._discovery_info import NodeEntities, encode
 from rclpy.exceptions import RCLError
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -269,7 +269,7 @@ def test_bad_discovery_info_is_dropped_counted_and_logged_once(
 
     def all_are_counted() -> bool:
         node.get_node_names()  # a query reads the pending samples
-        return node._rclpy_graph._bad_input.count == 200
+        return node._rclpy_graph._peers._bad_input.count == 200
 
     spin_until(all_are_counted)
     assert node.get_node_names() == ["node"]

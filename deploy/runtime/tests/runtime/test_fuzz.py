@@ -17,13 +17,13 @@ PLANTED = """
 import sys
 sys.path.insert(0, {directory!r})
 import fuzz
-from rclpy import _graph
+from rclpy import _discovery_info
 
 kept = []
 
 def read(data):
     {fault}
-    return _graph.decode(data)
+    return _discovery_info.decode(data)
 
 good = fuzz.decoder(fuzz.DISCOVERY)
 planted = good._replace(read=read)

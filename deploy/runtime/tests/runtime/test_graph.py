@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rclpy._dds.discovery import Discovery
-from rclpy._graph import NodeEntities, decode, encode
+from rclpy._discovery_info import NodeEntities, decode, encode
 from rclpy.node import Node
 
 MakeNode = Callable[..., Node]
