@@ -13,6 +13,7 @@ import math
 import sys
 import threading
 import traceback
+from collections.abc import Callable
 from typing import Any
 
 import rclpy
@@ -20,12 +21,13 @@ from rclpy.action import ActionClient, ActionServer, get_action_names_and_types
 from rclpy.action.server import ServerGoalHandle
 from rclpy.client import Client
 from rclpy.duration import Duration
+from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.parameter_client import AsyncParameterClient
 from rclpy.publisher import Publisher
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, QoSPolicyKind, QoSProfile, ReliabilityPolicy
 from rclpy.subscription import Subscription
 from rclpy.task import Future
 from rclpy.topic_endpoint_info import TopicEndpointInfo
@@ -53,10 +55,14 @@ class Peer:
         self._received: dict[str, list[str]] = {}
         self._clients: dict[str, Client] = {}
         self._calls: list[bool] = []
+        self._incompatible: dict[str, list[str]] = {}
 
     def advertise(self, topic: str, type_name: str, qos: dict[str, Any]) -> None:
         """Create the publisher of a topic."""
-        self._publishers[topic] = self._node.create_publisher(_type(type_name), topic, _profile(**qos))
+        events = PublisherEventCallbacks(incompatible_qos=self._note_incompatible(topic))
+        self._publishers[topic] = self._node.create_publisher(
+            _type(type_name), topic, _profile(**qos), event_callbacks=events
+        )
 
     def publish(self, topic: str, *messages: str) -> None:
         """Publish messages, one directly after the other."""
@@ -67,8 +73,20 @@ class Peer:
         """Create the subscription of a topic."""
         received = self._received.setdefault(topic, [])
         self._subscriptions[topic] = self._node.create_subscription(
-            _type(type_name), topic, lambda message: received.append(repr(message)), _profile(**qos)
+            _type(type_name),
+            topic,
+            lambda message: received.append(repr(message)),
+            _profile(**qos),
+            event_callbacks=SubscriptionEventCallbacks(incompatible_qos=self._note_incompatible(topic)),
         )
+
+    def _note_incompatible(self, topic: str) -> Callable[[Any], None]:
+        policies = self._incompatible.setdefault(topic, [])
+        return lambda event: policies.append(QoSPolicyKind(event.last_policy_kind).name)
+
+    def incompatible(self, topic: str) -> list[str]:
+        """Return the policies because of which an endpoint of the topic has not matched another."""
+        return self._incompatible[topic]
 
     def received(self, topic: str) -> list[str]:
         """Return the messages of the subscription so far."""

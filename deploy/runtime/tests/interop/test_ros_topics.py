@@ -128,3 +128,24 @@ def test_late_reader_gets_a_message_within_its_lifespan(
     reader("subscribe", topic, FLOAT64, qos)
     wait_until(lambda: reader("received", topic))
     assert reader("received", topic) == [value(2.0)]
+
+
+@pytest.mark.parametrize(
+    ("offered", "requested", "policy"),
+    [
+        ({"depth": 1, "reliability": "BEST_EFFORT"}, {"depth": 1}, "RELIABILITY"),
+        ({"depth": 1}, {"depth": 1, "durability": "TRANSIENT_LOCAL"}, "DURABILITY"),
+    ],
+)
+def test_both_sides_report_a_writer_that_offers_too_little(
+    offered: dict[str, Any],
+    requested: dict[str, Any],
+    policy: str,
+    writer: PeerProcess,
+    reader: PeerProcess,
+    topic: str,
+) -> None:
+    writer("advertise", topic, FLOAT64, offered)
+    reader("subscribe", topic, FLOAT64, requested)
+    wait_until(lambda: writer("incompatible", topic) == reader("incompatible", topic) == [policy])
+    assert (writer("readers", topic), reader("writers", topic)) == (0, 0)
