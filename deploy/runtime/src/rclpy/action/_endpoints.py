@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Coroutine, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +15,7 @@ from rclpy.qos import QoSProfile
 from rclpy.service import Service
 from rclpy.subscription import Subscription
 from rclpy.type_support import check_for_type_support
+from rclpy.waitable import Waitable
 
 if TYPE_CHECKING:
     from rclpy.node import Node
@@ -112,12 +113,38 @@ def uuid_bytes(goal_id: Any) -> bytes:
     return data
 
 
-def add_to_wait_set(wait_set: Any, endpoints: Endpoints) -> list[tuple[str, int]]:
-    """Add what receives messages to a wait set; return the kinds and indices."""
-    kinds = {Subscription: "subscription", Service: "service"}
-    return [
-        (kind, wait_set._add(kind, handle))
-        for endpoint in endpoints.created
-        for kind in (kinds.get(type(endpoint), "client"),)
-        for handle in getattr(endpoint, "_rclpy_handles", ())
-    ]
+class ActionWaitable(Waitable):
+    """What an action client and an action server have in common for executors."""
+
+    _node: Node
+    _rclpy_endpoints: Endpoints
+    _rclpy_in_wait_set: list[tuple[str, int]]
+
+    def add_to_wait_set(self, wait_set: Any) -> None:
+        """Add what receives messages to a wait set; the node's executor does without."""
+        kinds = {Subscription: "subscription", Service: "service"}
+        self._rclpy_in_wait_set = [
+            (kind, wait_set._add(kind, handle))
+            for endpoint in self._rclpy_endpoints.created
+            for kind in (kinds.get(type(endpoint), "client"),)
+            for handle in getattr(endpoint, "_rclpy_handles", ())
+        ]
+
+    def is_ready(self, wait_set: Any) -> bool:
+        """Return whether anything has arrived, after a wait."""
+        return any(wait_set.is_ready(kind, index) for kind, index in self._rclpy_in_wait_set)
+
+    def _rclpy_take(self) -> dict[str, Any] | None:
+        return self.take_data() or None
+
+    def _rclpy_execute(self, taken: dict[str, Any]) -> Coroutine[Any, Any, None]:
+        return self.execute(taken)
+
+    def destroy(self) -> None:
+        """Destroy it: it receives nothing any more, and a server forgets its goals."""
+        if self in self._node.waitables:
+            self._node.remove_waitable(self)
+        self._rclpy_close()
+
+    def _rclpy_close(self) -> None:
+        self._rclpy_endpoints.destroy()

@@ -5,18 +5,18 @@ from __future__ import annotations
 import threading
 import uuid
 import weakref
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from action_msgs.msg import GoalStatus
 from action_msgs.srv import CancelGoal
-from rclpy.action._endpoints import add_to_wait_set, creation, uuid_bytes
+from rclpy.action._endpoints import ActionWaitable, creation, uuid_bytes
 from rclpy.callback_groups import CallbackGroup
 from rclpy.client import Client
 from rclpy.executors import await_or_execute
 from rclpy.qos import QoSProfile, qos_profile_action_status_default, qos_profile_services_default
 from rclpy.task import Future
-from rclpy.waitable import NumberOfEntities, Waitable
+from rclpy.waitable import NumberOfEntities
 from unique_identifier_msgs.msg import UUID
 
 if TYPE_CHECKING:
@@ -113,7 +113,7 @@ class _ResultCalls(_Calls):
     kind = "result"
 
 
-class ActionClient(Waitable):
+class ActionClient(ActionWaitable):
     """Sends goals to an action server."""
 
     def __init__(
@@ -166,7 +166,6 @@ class ActionClient(Waitable):
                 impl.GoalStatusMessage, "status", status_sub_qos_profile
             )
         self._rclpy_endpoints = endpoints
-        self._rclpy_in_wait_set: list[tuple[str, int]] = []
         # The interface that executors use for every entity.
         self._rclpy_handles = endpoints.handles()
         self._rclpy_timers: tuple[Timer, ...] = ()
@@ -275,14 +274,6 @@ class ActionClient(Waitable):
         """Return the numbers of subscriptions and clients."""
         return NumberOfEntities(num_subs=2, num_clients=3)
 
-    def add_to_wait_set(self, wait_set: Any) -> None:
-        """Add the subscriptions and clients to a wait set; the node's executor does without."""
-        self._rclpy_in_wait_set = add_to_wait_set(wait_set, self._rclpy_endpoints)
-
-    def is_ready(self, wait_set: Any) -> bool:
-        """Return whether anything has arrived, after a wait."""
-        return any(wait_set.is_ready(kind, index) for kind, index in self._rclpy_in_wait_set)
-
     def take_data(self) -> dict[str, Any]:
         """Take what has arrived: a response of each service, a status message and feedback messages."""
         feedback: list[Any] = []
@@ -346,21 +337,6 @@ class ActionClient(Waitable):
             goal_handle._status = status
         if goal_handle is None or status in _TERMINAL:
             del self._goal_handles[goal_uuid]
-
-    def _rclpy_take(self) -> dict[str, Any] | None:
-        return self.take_data() or None
-
-    def _rclpy_execute(self, taken: dict[str, Any]) -> Coroutine[Any, Any, None]:
-        return self.execute(taken)
-
-    def destroy(self) -> None:
-        """Destroy the client: it receives nothing any more."""
-        if self in self._node.waitables:
-            self._node.remove_waitable(self)
-        self._rclpy_close()
-
-    def _rclpy_close(self) -> None:
-        self._rclpy_endpoints.destroy()
 
 
 def _check_goal_handle(goal_handle: Any) -> None:

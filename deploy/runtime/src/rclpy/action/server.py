@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import threading
 import traceback
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable
 from enum import Enum
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from action_msgs.msg import GoalInfo, GoalStatus, GoalStatusArray
 from action_msgs.srv import CancelGoal
-from rclpy.action._endpoints import add_to_wait_set, creation, uuid_bytes
+from rclpy.action._endpoints import ActionWaitable, creation, uuid_bytes
 from rclpy.callback_groups import CallbackGroup
 from rclpy.constants import S_TO_NS
 from rclpy.exceptions import InvalidHandle, RCLError
@@ -23,7 +23,7 @@ from rclpy.executors import await_or_execute
 from rclpy.qos import QoSProfile, qos_profile_action_status_default, qos_profile_services_default
 from rclpy.task import Future, Task
 from rclpy.timer import Timer
-from rclpy.waitable import NumberOfEntities, Waitable
+from rclpy.waitable import NumberOfEntities
 
 if TYPE_CHECKING:
     from rclpy._service_wire import RequestId
@@ -198,7 +198,7 @@ def default_cancel_callback(cancel_request: Any) -> CancelResponse:
     return CancelResponse.REJECT
 
 
-class ActionServer(Waitable):
+class ActionServer(ActionWaitable):
     """Accepts and executes goals."""
 
     def __init__(
@@ -266,7 +266,6 @@ class ActionServer(Waitable):
             )
             self._rclpy_status = endpoints.publisher(impl.GoalStatusMessage, "status", status_pub_qos_profile)
         self._rclpy_endpoints = endpoints
-        self._rclpy_in_wait_set: list[tuple[str, int]] = []
         self._rclpy_expiry = Timer(
             self._rclpy_expire_goals,
             group,
@@ -498,14 +497,6 @@ class ActionServer(Waitable):
         """Return the numbers of timers and services."""
         return NumberOfEntities(num_timers=1, num_services=3)
 
-    def add_to_wait_set(self, wait_set: Any) -> None:
-        """Add the services to a wait set; the node's executor does without."""
-        self._rclpy_in_wait_set = add_to_wait_set(wait_set, self._rclpy_endpoints)
-
-    def is_ready(self, wait_set: Any) -> bool:
-        """Return whether anything has arrived, after a wait."""
-        return any(wait_set.is_ready(kind, index) for kind, index in self._rclpy_in_wait_set)
-
     def take_data(self) -> dict[str, Any]:
         """Take what has arrived: at most one request of each service."""
         sources = {
@@ -525,25 +516,13 @@ class ActionServer(Waitable):
         if "result" in taken_data:
             self._rclpy_handle_result_request(*taken_data["result"])
 
-    def _rclpy_take(self) -> dict[str, Any] | None:
-        return self.take_data() or None
-
-    def _rclpy_execute(self, taken: dict[str, Any]) -> Coroutine[Any, Any, None]:
-        return self.execute(taken)
-
-    def destroy(self) -> None:
-        """Destroy the server: its goals are forgotten, and clients get no more responses."""
-        if self in self._node.waitables:
-            self._node.remove_waitable(self)
-        self._rclpy_close()
-
     def _rclpy_close(self) -> None:
         for task in list(self._rclpy_executions):
             task._rclpy_cancel_before_start()
         for goal_handle in list(self._goal_handles.values()):
             goal_handle.destroy()
         self._rclpy_expiry.destroy()
-        self._rclpy_endpoints.destroy()
+        super()._rclpy_close()
 
 
 def _nanoseconds(stamp: Any) -> int:
