@@ -8,15 +8,11 @@ differently (its daemon, tracebacks) or what its installation may lack.
 from __future__ import annotations
 
 import importlib.util
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack
-from typing import Any
 
 import pytest
+from deploy.runtime.tests.conftest import executor, make_node, node, other_context
 
-from rclpy.context import Context
-from rclpy.executors import SingleThreadedExecutor
-from rclpy.node import Node
+__all__ = ["executor", "make_node", "node", "other_context"]
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -31,41 +27,3 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if item.get_closest_marker("own"):
             item.add_marker(pytest.mark.skip(reason="platform: ROS 2 has its own tools"))
-
-
-@pytest.fixture
-def executor(context: Context) -> Iterator[SingleThreadedExecutor]:
-    """The executor that rclpy documents, in the test's context."""
-    with SingleThreadedExecutor(context=context) as executor:
-        yield executor
-
-
-@pytest.fixture
-def make_node(context: Context) -> Iterator[Callable[..., Node]]:
-    """Makes nodes in the test's context and destroys them after the test; no executor spins them."""
-    with ExitStack() as stack:
-
-        def make(name: str = "node", **options: Any) -> Node:
-            node = Node(name, **{"context": context, **options})
-            stack.callback(node.destroy_node)
-            return node
-
-        yield make
-
-
-@pytest.fixture
-def node(make_node: Callable[..., Node], executor: SingleThreadedExecutor) -> Node:
-    """A node in the test's executor."""
-    node = make_node()
-    executor.add_node(node)
-    return node
-
-
-@pytest.fixture
-def other_context(domain_id: int) -> Iterator[Context]:
-    """A second participant in the test's domain, as another process would be."""
-    context = Context()
-    context.init([], domain_id=domain_id)
-    yield context
-    context.try_shutdown()
-    context.destroy()
