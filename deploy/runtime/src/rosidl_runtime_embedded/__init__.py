@@ -3,7 +3,7 @@
 from .action import Action, action_class
 from .definition import InvalidDefinition
 from .message import Message, message_class
-from .packages import install, interfaces, kinds
+from .packages import install, kinds
 from .service import Service, service_class
 
 install()
@@ -14,7 +14,6 @@ __all__ = [
     "Message",
     "Service",
     "action_class",
-    "interfaces",
     "kinds",
     "message_class",
     "service_class",

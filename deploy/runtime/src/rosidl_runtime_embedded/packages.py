@@ -22,7 +22,7 @@ _PARTS: dict[str, tuple[str, ...]] = {"msg": (), "srv": SERVICE_PARTS, "action":
 """Suffixes of the messages that an interface of each kind defines."""
 
 
-def interfaces(module_name: str) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
+def _interfaces(module_name: str) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
     """The functions ``__getattr__`` and ``__dir__`` of a module ``<package>.<msg, srv or action>``."""
     package, kind = module_name.split(".")
 
@@ -79,8 +79,8 @@ def _make(kind: str, part: str) -> Callable[[str], Any]:
     return action_class if kind == "action" and not part else message_class
 
 
-class _UserPackages:
-    """Meta path finder and loader of the message packages in AMENT_PREFIX_PATH."""
+class _MessagePackages:
+    """Meta path finder and loader of packages in AMENT_PREFIX_PATH, and of the modules of our packages."""
 
     def find_spec(
         self, name: str, path: Sequence[str] | None = None, target: ModuleType | None = None
@@ -116,17 +116,17 @@ class _UserPackages:
             case 0:
                 members["__getattr__"] = kinds(name)
             case 1:
-                members["__getattr__"], members["__dir__"] = interfaces(name)
+                members["__getattr__"], members["__dir__"] = _interfaces(name)
             case _:
                 members["__getattr__"] = _one_interface(name)
 
 
 def install() -> None:
-    """Make the packages in AMENT_PREFIX_PATH importable, unless Python finds a module of that name.
+    """Make message packages importable, unless Python finds a module of that name.
 
     This finder goes before Python's, which would take any directory with the name of the package, such as
     that of its sources, for the package.
     """
-    if not any(isinstance(finder, _UserPackages) for finder in sys.meta_path):
+    if not any(isinstance(finder, _MessagePackages) for finder in sys.meta_path):
         finders: list[object] = [*sys.meta_path, PathFinder]
-        sys.meta_path.insert(finders.index(PathFinder), _UserPackages())
+        sys.meta_path.insert(finders.index(PathFinder), _MessagePackages())
