@@ -61,6 +61,12 @@ class Owner:
             kind = type(self).__name__.lower()
             raise InvalidHandle(f"cannot use a {kind} of {self._rclpy_name} that was destroyed")
 
+    @property
+    def logger_name(self) -> str:
+        """The name of the logger of its node. Raises InvalidHandle if it was destroyed."""
+        self._rclpy_check_usable()
+        return self._rclpy_node.get_logger().name
+
     def destroy(self) -> None:
         """Destroy it. The node's ``destroy_…`` method also removes it from the node."""
         if not self._rclpy_destroyed:

@@ -118,6 +118,14 @@ class Future:
         else:
             callback(self)
 
+    def remove_done_callback(self, callback: Callable[[Any], Any]) -> bool:
+        """Undo :meth:`add_done_callback`; return whether the callback was still waiting."""
+        with self._lock:
+            if callback not in self._callbacks:
+                return False
+            self._callbacks.remove(callback)
+            return True
+
     def _set_executor(self, executor: Executor | None) -> None:
         """Set the executor of the done callbacks, without keeping it alive."""
         with self._lock:

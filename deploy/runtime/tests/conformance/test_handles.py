@@ -171,3 +171,14 @@ def test_a_subscription_can_be_polled(
     assert message == Float64(data=1.0)
     assert 0 < info["source_timestamp"] <= info["received_timestamp"]
     assert deserialize_message(data, Float64) == Float64(data=2.0)
+
+
+def test_each_entity_knows_the_logger_of_its_node(make_node: Callable[..., Node]) -> None:
+    node = make_node("talker", namespace="/arm1")
+    entities = [
+        node.create_publisher(Float64, "x", 1),
+        node.create_subscription(Float64, "x", lambda _: None, 1),
+        node.create_service(Trigger, "y", lambda request, response: response),
+        node.create_client(Trigger, "y"),
+    ]
+    assert {entity.logger_name for entity in entities} == {"arm1.talker"}

@@ -242,3 +242,13 @@ def test_a_finished_task_releases_its_arguments() -> None:
     del big
     task()
     assert alive() is None
+
+
+def test_a_removed_done_callback_is_not_called() -> None:
+    future: Future = Future()
+    called: list[Future] = []
+    future.add_done_callback(called.append)
+    assert future.remove_done_callback(called.append)
+    assert not future.remove_done_callback(called.append)
+    future.set_result(None)
+    assert called == []
