@@ -1,4 +1,4 @@
-"""Names that can be imported from rclpy's modules, besides those of facts/rclpy_api.json."""
+"""Names that can be imported from rclpy's modules, besides those that they define."""
 
 from __future__ import annotations
 

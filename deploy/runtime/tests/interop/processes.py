@@ -38,25 +38,30 @@ def python(rclpy: str) -> str:
     return sys.executable
 
 
+def environment(rclpy: str) -> dict[str, str]:
+    """Return the environment variables of a process on an rclpy."""
+    # A wheel starts its interpreter again with the libraries of its own environment, but only once.
+    not_inherited = ("LD_LIBRARY_PATH", "_ROS_WHEELS_BOOTSTRAP_COMPLETE")
+    inherited = {name: value for name, value in os.environ.items() if name not in not_inherited}
+    return inherited | {"RUNTIME": "embedded" if rclpy == "embedded" else ""}
+
+
 class PeerProcess:
     """A process with a node on an rclpy. The methods of its node (peer.py) are called by their names."""
 
     def __init__(
         self,
         rclpy: str,
-        environment: dict[str, str],
+        variables: dict[str, str],
         name: str = "",
         enter: Sequence[str] = (),
     ) -> None:
         """``name``: of the node, by default that of the rclpy; ``enter``: runs a command on another host."""
         self.name, self.namespace = name or f"{rclpy}_peer", f"/{rclpy}"
         self.full_name = f"{self.namespace}/{self.name}"
-        # A wheel starts its interpreter again with the libraries of its own environment, but only once.
-        not_inherited = ("LD_LIBRARY_PATH", "_ROS_WHEELS_BOOTSTRAP_COMPLETE")
-        inherited = {name: value for name, value in os.environ.items() if name not in not_inherited}
         self._process = subprocess.Popen(
             [*enter, python(rclpy), str(PROGRAM), self.name, self.namespace],
-            env={**inherited, "RUNTIME": "embedded" if rclpy == "embedded" else "", **environment},
+            env=environment(rclpy) | variables,
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,

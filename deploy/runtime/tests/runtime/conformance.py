@@ -1,7 +1,7 @@
-"""Compares the embedded runtime with the public API of rclpy 7.1.3: the table of deploy/runtime/README.md.
+"""Compares the embedded runtime with the public API of ROS 2's rclpy: the table of deploy/runtime/README.md.
 
 ``python -m deploy.runtime.tests.runtime.conformance``, run from the root of the repository, prints it. The
-API is recorded in ``rclpy_api.json``: classes, functions and signatures. A name is *supported* if this
+wheels of ROS 2 tell their API: classes, functions and signatures (api.py). A name is *supported* if this
 runtime accepts the calls that rclpy accepts: its parameters have the same names, kinds and order, and the
 same ones have a default.
 """
@@ -13,15 +13,17 @@ import importlib
 import importlib.util
 import inspect
 import json
+import subprocess
 import textwrap
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from enum import Enum
+from functools import cache
 from inspect import Parameter
 from pathlib import Path
 from typing import Any
 
-API = json.loads((Path(__file__).parents[1] / "facts" / "rclpy_api.json").read_text())
+from deploy.runtime.tests.interop.processes import environment, python
 
 ABSTRACT = {
     "CallbackGroup": ("beginning_execution", "can_execute", "ending_execution"),
@@ -29,6 +31,14 @@ ABSTRACT = {
     "Waitable": ("add_to_wait_set", "execute", "get_num_entities", "is_ready", "take_data"),
 }
 """Methods that raise NotImplementedError in rclpy as well: tests/conformance shows it on both."""
+
+MISSING = {
+    "rclpy.destroyable": ["the module"],
+    "rclpy.experimental": ["the module"],
+    "rclpy.experimental.events_executor": ["the module"],
+    "rclpy.task": ["FutureState (no such name)"],
+}
+"""Names for annotations only, and the EventsExecutor, which costs more than the executors here."""
 
 TOOLS = {
     "ros2topic.api": ("get_msg_class", "get_topic_names", "get_topic_names_and_types"),
@@ -62,10 +72,18 @@ TOOLS = {
 }
 """Functions and classes of ROS 2's tools that public programs import, by module."""
 
-_OPENING, _CLOSING = "([{<", ")]}>"
 _ANY_POSITIONAL = Parameter("args", Parameter.VAR_POSITIONAL)
 _ANY_KEYWORD = Parameter("kwargs", Parameter.VAR_KEYWORD)
-_ENUM_METHODS = {"__init__"}  # of an enumeration: never called
+_KINDS = {kind.name: kind for kind in type(Parameter.KEYWORD_ONLY)}
+
+
+@cache
+def api() -> dict[str, dict[str, Any]]:
+    """The public API of the rclpy of ROS 2's wheels, by module."""
+    command = [python("jazzy"), "-W", "ignore", str(Path(__file__).with_name("api.py"))]
+    output = subprocess.check_output(command, env=environment("jazzy"), text=True)
+    found: dict[str, dict[str, Any]] = json.loads(output)
+    return found
 
 
 @dataclass
@@ -79,8 +97,8 @@ class Module:
 
 
 def modules() -> list[Module]:
-    """Compare every recorded module with the module of this runtime."""
-    return [_module(name, entries) for name, entries in API.items()]
+    """Compare every module of ROS 2's rclpy with the module of this runtime."""
+    return [_module(name, entries) for name, entries in api().items()]
 
 
 def tools() -> list[Module]:
@@ -101,11 +119,14 @@ def surplus() -> list[str]:
     """Return the public members of classes that rclpy lacks: code that uses them would fail there."""
     recorded: dict[str, set[str]] = {}
     classes: list[type] = []
-    for name, entries in API.items():
+    for name, entries in api().items():
+        if "the module" in MISSING.get(name, ()):
+            continue
         for entry, facts in entries.items():
-            # The record of a protocol or of a class of C is incomplete.
-            if entry.startswith("class ") and not {"Protocol", "pybind11_object"} & {*facts["bases"]}:
-                cls = getattr(importlib.import_module(name), entry.split()[-1])
+            # What a protocol or a class of C tells is incomplete.
+            if "methods" in facts and not {"Protocol", "pybind11_object"} & {*facts["bases"]}:
+                if (cls := getattr(importlib.import_module(name), entry, None)) is None:
+                    continue
                 recorded[cls.__name__] = {*facts["methods"]}
                 classes.append(cls)
     found = set()
@@ -161,39 +182,37 @@ def _module(name: str, entries: dict[str, Any]) -> Module:
     return row
 
 
-def _problems(module: Any, entry: str, recorded: Any) -> Iterator[tuple[str, str | None]]:
-    """Yield each name of a recorded entry, and its problem, ``None`` if it is supported."""
-    name = entry.split()[-1]
+def _problems(module: Any, name: str, facts: Any) -> Iterator[tuple[str, str | None]]:
+    """Yield each name of an entry, and its problem, ``None`` if it is supported."""
     if not hasattr(module, name):
         yield name, " (no such name)"
-    elif entry.startswith("def "):
-        yield name, _callable_problem(getattr(module, name), recorded)
-    elif not entry.startswith("class "):
+    elif "parameters" in facts:
+        yield name, _callable_problem(getattr(module, name), facts["parameters"])
+    elif "methods" not in facts:
         yield name, None
     else:
         cls = getattr(module, name)
-        absent = [member for member in recorded.get("members", ()) if member not in cls.__members__]
+        absent = [member for member in facts.get("members", ()) if member not in cls.__members__]
         yield name, f" (without {', '.join(absent)})" if absent else None
-        for method, signature in recorded["methods"].items():
-            if not (isinstance(cls, type) and issubclass(cls, Enum) and method in _ENUM_METHODS):
-                problem = _method_problem(cls, method, signature)
-                abstract = problem == "NotImplementedError" and method in ABSTRACT.get(name, ())
-                yield f"{name}.{method}", None if abstract else problem
+        for method, parameters in facts["methods"].items():
+            problem = _method_problem(cls, method, parameters)
+            abstract = problem == "NotImplementedError" and method in ABSTRACT.get(name, ())
+            yield f"{name}.{method}", None if abstract else problem
 
 
-def _method_problem(cls: Any, name: str, signature: str) -> str | None:
+def _method_problem(cls: Any, name: str, parameters: Any) -> str | None:
     try:
         found = inspect.getattr_static(cls, name)
     except AttributeError:
         # Attributes of instances only: set in __init__, or fields of a dataclass.
-        if signature == "property" and name in _instance_attributes(cls):
+        if parameters == "property" and name in _instance_attributes(cls):
             return None
         return " (no such name)"
-    if signature == "property":
+    if parameters == "property":
         return None
     if isinstance(found, classmethod | staticmethod):
         found = found.__func__
-    return _callable_problem(found, signature[signature.index("(") :])
+    return _callable_problem(found, parameters)
 
 
 def _instance_attributes(cls: Any) -> set[str]:
@@ -202,19 +221,19 @@ def _instance_attributes(cls: Any) -> set[str]:
         node.attr
         for node in ast.walk(ast.parse(source))
         if isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store)
-    } | set(inspect.get_annotations(cls))
+    } | {name for base in cls.__mro__ for name in inspect.get_annotations(base)}
 
 
-def _callable_problem(found: Any, signature: str) -> str | None:
-    if isinstance(found, type) and issubclass(found, Enum):
-        return None  # its signature differs between versions of Python
+def _callable_problem(found: Any, parameters: list[tuple[str, str, bool]] | None) -> str | None:
     if _only_raises_not_implemented_error(found):
         return "NotImplementedError"
-    try:
-        ours = list(inspect.signature(found).parameters.values())
-    except ValueError:  # a method of object, such as __hash__
-        return None
-    difference = _difference(ours, _parse(signature))
+    if parameters is None:
+        return None  # a function in C does not tell
+    theirs = [
+        Parameter(name, _KINDS[kind], default=None if has_default else Parameter.empty)
+        for name, kind, has_default in parameters
+    ]
+    difference = _difference(list(inspect.signature(found).parameters.values()), theirs)
     return f" ({difference})" if difference else None
 
 
@@ -263,53 +282,6 @@ def _only_raises_not_implemented_error(function: Any) -> bool:
         and last.exc is not None
         and "NotImplementedError" in ast.unparse(last.exc)
     )
-
-
-def _parse(signature: str) -> list[Parameter]:
-    """Parse a recorded signature. It is not valid Python: annotations and defaults are reprs."""
-    parameters: list[Parameter] = []
-    kind: Any = Parameter.POSITIONAL_OR_KEYWORD
-    for text in _split(signature):
-        if text == "/":
-            continue
-        if text == "*":
-            kind = Parameter.KEYWORD_ONLY
-            continue
-        name = text.lstrip("*").split(":")[0].split("=")[0].strip()
-        if text.startswith("**"):
-            own_kind = Parameter.VAR_KEYWORD
-        elif text.startswith("*"):
-            own_kind, kind = Parameter.VAR_POSITIONAL, Parameter.KEYWORD_ONLY
-        else:
-            own_kind = kind
-        default = None if _has_default(text) else Parameter.empty
-        parameters.append(Parameter(name, own_kind, default=default))
-    return parameters
-
-
-def _split(signature: str) -> list[str]:
-    """Split ``(a, b: Dict[c, d] = <e>) -> f`` into its parameters."""
-    parts, depth, start = [], 0, 1
-    for index, character in enumerate(signature):
-        if character in _OPENING:
-            depth += 1
-        elif character in _CLOSING and signature[index - 1] != "-":
-            depth -= 1
-        if (character == "," and depth == 1) or depth == 0:
-            parts.append(signature[start:index].strip())
-            start = index + 1
-        if depth == 0:
-            break
-    return [part for part in parts if part]
-
-
-def _has_default(text: str) -> bool:
-    depth = 0
-    for character in text:
-        depth += (character in _OPENING) - (character in _CLOSING)
-        if character == "=" and depth == 0:
-            return True
-    return False
 
 
 if __name__ == "__main__":
