@@ -51,7 +51,9 @@ def is_public(module: Any, name: str, value: Any) -> bool:
         return False
     if isinstance(value, type) or inspect.isroutine(value):
         owner = str(value.__module__)
-        if owner == module.__name__ or (hasattr(module, "__path__") and owner.startswith("rclpy")):
+        if not owner.startswith("rclpy"):
+            return False
+        if owner == module.__name__ or hasattr(module, "__path__"):
             return True
     elif not isinstance(value, int | str) and type(value).__module__ != "rclpy.qos":
         return False
