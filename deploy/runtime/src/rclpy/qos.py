@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable
 from enum import Enum, IntEnum
 from typing import Any, NoReturn, TypeVar
 
+from rclpy._checked import Checked
 from rclpy.duration import Duration
 
 
@@ -173,6 +174,23 @@ class QoSProfile:
     # Not hashable, because it is mutable, as in rclpy.
     __hash__ = None  # type: ignore[assignment]
 
+    history = Checked(HistoryPolicy, "The samples to keep.", int)
+    reliability = Checked(ReliabilityPolicy, "Whether lost samples are sent again.", int)
+    durability = Checked(
+        DurabilityPolicy, "Whether a late subscription gets the samples that publishers keep.", int
+    )
+    lifespan = Checked(Duration, "The age at which an undelivered sample is dropped.")
+    deadline = Checked(Duration, "The longest time between two samples.")
+    liveliness = Checked(
+        LivelinessPolicy, "Whether the process or the topic asserts that a publisher is alive.", int
+    )
+    liveliness_lease_duration = Checked(
+        Duration, "The time without an assertion after which a publisher is not alive."
+    )
+    avoid_ros_namespace_conventions = Checked(
+        bool, "Whether the DDS topic has the name of the ROS topic, without the prefix `rt`."
+    )
+
     def __init__(self, **kwargs: Any) -> None:
         """
         Create a profile from policies by name; other policies are those of `qos_profile_default`.
@@ -197,36 +215,6 @@ class QoSProfile:
         self.avoid_ros_namespace_conventions = kwargs.get("avoid_ros_namespace_conventions", False)
 
     @property
-    def history(self) -> HistoryPolicy:
-        """The samples to keep."""
-        return self._history
-
-    @history.setter
-    def history(self, value: HistoryPolicy | int) -> None:
-        assert isinstance(value, int), f"history must be a HistoryPolicy, not {value!r}"
-        self._history = HistoryPolicy(value)
-
-    @property
-    def reliability(self) -> ReliabilityPolicy:
-        """Whether lost samples are sent again."""
-        return self._reliability
-
-    @reliability.setter
-    def reliability(self, value: ReliabilityPolicy | int) -> None:
-        assert isinstance(value, int), f"reliability must be a ReliabilityPolicy, not {value!r}"
-        self._reliability = ReliabilityPolicy(value)
-
-    @property
-    def durability(self) -> DurabilityPolicy:
-        """Whether a late subscription gets the samples that publishers keep."""
-        return self._durability
-
-    @durability.setter
-    def durability(self, value: DurabilityPolicy | int) -> None:
-        assert isinstance(value, int), f"durability must be a DurabilityPolicy, not {value!r}"
-        self._durability = DurabilityPolicy(value)
-
-    @property
     def depth(self) -> int:
         """The number of samples that KEEP_LAST keeps."""
         return self._depth
@@ -241,56 +229,6 @@ class QoSProfile:
                 stacklevel=2,
             )
         self._depth = value
-
-    @property
-    def lifespan(self) -> Duration:
-        """The age at which an undelivered sample is dropped."""
-        return self._lifespan
-
-    @lifespan.setter
-    def lifespan(self, value: Duration) -> None:
-        assert isinstance(value, Duration), f"lifespan must be a Duration, not {value!r}"
-        self._lifespan = value
-
-    @property
-    def deadline(self) -> Duration:
-        """The longest time between two samples."""
-        return self._deadline
-
-    @deadline.setter
-    def deadline(self, value: Duration) -> None:
-        assert isinstance(value, Duration), f"deadline must be a Duration, not {value!r}"
-        self._deadline = value
-
-    @property
-    def liveliness(self) -> LivelinessPolicy:
-        """Whether the process or the topic asserts that a publisher is alive."""
-        return self._liveliness
-
-    @liveliness.setter
-    def liveliness(self, value: LivelinessPolicy | int) -> None:
-        assert isinstance(value, int), f"liveliness must be a LivelinessPolicy, not {value!r}"
-        self._liveliness = LivelinessPolicy(value)
-
-    @property
-    def liveliness_lease_duration(self) -> Duration:
-        """The time without an assertion after which a publisher is not alive."""
-        return self._liveliness_lease_duration
-
-    @liveliness_lease_duration.setter
-    def liveliness_lease_duration(self, value: Duration) -> None:
-        assert isinstance(value, Duration), f"liveliness_lease_duration must be a Duration, not {value!r}"
-        self._liveliness_lease_duration = value
-
-    @property
-    def avoid_ros_namespace_conventions(self) -> bool:
-        """Whether the DDS topic has the name of the ROS topic, without the prefix `rt`."""
-        return self._avoid_ros_namespace_conventions
-
-    @avoid_ros_namespace_conventions.setter
-    def avoid_ros_namespace_conventions(self, value: bool) -> None:
-        assert isinstance(value, bool), f"avoid_ros_namespace_conventions must be a bool, not {value!r}"
-        self._avoid_ros_namespace_conventions = value
 
     def get_c_qos_profile(self) -> NoReturn:
         """

@@ -5,6 +5,7 @@ from __future__ import annotations
 from enum import IntEnum
 from typing import Any
 
+from rclpy._checked import Checked
 from rclpy.qos import HistoryPolicy, QoSPresetProfiles, QoSProfile
 from rclpy.type_hash import TypeHash
 
@@ -33,6 +34,23 @@ class TopicEndpointInfo:
     # Not hashable, because it is mutable, as in rclpy.
     __hash__ = None  # type: ignore[assignment]
 
+    node_name = Checked(str, "The name of its node.")
+    node_namespace = Checked(str, "The namespace of its node.")
+    topic_type = Checked(str, "The type of the messages, for example `std_msgs/msg/String`.")
+    topic_type_hash = Checked(
+        TypeHash,
+        "The hash of the type's definition. A dictionary of its properties can be assigned, too.",
+        dict,
+        lambda properties: TypeHash(**properties),
+    )
+    endpoint_type = Checked(TopicEndpointTypeEnum, "Whether it is a publisher or a subscription.", int)
+    qos_profile = Checked(
+        QoSProfile,
+        "The quality of service. A dictionary of policies can be assigned, too.",
+        dict,
+        lambda policies: QoSProfile(**policies),
+    )
+
     def __init__(self, **kwargs: Any) -> None:
         """Create it from properties by name. Missing ones are empty or unknown."""
         assert all(f"_{key}" in self.__slots__ for key in kwargs), (
@@ -47,56 +65,6 @@ class TopicEndpointInfo:
         self.qos_profile = kwargs.get("qos_profile", QoSPresetProfiles.UNKNOWN.value)
 
     @property
-    def node_name(self) -> str:
-        """The name of its node."""
-        return self._node_name
-
-    @node_name.setter
-    def node_name(self, value: str) -> None:
-        assert isinstance(value, str), f"node_name must be a str, not {value!r}"
-        self._node_name = value
-
-    @property
-    def node_namespace(self) -> str:
-        """The namespace of its node."""
-        return self._node_namespace
-
-    @node_namespace.setter
-    def node_namespace(self, value: str) -> None:
-        assert isinstance(value, str), f"node_namespace must be a str, not {value!r}"
-        self._node_namespace = value
-
-    @property
-    def topic_type(self) -> str:
-        """The type of the messages, for example `std_msgs/msg/String`."""
-        return self._topic_type
-
-    @topic_type.setter
-    def topic_type(self, value: str) -> None:
-        assert isinstance(value, str), f"topic_type must be a str, not {value!r}"
-        self._topic_type = value
-
-    @property
-    def topic_type_hash(self) -> TypeHash:
-        """The hash of the type's definition. A dictionary of its properties can be assigned, too."""
-        return self._topic_type_hash
-
-    @topic_type_hash.setter
-    def topic_type_hash(self, value: TypeHash | dict[str, Any]) -> None:
-        assert isinstance(value, (TypeHash, dict)), f"topic_type_hash must be a TypeHash, not {value!r}"
-        self._topic_type_hash = TypeHash(**value) if isinstance(value, dict) else value
-
-    @property
-    def endpoint_type(self) -> TopicEndpointTypeEnum:
-        """Whether it is a publisher or a subscription."""
-        return self._endpoint_type
-
-    @endpoint_type.setter
-    def endpoint_type(self, value: TopicEndpointTypeEnum | int) -> None:
-        assert isinstance(value, int), f"endpoint_type must be a TopicEndpointTypeEnum, not {value!r}"
-        self._endpoint_type = TopicEndpointTypeEnum(value)
-
-    @property
     def endpoint_gid(self) -> list[int]:
         """The bytes of its GID, the identity in the middleware."""
         return self._endpoint_gid
@@ -105,16 +73,6 @@ class TopicEndpointInfo:
     def endpoint_gid(self, value: list[int]) -> None:
         assert all(isinstance(byte, int) for byte in value), f"endpoint_gid must be ints, not {value!r}"
         self._endpoint_gid = value
-
-    @property
-    def qos_profile(self) -> QoSProfile:
-        """The quality of service. A dictionary of policies can be assigned, too."""
-        return self._qos_profile
-
-    @qos_profile.setter
-    def qos_profile(self, value: QoSProfile | dict[str, Any]) -> None:
-        assert isinstance(value, (QoSProfile, dict)), f"qos_profile must be a QoSProfile, not {value!r}"
-        self._qos_profile = QoSProfile(**value) if isinstance(value, dict) else value
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, TopicEndpointInfo):

@@ -62,17 +62,6 @@ def shipped_packages() -> list[str]:
     return sorted(name for name in names if any(interface_names(name, kind) for kind in KINDS))
 
 
-def interface_packages() -> dict[str, str]:
-    """Names of all message packages with the directory or prefix that has them, sorted."""
-    found = dict.fromkeys(shipped_packages(), _SHIPPED)
-    for prefix in filter(os.path.isdir, os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep)):
-        share = os.path.join(prefix, "share")
-        for package in os.listdir(share) if os.path.isdir(share) else []:
-            if any(interface_names(package, kind) for kind in KINDS):
-                found.setdefault(package, prefix)
-    return dict(sorted(found.items()))
-
-
 def interface_names(package: str, kind: str) -> list[str]:
     """Names of all messages, services or actions (see KINDS) that a package defines, sorted."""
     directories = filter(
