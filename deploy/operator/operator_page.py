@@ -9,16 +9,16 @@ from __future__ import annotations
 import ssl
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from datetime import timedelta
 from typing import Any
 
 import reactivex as rx
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from reactivex import Observable
+from reactivex.abc import SchedulerBase
 from reactivex.subject import BehaviorSubject, Subject
 
 from deploy.operator import hold
-from deploy.operator.lines import Span, line_batches
+from deploy.operator.lines import line_batches
 from deploy.operator.page import address, protocol, requests, server, state
 from deploy.operator.page.site import Site
 from deploy.operator.remote import parameter_changes
@@ -39,7 +39,6 @@ UNSEEN = replace(topics.ENGINES_STATE, qos=BEST_EFFORT)
 """The engines' state while no page shows it. To read and acknowledge it ten times a second would cost more
 than the rest of this process."""
 UNSEEN_PERIOD = 0.3  # s
-PUBLISHED_WITHIN = timedelta(milliseconds=50)
 
 
 @dataclass(frozen=True)
@@ -84,18 +83,17 @@ def wire(node: ServiceNode) -> None:
     newest = BehaviorSubject(initial)
 
     events: Subject[server.Event] = Subject()
-    is_open = pages_are_open(events).share()
+    is_open = pages_are_open(events, node.scheduler).share()
     parameter_events = is_open.switch_map(lambda it: parameter_changes(node) if it else rx.never()).share()
     hands = only(events, hold.Press, hold.Beat, hold.Release)
     switch = Switch(node, hands, parameter_events, is_open, clock.now)
-    node.publish(topics.OPERATOR_HEARTBEAT, hold.heartbeats(switch.holds))
 
     asked = only(events, server.Request).share()
     configuration = requests.Configuration(node)
     commands = requests.engine_commands(asked).share()
-    turn_offs = commands.filter(lambda command: command == TURN_OFF).share()
+    turn_offs = commands.filter(lambda command: command.value == TURN_OFF).share()
     signals = asked.filter(lambda it: isinstance(it.message, protocol.Process))
-    node.publish(topics.ENGINES, commands)
+    node.publish(topics.ENGINES, commands.map(lambda command: command.value))
 
     # One reader of each topic for state and lines, while they observe it.
     observed = {topic.name: node.observe(topic, timestamped=True).share() for topic in topics.CONTRACT}
@@ -109,7 +107,9 @@ def wire(node: ServiceNode) -> None:
     def always_seen(topic: topics.Topic) -> Observable[Any]:
         return engines if topic is topics.ENGINES_STATE else seen(topic)
 
-    lines = line_batches(seen, turn_offs.map(just_now), rx.interval(LINES_PERIOD), node.get_namespace())
+    own_turn_offs = turn_offs.map(lambda command: (command.timestamp, stamps.now()))  # it is published by now
+    ticks = rx.interval(LINES_PERIOD, node.scheduler)
+    lines = line_batches(seen, own_turn_offs, ticks, node.get_namespace())
     session = state.while_open(seen, lines, node.get_namespace(), clock)
     changes = rx.merge(
         state.always(always_seen, new_watchdogs(node, epoch), controllers(node), clock),
@@ -123,7 +123,9 @@ def wire(node: ServiceNode) -> None:
         signals.flat_map(lambda it: requests.send_signal(it, newest.value.programs)),
     )
     states = state.page_states(changes, newest.value)
-    states.subscribe(newest.on_next, node.fail, scheduler=node.scheduler)
+    # A scheduler would subscribe to one part of the recipe after another, and the first page may be faster.
+    states.subscribe(newest.on_next, node.fail)
+    node.publish(topics.OPERATOR_HEARTBEAT, hold.heartbeats(switch.holds))
     only(events, server.Violation).subscribe(lambda it: node.health.drop("page", it.reason))
 
     def receive(event: server.Event) -> None:
@@ -137,13 +139,12 @@ def only(events: Observable[Any], *kinds: type) -> Observable[Any]:
     return events.filter(lambda event: isinstance(event, kinds))
 
 
-def pages_are_open(events: Observable[server.Event]) -> Observable[bool]:
+def pages_are_open(events: Observable[server.Event], scheduler: SchedulerBase) -> Observable[bool]:
     """Emit ``True`` when the first page opens, ``False`` ``LINGER`` [s] after the last page has closed."""
     opened = only(events, server.Opened, server.Closed).map(lambda it: isinstance(it, server.Opened))
     are_open = opened.scan(lambda count, opens: count + (1 if opens else -1), 0).map(bool)
-    closed = rx.timer(LINGER).map(lambda _: False)
-    present = are_open.distinct_until_changed().switch_map(lambda it: rx.of(True) if it else closed)
-    return present.distinct_until_changed()
+    lingering = are_open.distinct_until_changed().debounce(LINGER, scheduler)
+    return rx.merge(are_open.filter(bool), lingering).distinct_until_changed()
 
 
 def new_watchdogs(node: ServiceNode, epoch: Epoch) -> Observable[bool]:
@@ -162,7 +163,8 @@ def terminal_holds(node: ServiceNode, is_open: Observable[bool]) -> Observable[b
     def look(_: Any) -> bool:
         return any(each.node_name not in services for each in node.get_publishers_info_by_topic(name))
 
-    looks = is_open.switch_map(lambda it: rx.timer(0.0, TERMINALS_PERIOD) if it else rx.never())
+    ticks = rx.timer(0.0, TERMINALS_PERIOD, node.scheduler)
+    looks = is_open.switch_map(lambda it: ticks if it else rx.never())
     return looks.map(look).distinct_until_changed()
 
 
@@ -170,12 +172,6 @@ def controllers(node: ServiceNode) -> Callable[[], frozenset[tuple[int, ...]]]:
     """Return what returns the identifiers of the publishers of the engines' state."""
     name = node.resolve_topic_name(topics.ENGINES_STATE.name)
     return lambda: frozenset(tuple(each.endpoint_gid) for each in node.get_publishers_info_by_topic(name))
-
-
-def just_now(_: Any) -> Span:
-    """Return the time within which the command of a page was published, which has just happened."""
-    now = stamps.now()
-    return now - PUBLISHED_WITHIN, now
 
 
 def serve(

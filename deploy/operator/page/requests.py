@@ -17,16 +17,18 @@ from deploy.operator.page.state import Change, Program, follows_scenario, refuse
 from deploy.operator.remote import ParameterChange, RemoteParameters
 from deploy.running import processes
 from interfaces import topics
-from reactive_node import ReactiveNode
+from reactive_node import ReactiveNode, stamps
+from reactive_node.stamps import Timestamp
 
 VALUE, FOLLOW_SCENARIO = "value", "follow_scenario"  # parameters of a source of the configuration
 SIGNALS = {"kill": signal.SIGKILL, "stop": signal.SIGSTOP}
 
 
-def engine_commands(requests: Observable[Request]) -> Observable[str]:
-    """Emit the commands to the engines."""
+def engine_commands(requests: Observable[Request]) -> Observable[Timestamp[str]]:
+    """Emit the commands to the engines, each with a time before it is published."""
     messages = requests.map(lambda request: request.message)
-    return messages.filter(lambda it: isinstance(it, protocol.Engines)).map(lambda it: it.command)
+    commands = messages.filter(lambda it: isinstance(it, protocol.Engines))
+    return commands.map(lambda it: Timestamp(it.command, stamps.now()))
 
 
 class Configuration:

@@ -130,12 +130,15 @@ class World:
         self.until(lambda: time.monotonic() >= end)
 
     @contextlib.contextmanager
-    def page(self) -> Iterator[Page]:
+    def page(self, **first: Any) -> Iterator[Page]:
+        """:param first: a message that the page sends before the program takes another turn."""
         line = (self.folder / PAGE_FILE).read_text().strip().removeprefix("The page: http://")
         host, _, token = line.partition("/#")
         with connect(f"ws://{host}/socket", origin=f"http://{host}", compression=None) as connection:
             connection.send(json.dumps({"type": "hello", "token": token}))
             page = Page(connection)
+            if first:
+                connection.send(json.dumps(first))
             self._pages.append(page)
             self.until(lambda: "processes" in page.shown)
             try:
@@ -331,8 +334,7 @@ def test_engines_are_commanded(world: World) -> None:
 
 
 def test_line_tells_that_a_page_has_turned_the_engines_off(world: World) -> None:
-    with world.page() as page:
-        page.say("engines", command="turn_off")
+    with world.page(type="engines", command="turn_off") as page:
         world.until(lambda: page.shown.get("lines"))
     assert [line["text"] for line in page.shown["lines"]] == ["Turning off engines, as you asked..."]
 
