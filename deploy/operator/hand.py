@@ -36,7 +36,7 @@ class Hand:
         self._publisher: Publisher | None = None  # exists while the hand holds: so pages know who holds
         self._events: Subject[hold.Event] = Subject()
         self._takes: Subject[None] = Subject()
-        holds = hold.holds(self._events, max_age=LONGEST_PAUSE)
+        holds = hold.holds(self._events, hold.monotonic, LONGEST_PAUSE)
         holds.subscribe(self._follow, scheduler=node.scheduler)
         switch = VirtualSwitch(node, hold.monotonic)
         others = switch.by_others(parameter_changes(node))

@@ -101,11 +101,10 @@ def monotonic() -> float:
 
 def holds(
     events: Observable[Event],
-    *,
+    now: Callable[[], float],
     max_age: float = MAX_NONCE_AGE,
-    now: Callable[[], float] = monotonic,
 ) -> Observable[Hold]:
-    """Emit the switch after each event; see :func:`step`."""
+    """Emit the switch after each event; see :func:`step`. ``now`` is the clock of the nonces [s]."""
     return events.scan(lambda hold, event: step(hold, event, now(), max_age), Hold())
 
 

@@ -48,7 +48,7 @@ class Switch:
         virtual = VirtualSwitch(node, now)
         by_others = virtual.by_others(changes).share()
         releases = by_others.map(lambda _: hold.Release())
-        self.holds: Observable[hold.Hold] = hold.holds(rx.merge(events, releases), now=now).share()
+        self.holds: Observable[hold.Hold] = hold.holds(rx.merge(events, releases), now).share()
         """The switch of the pages, after each event."""
         presses = rx.merge(self.holds.filter(lambda it: it.pressed), by_others.filter(bool))
         taken = presses.switch_map(

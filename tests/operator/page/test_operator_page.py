@@ -16,9 +16,9 @@ from std_msgs.msg import Bool, String
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
-from deploy.operator import operator_page as operator_page
-from deploy.operator import remote
+from deploy.operator import hold, operator_page, remote
 from deploy.operator.hand import Hand
+from deploy.operator.page.server import UPDATE_PERIOD
 from deploy.operator.page.state import RESTARTED
 from deploy.operator.switch import ECHO
 from deploy.running.system import PAGE_FILE
@@ -28,9 +28,44 @@ from interfaces.topics import CONFIGURATION
 from reactive_node import ReactiveNode
 from services import config_publisher, dead_mans_switch
 
-pytestmark = pytest.mark.timed  # a held page answers within 250 ms
-
 SpinUntil = Callable[..., None]
+
+
+STEP = 1.1 * UPDATE_PERIOD  # s: each step brings an update
+PATIENCE = 1.0  # s: the server sends no update to a page that has not answered its ping
+
+
+class Clock:
+    """The clock of the hands: it stands still until all pages and the program have done what is due."""
+
+    def __init__(self) -> None:
+        self._now = 1000.0
+        self._due = 0.0
+        self._is_asked = self._is_done = False
+
+    def __call__(self) -> float:
+        return self._now
+
+    def goes_on(self, pages: list[Page], program: ServiceNode) -> bool:
+        """Go on if it is time to, by the clock of the machine as well; return whether it does."""
+        if not self._is_asked and all(page.is_updated for page in pages):
+            self._is_asked = True
+            program.scheduler.schedule(self._done)
+        late = time.monotonic() - self._due
+        goes_on = late >= 0.0 if self._is_done else late > PATIENCE
+        if goes_on:
+            self.step(pages)
+        return goes_on
+
+    def step(self, pages: list[Page]) -> None:
+        self._is_asked = self._is_done = False
+        self._due = time.monotonic() + STEP
+        for page in pages:
+            page.is_updated = False
+        self._now += STEP
+
+    def _done(self, *_: Any) -> None:
+        self._is_done = True
 
 
 class Page:
@@ -41,9 +76,9 @@ class Page:
         self.shown: dict[str, Any] = {}
         self.refused: list[dict[str, str]] = []
         self.is_held = False
+        self.is_updated = True
         self.nonce = ""
         self._connection = connection
-        self._beat_due = 0.0
 
     def say(self, kind: str, **fields: Any) -> None:
         self._connection.send(json.dumps({"type": kind, **fields}))
@@ -57,7 +92,7 @@ class Page:
         self.say("release")
 
     def live(self) -> None:
-        """Take what has come, and beat when it is time."""
+        """Take what has come, and answer an update with a beat."""
         with contextlib.suppress(TimeoutError):
             while True:
                 message = json.loads(self._connection.recv(timeout=0.0))
@@ -67,10 +102,10 @@ class Page:
                     self.welcome = message
                 elif message["type"] == "update":
                     self.nonce = message["nonce"]
+                    self.is_updated = True
                     self.shown |= message
-        if self.is_held and time.monotonic() >= self._beat_due:
-            self._beat_due = time.monotonic() + 0.05
-            self.say("beat", nonce=self.nonce)
+                    if self.is_held:
+                        self.say("beat", nonce=self.nonce)
 
 
 class World:
@@ -79,14 +114,18 @@ class World:
     def __init__(
         self, make_node: Callable[..., Any], spin_until: SpinUntil, folder: Path, **options: Any
     ) -> None:
+        assert isinstance(hold.monotonic, Clock)
+        self._clock = hold.monotonic
         with socket.create_server(("127.0.0.1", 0)) as free:
             port = free.getsockname()[1]
         overrides = {"port": port, "settings": str(folder)} | options
-        self.console = self._service(make_node, "operator_page", operator_page.wire, **overrides)
+        self.program = self._service(make_node, "operator_page", operator_page.wire, **overrides)
         self.switch = self._service(make_node, "dead_mans_switch", dead_mans_switch.wire, rate=20.0)
         self.l1 = self._service(
             make_node, "config_l1", lambda node: config_publisher.wire(node, CONFIGURATION["l1"])
         )
+        self.takes = 0
+        self.switch.add_post_set_parameters_callback(self._count_take)
         self.folder = folder
         self.heartbeats: list[float] = []
         self.commands: list[str] = []
@@ -98,7 +137,7 @@ class World:
             String, "engines", lambda it: self.commands.append(it.data), topics.ENGINES.qos
         )
         self._pages: list[Page] = []
-        self._others: list[Callable[[], None]] = []
+        self.hand: Hand | None = None  # at a terminal that lives
         self._spin_until = spin_until
 
     @staticmethod
@@ -113,21 +152,28 @@ class World:
     def _on_heartbeat(self, message: Bool) -> None:
         self.heartbeats.append(time.monotonic())
 
+    def _count_take(self, _: Any) -> None:
+        self.takes += 1
+
     def until(self, condition: Callable[[], object]) -> None:
         def lives() -> bool:
-            for live in (*(page.live for page in self._pages), *self._others):
-                live()
+            if self._clock.goes_on(self._pages, self.program) and self.hand:
+                self.hand.beat()  # not on each turn: the program would do nothing but hear it
+            for page in self._pages:
+                page.live()
             return bool(condition())
 
         self._spin_until(lives)
 
-    def also_live(self, live: Callable[[], None]) -> None:
-        """Call this all the time, as for the pages."""
-        self._others.append(live)
-
     def for_seconds(self, seconds: float) -> None:
-        end = time.monotonic() + seconds
-        self.until(lambda: time.monotonic() >= end)
+        end = self._clock() + seconds
+        self.until(lambda: self._clock() >= end)
+
+    def delay(self, seconds: float) -> None:
+        """Let time pass in which the program takes no turn."""
+        end = self._clock() + seconds
+        while self._clock() < end:
+            self._clock.step(self._pages)
 
     @contextlib.contextmanager
     def page(self, **first: Any) -> Iterator[Page]:
@@ -148,6 +194,11 @@ class World:
 
     def set_pressed(self, pressed: bool) -> None:
         self.switch.set_parameters([Parameter("pressed", value=pressed)])
+
+
+@pytest.fixture(autouse=True)
+def _clock(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(hold, "monotonic", Clock())
 
 
 @pytest.fixture
@@ -202,7 +253,7 @@ def test_beats_that_were_queued_are_no_sign_of_life(world: World) -> None:
         page.is_held = False
         for _ in range(40):
             page.say("beat", nonce=page.nonce)
-            time.sleep(0.02)  # the console's executor does not run meanwhile
+            world.delay(0.05)
         count = len(world.heartbeats)
         world.for_seconds(0.5)
         assert len(world.heartbeats) <= count + 1, "but for a heartbeat on its way"
@@ -268,7 +319,7 @@ def test_released_parameter_releases_a_page(world: World) -> None:
 def terminal(world: World, make_node: Callable[..., Any]) -> Hand:
     """The hand at a terminal that lives."""
     hand = Hand(make_node("console_7", kind=ReactiveNode))
-    world.also_live(hand.beat)
+    world.hand = hand
     world.for_seconds(0.5)  # it meets the switch
     return hand
 
@@ -277,6 +328,7 @@ def test_hand_at_a_terminal_takes_the_switch_from_a_page(world: World, terminal:
     with world.page() as page:
         page.press()
         world.until(lambda: page.shown["switch"] == {"held": True, "by": "this_page"})
+        world.until(lambda: world.takes)
         world.for_seconds(ECHO)
         terminal.press()
         world.until(lambda: page.shown["switch"] == {"held": True, "by": "terminal"})
@@ -292,6 +344,7 @@ def test_page_takes_the_switch_from_a_hand_at_a_terminal(world: World, terminal:
     terminal.press()
     with world.page() as page:
         world.until(lambda: page.shown["switch"] == {"held": True, "by": "terminal"})
+        world.until(lambda: world.takes)
         world.for_seconds(ECHO)
         page.press()
         world.until(lambda: page.shown["switch"] == {"held": True, "by": "this_page"})
@@ -307,6 +360,7 @@ def test_release_of_a_hand_at_a_terminal_releases_a_page(world: World, terminal:
     with world.page() as page:
         page.press()
         world.until(lambda: page.shown["switch"] == {"held": True, "by": "this_page"})
+        world.until(lambda: world.takes)
         world.for_seconds(ECHO)
         terminal.release()
         world.until(lambda: page.shown["switch"] == {"held": False, "by": None})
@@ -404,7 +458,7 @@ def test_topics_are_observed_only_while_a_page_is_open(world: World, monkeypatch
     monkeypatch.setattr(operator_page, "LINGER", 0.2)
 
     def observed() -> set[str]:
-        return {each.topic_name for each in world.console.subscriptions}
+        return {each.topic_name for each in world.program.subscriptions}
 
     always = {"/operator_activity", "/engines", "/engines/state"}
     world.until(lambda: observed() == always)
