@@ -42,13 +42,13 @@ GIVEN := $(foreach name,$(.VARIABLES),$(if $(filter command,$(origin $(name))),$
 $(foreach name,$(filter-out $(USED) $(ENVIRONMENT),$(GIVEN)),$(error make $(GOALS) has no variable $(name); it has $(USED)))
 endif
 
-.PHONY: help setup tables run start stop status logs record console chaos simulate replay test mutants check bench
+.PHONY: help setup tables run start stop status logs record terminal chaos simulate replay test mutants check bench
 
 help:
 	@echo "make run      start the system, show it in this terminal, stop it with Ctrl-C"
 	@echo "make start    start it in the background          (run, start: SCENARIO=demo, listing_5_9 or a file)"
 	@echo "                                                  (PARAMETERS=file; WEB=off for no page, or its port)"
-	@echo "make console  attach this terminal to it"
+	@echo "make terminal attach this terminal to it"
 	@echo "make status   its services: state, pid, uptime, restarts, last output, health"
 	@echo "make logs     follow their logs"
 	@echo "make record   record its messages until Ctrl-C     (MCAP for Foxglove and ros2 bag, in .run/records)"
@@ -71,7 +71,7 @@ setup:
 run start: setup
 	@exec $(HOLD) $(PY) -m deploy.commands.launcher $@ "$$SCENARIO" "$$PARAMETERS"
 
-console status logs record:
+terminal status logs record:
 	@test -e $(STAMP) || { echo ".venv is not set up: make setup (make stop works without it)" >&2; exit 1; }
 	@exec $(HOLD) $(PY) -m deploy.commands.launcher $@
 

@@ -163,7 +163,7 @@ def _qos(
 _STATE = _qos(1, latched=True)
 _EVENTS = _qos(10)
 
-OPERATOR_NODES = ("console", "operator_page")
+OPERATOR_NODES = ("terminal", "operator_page")
 """The nodes that show the arm to its operator."""
 _VIEWERS = ("RViz", "Foxglove")
 _CONFIGURED = ("kinematics", "robot_state", *OPERATOR_NODES)

@@ -1,4 +1,4 @@
-"""The commands behind `make run`, `start`, `console`, `status`, `logs` and `record`."""
+"""The commands behind `make run`, `start`, `terminal`, `status`, `logs` and `record`."""
 
 from __future__ import annotations
 
@@ -69,10 +69,10 @@ def run(system: System, scenario: str, parameter_file: str) -> None:
 def start(system: System, scenario: str, parameter_file: str) -> None:
     """Start the system in the background; returns when all services are up."""
     with _started(system, scenario, parameter_file):
-        print("It runs in the background: make console, make status, make logs, make stop.")
+        print("It runs in the background: make terminal, make status, make logs, make stop.")
 
 
-def console(system: System) -> None:
+def attach(system: System) -> None:
     """Show a running system in this terminal."""
     if not _adopt_environment(system):
         raise DeploymentError("Nothing runs: make start")
@@ -201,16 +201,16 @@ def _reports(program: Program, health: Mapping[str, Health]) -> bool:
 
 def _show(system: System, member: Member, *, owner: bool = False) -> None:
     """Be the operator's terminal until the end; the owner of the system revives a killed supervisord."""
-    from deploy.operator.terminal.terminal import HELP, Console
+    from deploy.operator.terminal.terminal import HELP, Terminal
 
     # In the background, reading the terminal fails and does not stop the process.
     signal.signal(signal.SIGTTIN, signal.SIG_IGN)
     parent = os.getppid()
-    with Console(member.node, system.origin()) as console:
+    with Terminal(member.node, system.origin()) as terminal:
         say(HELP)
-        while not console.has_quit:
+        while not terminal.has_quit:
             member.spin_some()
-            console.refresh()
+            terminal.refresh()
             if owner and os.getppid() != parent:  # make was killed
                 return
             if system.supervisor_has_ended():
@@ -245,7 +245,7 @@ def main(arguments: list[str]) -> int:
         command = commands.add_parser(name)
         command.add_argument("scenario")
         command.add_argument("parameter_file", nargs="?", default="")
-    for name in ("console", "status", "logs", "record"):
+    for name in ("terminal", "status", "logs", "record"):
         commands.add_parser(name)
     options = parser.parse_args(arguments)
 
@@ -257,8 +257,8 @@ def main(arguments: list[str]) -> int:
                 run(system, options.scenario, options.parameter_file)
             case "start":
                 start(system, options.scenario, options.parameter_file)
-            case "console":
-                console(system)
+            case "terminal":
+                attach(system)
             case "status":
                 status(system)
             case "logs":

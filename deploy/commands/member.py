@@ -27,7 +27,7 @@ class Member:
         """Join. Raises DeploymentError if the environment does not allow it."""
         try:
             rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
-            self.node = ReactiveNode(f"console_{os.getpid()}", namespace=namespace_of(os.environ))
+            self.node = ReactiveNode(f"terminal_{os.getpid()}", namespace=namespace_of(os.environ))
         except RuntimeError as error:
             rclpy.try_shutdown()
             raise DeploymentError(f"Cannot join the ROS graph: {error}") from None

@@ -1,4 +1,4 @@
-"""Best-effort console output that never blocks for long."""
+"""Best-effort output to the user that never blocks for long."""
 
 from __future__ import annotations
 

@@ -245,7 +245,7 @@ class System:
     def _prepare(self, parameters: Mapping[str, object]) -> None:
         if pid := self.supervisor():
             where = f"supervisord has pid {pid} and works in {self.run}"
-            raise DeploymentError(f"Already running: {where}. make console shows it, make stop ends it")
+            raise DeploymentError(f"Already running: {where}. make terminal shows it, make stop ends it")
         shutil.rmtree(self.run / SETTINGS, ignore_errors=True)
         self.write_parameters(parameters)
 

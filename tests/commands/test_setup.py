@@ -88,7 +88,7 @@ def test_an_error_of_the_file_system_is_one_line(checkout: Path) -> None:
     assert errors == f"Set-up failed: [Errno 20] Not a directory: '{checkout / STAMP}'\n"
 
 
-@pytest.mark.parametrize("command", ["console", "status", "logs"])
+@pytest.mark.parametrize("command", ["terminal", "status", "logs"])
 def test_half_a_set_up_runs_no_command(checkout: Path, command: str) -> None:
     python = checkout / ".venv/bin/python"
     python.parent.mkdir(parents=True)

@@ -14,7 +14,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from deploy.operator.hand import Hand
-from deploy.operator.terminal.terminal import Console
+from deploy.operator.terminal.terminal import Terminal
 from deploy.running import manifest, processes
 from interfaces import service, topics
 from interfaces.service import ServiceNode
@@ -80,11 +80,11 @@ def test_service_reads_and_publishes_what_the_contract_says(
 def test_terminal_reads_and_publishes_what_the_contract_says(
     make_node: MakeNode, spin_until: SpinUntil
 ) -> None:
-    node: ReactiveNode = make_node("console", kind=ReactiveNode)
-    Console(node, 0.0)
+    node: ReactiveNode = make_node("terminal", kind=ReactiveNode)
+    Terminal(node, 0.0)
     Hand(node).press()
 
-    reads, publishes = promised("console")
+    reads, publishes = promised("terminal")
     spin_until(lambda: used(node.subscriptions) >= reads)
 
     assert used(node.subscriptions) == reads

@@ -1,4 +1,4 @@
-"""Console output: to a reader, to a stuck reader, and without one."""
+"""Output to the user: to a reader, to a stuck reader, and without one."""
 
 from __future__ import annotations
 

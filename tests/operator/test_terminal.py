@@ -16,7 +16,7 @@ from contextlib import suppress
 
 import pytest
 
-from deploy.operator.terminal.plain import PlainTerminal
+from deploy.operator.terminal.plain import PlainLines
 from deploy.running.processes import ROOT
 
 LIMIT = 20.0  # s for each awaited text
@@ -25,9 +25,9 @@ ERASE = rb"\x1b\[J"  # from the cursor on
 # Shows a line every 50 ms, and each typed line in upper case, until Ctrl-D or SIGINT.
 PROGRAM = """
 import itertools, signal
-from deploy.operator.terminal.display import open_terminal
+from deploy.operator.terminal.display import open_display
 signal.signal(signal.SIGTTIN, signal.SIG_IGN)
-terminal = open_terminal(["press", "turn_off"])
+terminal = open_display(["press", "turn_off"])
 try:
     for number in itertools.count():
         terminal.show([f"line {number}"])
@@ -42,8 +42,8 @@ finally:
 # Shows one line only, and reads until the input ends.
 SILENT_PROGRAM = """
 from contextlib import suppress
-from deploy.operator.terminal.display import open_terminal
-terminal = open_terminal([])
+from deploy.operator.terminal.display import open_display
+terminal = open_display([])
 terminal.show(["line 0"])
 with suppress(EOFError):
     while True:
@@ -258,5 +258,5 @@ def test_last_line_of_a_pipe_needs_no_newline(monkeypatch: pytest.MonkeyPatch) -
         os.write(writing, b"press\nturn_off")
         os.close(writing)
         monkeypatch.setattr(sys, "stdin", pipe)
-        terminal = PlainTerminal()
+        terminal = PlainLines()
         assert [terminal.read(0.0) for _ in range(3)] == [["press"], ["turn_off"], []]

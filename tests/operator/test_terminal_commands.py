@@ -17,8 +17,8 @@ from std_msgs.msg import Bool, String
 
 from deploy.operator import hand, remote
 from deploy.operator.switch import ECHO
-from deploy.operator.terminal import terminal as console
-from deploy.operator.terminal.terminal import Console
+from deploy.operator.terminal import terminal as program
+from deploy.operator.terminal.terminal import Terminal
 from interfaces.service import ServiceNode
 from interfaces.topics import ENGINES, ENGINES_STATE, OFF, ON, OPERATOR_HEARTBEAT, TURN_OFF, TURN_ON
 from reactive_node import ReactiveNode
@@ -31,7 +31,7 @@ Live = Callable[[Callable[[], object]], None]
 class Operator:
     """Types at a terminal."""
 
-    def __init__(self, node: Node, terminal: Console, keyboard: int) -> None:
+    def __init__(self, node: Node, terminal: Terminal, keyboard: int) -> None:
         self.node = node
         self._terminal = terminal
         self._keyboard = keyboard
@@ -47,15 +47,15 @@ class Operator:
 
 @pytest.fixture
 def operator(make_node: MakeNode, monkeypatch: pytest.MonkeyPatch) -> Iterator[Operator]:
-    monkeypatch.setattr(console, "AGAIN", 0.2)
-    monkeypatch.setattr(console, "PERIOD", 0.01)
+    monkeypatch.setattr(program, "AGAIN", 0.2)
+    monkeypatch.setattr(program, "PERIOD", 0.01)
     monkeypatch.setattr(hand, "LONGEST_PAUSE", 0.5)
     monkeypatch.setattr(remote, "TIMEOUT", 0.5)
     reading, writing = os.pipe()
     with open(reading) as keyboard, open(writing, "wb"):
         monkeypatch.setattr(sys, "stdin", keyboard)
         node = make_node("terminal", kind=ReactiveNode)
-        with Console(node, time.monotonic()) as terminal:
+        with Terminal(node, time.monotonic()) as terminal:
             yield Operator(node, terminal, writing)
 
 
@@ -134,7 +134,7 @@ def said(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
 @pytest.fixture
 def live_until(operator: Operator, executor: Executor) -> Live:
-    """Lets the terminal live, as `make console` does, until a condition is true."""
+    """Lets the terminal live, as `make terminal` does, until a condition is true."""
 
     def until(condition: Callable[[], object]) -> None:
         deadline = time.monotonic() + 10.0

@@ -59,11 +59,11 @@ def test_it_starts_again_when_supervisord_is_killed(small_site: Site) -> None:
 
 def test_orphans_of_a_killed_supervisord_are_reported_until_they_are_stopped(small_site: Site) -> None:
     assert small_site.do("start", STEADY)[0] == 0
-    console = small_site.begin("console")
-    console.await_line("Engines are off")
+    terminal = small_site.begin("terminal")
+    terminal.await_line("Engines are off")
     os.kill(small_site.members[""], signal.SIGKILL)
-    console.await_line(f"supervisord has died; {len(small_site.programs)} services go on without it")
-    assert console.wait() == 0
+    terminal.await_line(f"supervisord has died; {len(small_site.programs)} services go on without it")
+    assert terminal.wait() == 0
     assert small_site.members.keys() == small_site.programs
     code, printed = small_site.do("status")
     assert code == 1

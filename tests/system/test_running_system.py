@@ -78,7 +78,7 @@ def test_a_second_start_reports_the_running_system(module_site: Site) -> None:
         code, printed = module_site.do(command, STEADY)
         assert code == 1
         where = f"supervisord has pid {module_site.members['']} and works in {module_site.run}"
-        assert printed == f"Already running: {where}. make console shows it, make stop ends it"
+        assert printed == f"Already running: {where}. make terminal shows it, make stop ends it"
 
 
 def test_a_second_system_in_the_same_domain_is_refused(module_site: Site, tmp_path: Path) -> None:
@@ -216,31 +216,31 @@ def test_a_killed_service_comes_back_though_its_log_does_not_open(module_site: S
 
 
 @pytest.mark.parametrize("in_terminal", [False, True], ids=["plain", "prompt"])
-def test_the_operator_commands_switch_and_engines_from_the_console(
+def test_the_operator_commands_switch_and_engines_from_the_terminal(
     module_site: Site, in_terminal: bool
 ) -> None:
     begin = module_site.begin_in_terminal if in_terminal else module_site.begin_command
-    console = begin(sys.executable, "-m", "deploy.commands.launcher", "console")
-    console.await_line("Engines are off")
-    console.insist("press\n", "Operator is alive")
-    console.insist("turn_on\n", "Engines are on")
-    console.type("turn_off\n")
-    console.await_line("Turning off engines, as you asked...")
-    console.type("release\nfly\n")
-    console.await_line(r"fly\? Commands: press, release, turn_on, turn_off, quit")
-    console.await_line("Not received signal from operator")
-    console.type("quit\n")
-    assert console.wait() == 0
+    terminal = begin(sys.executable, "-m", "deploy.commands.launcher", "terminal")
+    terminal.await_line("Engines are off")
+    terminal.insist("press\n", "Operator is alive")
+    terminal.insist("turn_on\n", "Engines are on")
+    terminal.type("turn_off\n")
+    terminal.await_line("Turning off engines, as you asked...")
+    terminal.type("release\nfly\n")
+    terminal.await_line(r"fly\? Commands: press, release, turn_on, turn_off, quit")
+    terminal.await_line("Not received signal from operator")
+    terminal.type("quit\n")
+    assert terminal.wait() == 0
     assert module_site.members.keys() >= module_site.programs
 
 
 def test_what_is_typed_just_before_quit_is_obeyed(module_site: Site) -> None:
-    launcher = (sys.executable, "-m", "deploy.commands.launcher", "console")
-    console = module_site.begin_command(*launcher)
-    console.await_line("Engines are off")
-    console.insist("press\n", "Operator is alive")
-    console.type("release\nquit\n")
-    assert console.wait() == 0
+    launcher = (sys.executable, "-m", "deploy.commands.launcher", "terminal")
+    terminal = module_site.begin_command(*launcher)
+    terminal.await_line("Engines are off")
+    terminal.insist("press\n", "Operator is alive")
+    terminal.type("release\nquit\n")
+    assert terminal.wait() == 0
 
     module_site.begin_command(*launcher).await_line("Not received signal from operator")
 
@@ -249,21 +249,21 @@ def test_what_is_typed_just_before_quit_is_obeyed(module_site: Site) -> None:
 def test_terminal_that_is_killed_or_stopped_is_a_silent_operator(
     module_site: Site, peer: Peer, number: signal.Signals
 ) -> None:
-    console = module_site.begin_command(sys.executable, "-m", "deploy.commands.launcher", "console")
-    console.await_line("Engines are off")
-    console.insist("press\n", "Operator is alive")
+    terminal = module_site.begin_command(sys.executable, "-m", "deploy.commands.launcher", "terminal")
+    terminal.await_line("Engines are off")
+    terminal.insist("press\n", "Operator is alive")
     heartbeats = peer.collect(topics.OPERATOR_HEARTBEAT)
     peer.spin_until(lambda: len(heartbeats) > 5)
 
-    os.kill(console.pid, number)
+    os.kill(terminal.pid, number)
     spin_for(peer, 0.5)
     heartbeats.clear()
     spin_for(peer, 1.5)
     assert heartbeats == []
 
     if number == signal.SIGSTOP:
-        os.kill(console.pid, signal.SIGCONT)
-        console.await_line("Released, because this terminal stood still: press again.")
+        os.kill(terminal.pid, signal.SIGCONT)
+        terminal.await_line("Released, because this terminal stood still: press again.")
         heartbeats.clear()
         spin_for(peer, 0.5)
         assert heartbeats == []

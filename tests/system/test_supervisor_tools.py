@@ -38,8 +38,8 @@ def test_supervisorctl_works(checkout: Checkout) -> None:
 def test_a_start_by_hand_serves_the_commands_of_make(checkout: Checkout) -> None:
     assert checkout.do_command("supervisord", *CONF) == (0, "")
     checkout.await_members(lambda left: left.keys() >= checkout.programs)
-    console = checkout.begin("console")
-    console.await_line("Received signal from operator")  # the demo has begun
+    terminal = checkout.begin("terminal")
+    terminal.await_line("Received signal from operator")  # the demo has begun
     code, table = checkout.do("status")
     assert code == 0
     assert len(table.splitlines()) == len(checkout.programs) + 1
@@ -47,8 +47,8 @@ def test_a_start_by_hand_serves_the_commands_of_make(checkout: Checkout) -> None
     assert code == 1
     assert printed.startswith("Already running: supervisord has pid ")
     assert checkout.do_command("supervisorctl", *CONF, "shutdown") == (0, "Shut down")
-    console.await_line("The system has ended")
-    assert console.wait() == 0
+    terminal.await_line("The system has ended")
+    assert terminal.wait() == 0
     checkout.await_members(lambda left: not left)
 
 

@@ -1,1 +1,1 @@
-"""The terminal: a prompt or plain lines."""
+"""The terminal, with a prompt or plain lines."""

@@ -1,4 +1,4 @@
-"""The operator's terminal: a prompt if it can show one, plain lines elsewhere."""
+"""The display of the terminal: a prompt if it can show one, plain lines elsewhere."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from typing import Protocol
 
-from deploy.operator.terminal.plain import PlainTerminal
+from deploy.operator.terminal.plain import PlainLines
 
 
-class Terminal(Protocol):
+class Display(Protocol):
     """Shows lines and reads typed ones."""
 
     def show(self, lines: Iterable[str]) -> None:
@@ -27,10 +27,10 @@ class Terminal(Protocol):
         """Leave the terminal as it was."""
 
 
-def open_terminal(words: Sequence[str]) -> Terminal:
-    """Return the terminal of this process; a prompt completes the words."""
+def open_display(words: Sequence[str]) -> Display:
+    """Return the display of this process; a prompt completes the words."""
     if not _takes_a_prompt():
-        return PlainTerminal()
+        return PlainLines()
     from deploy.operator.terminal.prompt import Prompt  # loads prompt_toolkit: 0.1 s
 
     return Prompt(words)

@@ -11,7 +11,7 @@ from collections.abc import Iterable
 from deploy.operator.output import say
 
 
-class PlainTerminal:
+class PlainLines:
     """Standard output and input, line by line."""
 
     def __init__(self) -> None:

@@ -17,7 +17,7 @@ from std_msgs.msg import String
 from deploy.operator.hand import BEAT_PERIOD, Hand
 from deploy.operator.lines import Line, Span, line_batches
 from deploy.operator.output import say
-from deploy.operator.terminal.display import open_terminal
+from deploy.operator.terminal.display import open_display
 from interfaces import topics
 from reactive_node import ReactiveNode, stamps
 from reactive_node.stamps import Timestamp
@@ -31,7 +31,7 @@ Commands: press, release (the operator's switch), turn_on, turn_off (the engines
 Lines that come too fast to be read are thinned to one a second of each kind."""
 
 
-class Console:
+class Terminal:
     """
     The terminal of a node that joins the system, open in a ``with``.
 
@@ -64,14 +64,14 @@ class Console:
         batches = line_batches(self._seen, self._turned_off, self._ticks, node.get_namespace())
         batches.subscribe(self._show, scheduler=node.scheduler)
 
-    def __enter__(self) -> Console:
-        self._terminal = open_terminal(list(self._commands))
+    def __enter__(self) -> Terminal:
+        self._display = open_display(list(self._commands))
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._terminal.close()
+        self._display.close()
 
     def refresh(self) -> None:
         """Show the lines that have come, and obey what is typed until the next batch is due."""
@@ -81,7 +81,7 @@ class Console:
         try:
             while not typed and (left := due - time.monotonic()) > 0.0:
                 self._hand.beat()
-                typed = self._terminal.read(min(left, BEAT_PERIOD) if self._hand.holds else left)
+                typed = self._display.read(min(left, BEAT_PERIOD) if self._hand.holds else left)
         except EOFError:
             self._quit()
         for line in typed:
@@ -100,7 +100,7 @@ class Console:
         return self._topics[topic.name]
 
     def _show(self, lines: list[Line]) -> None:
-        self._terminal.show(f"[{self._milliseconds(line):.0f}] {line.text}" for line in lines)
+        self._display.show(f"[{self._milliseconds(line):.0f}] {line.text}" for line in lines)
 
     def _milliseconds(self, line: Line) -> float:
         return (line.time - self._origin) / timedelta(milliseconds=1)

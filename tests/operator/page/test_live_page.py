@@ -168,7 +168,7 @@ def test_closed_page_is_released(address: str, observer: Observer) -> None:
     assert max(observer.after(closed), default=0.0) <= LATCHED
 
 
-def test_killed_console_is_a_silent_operator(
+def test_killed_page_program_is_a_silent_operator(
     hand: Hand, observer: Observer, address: str, module_site: Site
 ) -> None:
     hold(hand, observer)
@@ -190,7 +190,7 @@ def test_killed_console_is_a_silent_operator(
 
 # Shorter than the patience of the sentinel: it restarts a process that was silent for longer.
 @pytest.mark.parametrize("seconds", [0.6, 1.2])
-def test_paused_console_holds_nothing_when_it_goes_on(
+def test_paused_page_program_holds_nothing_when_it_goes_on(
     hand: Hand, observer: Observer, module_site: Site, seconds: float
 ) -> None:
     hold(hand, observer)

@@ -318,7 +318,7 @@ def test_released_parameter_releases_a_page(world: World) -> None:
 @pytest.fixture
 def terminal(world: World, make_node: Callable[..., Any]) -> Hand:
     """The hand at a terminal that lives."""
-    hand = Hand(make_node("console_7", kind=ReactiveNode))
+    hand = Hand(make_node("terminal_7", kind=ReactiveNode))
     world.hand = hand
     world.for_seconds(0.5)  # it meets the switch
     return hand

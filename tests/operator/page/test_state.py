@@ -346,14 +346,14 @@ def test_old_reason_is_forgotten_when_they_are_on_again(play: Play) -> None:
     assert view(play.run(211), "page", 210.8)["engines"]["why"] == BY_CONTROLLER
 
 
-def test_restarted_console_does_not_guess(play: Play) -> None:
+def test_restarted_page_program_does_not_guess(play: Play) -> None:
     engines(play, (209, OFF), (211, OFF))
 
     found = play.run(212, PageState(since_when=state.OLDER))
     assert view(found, "page", 211.1)["engines"]["why"] == state.OLDER
 
 
-def test_restarted_console_recognizes_the_watchdog(play: Play) -> None:
+def test_restarted_page_program_recognizes_the_watchdog(play: Play) -> None:
     play.say(210, topics.ENGINES, TURN_OFF)
     engines(play, (209, OFF), (211, OFF))
 

@@ -1,4 +1,4 @@
-"""Page, browser, console or link is lost while a hand holds the arm with the engines on.
+"""Page, browser, program or link is lost while a hand holds the arm with the engines on.
 
 The heartbeats must stop and must not come back until the next press. That the engines are off in time (S1) is
 measured once here: what follows the last heartbeat is the same in all cases.
@@ -63,7 +63,7 @@ def test_suspended_browser_releases_and_resumes_released(arm: Arm, own_browser: 
     hand.hold()
 
 
-def test_killed_console_releases_and_comes_back_released(arm: Arm, hand: HandOnPage) -> None:
+def test_killed_program_releases_and_comes_back_released(arm: Arm, hand: HandOnPage) -> None:
     hold_with_engines_on(arm, hand)
     process = arm.site.members["operator_page"]
     page = hand.page.get_attribute("html", "data-page")
@@ -78,7 +78,7 @@ def test_killed_console_releases_and_comes_back_released(arm: Arm, hand: HandOnP
     arm.record.await_beats(time.time())
 
 
-def test_stopped_console_releases_and_resumes_released(arm: Arm, hand: HandOnPage) -> None:
+def test_stopped_program_releases_and_resumes_released(arm: Arm, hand: HandOnPage) -> None:
     hold_with_engines_on(arm, hand)
     process = arm.site.members["operator_page"]
     arm.record.await_beats(time.time())
