@@ -19,9 +19,10 @@ from deploy.benchmarks.alternatives import Alternative
 from deploy.benchmarks.measurement import MeasurementFailed, Scenario, measure_subscribers
 from deploy.benchmarks.table import Results, table
 from deploy.running import interruption
+from deploy.running.environment import NAMESPACE
 from deploy.running.processes import ROOT
 from deploy.running.rclpy_choice import sourced_rclpy
-from deploy.running.system import NAMESPACE, System
+from deploy.running.system import System
 from deploy.trials.chaos.arm import RealArm
 from deploy.trials.chaos.cost import Cost
 from reactive_node.domains import reserved_domain

@@ -14,8 +14,11 @@ from typing import TYPE_CHECKING
 
 from deploy.commands.stop import stop
 from deploy.operator.output import say
-from deploy.running import interruption
-from deploy.running.system import NAMESPACE, DeploymentError, Program, System, set_middleware
+from deploy.running import interruption, messages
+from deploy.running.environment import NAMESPACE, set_middleware
+from deploy.running.errors import DeploymentError
+from deploy.running.supervisord import Program
+from deploy.running.system import System
 
 if TYPE_CHECKING:
     from deploy.commands.member import Member
@@ -104,14 +107,14 @@ def logs(system: System) -> None:
     """Follow the logs of all services until Ctrl-C or the end of the system."""
     if system.supervisor_has_ended():
         nothing = f"Nothing runs: make start. The logs of the last run are in {system.logs}"
-        raise DeploymentError(system.unattended() if system.members() else nothing)
+        raise DeploymentError(messages.unattended(system.run) if system.members() else nothing)
     files = sorted(f"{system.logs.name}/{path.name}" for path in system.logs.glob("*.log"))
     with subprocess.Popen(["tail", "-n", "10", "-F", "supervisord.log", *files], cwd=system.run) as tail:
         try:
             while tail.poll() is None:
                 interruption.check()
                 if system.supervisor_has_ended():
-                    print(system.how_it_ended())
+                    print(messages.how_it_ended(system.run))
                     break
                 with suppress(subprocess.TimeoutExpired):
                     tail.wait(0.1)
@@ -124,7 +127,7 @@ def record(system: System) -> None:
     if not _adopt_environment(system):
         raise DeploymentError("Nothing runs: make start")
     if system.supervisor_has_ended():
-        raise DeploymentError(system.unattended())
+        raise DeploymentError(messages.unattended(system.run))
     from deploy.commands import record
     from deploy.commands.member import Member
 
@@ -171,7 +174,8 @@ def _await_services(system: System, member: Member, log_sizes: dict[str, int]) -
             for program in missing:
                 if program.state in ("BACKOFF", "FATAL") or program.restarts >= START_ATTEMPTS:
                     words = _last_words(system, program, log_sizes.get(program.name, 0))
-                    raise DeploymentError(f"{program.name} does not start:\n{words or system.silent_end()}")
+                    words = words or messages.silent_end(system.run)
+                    raise DeploymentError(f"{program.name} does not start:\n{words}")
             if time.monotonic() > deadline:
                 names = ", ".join(program.name for program in missing)
                 raise DeploymentError(f"No sign of life from {names}; see {system.logs}")
@@ -215,7 +219,7 @@ def _show(system: System, member: Member, *, owner: bool = False) -> None:
                 return
             if system.supervisor_has_ended():
                 if not owner or not system.start_again():
-                    say(system.how_it_ended())
+                    say(messages.how_it_ended(system.run))
                     return
                 say("supervisord was killed: everything has started again.")
         member.spin_some()  # sends what was typed just before `quit`

@@ -13,7 +13,8 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
 from deploy.running import interruption, manifest
-from deploy.running.system import DeploymentError, namespace_of
+from deploy.running.environment import namespace_of
+from deploy.running.errors import DeploymentError
 from reactive_node import ReactiveNode
 from reactive_node.executor import create_executor
 

@@ -12,17 +12,11 @@ from rclpy.validate_namespace import validate_namespace
 
 from deploy.operator.page.address import DEFAULT_PORT, host_names, tls
 from deploy.running import manifest, parameter_file, processes
+from deploy.running.environment import NAMESPACE, namespace_of
+from deploy.running.errors import DeploymentError
 from deploy.running.processes import ROOT
-from deploy.running.system import (
-    ALL,
-    KEY,
-    NAMESPACE,
-    NOT_YET,
-    DeploymentError,
-    System,
-    namespace_of,
-    scenario_parameters,
-)
+from deploy.running.run_directory import ALL, KEY, NOT_YET, scenario_parameters
+from deploy.running.system import System
 from interfaces.service import UserError, instance
 from interfaces.sources import scenario_file
 

@@ -10,9 +10,10 @@ from mcap_files import SAVE_PERIOD
 from rclpy.clock import Clock, ClockType
 
 from deploy.commands.member import Member
-from deploy.running import interruption
+from deploy.running import interruption, messages
+from deploy.running.errors import DeploymentError
 from deploy.running.recorder import Recorder, clocks, record
-from deploy.running.system import DeploymentError, System
+from deploy.running.system import System
 
 
 def write(directory: Path, member: Member, system: System) -> None:
@@ -29,7 +30,7 @@ def write(directory: Path, member: Member, system: System) -> None:
             try:
                 while not system.supervisor_has_ended():
                     member.spin_once()
-                print(system.how_it_ended())
+                print(messages.how_it_ended(system.run))
             except interruption.Interrupted:
                 interruption.ignore()
     except OSError as error:  # such as a full disk

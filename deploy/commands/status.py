@@ -6,7 +6,7 @@ import time
 from collections.abc import Iterable, Mapping
 
 from deploy.running.columns import table
-from deploy.running.system import Program
+from deploy.running.supervisord import Program
 from interfaces.service.health import Health
 
 HEADER = ("SERVICE", "STATE", "PID", "UPTIME", "RESTARTS", "LAST OUTPUT", "HEALTH")

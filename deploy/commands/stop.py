@@ -7,7 +7,8 @@ from contextlib import suppress
 
 from deploy.operator.output import say
 from deploy.running import interruption
-from deploy.running.system import DeploymentError, System
+from deploy.running.errors import DeploymentError
+from deploy.running.system import System
 
 
 def stop(system: System) -> None:

@@ -25,8 +25,8 @@ from deploy.promises.history import (
     merged,
 )
 from deploy.promises.marks import is_babble
+from deploy.running.errors import DeploymentError
 from deploy.running.recorder import METADATA
-from deploy.running.system import DeploymentError
 from interfaces import topics
 
 PROCESSES, FAULTS = "/chaos/processes", "/chaos/faults"  # topics

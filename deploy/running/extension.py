@@ -29,7 +29,7 @@ from supervisor.states import ProcessStates, SupervisorStates, getProcessStateDe
 
 from deploy.running import prefork
 from deploy.running.manifest import SENTINEL
-from deploy.running.system import PARAMETERS
+from deploy.running.run_directory import PARAMETERS
 
 LONGEST_WAIT = 0.1  # s, while the state of a program changes with time
 _CHANGING = (ProcessStates.STARTING, ProcessStates.BACKOFF, ProcessStates.STOPPING)

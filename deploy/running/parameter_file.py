@@ -15,7 +15,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from deploy.running import interruption, manifest
-from deploy.running.system import ALL, KEY
+from deploy.running.run_directory import ALL, KEY
 from interfaces.service import UserError
 from interfaces.service.parameters import Declaration, declarations
 from interfaces.sources import yaml_file

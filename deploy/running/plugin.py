@@ -12,8 +12,10 @@ import time
 from pathlib import Path
 
 from deploy.running import manifest, processes
+from deploy.running.errors import DeploymentError
 from deploy.running.extension import make_interface
-from deploy.running.system import DeploymentError, System, scenario_parameters
+from deploy.running.run_directory import scenario_parameters
+from deploy.running.system import System
 
 __all__ = ["make_interface"]
 

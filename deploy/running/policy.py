@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from deploy.running import processes
 from deploy.running.manifest import SENTINEL
-from deploy.running.system import Program
+from deploy.running.supervisord import Program
 
 RECENT = 60.0  # s for which a restart counts as recent
 

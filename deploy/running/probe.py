@@ -5,10 +5,12 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Mapping
+from pathlib import Path
 
 from deploy.running import processes
+from deploy.running.errors import DeploymentError
 from deploy.running.policy import Observation
-from deploy.running.system import DeploymentError, Program, System
+from deploy.running.supervisord import Program, Supervisord
 from interfaces.service.health import Health
 
 ASKING_PERIOD = 1.0  # s between two questions to supervisord; each costs both of us a millisecond
@@ -20,9 +22,9 @@ LONGEST_PERIOD = 10.0  # s
 class Probe:
     """Observes the processes of a system; part of a process that supervisord has started."""
 
-    def __init__(self, system: System, supervisor: int) -> None:
-        self._system = system
-        self._supervisor = supervisor
+    def __init__(self, run: Path, supervisord: Supervisord) -> None:
+        self._run = run
+        self._supervisord = supervisord
         self._programs: list[Program] = []
         self._next_question = 0.0
         self._last_health: dict[tuple[str, int], float] = {}
@@ -40,11 +42,11 @@ class Probe:
 
         While all its processes live, supervisord is asked only now and then.
         """
-        if os.getppid() != self._supervisor:
+        if os.getppid() != self._supervisord.pid:
             raise DeploymentError("supervisord has died: a killed process would not be replaced")
         states = self._states()
         if time.monotonic() >= self._next_question or not all(map(self._runs, self._programs, states)):
-            self._programs = self._system.watch(self._supervisor)
+            self._programs = self._supervisord.watch()
             self._next_question = time.monotonic() + ASKING_PERIOD
             states = self._states()
         now = time.monotonic()
@@ -64,16 +66,16 @@ class Probe:
 
     def _runs(self, program: Program, state: tuple[str, int]) -> bool:
         """Whether supervisord knows nothing new about a program."""
-        return program.state == "RUNNING" and state[0] != "Z" and state[1] == self._supervisor
+        return program.state == "RUNNING" and state[0] != "Z" and state[1] == self._supervisord.pid
 
     def _find_duplicates(self) -> frozenset[processes.Process]:
         """The processes of a program that supervisord has not started and is not about to start."""
         supervised = {program.name: program.pid for program in self._programs}
         return frozenset(
             process
-            for process in processes.of_system(self._system.run)
+            for process in processes.of_system(self._run)
             if supervised.get(process.program, process.pid) != process.pid
-            and _state_of(process.pid)[1] not in (0, self._supervisor, *supervised.values())
+            and _state_of(process.pid)[1] not in (0, self._supervisord.pid, *supervised.values())
         )
 
 

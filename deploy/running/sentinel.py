@@ -24,10 +24,11 @@ import reactivex as rx
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
 from deploy.running import processes
+from deploy.running.errors import DeploymentError
 from deploy.running.manifest import SENTINEL
 from deploy.running.policy import Action, Observation, Policy, Timeouts
 from deploy.running.probe import Probe
-from deploy.running.system import DeploymentError, Program, System
+from deploy.running.supervisord import Program, Supervisord
 from interfaces import service
 from interfaces.service import ServiceNode, parameter
 from interfaces.service.health import healths
@@ -72,14 +73,14 @@ def _state(program: Program, reason: str, recent_restarts: int, node: str) -> Di
     )
 
 
-def carry_out(action: Action, system: System, supervisor: int) -> None:
+def carry_out(action: Action, run: Path, supervisord: Supervisord) -> None:
     """Carry out an action, unless its process has changed meanwhile, or supervisord does not answer."""
     with suppress(DeploymentError):  # the next observation shows whether it worked
         if action.verb == "kill":
-            system.watch(supervisor)  # a supervisord that hangs would not replace the process
-            processes.send_signal(system.run, action.program, action.pid, signal.SIGKILL)
+            supervisord.watch()  # a supervisord that hangs would not replace the process
+            processes.send_signal(run, action.program, action.pid, signal.SIGKILL)
         else:
-            system.revive(supervisor, action.program)
+            supervisord.revive(action.program)
 
 
 @dataclass(frozen=True)
@@ -97,8 +98,8 @@ def wire(node: ServiceNode) -> None:
     """Connect probe, policy and actions: observe, decide, act, publish."""
     parameters = node.declare(Parameters)
     timeouts = Timeouts(parameters.period, parameters.health_timeout, parameters.start_timeout)
-    system, supervisor = System(Path(os.environ[processes.MARK])), os.getppid()
-    probe, policy = Probe(system, supervisor), Policy(timeouts)
+    run, supervisord = Path(os.environ[processes.MARK]), Supervisord(os.getppid())
+    probe, policy = Probe(run, supervisord), Policy(timeouts)
     own_name = node.get_fully_qualified_name()
     namespace = node.get_namespace().rstrip("/")
 
@@ -112,7 +113,7 @@ def wire(node: ServiceNode) -> None:
     def act(actions: list[Action]) -> None:
         for action in actions:
             node.remark(action.program, f"{action.verb}: {action.reason}")
-            carry_out(action, system, supervisor)
+            carry_out(action, run, supervisord)
         if policy.kill_inhibited_by:
             node.remark(SENTINEL, f"kills no silent service: {policy.kill_inhibited_by}")
 

@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from deploy.commands.launcher import place
-from deploy.running.system import DeploymentError, System
+from deploy.running.errors import DeploymentError
+from deploy.running.system import System
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import time
 import pytest
 
 from deploy.commands.status import of_services
-from deploy.running.system import Program
+from deploy.running.supervisord import Program
 from interfaces.service.health import Health
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from xml.etree import ElementTree
 
-from deploy.running.system import set_middleware
+from deploy.running.environment import set_middleware
 
 
 def test_the_settings_of_the_user_win() -> None:

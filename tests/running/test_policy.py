@@ -9,7 +9,7 @@ import pytest
 from deploy.running.manifest import SENTINEL
 from deploy.running.policy import RECENT, Action, Observation, Policy, Timeouts
 from deploy.running.processes import Process
-from deploy.running.system import Program
+from deploy.running.supervisord import Program
 
 TIMEOUTS = Timeouts(period=0.25, health=2.5)  # times without rounding
 PIDS = {name: 100 + index for index, name in enumerate(("a", "b", "c", "d", "e", SENTINEL))}

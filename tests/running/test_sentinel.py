@@ -10,12 +10,13 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
 
 from deploy.running import processes, rpc
+from deploy.running.errors import DeploymentError
 from deploy.running.manifest import SENTINEL
 from deploy.running.policy import Action, Observation, Policy, Timeouts
 from deploy.running.probe import Probe
 from deploy.running.processes import Process
 from deploy.running.sentinel import states
-from deploy.running.system import DeploymentError, Program, System
+from deploy.running.supervisord import Program, Supervisord
 
 SERVICES = ("engine_controller", "kinematics", "operator_watchdog", "velocity", SENTINEL)
 PIDS = {name: 100 + index for index, name in enumerate(SERVICES)}
@@ -241,17 +242,17 @@ def test_publishes_state_pid_restarts_exit_and_reason() -> None:
 
 def test_observes_nothing_when_supervisord_is_gone(tmp_path: Path) -> None:
     with pytest.raises(DeploymentError, match="supervisord has died"):
-        Probe(System(tmp_path), os.getpid()).observe()  # which is not whose child this process is
+        Probe(tmp_path, Supervisord(os.getpid())).observe()  # which is not whose child this process is
     with pytest.raises(DeploymentError, match="does not answer"):
-        Probe(System(tmp_path), os.getppid()).observe()
+        Probe(tmp_path, Supervisord(os.getppid())).observe()
 
 
-def test_a_supervisord_of_another_version_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_supervisord_of_another_version_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     answers = ([{"name": "velocity"}], '[{"name": "velocity", "mood": "good"}]', "velocity RUNNING")
     for answer in answers:
         monkeypatch.setattr(rpc, "call", lambda *_, answer=answer, **__: answer)
         with pytest.raises(DeploymentError, match=r"supervisord \(pid 7\) runs another version"):
-            System(tmp_path).watch(7)
+            Supervisord(7).watch()
 
 
 class Machine:
@@ -267,8 +268,8 @@ class Machine:
         self.states = {each.pid: ["S", str(os.getppid())] for each in self.programs}
         machine = self
 
-        class Asked(System):
-            def watch(self, supervisor: int) -> list[Program]:
+        class Asked(Supervisord):
+            def watch(self) -> list[Program]:
                 machine.questions.append(machine.now)
                 return list(machine.programs)
 
@@ -280,7 +281,7 @@ class Machine:
         monkeypatch.setattr("time.monotonic", lambda: self.now)
         monkeypatch.setattr(processes, "stat_of", lambda pid: self.states.get(pid, []))
         monkeypatch.setattr(processes, "of_system", search)
-        self.probe = Probe(Asked(run), os.getppid())
+        self.probe = Probe(run, Asked(os.getppid()))
 
     def observe(self, times: int = 1) -> Observation:
         """Observe so many times; return the last observation."""

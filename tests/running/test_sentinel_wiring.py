@@ -18,9 +18,10 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.time import Time
 
 from deploy.running import processes, sentinel
+from deploy.running.errors import DeploymentError
 from deploy.running.manifest import SENTINEL
 from deploy.running.policy import Action, Observation, Timeouts
-from deploy.running.system import DeploymentError, Program, System
+from deploy.running.supervisord import Program, Supervisord
 from interfaces.topics import DIAGNOSTICS
 from reactive_node.testing import MakeNode, SpinFor, SpinUntil
 from tests.component.wiring import Wired
@@ -89,9 +90,9 @@ def wired(make_node: MakeNode, spin_until: SpinUntil, monkeypatch: pytest.Monkey
     monkeypatch.setenv(processes.MARK, str(tmp_path))
     monkeypatch.setattr("interfaces.service.health.PERIOD", 3600.0)
 
-    def make_probe(system: System, supervisor: int) -> Probe:
+    def make_probe(run: Path, supervisord: Supervisord) -> Probe:
         probe.made = time.time_ns()
-        probe.made_of = (system.run, supervisor)
+        probe.made_of = (run, supervisord.pid)
         return probe
 
     monkeypatch.setattr(sentinel, "Probe", make_probe)
@@ -99,7 +100,7 @@ def wired(make_node: MakeNode, spin_until: SpinUntil, monkeypatch: pytest.Monkey
     monkeypatch.setattr(
         sentinel,
         "carry_out",
-        lambda action, system, supervisor: carried_out.append((action, system.run, supervisor)),
+        lambda action, run, supervisord: carried_out.append((action, run, supervisord.pid)),
     )
 
     def make(**options: Any) -> Sentinel:
@@ -209,10 +210,10 @@ def test_states_are_not_repeated_while_observations_fail(
 # Actions
 
 
-class Answering(System):
-    """A system whose supervisord answers."""
+class Answering(Supervisord):
+    """A supervisord that answers."""
 
-    def watch(self, supervisor: int) -> list[Program]:
+    def watch(self) -> list[Program]:
         """Return no program."""
         return []
 
@@ -225,12 +226,12 @@ def test_kill_reaches_the_process_of_the_program_only(tmp_path: Path) -> None:
         try:
             assert process.stdout is not None
             process.stdout.readline()
-            sentinel.carry_out(Action("kill", "kinematics", process.pid, ""), Answering(tmp_path), 1)
-            sentinel.carry_out(Action("kill", "velocity", process.pid, ""), Answering(tmp_path / "other"), 1)
+            sentinel.carry_out(Action("kill", "kinematics", process.pid, ""), tmp_path, Answering(1))
+            sentinel.carry_out(Action("kill", "velocity", process.pid, ""), tmp_path / "other", Answering(1))
             # A supervisord that does not answer would not replace the process.
-            sentinel.carry_out(Action("kill", "velocity", process.pid, ""), System(tmp_path), 1)
+            sentinel.carry_out(Action("kill", "velocity", process.pid, ""), tmp_path, Supervisord(1))
             assert process.poll() is None
-            sentinel.carry_out(Action("kill", "velocity", process.pid, ""), Answering(tmp_path), 1)
+            sentinel.carry_out(Action("kill", "velocity", process.pid, ""), tmp_path, Answering(1))
             assert process.wait(5.0) == -signal.SIGKILL
         finally:
             process.kill()
@@ -239,12 +240,12 @@ def test_kill_reaches_the_process_of_the_program_only(tmp_path: Path) -> None:
 def test_revival_asks_supervisord_and_may_fail(tmp_path: Path) -> None:
     asked: list[tuple[int, str]] = []
 
-    class Asked(System):
-        def revive(self, supervisor: int, program: str) -> None:
-            asked.append((supervisor, program))
+    class Asked(Supervisord):
+        def revive(self, program: str) -> None:
+            asked.append((self.pid, program))
             raise DeploymentError("it does not answer")
 
-    sentinel.carry_out(Action("revive", "velocity", 0, ""), Asked(tmp_path), 7)
+    sentinel.carry_out(Action("revive", "velocity", 0, ""), tmp_path, Asked(7))
 
     assert asked == [(7, "velocity")]
 

@@ -9,7 +9,8 @@ from contextlib import suppress
 
 from deploy.promises.marks import BABBLER
 from deploy.running import processes
-from deploy.running.system import DeploymentError, System
+from deploy.running.errors import DeploymentError
+from deploy.running.system import System
 from deploy.trials.chaos.clock import Clock
 from deploy.trials.chaos.nested_faults import NestedFaults
 

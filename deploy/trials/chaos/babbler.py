@@ -24,7 +24,7 @@ from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import Bool, Float64, Header, String
 
 from deploy.promises.marks import GARBAGE, TEXT, nan
-from deploy.running.system import namespace_of
+from deploy.running.environment import namespace_of
 from interfaces import topics
 
 RATES = {"flood": 10_000.0, "babble": 200.0, "pretend": 2.0}  # Hz; of babble, over all topics

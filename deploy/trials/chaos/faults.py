@@ -18,7 +18,7 @@ from deploy.promises import marks
 from deploy.promises.history import ALL, NO_TARGET, PROGRAMS
 from deploy.promises.marks import BABBLER
 from deploy.running import parameter_file, processes
-from deploy.running.system import KEY
+from deploy.running.run_directory import KEY
 from deploy.trials.chaos import clock
 from deploy.trials.chaos.arm import RealArm
 

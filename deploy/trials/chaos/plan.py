@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from deploy.promises import marks
-from deploy.running.system import DeploymentError
+from deploy.running.errors import DeploymentError
 from deploy.trials.chaos import clock, partition, schedule, schedule_file
 from deploy.trials.chaos.faults import FAULT_KINDS
 from deploy.trials.chaos.schedule import Schedule

@@ -20,7 +20,7 @@ from typing import Any
 
 import yaml
 
-from deploy.running.system import DeploymentError
+from deploy.running.errors import DeploymentError
 from deploy.trials.chaos.schedule import PlannedFault, Schedule
 
 

@@ -39,7 +39,10 @@ from deploy.promises.history import (
     target_name,
 )
 from deploy.running import interruption, processes
-from deploy.running.system import NAMESPACE, DeploymentError, System, scenario_parameters
+from deploy.running.environment import NAMESPACE
+from deploy.running.errors import DeploymentError
+from deploy.running.run_directory import scenario_parameters
+from deploy.running.system import System
 from deploy.trials.chaos import clock
 from deploy.trials.chaos.arm import RealArm, file_suffix
 from deploy.trials.chaos.faults import FAULT_KINDS, INJECTED, Undo

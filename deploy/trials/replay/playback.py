@@ -19,7 +19,7 @@ from rclpy_simulation import Delay, Network, Process, Simulation
 from rclpy_simulation.host import BOOT, SECOND
 
 from deploy.running import manifest
-from deploy.running.system import NAMESPACE
+from deploy.running.environment import NAMESPACE
 from deploy.trials.replay import chains
 from deploy.trials.replay.chains import WATCHDOG, Chain
 from deploy.trials.replay.lives import AHEAD, ReplayedLife, Suspension, lives, origin

@@ -18,7 +18,8 @@ from deploy.promises.history import STUCK_DRIVE
 from deploy.promises.html_report import page, verdict
 from deploy.promises.text_report import text
 from deploy.running import interruption, processes
-from deploy.running.system import DeploymentError, make_directory
+from deploy.running.errors import DeploymentError
+from deploy.running.run_directory import make_directory
 from deploy.trials.chaos import schedule_file
 from deploy.trials.chaos.plan import names, number
 from deploy.trials.chaos.schedule_file import Experiment

@@ -14,8 +14,10 @@ from rclpy_simulation.host import BOOT, SECOND
 
 from deploy.promises.history import SWITCH, Life
 from deploy.running import manifest
+from deploy.running.errors import DeploymentError
 from deploy.running.processes import MARK
-from deploy.running.system import SERVICE_GRACE, SETTINGS, DeploymentError, scenario_parameters
+from deploy.running.run_directory import SETTINGS, scenario_parameters
+from deploy.running.system import SERVICE_GRACE
 from deploy.trials.chaos.nested_faults import NestedFaults
 from deploy.trials.simulation.calibration import Calibration, load
 from deploy.trials.simulation.machine import simulated_services

@@ -26,7 +26,7 @@ from deploy.promises import observations as record
 from deploy.promises.findings import percentile
 from deploy.promises.history import SOURCES, History, Life
 from deploy.promises.promises import CHECKERS
-from deploy.running.system import DeploymentError
+from deploy.running.errors import DeploymentError
 
 PATH = Path(__file__).with_name("calibration.json")
 

@@ -16,8 +16,9 @@ from rclpy_simulation import Network, Process, Simulation
 from rclpy_simulation.process import running_process
 
 from deploy.running import processes
+from deploy.running.errors import DeploymentError
 from deploy.running.processes import MARK
-from deploy.running.system import DeploymentError, Program, System
+from deploy.running.supervisord import Supervisord
 from interfaces.service import instance
 from interfaces.service import process as service_process
 from interfaces.sources import scenario_file
@@ -67,7 +68,11 @@ class Machine:
                 open_handles=self._open_handles,
                 close=lambda handles: None,
             ),
-            mock.patch.multiple(System, watch=self._watch, revive=self._revive),
+            mock.patch.multiple(
+                Supervisord,
+                watch=lambda it: list(self._answering(it.pid).watch()),
+                revive=lambda it, program: self._answering(it.pid).revive(program),
+            ),
             mock.patch.object(signal, "pidfd_send_signal", self._send),
         ):
             yield
@@ -107,12 +112,6 @@ class Machine:
         if process is None:
             raise ProcessLookupError
         process.send_signal(number)
-
-    def _watch(self, supervisor: int) -> list[Program]:
-        return list(self._answering(supervisor).watch())
-
-    def _revive(self, supervisor: int, program: str) -> None:
-        self._answering(supervisor).revive(program)
 
     def _answering(self, pid: int) -> Any:
         supervisor = self._supervisor()

@@ -15,7 +15,7 @@ from rclpy_simulation import Process, Simulation
 from deploy.running import manifest
 from deploy.running.extension import LONGEST_WAIT, SENTINEL_START_TIMEOUT, SENTINEL_TIMEOUT
 from deploy.running.manifest import SENTINEL
-from deploy.running.system import Program
+from deploy.running.supervisord import Program
 
 START_SECONDS = 1.0  # s; supervisor's default of startsecs
 

@@ -21,7 +21,7 @@ from deploy.operator.hand import Hand
 from deploy.operator.page.server import UPDATE_PERIOD
 from deploy.operator.page.state import RESTARTED
 from deploy.operator.switch import ECHO
-from deploy.running.system import PAGE_FILE
+from deploy.running.run_directory import PAGE_FILE
 from interfaces import topics
 from interfaces.service import ServiceNode
 from interfaces.topics import CONFIGURATION

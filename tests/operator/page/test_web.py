@@ -8,7 +8,9 @@ from typing import Any
 import pytest
 
 from deploy.commands import parameters
-from deploy.running.system import KEY, NAMESPACE, DeploymentError
+from deploy.running.environment import NAMESPACE
+from deploy.running.errors import DeploymentError
+from deploy.running.run_directory import KEY
 
 
 def port_of(web: str, namespace: str = "", user_file: str = "") -> Any:

@@ -1,0 +1,7 @@
+"""What the user is told instead of a traceback."""
+
+from __future__ import annotations
+
+
+class DeploymentError(Exception):
+    """Why the system cannot be started, stopped or asked; one line for the user."""

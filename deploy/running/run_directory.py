@@ -1,0 +1,122 @@
+"""The run directory of a system: its logs, its parameter file, the address of its page."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+from deploy.running import interruption, processes
+from deploy.running.errors import DeploymentError
+
+# `make stop` runs without .venv: PyYAML is imported where it is needed.
+
+SETTINGS = "settings"  # in the run directory: where services keep the values that were set by hand
+PAGE_FILE = "page.txt"  # in the settings: the line that tells the address of the page
+PARAMETERS = "parameters.yaml"  # in the run directory: the ROS parameter file of all services
+ALL, KEY = "/**", "ros__parameters"  # the form of ROS 2's parameter files
+NOT_YET = -1.0  # scenario_epoch: the scenario waits until this parameter is set
+
+
+class RunDirectory:
+    """The runtime files of a system."""
+
+    def __init__(self, run: Path | None = None) -> None:
+        """:param run: the directory; by default that of this checkout."""
+        self.run = run or processes.run_directory()
+
+    @property
+    def logs(self) -> Path:
+        """The directory of the programs' logs."""
+        return self.run / "logs"
+
+    @property
+    def parameters(self) -> Path:
+        """The ROS parameter file of all services; written at each start, removed by an orderly end."""
+        return self.run / PARAMETERS
+
+    @property
+    def page(self) -> str:
+        """The line that tells the address of the page, or why there is none; empty if it is switched off."""
+        with suppress(OSError):
+            return (self.run / SETTINGS / PAGE_FILE).read_text(encoding="ascii").strip()
+        return ""
+
+    @property
+    def is_wanted(self) -> bool:
+        """Whether the system was started and not stopped since."""
+        return self.parameters.exists()
+
+    def write_parameters(self, parameters: Mapping[str, object]) -> None:
+        """Write the parameter file; services read the old one or the new one."""
+        import yaml
+
+        new = self.parameters.with_suffix(".new")
+        try:
+            new.write_text(yaml.safe_dump(dict(parameters), sort_keys=False))
+            os.replace(new, self.parameters)
+        except OSError as error:  # which names no file on a full disk
+            raise DeploymentError(f"{self.parameters}: {error.strerror}") from error
+
+    def origin(self) -> float:
+        """The origin of the running system's scenario [s, monotonic clock]; NOT_YET before it begins."""
+        return float(self._written_parameters()[ALL][KEY]["scenario_epoch"])
+
+    def keep_origin(self, origin: float) -> None:
+        """Write the origin of the scenario [s, monotonic clock] for services that start from now on."""
+        document = self._written_parameters()
+        document[ALL][KEY]["scenario_epoch"] = origin
+        self.write_parameters(document)
+
+    def _written_parameters(self) -> dict[str, Any]:
+        import yaml
+
+        try:
+            document: dict[str, Any] = yaml.safe_load(self.parameters.read_text())
+            document[ALL][KEY]["scenario_epoch"]
+        except (OSError, ValueError, LookupError, TypeError, yaml.YAMLError):
+            reason = "was deleted or damaged: make stop, make start"
+            raise DeploymentError(f"{self.parameters} {reason}") from None
+        return document
+
+    @contextmanager
+    def alone(self) -> Iterator[None]:
+        """Hold the logs: only one start or stop at a time. supervisord holds the run directory."""
+        make_directory(self.run, 0o700)
+        make_directory(self.logs)
+        directory = os.open(self.logs, os.O_RDONLY)
+        try:
+            try:
+                fcntl.flock(directory, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                with suppress(OSError):  # a closed terminal
+                    print("Waiting for another make to end its start or stop.", flush=True)
+                with interruption.blocking():
+                    fcntl.flock(directory, fcntl.LOCK_EX)
+            yield
+        finally:
+            os.close(directory)
+
+
+def make_directory(path: Path, mode: int = 0o777) -> None:
+    """Make the run directory or one in it, unless it exists. Raises DeploymentError."""
+    try:
+        path.mkdir(mode, parents=True, exist_ok=True)
+    except OSError as error:
+        raise DeploymentError(
+            f"The run directory {path} cannot be made: {error.strerror}."
+            f" Set {processes.RUN_DIRECTORY} to another one."
+        ) from None
+
+
+def scenario_parameters(scenario: Path, origin: float, settings: str | Path = SETTINGS) -> dict[str, object]:
+    """The parameters that all services share, as the content of a ROS parameter file.
+
+    :param origin: of the scenario [s, monotonic clock], or NOT_YET.
+    :param settings: the folder of what is set by hand; by default in the run directory.
+    """
+    shared = {"scenario": str(scenario), "scenario_epoch": origin, "settings": str(settings)}
+    return {ALL: {KEY: shared}}
