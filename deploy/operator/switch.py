@@ -18,11 +18,10 @@ from reactivex import Observable
 
 from deploy.operator import hold
 from deploy.operator.remote import ParameterChange, RemoteParameters
-from interfaces.topics import OPERATOR_HEARTBEAT
 from reactive_node import ReactiveNode
 
 ECHO = 1.0  # s after an answer within which the event of the same change comes
-VIRTUAL_SWITCH = OPERATOR_HEARTBEAT.publishers[0]
+VIRTUAL_SWITCH = "dead_mans_switch"
 PRESSED = "pressed"
 
 

@@ -36,7 +36,7 @@ class Configuration:
 
     def __init__(self, node: ReactiveNode) -> None:
         """Create the clients of the sources; they belong to the node."""
-        self._programs = {topic.publishers[0]: name for name, topic in topics.CONFIGURATION.items()}
+        self._programs = {f"config_{name}": name for name in topics.CONFIGURATION}
         self._sources = {name: RemoteParameters(node, program) for program, name in self._programs.items()}
 
     def outcomes(self, requests: Observable[Request]) -> Observable[Change]:

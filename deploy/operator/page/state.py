@@ -21,7 +21,7 @@ from reactive_node.stamps import Timestamp
 from services import engine_controller, operator_watchdog
 
 PROGRAMS = tuple(program.name for program in manifest.programs())
-ENGINE_CONTROLLER = topics.ENGINES_STATE.publishers[0]
+ENGINE_CONTROLLER = "engine_controller"
 ECHO = 0.15  # s after a beat of a page for which a heartbeat on the topic is taken for that beat
 TOGETHER = 1.0  # s within which a command or a conclusion explains that the engines are off
 RENEWED = 0.5  # s: the drive's 0.4 s and the way of the message
