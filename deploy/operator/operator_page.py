@@ -76,9 +76,9 @@ def wire(node: ServiceNode) -> None:
     epoch = Epoch(node)
     clock = state.Clock(hold.monotonic, node.age, lambda: epoch.elapsed() if epoch.is_known else 0.0)
     initial = state.PageState(
-        since_when=state.OLDER if epoch.is_past else state.NOT_YET,
         strikes=given.strikes,
         presence_timeout=given.presence_timeout,
+        engines=state.Engines(since_when=state.OLDER if epoch.is_past else state.NOT_YET),
     )
     newest = BehaviorSubject(initial)
 

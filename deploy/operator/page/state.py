@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from datetime import datetime
 from typing import Any, NamedTuple
 
@@ -15,7 +15,7 @@ from deploy.operator.hold import ENDED, Hold
 from deploy.running import manifest
 from interfaces import topics
 from interfaces.service.health import healths
-from interfaces.topics import ALIVE, INCAPACITATED, MISSED, OFF, ON, TURN_OFF
+from interfaces.topics import ALIVE, INCAPACITATED, MISSED, ON, TURN_OFF
 from reactive_node import stamps
 from reactive_node.stamps import Timestamp
 from services import engine_controller, operator_watchdog
@@ -69,23 +69,53 @@ class Program(NamedTuple):
     """The age of its last output at that time [s]."""
 
 
-class PageState(NamedTuple):
-    """All that a page may show; times are those of :attr:`Clock.now` [s]."""
+class Recent(NamedTuple):
+    """The last items of a sequence, for pages that each have seen a part of it."""
 
-    strikes: int = operator_watchdog.DEFAULTS.strikes
-    """The strike that turns the engines off."""
-    presence_timeout: float = engine_controller.DEFAULTS.presence_timeout
-    """How long the engines stay on without an operator [s]."""
+    items: tuple[Any, ...] = ()
+    total: int = 0
+    """The number of all items."""
+
+    def add(self, items: Iterable[Any], most: int) -> Recent:
+        """Return it with more items, of which at most so many are kept."""
+        new = tuple(items)
+        return Recent((*self.items, *new)[-most:], self.total + len(new))
+
+    def forget(self) -> Recent:
+        """Return it without its items."""
+        return Recent((), self.total)
+
+    def since(self, count: int) -> tuple[Any, ...]:
+        """Return what is kept of the items after the first ``count``."""
+        new = self.total - count
+        return self.items[-new:] if new else ()
+
+
+class Arm(NamedTuple):
+    """What the arm does."""
+
     configuration: Mapping[str, float] = {}
-    by_hand: frozenset[str] = frozenset()
-    """The sources that were set by hand."""
     position: tuple[float, float] | None = None
     speed: float | None = None
+    samples: Recent = Recent()
+    """The trace: time since the origin of the scenario [s], x, y and speed."""
+    sampled: float = -math.inf
+
+
+class Operator(NamedTuple):
+    """What the operator watchdog concludes."""
+
     seen: float = -math.inf
-    """When the operator watchdog has seen the operator."""
+    """When the operator was seen."""
     activity: str | None = None
     strikes_left: int | None = None
+
+
+class Hands(NamedTuple):
+    """Who is on the switch."""
+
     hold: Hold = Hold()
+    """The page that holds it."""
     beaten: float = -math.inf
     """When the last beat of a page counted; a release does not change it."""
     heartbeat: float = -math.inf
@@ -94,30 +124,54 @@ class PageState(NamedTuple):
     """Whether the virtual switch was pressed by hand."""
     at_terminal: bool = False
     """Whether a hand at a terminal sends heartbeats."""
-    engines: str | None = None
+
+
+class Engines(NamedTuple):
+    """The engines, and why they are off."""
+
+    state: str | None = None
     reported: float = -math.inf
-    """When the engines' state was published."""
+    """When the state was published."""
     controllers: frozenset[Any] = frozenset()
-    """The publishers of the engines' state when they went on."""
+    """The publishers of the state when they went on."""
     off_since: float = -math.inf
     since_when: str = NOT_YET
-    """Why the engines are off, if no command explains it."""
+    """Why they are off, if no command explains it."""
     cause: str = ""
-    """The command or conclusion that has turned the engines off."""
+    """The command or conclusion that has turned them off."""
     caused: float = -math.inf
     own_turn_off: float = -math.inf
-    """When a page has turned the engines off."""
+    """When a page has turned them off."""
     refused: tuple[float, str] | None = None
     """When and why a `turn_on` was refused."""
+
+    def explain(self, cause: str, now: float) -> Engines:
+        """Note why they go off: messages of other topics may come a little before or after that."""
+        goes_off = self.state == ON or now - self.off_since < TOGETHER
+        is_older = self.off_since == -math.inf and self.since_when == OLDER
+        # The command of the watchdog may overtake its conclusion.
+        is_first = not self.cause or (self.cause == BY_COMMAND and now - self.caused < TOGETHER)
+        return self._replace(cause=cause, caused=now) if (goes_off or is_older) and is_first else self
+
+
+class PageState(NamedTuple):
+    """All that a page may show; times are those of :attr:`Clock.now` [s]."""
+
+    strikes: int = operator_watchdog.DEFAULTS.strikes
+    """The strike that turns the engines off."""
+    presence_timeout: float = engine_controller.DEFAULTS.presence_timeout
+    """How long the engines stay on without an operator [s]."""
+    arm: Arm = Arm()
+    by_hand: frozenset[str] = frozenset()
+    """The sources of the configuration that were set by hand."""
+    operator: Operator = Operator()
+    hands: Hands = Hands()
+    engines: Engines = Engines()
     programs: Mapping[str, Program] = {}
-    samples: tuple[tuple[float, float, float, float | None], ...] = ()
-    sample_count: int = 0
-    sampled: float = -math.inf
-    lines: tuple[dict[str, Any], ...] = ()
-    line_count: int = 0
-    refusals: tuple[tuple[str, str, str], ...] = ()
-    """Page, request and reason of the last requests that were refused."""
-    refusal_count: int = 0
+    lines: Recent = Recent()
+    """The lines of the terminal."""
+    refusals: Recent = Recent()
+    """Page, request and reason of each request that was refused."""
 
 
 Change = Callable[[PageState], PageState]
@@ -171,17 +225,13 @@ def _changes(
 
 
 def _forget(state: PageState) -> PageState:
-    fresh = PageState()
     return state._replace(
-        configuration=fresh.configuration,
-        position=None,
-        speed=None,
-        seen=fresh.seen,
-        heartbeat=fresh.heartbeat,
-        refused=None,
-        programs=fresh.programs,
-        samples=(),
-        lines=(),
+        arm=Arm(samples=state.arm.samples.forget()),
+        operator=state.operator._replace(seen=-math.inf),
+        hands=state.hands._replace(heartbeat=-math.inf),
+        engines=state.engines._replace(refused=None),
+        programs={},
+        lines=state.lines.forget(),
     )
 
 
@@ -190,28 +240,24 @@ def _forget(state: PageState) -> PageState:
 
 def _configuration(name: str) -> Callable[[PageState, Any, Clock], PageState]:
     def change(state: PageState, message: Timestamp[Any], clock: Clock) -> PageState:
-        return state._replace(configuration={**state.configuration, name: message.value})
+        configuration = {**state.arm.configuration, name: message.value}
+        return state._replace(arm=state.arm._replace(configuration=configuration))
 
     return change
 
 
 def _position(state: PageState, message: Timestamp[Any], clock: Clock) -> PageState:
     stamp, x, y, _ = message.value
-    position, now = (x, y), clock.now()
-    if now - state.sampled < SAMPLE_PERIOD:
-        return state._replace(position=position)
-    at = clock.elapsed() - clock.age(stamps.from_nanoseconds(stamp))
-    sample = (round(at, 3), *position, state.speed)
-    return state._replace(
-        position=position,
-        samples=(*state.samples, sample)[-MAX_SAMPLES:],
-        sample_count=state.sample_count + 1,
-        sampled=now,
-    )
+    arm, now = state.arm._replace(position=(x, y)), clock.now()
+    if now - arm.sampled >= SAMPLE_PERIOD:
+        at = clock.elapsed() - clock.age(stamps.from_nanoseconds(stamp))
+        samples = arm.samples.add([(round(at, 3), x, y, arm.speed)], MAX_SAMPLES)
+        arm = arm._replace(samples=samples, sampled=now)
+    return state._replace(arm=arm)
 
 
 def _speed(state: PageState, message: Timestamp[Any], clock: Clock) -> PageState:
-    return state._replace(speed=message.value)
+    return state._replace(arm=state.arm._replace(speed=message.value))
 
 
 # The operator
@@ -219,68 +265,68 @@ def _speed(state: PageState, message: Timestamp[Any], clock: Clock) -> PageState
 
 def _heartbeat(state: PageState, message: Timestamp[Any], clock: Clock) -> PageState:
     now = clock.now()
-    return state if now - state.beaten < ECHO else state._replace(heartbeat=now)
+    is_of_page = now - state.hands.beaten < ECHO
+    return state if is_of_page else state._replace(hands=state.hands._replace(heartbeat=now))
 
 
 def _presence(state: PageState, message: Timestamp[Any], clock: Clock) -> PageState:
-    age = clock.age(message.value)
-    return state._replace(seen=clock.now() - max(age, 0.0))
+    seen = clock.now() - max(clock.age(message.value), 0.0)
+    return state._replace(operator=state.operator._replace(seen=seen))
 
 
 def _new_watchdog(state: PageState, begins: bool) -> PageState:
-    return state._replace(activity=None, strikes_left=state.strikes if begins else None)
+    left = state.strikes if begins else None
+    return state._replace(operator=state.operator._replace(activity=None, strikes_left=left))
 
 
 def _activity(state: PageState, message: Timestamp[Any], clock: Clock) -> PageState:
-    activity, left, now = message.value, state.strikes_left, clock.now()
+    activity, (seen, before, left) = message.value, state.operator
     if activity == MISSED and left is not None:
         left = max(0, left - 1)
     elif activity == INCAPACITATED:
         left = 0
-    elif activity == ALIVE and state.activity == INCAPACITATED:
+    elif activity == ALIVE and before == INCAPACITATED:
         left = state.strikes
-    state = state._replace(activity=activity, strikes_left=left)
-    return _explain(state, BY_WATCHDOG, now) if activity == INCAPACITATED else state
+    state = state._replace(operator=Operator(seen, activity, left))
+    return _explain(state, BY_WATCHDOG, clock) if activity == INCAPACITATED else state
 
 
 # The engines
 
 
 def _command(state: PageState, message: Timestamp[Any], clock: Clock) -> PageState:
-    now = clock.now()
     if message.value != TURN_OFF:
         return state
-    if now - state.own_turn_off < TOGETHER:
-        return _explain(state, BY_PAGE, now)
-    if state.activity is None and state.since_when == OLDER:
+    if clock.now() - state.engines.own_turn_off < TOGETHER:
+        return _explain(state, BY_PAGE, clock)
+    operator = state.operator
+    if operator.activity is None and state.engines.since_when == OLDER:
         # A watchdog that is older than this process repeats the command of an earlier conclusion.
-        state = state._replace(activity=INCAPACITATED, strikes_left=0)
-    return _explain(state, BY_WATCHDOG if state.activity == INCAPACITATED else BY_COMMAND, now)
+        operator = operator._replace(activity=INCAPACITATED, strikes_left=0)
+    cause = BY_WATCHDOG if operator.activity == INCAPACITATED else BY_COMMAND
+    return _explain(state._replace(operator=operator), cause, clock)
 
 
-def _explain(state: PageState, cause: str, now: float) -> PageState:
-    """Note why the engines go off: messages of other topics may come a little before or after that."""
-    goes_off = state.engines == ON or now - state.off_since < TOGETHER
-    is_older = state.off_since == -math.inf and state.since_when == OLDER
-    # The command of the watchdog may overtake its conclusion.
-    is_first = not state.cause or (state.cause == BY_COMMAND and now - state.caused < TOGETHER)
-    return state._replace(cause=cause, caused=now) if (goes_off or is_older) and is_first else state
+def _explain(state: PageState, cause: str, clock: Clock) -> PageState:
+    return state._replace(engines=state.engines.explain(cause, clock.now()))
 
 
 def _engines(controllers: Callable[[], frozenset[Any]]) -> Callable[[PageState, Any, Clock], PageState]:
     def change(state: PageState, message: Timestamp[Any], clock: Clock) -> PageState:
-        engines, now = message.value, clock.now()
-        if engines == ON:
+        engines, now = state.engines, clock.now()
+        was_on = engines.state == ON
+        after = engines._replace(state=message.value, reported=now)
+        if message.value == ON:
             # A repeated `on` may come after the command that ends it.
-            cause = state.cause if state.engines == ON and now - state.caused < TOGETHER else ""
-            known = state.controllers if state.engines == ON else controllers()
-            return state._replace(engines=ON, reported=now, controllers=known, cause=cause, refused=None)
-        if state.engines == ON:
-            is_new = not controllers() <= state.controllers
-            is_restarted = is_new or now - state.reported >= RENEWED
+            cause = engines.cause if was_on and now - engines.caused < TOGETHER else ""
+            known = engines.controllers if was_on else controllers()
+            after = after._replace(controllers=known, cause=cause, refused=None)
+        elif was_on:
+            is_new = not controllers() <= engines.controllers
+            is_restarted = is_new or now - engines.reported >= RENEWED
             fallback = RESTARTED if is_restarted else BY_CONTROLLER.format(state.presence_timeout)
-            return state._replace(engines=OFF, reported=now, off_since=now, since_when=fallback)
-        return state._replace(engines=OFF, reported=now)
+            after = after._replace(off_since=now, since_when=fallback)
+        return state._replace(engines=after)
 
     return change
 
@@ -292,14 +338,14 @@ def _diagnostics(namespace: str) -> Callable[[PageState, Any, Clock], PageState]
     by_sentinel = f"{namespace}/{manifest.SENTINEL}: "
 
     def change(state: PageState, message: Timestamp[Any], clock: Clock) -> PageState:
-        programs, now, refused = dict(state.programs), clock.now(), state.refused
+        programs, now, engines = dict(state.programs), clock.now(), state.engines
         for name, health in healths(message.value, namespace).items():
             if name in PROGRAMS:
                 programs[name] = programs.get(name, Program())._replace(
                     heard=now, ok=health.ok, reason=health.reason, since_output=health.since_output
                 )
             if name == ENGINE_CONTROLLER and (refusal := _REFUSED.search(health.reason)):
-                refused = now, refusal[1].strip()
+                engines = engines._replace(refused=(now, refusal[1].strip()))
         for status in message.value.status:
             name = status.name.removeprefix(by_sentinel)
             if name != status.name and name in PROGRAMS:
@@ -310,7 +356,7 @@ def _diagnostics(namespace: str) -> Callable[[PageState, Any, Clock], PageState]
                     restarts=_integer(values.get("restarts", "")),
                     observed=now,
                 )
-        return state._replace(programs=programs, refused=refused)
+        return state._replace(programs=programs, engines=engines)
 
     return change
 
@@ -320,15 +366,15 @@ def _integer(text: str) -> int:
 
 
 def _lines(state: PageState, batch: Sequence[Any], clock: Clock) -> PageState:
-    new = tuple(
+    new = [
         {
             "time": round(1000 * (clock.elapsed() - clock.age(line.time))),
             "kind": line.kind.name.lower(),
             "text": line.text,
         }
         for line in batch
-    )
-    return state._replace(lines=(*state.lines, *new)[-MAX_LINES:], line_count=state.line_count + len(new))
+    ]
+    return state._replace(lines=state.lines.add(new, MAX_LINES))
 
 
 # What the wiring notes
@@ -338,7 +384,8 @@ def held(hold: Hold) -> Change:
     """The switch after an event of a page."""
 
     def change(state: PageState) -> PageState:
-        state = state._replace(hold=hold, beaten=max(state.beaten, hold.seen))
+        beaten = max(state.hands.beaten, hold.seen)
+        state = state._replace(hands=state.hands._replace(hold=hold, beaten=beaten))
         if hold.ended:
             return refuse(hold.ended, BEAT, ENDED)(state)
         return refuse(hold.refused[0], "press", hold.refused[1])(state) if hold.refused else state
@@ -348,25 +395,23 @@ def held(hold: Hold) -> Change:
 
 def refuse(page: str, request: str, reason: str) -> Change:
     """A request of a page is refused."""
-    return lambda state: state._replace(
-        refusals=(*state.refusals, (page, request, reason))[-MAX_REFUSALS:],
-        refusal_count=state.refusal_count + 1,
-    )
+    refusal = (page, request, reason)
+    return lambda state: state._replace(refusals=state.refusals.add([refusal], MAX_REFUSALS))
 
 
 def turned_off(now: float) -> Change:
     """A page turns the engines off."""
-    return lambda state: state._replace(own_turn_off=now)
+    return lambda state: state._replace(engines=state.engines._replace(own_turn_off=now))
 
 
 def pressed(pressed: bool) -> Change:
     """The virtual switch is pressed or released by hand."""
-    return lambda state: state._replace(pressed=pressed)
+    return lambda state: state._replace(hands=state.hands._replace(pressed=pressed))
 
 
 def held_at_terminal(at_terminal: bool) -> Change:
     """A hand at a terminal begins or ends to send heartbeats."""
-    return lambda state: state._replace(at_terminal=at_terminal)
+    return lambda state: state._replace(hands=state.hands._replace(at_terminal=at_terminal))
 
 
 def follows_scenario(name: str, follows: bool) -> Change:

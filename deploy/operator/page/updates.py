@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from deploy.operator.page.state import BEAT, PROGRAMS, RENEWED, Clock, PageState, Program
+from deploy.operator.page.state import BEAT, PROGRAMS, RENEWED, Clock, Engines, PageState, Program
 from deploy.running import sentinel
 from interfaces import topics
 from interfaces.topics import ON
@@ -20,29 +20,30 @@ SILENT_CONTROLLER = "the engine controller is silent, so the drive stops the eng
 
 def view(state: PageState, page: str, now: float) -> dict[str, Any]:
     """Return what a page shows of a state at a time [s], by keys of an update."""
-    holder = state.hold.holder(now)
-    is_beating = now - state.heartbeat <= HEARTBEAT_VISIBLE
-    by = "terminal" if state.pressed or state.at_terminal else "scenario"
-    age = now - state.seen
-    is_reported = now - state.reported <= RENEWED
-    refused = state.refused[1] if state.refused and now - state.refused[0] <= REFUSAL_VISIBLE else None
+    arm, operator, hands, engines = state.arm, state.operator, state.hands, state.engines
+    holder = hands.hold.holder(now)
+    is_beating = now - hands.heartbeat <= HEARTBEAT_VISIBLE
+    by = "terminal" if hands.pressed or hands.at_terminal else "scenario"
+    age = now - operator.seen
+    is_reported = now - engines.reported <= RENEWED
+    refused = engines.refused[1] if engines.refused and now - engines.refused[0] <= REFUSAL_VISIBLE else None
     return {
-        "arm": {name: state.configuration.get(name) for name in topics.CONFIGURATION},
-        "position": {"x": state.position[0], "y": state.position[1]} if state.position else None,
-        "speed": state.speed,
+        "arm": {name: arm.configuration.get(name) for name in topics.CONFIGURATION},
+        "position": {"x": arm.position[0], "y": arm.position[1]} if arm.position else None,
+        "speed": arm.speed,
         "operator": {
             "seen": age <= PRESENCE_VISIBLE,
             "age": round(age, 1) if math.isfinite(age) else None,
-            "activity": state.activity,
-            "strikes_left": state.strikes_left,
+            "activity": operator.activity,
+            "strikes_left": operator.strikes_left,
         },
         "switch": {
             "held": bool(holder) or is_beating,
             "by": ("this_page" if holder == page else "other_page") if holder else by if is_beating else None,
         },
         "engines": {
-            "state": state.engines if is_reported else None,
-            "why": _why(state, is_reported),
+            "state": engines.state if is_reported else None,
+            "why": _why(engines, is_reported),
             "refused": refused,
         },
         "sources": {name: "hand" if name in state.by_hand else "scenario" for name in topics.CONFIGURATION},
@@ -50,10 +51,10 @@ def view(state: PageState, page: str, now: float) -> dict[str, Any]:
     }
 
 
-def _why(state: PageState, is_reported: bool) -> str:
+def _why(engines: Engines, is_reported: bool) -> str:
     if not is_reported:
         return SILENT_CONTROLLER
-    return "" if state.engines == ON else state.cause or state.since_when
+    return "" if engines.state == ON else engines.cause or engines.since_when
 
 
 def _row(name: str, program: Program, now: float) -> dict[str, Any]:
@@ -93,18 +94,16 @@ class Updates:
         shown = view(state, self._page, now)
         changes = {key: value for key, value in shown.items() if self._shown.get(key, self) != value}
         self._shown = shown
-        samples, self._samples = state.sample_count - self._samples, state.sample_count
-        lines, self._lines = state.line_count - self._lines, state.line_count
-        if samples:
-            changes["trace"] = state.samples[-samples:]
-        if lines:
-            changes["lines"] = state.lines[-lines:]
+        if samples := state.arm.samples.since(self._samples):
+            changes["trace"] = samples
+        if lines := state.lines.since(self._lines):
+            changes["lines"] = lines
+        self._samples, self._lines = state.arm.samples.total, state.lines.total
         return {"type": "update", "nonce": nonce, "time": round(self._clock.elapsed(), 3), **changes}
 
     def refusals(self, state: PageState) -> list[dict[str, str]]:
         """Return the new refusals of requests of the page, and once that its hold has ended."""
-        new, self._refusals = state.refusal_count - self._refusals, state.refusal_count
-        latest = state.refusals[-new:] if new else ()
+        latest, self._refusals = state.refusals.since(self._refusals), state.refusals.total
         ours = dict.fromkeys((request, reason) for page, request, reason in latest if page == self._page)
         return [
             {"type": "released", "why": reason}

@@ -35,7 +35,7 @@ def sent(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[Any]:
 def refusals(request: Request, programs: dict[str, Program]) -> list[tuple[str, str, str]]:
     changes: list[Change] = []
     requests.send_signal(request, programs).subscribe(changes.append)
-    return list(reduce(lambda state, change: change(state), changes, PageState()).refusals)
+    return list(reduce(lambda state, change: change(state), changes, PageState()).refusals.items)
 
 
 def test_page_on_the_machine_may_kill_a_process(sent: list[Any], tmp_path: Path) -> None:

@@ -21,7 +21,7 @@ from websockets.sync.client import connect
 from websockets.typing import Origin
 
 from deploy.operator import hold
-from deploy.operator.page import address, connection, protocol, server
+from deploy.operator.page import address, connection, protocol, server, state
 from deploy.operator.page.state import PageState, refuse
 from tests.operator.page.clients import TOKEN, Arm, SleepyPage, close_code, end, message, update
 
@@ -243,10 +243,10 @@ def test_flood_of_pings_is_closed(arm: Arm) -> None:
 
 
 def test_update_tells_all_first_and_then_the_changes(arm: Arm) -> None:
-    arm.state = PageState(speed=1.0)
+    arm.state = PageState(arm=state.Arm(speed=1.0))
     with arm.page() as page:
         first, second = update(page), update(page)
-        arm.state = PageState(speed=2.0)
+        arm.state = PageState(arm=state.Arm(speed=2.0))
         third = next(found for found in iter(lambda: update(page), None) if len(found) > 3)
 
     assert first["speed"] == 1.0
@@ -272,7 +272,7 @@ def test_page_that_sleeps_finds_the_newest_state_and_no_queue(arm: Arm) -> None:
     with contextlib.closing(SleepyPage(arm)) as page:
         assert page.wake(0.5)[0]["type"] == "welcome"
         for tick in range(40):
-            arm.state = PageState(speed=float(tick))
+            arm.state = PageState(arm=state.Arm(speed=float(tick)))
             time.sleep(0.05)
         messages = page.wake(0.5)
 

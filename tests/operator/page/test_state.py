@@ -14,7 +14,7 @@ from reactivex.testing import ReactiveTest, TestScheduler
 
 from deploy.operator.hold import OTHER_PAGE, Hold
 from deploy.operator.page import state
-from deploy.operator.page.state import Clock, PageState
+from deploy.operator.page.state import Arm, Clock, Engines, Operator, PageState, Recent
 from deploy.operator.page.updates import SILENT_CONTROLLER, Updates, view
 from interfaces import topics
 from interfaces.topics import ALIVE, INCAPACITATED, MISSED, OFF, ON, TURN_OFF
@@ -113,14 +113,17 @@ def test_trace_is_thinned_and_bounded(play: Play) -> None:
 
     found = play.run(222)
 
-    times = [sample[0] for sample in found.samples]
+    times = [sample[0] for sample in found.arm.samples.items]
     assert len(times) == state.MAX_SAMPLES
-    assert 450 <= found.sample_count <= 600, "at most 30 a second"
+    assert 450 <= found.arm.samples.total <= 600, "at most 30 a second"
     assert times[-1] == pytest.approx(220.8, abs=0.05), "of the stamp, not of the arrival"
 
 
 def test_new_page_shows_nothing_of_the_last_one(play: Play) -> None:
-    old = PageState(speed=1.0, position=(1.0, 1.0), configuration={"l1": 1.0}, seen=199.0, strikes_left=2)
+    old = PageState(
+        arm=Arm({"l1": 1.0}, position=(1.0, 1.0), speed=1.0),
+        operator=Operator(seen=199.0, strikes_left=2),
+    )
 
     shown = view(play.run(201, old), "page", 201)
 
@@ -164,38 +167,38 @@ def test_strikes_are_counted_from_the_start_of_the_watchdog(
     play.watchdogs.append(on_next(201, True))
     conclude(play, *((210 + number, conclusion) for number, conclusion in enumerate(conclusions)))
 
-    assert play.run(220).strikes_left == left
+    assert play.run(220).operator.strikes_left == left
 
 
 def test_new_watchdog_begins_new_strikes(play: Play) -> None:
     play.watchdogs += [on_next(201, True), on_next(215, True)]
     conclude(play, (210, MISSED), (211, MISSED))
 
-    assert play.run(220).strikes_left == 3
+    assert play.run(220).operator.strikes_left == 3
 
 
 def test_limits_are_those_of_this_arm(play: Play) -> None:
-    initial = PageState(since_when=state.NOT_YET, strikes=5, presence_timeout=2.5)
+    initial = PageState(strikes=5, presence_timeout=2.5)
     play.watchdogs = [on_next(201, True)]
     conclude(play, (205, MISSED))
     engines(play, (209, ON), (209.1, OFF))
 
     found = play.run(210, initial)
 
-    assert found.strikes_left == 4
+    assert found.operator.strikes_left == 4
     assert view(found, "page", 209.2)["engines"]["why"] == BY_CONTROLLER.replace("10", "2.5")
 
 
 def test_strikes_of_an_older_watchdog_are_unknown_until_it_begins_again(play: Play) -> None:
     play.watchdogs.append(on_next(201, False))
     conclude(play, (210, MISSED))
-    assert play.run(211).strikes_left is None
+    assert play.run(211).operator.strikes_left is None
 
 
 def test_strikes_are_known_again_after_the_operator_was_incapacitated(play: Play) -> None:
     play.watchdogs.append(on_next(201, False))
     conclude(play, (210, MISSED), (213, INCAPACITATED), (214, ALIVE))
-    assert play.run(215).strikes_left == 3
+    assert play.run(215).operator.strikes_left == 3
 
 
 # The switch
@@ -349,7 +352,7 @@ def test_old_reason_is_forgotten_when_they_are_on_again(play: Play) -> None:
 def test_restarted_page_program_does_not_guess(play: Play) -> None:
     engines(play, (209, OFF), (211, OFF))
 
-    found = play.run(212, PageState(since_when=state.OLDER))
+    found = play.run(212, PageState(engines=Engines(since_when=state.OLDER)))
     assert view(found, "page", 211.1)["engines"]["why"] == state.OLDER
 
 
@@ -357,7 +360,7 @@ def test_restarted_page_program_recognizes_the_watchdog(play: Play) -> None:
     play.say(210, topics.ENGINES, TURN_OFF)
     engines(play, (209, OFF), (211, OFF))
 
-    found = play.run(212, PageState(since_when=state.OLDER))
+    found = play.run(212, PageState(engines=Engines(since_when=state.OLDER)))
     shown = view(found, "page", 211.1)
     assert shown["engines"]["why"] == state.BY_WATCHDOG
     assert (shown["operator"]["activity"], shown["operator"]["strikes_left"]) == (INCAPACITATED, 0)
@@ -462,9 +465,9 @@ class Written(NamedTuple):
 def test_first_update_tells_everything_and_the_next_the_changes(play: Play) -> None:
     updates = Updates("page", play.clock)
 
-    first = updates.update(PageState(speed=1.0), "n1", 0.0)
-    second = updates.update(PageState(speed=1.0), "n2", 0.05)
-    third = updates.update(PageState(speed=2.0), "n3", 0.1)
+    first = updates.update(PageState(arm=Arm(speed=1.0)), "n1", 0.0)
+    second = updates.update(PageState(arm=Arm(speed=1.0)), "n2", 0.05)
+    third = updates.update(PageState(arm=Arm(speed=2.0)), "n3", 0.1)
 
     keys = {"arm", "position", "speed", "operator", "switch", "engines", "sources", "processes"}
     assert first.keys() == keys | {"type", "nonce", "time"}
@@ -478,12 +481,12 @@ def test_updates_carry_new_samples_and_lines_once(play: Play) -> None:
     lines = ({"text": "a"}, {"text": "b"})
 
     first = updates.update(
-        PageState(samples=samples[:3], sample_count=3, lines=lines, line_count=2), "n", 0.0
+        PageState(arm=Arm(samples=Recent(samples[:3], 3)), lines=Recent(lines, 2)), "n", 0.0
     )
     second = updates.update(
-        PageState(samples=samples[:5], sample_count=5, lines=lines, line_count=2), "n", 0.0
+        PageState(arm=Arm(samples=Recent(samples[:5], 5)), lines=Recent(lines, 2)), "n", 0.0
     )
-    third = updates.update(PageState(samples=samples, sample_count=500), "n", 0.0)
+    third = updates.update(PageState(arm=Arm(samples=Recent(samples, 500))), "n", 0.0)
 
     assert (first["trace"], first["lines"]) == (samples[:3], lines)
     assert (second["trace"], "lines" in second) == (samples[3:5], False)
@@ -496,9 +499,9 @@ def test_lines_are_numbered_in_milliseconds_of_the_scenario_and_bounded(play: Pl
     play.lines.append(on_next(210, batch))
 
     found = play.run(212)
-    assert len(found.lines) == state.MAX_LINES
-    assert found.lines[-1] == {"time": 209500, "kind": "speed", "text": "line 299"}
-    assert found.line_count == 300
+    assert len(found.lines.items) == state.MAX_LINES
+    assert found.lines.items[-1] == {"time": 209500, "kind": "speed", "text": "line 299"}
+    assert found.lines.total == 300
 
 
 def test_all_values_of_an_update_are_json(play: Play) -> None:
