@@ -82,20 +82,21 @@ def wire(node: ServiceNode) -> None:
     )
     newest = BehaviorSubject(initial)
 
+    # What pages do: they open, hold the switch, and ask for something
     events: Subject[server.Event] = Subject()
     is_open = pages_are_open(events, node.scheduler).share()
-    parameter_events = is_open.switch_map(lambda it: parameter_changes(node) if it else rx.never()).share()
+    set_elsewhere = during(is_open, parameter_changes(node)).share()
     hands = only(events, hold.Press, hold.Beat, hold.Release)
-    switch = Switch(node, hands, parameter_events, is_open, clock.now)
-
+    switch = Switch(node, hands, set_elsewhere, is_open, clock.now)
     asked = only(events, server.Request).share()
-    configuration = requests.Configuration(node)
     commands = requests.engine_commands(asked).share()
-    turn_offs = commands.filter(lambda command: command.value == TURN_OFF).share()
-    signals = asked.filter(lambda it: isinstance(it.message, protocol.Process))
     node.publish(topics.ENGINES, commands.map(lambda command: command.value))
+    turn_offs = commands.filter(lambda command: command.value == TURN_OFF).share()
+    own_turn_offs = turn_offs.map(lambda command: (command.timestamp, stamps.now()))  # it is published by now
+    configuration = requests.Configuration(node)
+    signals = asked.filter(lambda it: isinstance(it.message, protocol.Process))
 
-    # One reader of each topic for state and lines, while they observe it.
+    # What is observed, with one reader of each topic for state and lines
     observed = {topic.name: node.observe(topic, timestamped=True).share() for topic in topics.CONTRACT}
 
     def seen(topic: topics.Topic) -> Observable[Any]:
@@ -103,28 +104,23 @@ def wire(node: ServiceNode) -> None:
 
     unseen = node.observe_sampled(UNSEEN, UNSEEN_PERIOD, timestamped=True)
     engines = is_open.start_with(False).switch_map(lambda it: seen(topics.ENGINES_STATE) if it else unseen)
-
-    def always_seen(topic: topics.Topic) -> Observable[Any]:
-        return engines if topic is topics.ENGINES_STATE else seen(topic)
-
-    own_turn_offs = turn_offs.map(lambda command: (command.timestamp, stamps.now()))  # it is published by now
     ticks = rx.interval(LINES_PERIOD, node.scheduler)
     lines = line_batches(seen, own_turn_offs, ticks, node.get_namespace())
-    session = state.while_open(seen, lines, node.get_namespace(), clock)
+
+    # What pages show
     changes = rx.merge(
-        state.always(always_seen, new_watchdogs(node, epoch), controllers(node), clock),
-        is_open.switch_map(lambda it: session if it else rx.never()),
+        state.always(seen, engines, new_watchdogs(node, epoch), controllers(node), clock),
+        during(is_open, state.while_open(seen, lines, node.get_namespace(), clock)),
         switch.holds.map(state.held),
         switch.pressed.map(state.pressed),
-        terminal_holds(node, is_open).map(state.held_at_terminal),
+        during(is_open, terminal_holds(node)).map(state.held_at_terminal),
         turn_offs.map(lambda _: state.turned_off(clock.now())),
-        configuration.followers(parameter_events, is_open),
+        configuration.followers(set_elsewhere, is_open),
         configuration.outcomes(asked),
         signals.flat_map(lambda it: requests.send_signal(it, newest.value.programs)),
     )
-    states = state.page_states(changes, newest.value)
     # A scheduler would subscribe to one part of the recipe after another, and the first page may be faster.
-    states.subscribe(newest.on_next, node.fail)
+    state.page_states(changes, initial).subscribe(newest.on_next, node.fail)
     node.publish(topics.OPERATOR_HEARTBEAT, hold.heartbeats(switch.holds))
     only(events, server.Violation).subscribe(lambda it: node.health.drop("page", it.reason))
 
@@ -147,6 +143,11 @@ def pages_are_open(events: Observable[server.Event], scheduler: SchedulerBase) -
     return rx.merge(are_open.filter(bool), lingering).distinct_until_changed()
 
 
+def during(is_open: Observable[bool], items: Observable[Any]) -> Observable[Any]:
+    """Observe items while pages are open."""
+    return is_open.switch_map(lambda it: items if it else rx.never())
+
+
 def new_watchdogs(node: ServiceNode, epoch: Epoch) -> Observable[bool]:
     """Emit for each operator watchdog that appears whether it is new; the first may be older than us."""
     topic = topics.OPERATOR_ACTIVITY
@@ -155,17 +156,15 @@ def new_watchdogs(node: ServiceNode, epoch: Epoch) -> Observable[bool]:
     return appeared.map_indexed(lambda _, index: index > 0 or not epoch.is_past)
 
 
-def terminal_holds(node: ServiceNode, is_open: Observable[bool]) -> Observable[bool]:
-    """Emit while a page is open whether a hand at a terminal sends heartbeats: it has a publisher then."""
+def terminal_holds(node: ServiceNode) -> Observable[bool]:
+    """Emit whether a hand at a terminal sends heartbeats: it has a publisher then."""
     name = node.resolve_topic_name(topics.OPERATOR_HEARTBEAT.name)
     services = (VIRTUAL_SWITCH, manifest.PAGE)
 
     def look(_: Any) -> bool:
         return any(each.node_name not in services for each in node.get_publishers_info_by_topic(name))
 
-    ticks = rx.timer(0.0, TERMINALS_PERIOD, node.scheduler)
-    looks = is_open.switch_map(lambda it: ticks if it else rx.never())
-    return looks.map(look).distinct_until_changed()
+    return rx.timer(0.0, TERMINALS_PERIOD, node.scheduler).map(look).distinct_until_changed()
 
 
 def controllers(node: ServiceNode) -> Callable[[], frozenset[tuple[int, ...]]]:

@@ -183,11 +183,16 @@ def page_states(changes: Observable[Change], initial: PageState) -> Observable[P
 
 
 def always(
-    seen: Seen, watchdogs: Observable[bool], controllers: Callable[[], frozenset[Any]], clock: Clock
+    seen: Seen,
+    engines: Observable[Timestamp[str]],
+    watchdogs: Observable[bool],
+    controllers: Callable[[], frozenset[Any]],
+    clock: Clock,
 ) -> Observable[Change]:
     """
     The changes that count even while no page is open: a page that opens later shows strikes and reasons.
 
+    :param engines: the states of the engines.
     :param watchdogs: emits for each operator watchdog that appears, whether its strikes are known to begin.
     :param controllers: returns the present publishers of the engines' state.
     """
@@ -195,7 +200,7 @@ def always(
         watchdogs.map(lambda begins: lambda state: _new_watchdog(state, begins)),
         _changes(seen(topics.OPERATOR_ACTIVITY), _activity, clock),
         _changes(seen(topics.ENGINES), _command, clock),
-        _changes(seen(topics.ENGINES_STATE), _engines(controllers), clock),
+        _changes(engines, _engines(controllers), clock),
     )
 
 

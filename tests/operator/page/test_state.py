@@ -62,7 +62,9 @@ class Play:
 
         def create() -> rx.Observable[PageState]:
             hot = self._scheduler.create_hot_observable
-            always = state.always(seen, hot(*self.watchdogs), self.present_controllers, self.clock)
+            always = state.always(
+                seen, seen(topics.ENGINES_STATE), hot(*self.watchdogs), self.present_controllers, self.clock
+            )
             session = state.while_open(seen, hot(*self.lines), "/arm", self.clock)
             changes = rx.merge(
                 always,
