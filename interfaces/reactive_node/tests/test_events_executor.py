@@ -324,6 +324,26 @@ def test_timer_of_another_thread_wakes_a_sleeping_executor(make_node: MakeNode, 
     timer.join()
 
 
+def test_destroyed_subscription_gets_no_waiting_message(make_node: MakeNode, spin_until: SpinUntil) -> None:
+    node = make_node()
+    received: list[str] = []
+
+    def receive_once(message: Float64) -> None:
+        received.append("destroyed")
+        node.destroy_subscription(destroyed)
+
+    many = QoSProfile(depth=5, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    destroyed = node.create_subscription(Float64, "topic", receive_once, many)
+    node.create_subscription(Float64, "topic", lambda _: received.append("other"), many)
+    publisher = node.create_publisher(Float64, "topic", many)
+    for _ in range(5):
+        publisher.publish(ONE)
+    spin_until(lambda: received.count("other") == 5 and "destroyed" in received)
+    publisher.publish(ONE)
+    spin_until(lambda: received.count("other") == 6)
+    assert received.count("destroyed") == 1
+
+
 def test_entities_come_and_go_a_thousand_times_under_traffic(
     make_node: MakeNode, spin_until: SpinUntil
 ) -> None:

@@ -17,7 +17,7 @@ from rclpy.executors import Executor, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.task import Future, Task
 
-from reactive_node.stand_ins import NO_NODE, Window
+from reactive_node.stand_ins import NO_NODE, Turn, Window
 
 try:
     _experimental: Any = importlib.import_module("rclpy.experimental")
@@ -46,7 +46,7 @@ class _SteadyEventsExecutor(Executor):
 
     def __init__(self, context: Context | None) -> None:
         super().__init__(context=context)
-        self._turn: Future = Future()  # done as soon as another turn is needed
+        self._turn = Turn()
         self._events = _experimental.EventsExecutor(context=self.context)
         self._windows: dict[Node, Window] = {}
         # With one node, an exception of a task or of a QoS event is a segmentation fault (ros2/rclpy#1641).
@@ -75,8 +75,10 @@ class _SteadyEventsExecutor(Executor):
         return list(self._windows)
 
     def wake(self) -> None:
+        for window in [*self._windows.values()]:
+            window.refresh()
         self._events.wake()
-        self._turn.set_result(None)  # a new turn resumes the tasks whose futures another thread has completed
+        self._turn.end()  # a new turn resumes the tasks whose futures another thread has completed
 
     def spin(self) -> None:
         self.spin_until_future_complete(Future())
@@ -86,11 +88,8 @@ class _SteadyEventsExecutor(Executor):
 
     def spin_until_future_complete(self, future: Future, timeout_sec: float | None = None) -> None:
         end = _end(timeout_sec)
-        future.add_done_callback(lambda _: self._turn.set_result(None))
-        while not self._ends and self.context.ok():
-            self._turn = Future()
-            if future.done():  # before it could end this turn
-                return
+        future.add_done_callback(lambda _: self._turn.end())
+        while not self._ends and self.context.ok() and not future.done():
             self._events.spin_until_future_complete(self._turn, timeout_sec=self._begin_turn(end))
             if time.monotonic() >= end:
                 return

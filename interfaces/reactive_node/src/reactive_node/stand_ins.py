@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Iterable
+from types import SimpleNamespace
 from typing import Any
 
 from rclpy.event_handler import EventHandler
@@ -20,6 +21,24 @@ from rclpy.waitable import Waitable
 
 CreateTask = Callable[..., Any]
 """Runs a coroutine by the executor."""
+
+
+class Turn:
+    """The future that ends a turn of EventsExecutor, each turn the same: one of rclpy's would cost more."""
+
+    def __init__(self) -> None:
+        self._end: Callable[[Any], None] = lambda _: None
+
+    def add_done_callback(self, end: Callable[[Any], None]) -> None:
+        """Keep what ends this turn, or the next one if this has ended."""
+        self._end = end
+
+    def remove_done_callback(self, end: Callable[[Any], None]) -> None:
+        """Keep it: between two turns, there is one to end as well."""
+
+    def end(self) -> None:
+        """End the turn, on any thread."""
+        self._end(self)
 
 
 class _NoNode:
@@ -46,6 +65,18 @@ class Window(_NoNode):
         self._node = node
         self._create_task = create_task
         self._stand_ins: dict[type, dict[Any, Any]] = {}
+        self._events: list[Any] | None = None  # None after a change of entities
+
+    def refresh(self) -> None:
+        """
+        See which entities the node has now.
+
+        This takes the place of a look at each message: nothing else destroys a subscription of a node.
+        """
+        present = set(self._node.subscriptions)
+        for subscription, reader in self._stand_ins.get(_Reader, {}).items():
+            reader.lives = subscription in present
+        self._events = None
 
     def take_events(self) -> None:
         """
@@ -54,7 +85,11 @@ class Window(_NoNode):
         EventsExecutor must not see them: an event that is on its way while its endpoint is destroyed is a
         segmentation fault (ros2/rclpy#1644).
         """
-        for event in self._seen(_Event, [e for e in self._node.waitables if isinstance(e, EventHandler)]):
+        events = self._events
+        if events is None:
+            handlers = [each for each in self._node.waitables if isinstance(each, EventHandler)]
+            events = self._events = self._seen(_Event, handlers)
+        for event in events:
             event.take()
 
     @property
@@ -115,20 +150,19 @@ def _lives(entity: Any) -> bool:
 class _Reader:
     """A subscription that always asks for the info of a message: its callback may be replaced."""
 
-    CallbackType = Subscription.CallbackType
+    # The values of an Enum cost a call for each message.
+    CallbackType = SimpleNamespace(MessageOnly=SimpleNamespace(value=0))
+    _callback_type = SimpleNamespace(value=1)  # WithMessageInfo
 
     def __init__(self, subscription: Subscription, create_task: CreateTask) -> None:
         self.handle = subscription.handle
         self.msg_type = subscription.msg_type
         self.raw = subscription.raw
-        self._callback_type = self.CallbackType.WithMessageInfo
-        handle, only = self.handle, self.CallbackType.MessageOnly
+        self.lives = True
+        only = Subscription.CallbackType.MessageOnly
 
         def callback(*taken: Any) -> None:  # every message takes this path
-            try:
-                with handle:
-                    pass
-            except InvalidHandle:
+            if not self.lives:
                 return
             message, info = taken if len(taken) == 2 else taken[0]
             if subscription._callback_type is only:
