@@ -28,6 +28,7 @@ import traceback
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
+from types import ModuleType
 from typing import Any, NoReturn
 
 from deploy.running import processes
@@ -65,7 +66,6 @@ TYPES = (
     "rcl_interfaces.srv.SetParameters",
     "rcl_interfaces.srv.SetParametersAtomically",
     "sensor_msgs.msg.JointState",
-    "service_msgs.msg.ServiceEventInfo",
     "std_msgs.msg.Bool",
     "std_msgs.msg.Float64",
     "std_msgs.msg.Header",
@@ -84,6 +84,10 @@ _names: mmap.mmap  # the command line and the environment of this process, for a
 
 def import_libraries() -> None:
     """Import what programs need; what cannot be imported is an error of the program that imports it."""
+    if spec := importlib.util.find_spec("numpy"):
+        sys.modules.setdefault(
+            "numpy", _Late("numpy")
+        ).__file__ = spec.origin  # inspect looks at that of each
     gc.disable()  # imports leave next to no garbage, and to look for it takes a fifth of the time
     for name in libraries():
         with suppress(Exception):
@@ -95,6 +99,19 @@ def import_libraries() -> None:
         _use_names()
     gc.freeze()  # a collection in a fork would copy the memory that it shares
     gc.enable()
+
+
+class _Late(ModuleType):
+    """
+    A module that the first look at one of its names imports.
+
+    The message packages of ROS 2 import numpy for types with matrices: 17 MB that no service needs.
+    """
+
+    def __getattr__(self, name: str) -> Any:
+        del sys.modules[self.__name__]
+        vars(self).update(vars(importlib.import_module(self.__name__)))
+        return getattr(self, name)
 
 
 def libraries() -> tuple[str, ...]:
@@ -110,7 +127,9 @@ def types() -> tuple[str, ...]:
 def _use(type_: Any) -> None:
     """Let a type make what it makes on its first use: its hash and code, or load the library with both."""
     from rclpy.serialization import deserialize_message, serialize_message
+    from rclpy.type_support import check_for_type_support
 
+    check_for_type_support(type_)
     # A service's endpoint has the type of its request or response.
     parts = [type_.Request, type_.Response] if hasattr(type_, "Request") else [type_]
     for part in parts:

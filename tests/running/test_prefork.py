@@ -129,6 +129,17 @@ def test_edited_module_of_the_checkout_counts_at_the_next_start(tmp_path: Path) 
     assert (done.stdout, done.stderr) == ("True\nTrue\n", "")
 
 
+def test_numpy_is_imported_at_its_first_use(tmp_path: Path) -> None:
+    program = (
+        "counts = [sum(name.startswith('numpy') for name in sys.modules)]\n"
+        "import numpy as np, numpy.linalg; from numpy import zeros\n"
+        "assert np.__version__ and np.dtype('f8') == zeros(3).dtype and numpy.linalg.norm(zeros(3)) == 0.0\n"
+        f"print(counts); {FORKED}"
+    )
+    done = run(tmp_path, program, more="prefork.import_libraries()")
+    assert (done.stdout, done.stderr) == ("[1]\nTrue\n", "")
+
+
 @pytest.mark.parametrize("name", prefork.libraries())
 def test_prepared_library_exists(name: str) -> None:
     importlib.import_module(name)
