@@ -76,6 +76,7 @@ TYPES = (
 OPTIONAL = ("tf2_msgs.msg.TFMessage",)
 """A type that ROS 2's wheels do not have."""
 
+_NAMES = 40_000  # more than Python has room for in its table of names, and than a program adds
 _PR_SET_MM, _PR_SET_MM_MAP = 35, 14
 _NO_FILE = 0xFFFFFFFF
 
@@ -97,6 +98,8 @@ def import_libraries() -> None:
             _use(pkgutil.resolve_name(name))
     with suppress(Exception):
         _use_names()
+    for number in range(_NAMES):  # the table of names grows now: each fork would grow a copy of its own
+        sys.intern(f"name {number}")
     gc.freeze()  # a collection in a fork would copy the memory that it shares
     gc.enable()
 
