@@ -1,14 +1,40 @@
-"""How a service keeps Fast DDS from shared memory."""
+"""How a service keeps Fast DDS from shared memory, and packets from being lost."""
 
 from __future__ import annotations
 
 import os
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from rclpy.node import Node
+from std_msgs.msg import Float64
 
 from interfaces.service import middleware
+from reactive_node.testing import SpinUntil
 
+BURST = 1000  # packets; a socket holds 280 of them by default
+LARGEST_BUFFER = int(Path("/proc/sys/net/core/rmem_max").read_text())
+READER = f"""
+import rclpy
+from interfaces.service import middleware
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from std_msgs.msg import Float64
+
+middleware.avoid_shared_memory()
+rclpy.init()
+node = rclpy.create_node("reader")
+received = []
+qos = QoSProfile(depth={BURST}, reliability=ReliabilityPolicy.BEST_EFFORT)
+node.create_subscription(Float64, "burst", lambda message: received.append(message.data), qos)
+while received[-1:] != [{BURST - 1}.0]:
+    rclpy.spin_once(node)
+print(len(received))
+"""
 FASTDDS = Path("deploy/fastdds.xml").resolve()
 
 
@@ -18,6 +44,10 @@ FASTDDS = Path("deploy/fastdds.xml").resolve()
         ({}, ("SYSTEM_DEFAULT", FASTDDS.with_name("fastdds.localhost.xml"))),
         ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}, ("SUBNET", FASTDDS)),
         ({"ROS_STATIC_PEERS": "192.0.2.1"}, ("LOCALHOST", FASTDDS)),
+        (
+            {"FASTRTPS_DEFAULT_PROFILES_FILE": str(FASTDDS.with_name("fastdds.localhost.xml"))},
+            ("SYSTEM_DEFAULT", FASTDDS.with_name("fastdds.localhost.xml")),
+        ),
         ({"FASTRTPS_DEFAULT_PROFILES_FILE": "/users.xml"}, ("LOCALHOST", Path("/users.xml"))),
     ],
 )
@@ -38,3 +68,22 @@ def test_other_middleware_keeps_the_range(monkeypatch: pytest.MonkeyPatch) -> No
     monkeypatch.setattr(middleware, "get_rmw_implementation_identifier", lambda: "rmw_cyclonedds_cpp")
     middleware.avoid_shared_memory()
     assert os.environ[middleware.RANGE] == "LOCALHOST"
+
+
+@pytest.mark.skipif(LARGEST_BUFFER < 10**6, reason=f"platform: net.core.rmem_max is only {LARGEST_BUFFER}")
+def test_process_that_stands_still_loses_no_packet(
+    make_node: Callable[..., Node], spin_until: SpinUntil, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(middleware.PROFILES, str(FASTDDS))
+    publisher = make_node().create_publisher(Float64, "burst", 10)
+    with subprocess.Popen([sys.executable, "-c", READER], stdout=subprocess.PIPE, text=True) as reader:
+        last_resort = threading.Timer(20.0, reader.kill)
+        last_resort.start()
+        spin_until(lambda: publisher.get_subscription_count() == 1)
+        reader.send_signal(signal.SIGSTOP)
+        for number in range(BURST):
+            publisher.publish(Float64(data=float(number)))
+        reader.send_signal(signal.SIGCONT)
+        received = reader.communicate()[0]
+        last_resort.cancel()
+    assert int(received) == BURST

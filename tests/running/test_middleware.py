@@ -5,6 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from xml.etree import ElementTree
 
+import pytest
+
 from deploy.running.environment import set_middleware
 
 
@@ -18,14 +20,21 @@ def test_the_settings_of_the_user_win() -> None:
     assert users == unchanged
 
 
-def test_participants_of_fast_dds_announce_themselves_in_time() -> None:
-    """A killed service is heard again within a second. Fast DDS ignores a profile that it cannot read."""
+@pytest.mark.parametrize("file", ["fastdds.xml", "fastdds.localhost.xml"])
+def test_settings_of_fast_dds_bring_a_killed_service_back_in_time(file: str) -> None:
+    """Fast DDS ignores a profile that it cannot read."""
     settings: dict[str, str] = {}
     set_middleware(settings)
-    profiles = ElementTree.parse(Path(settings["FASTRTPS_DEFAULT_PROFILES_FILE"])).getroot()
+    profiles = ElementTree.parse(Path(settings["FASTRTPS_DEFAULT_PROFILES_FILE"]).with_name(file)).getroot()
     names = {"": "http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles"}
-    (participant,) = profiles.findall("profiles/participant", names)
-    assert participant.get("is_default_profile") == "true"
-    seconds = participant.findtext(".//leaseAnnouncement/sec", namespaces=names)
-    nanoseconds = participant.findtext(".//leaseAnnouncement/nanosec", namespaces=names)
-    assert 0.0 < float(seconds or 0) + float(nanoseconds or 0) * 1e-9 <= 0.5
+
+    def duration(path: str) -> float:
+        parts = (profiles.findtext(f".//{path}/{part}", namespaces=names) for part in ("sec", "nanosec"))
+        seconds, nanoseconds = (float(part or 0) for part in parts)
+        return seconds + nanoseconds * 1e-9
+
+    for kind in ("participant", "data_reader"):
+        (profile,) = profiles.findall(f"profiles/{kind}", names)
+        assert profile.get("is_default_profile") == "true"
+    assert 0.0 < duration("leaseAnnouncement") <= 0.31
+    assert 0.0 < duration("initialAcknackDelay") <= 0.01
