@@ -21,7 +21,6 @@ from interfaces.topics import ALIVE, INCAPACITATED, MISSED, TURN_OFF
 from reactive_node.stamps import Timestamp
 
 READING = 0.1  # s between two looks for a heartbeat: thousands of them cost no more than those of a switch
-FIRST_SAMPLE_AFTER_RESTART = 1.5 * READING  # so that a successor soon reports the operator
 
 
 class Activity(NamedTuple):
@@ -51,7 +50,7 @@ DEFAULTS = Parameters()
 
 
 def operator_activity(
-    heartbeats: Observable[Timestamp[Any]], given: Parameters = DEFAULTS, *, first: float = 0.5
+    heartbeats: Observable[Timestamp[Any]], given: Parameters = DEFAULTS, *, resumes: bool = False
 ) -> Observable[Activity]:
     """
     Emit whether the operator is alive, missed, incapacitated (Listings 5.7 and 5.8).
@@ -59,13 +58,14 @@ def operator_activity(
     A return between the strikes does not reset them. The first heartbeat after the last strike is ALIVE at
     once and begins new strikes.
 
-    :param first: time from each subscription to its first sample [s].
+    :param resumes: whether the first sample comes with the first heartbeat: the engines wait for a successor.
     """
 
     def watch(heartbeats: Observable[Timestamp[Any]]) -> Observable[Activity]:
         alive = heartbeats.map(lambda heartbeat: Activity(ALIVE, heartbeat.timestamp))
+        ticks = rx.interval(given.sampling)
         return (
-            alive.sample(rx.timer(first, given.sampling))
+            alive.sample(alive.take(1).concat(ticks) if resumes else ticks)
             .timeout(given.silence)
             .catch(lambda error, _: rx.throw(error).start_with(Activity(MISSED)))
             .retry(given.strikes)
@@ -100,9 +100,8 @@ def wire(node: ServiceNode) -> None:
     heartbeats = node.observe_sampled(
         topics.OPERATOR_HEARTBEAT, reading, timestamped=True, max_age=given.lifespan
     )
-    first = min(FIRST_SAMPLE_AFTER_RESTART, given.sampling) if epoch.is_past else given.sampling
     # Silences count from the origin of the scenario: before it, no operator is expected.
-    activity = epoch.start(operator_activity(heartbeats, given, first=first)).share()
+    activity = epoch.start(operator_activity(heartbeats, given, resumes=epoch.is_past)).share()
     presence, absence = activity.partition(lambda it: it.conclusion == ALIVE)
     absence.subscribe(warn, scheduler=node.scheduler)
     node.publish(topics.OPERATOR_PRESENCE, presence.map(lambda it: it.seen))

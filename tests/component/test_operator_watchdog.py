@@ -148,7 +148,7 @@ def test_end_of_the_heartbeats_is_a_silence(scheduler: TestScheduler) -> None:
     assert 10.0 <= watched.turn_off[0] <= 10.5
 
 
-def strikes(heartbeats: list[int], first: int, until: int) -> list[int]:
+def strikes(heartbeats: list[int], until: int) -> list[int]:
     """
     Return when the operator is missed [ms], by a model without Rx.
 
@@ -159,7 +159,7 @@ def strikes(heartbeats: list[int], first: int, until: int) -> list[int]:
     pending = sorted(heartbeats)
     while len(missed) < 3:
         before = begin
-        for sample in range(begin + first, until, 500):
+        for sample in range(begin + 500, until, 500):
             if seen + 3000 <= sample:
                 break
             beats = [beat for beat in pending if beat <= sample]
@@ -175,19 +175,29 @@ def strikes(heartbeats: list[int], first: int, until: int) -> list[int]:
     return missed
 
 
-@given(st.lists(st.integers(11, 20_000), max_size=30), st.sampled_from([100, 500]))
-def test_watchdog_fires_if_and_only_if_there_were_three_silences(heartbeats: list[int], sample: int) -> None:
+@given(st.lists(st.integers(11, 20_000), max_size=30))
+def test_watchdog_fires_if_and_only_if_there_were_three_silences(heartbeats: list[int]) -> None:
     until = 25_000
-    expected = strikes(heartbeats, sample, until)
+    expected = strikes(heartbeats, until)
     scheduler = TestScheduler()
     times = [time / 1000 for time in sorted(heartbeats)]
 
-    watched = watch(scheduler, hot(scheduler, *times), until / 1000, first=sample / 1000)
+    watched = watch(scheduler, hot(scheduler, *times), until / 1000)
 
     assert [round(time * 1000) for time in watched.missed[:3]] == expected
     first = [round(time * 1000) for time in watched.turn_off[:1]]
     assert first == expected[2:]
     assert first == [round(time * 1000) for time in watched.incapacitated[:1]]
+
+
+def test_watchdog_that_resumes_reports_the_first_heartbeat_at_once(scheduler: TestScheduler) -> None:
+    heartbeats = hot(scheduler, 0.3, 0.35, 0.7, 0.75, 1.4)
+
+    watched = watch(scheduler, heartbeats, 11.0, resumes=True)
+
+    assert watched.alive == [0.3, 0.8, 1.8]
+    assert [round(time, 3) for time in watched.missed] == [4.8, 7.8, 10.8]
+    assert [round(time, 3) for time in watched.incapacitated] == [10.8]
 
 
 @given(st.lists(st.integers(1, 2499), min_size=1, max_size=20))

@@ -142,14 +142,14 @@ def test_silences_are_missed_then_incapacitated_then_turn_off(
     assert took >= 2 * 0.4 + 38 * repeat
 
 
-@pytest.mark.parametrize(("sampling", "first"), [(2.0, pytest.approx(0.15)), (0.02, 0.02)])
-def test_watchdog_that_resumes_soon_reports_the_operator(
-    wired: Any, monkeypatch: pytest.MonkeyPatch, sampling: float, first: float
+@pytest.mark.parametrize(("begin", "resumes"), [(-60.0, True), (60.0, False)])
+def test_watchdog_resumes_a_running_scenario(
+    wired: Any, monkeypatch: pytest.MonkeyPatch, begin: float, resumes: bool
 ) -> None:
     recipe = mock.Mock(wraps=operator_watchdog.operator_activity)  # its samples have tests in virtual time
     monkeypatch.setattr(operator_watchdog, "operator_activity", recipe)
-    wired(sampling=sampling, scenario_epoch=time.monotonic() - 60.0)
-    assert [call.kwargs["first"] for call in recipe.mock_calls] == [first]
+    wired(scenario_epoch=time.monotonic() + begin)
+    assert [call.kwargs["resumes"] for call in recipe.mock_calls] == [resumes]
 
 
 def test_watchdog_samples_at_the_parameter_in_a_new_scenario(wired: Any, spin_for: SpinFor) -> None:

@@ -43,7 +43,7 @@ _TIMERS: dict[str, tuple[Topic, float, float]] = {
     "operator_watchdog": (
         OPERATOR_ACTIVITY,
         _WATCHDOG.sampling,
-        operator_watchdog.FIRST_SAMPLE_AFTER_RESTART,
+        operator_watchdog.READING,
     ),
     "engine_controller": (ENGINES_STATE, engine_controller.DEFAULTS.repeat, 0.0),
     "robot_state": (ROBOT_DESCRIPTION, robot_state.DESCRIPTION_PERIOD, 0.0),
