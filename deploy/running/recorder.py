@@ -129,6 +129,7 @@ def record(
     recorder: Recorder,
     first: Callable[[str], None] = lambda name: None,
     lost: Callable[[float, float], None] = lambda begin, end: None,
+    is_foreign: Callable[[topics.Topic, bytes], bool] = lambda topic, data: False,
 ) -> None:
     """
     Record all topics of the contract in the namespace of a node, for as long as the node is spun.
@@ -139,13 +140,14 @@ def record(
     :param first: is called with the name of each topic at its first message.
     :param lost: is called if the middleware has lost messages, with the begin and the end of the time in
         which they were sent, on the monotonic clock [s]. Lost heartbeats do not count: a flood has too many.
+    :param is_foreign: whether a message has a number of another publisher than the contract's.
     """
     for topic in topics.CONTRACT:
         write = _writer(node, topic, recorder, first)
         if topic is topics.OPERATOR_HEARTBEAT:
             _record_newest(node, topic, write)
         else:
-            _record_all(node, topic, write, lost)
+            _record_all(node, topic, write, lost, is_foreign)
 
 
 def _writer(
@@ -189,6 +191,7 @@ def _record_all(
     topic: topics.Topic,
     write: Callable[[bytes, int], int],
     lost: Callable[[float, float], None],
+    is_foreign: Callable[[topics.Topic, bytes], bool],
 ) -> None:
     # The loss is reported before or after the next message is: the one before both is among the last two.
     last_two: deque[int] = deque(maxlen=2)
@@ -199,6 +202,8 @@ def _record_all(
     def receive(data: bytes, info: Any) -> None:
         nonlocal last_number
         last_two.append(write(data, info["source_timestamp"]))
+        if is_foreign(topic, data):
+            return
         number = info["publication_sequence_number"] if is_numbered else None
         if last_number is not None and number is not None and number > last_number + 1:
             report_loss(info)  # Fast DDS does not report each one

@@ -16,6 +16,8 @@ from reactivex.testing import TestScheduler
 from deploy.running import recorder
 from interfaces import topics
 
+FOREIGN = b"from another publisher"
+
 
 class Reader:
     """In place of a subscription, and of its handle: keeps the newest messages, as many as its QoS says."""
@@ -80,7 +82,12 @@ def reports() -> list[tuple[float, float]]:
 def node(tmp_path: Path, reports: list[tuple[float, float]]) -> Iterator[Subscriptions]:
     subscriptions: Any = Subscriptions()
     file = recorder.Recorder(tmp_path / "record.mcap", 0, 10**18)
-    recorder.record(subscriptions, file, lost=lambda begin, end: reports.append((begin, end)))
+    recorder.record(
+        subscriptions,
+        file,
+        lost=lambda begin, end: reports.append((begin, end)),
+        is_foreign=lambda topic, data: data == FOREIGN,
+    )
     yield subscriptions
     file.close()
 
@@ -91,10 +98,11 @@ def receive(
     at: float,
     topic: topics.Topic = topics.L2,
     number: int | None = None,
+    data: bytes = b"",
 ) -> None:
     clock.now = at
     info = {"source_timestamp": time.time_ns(), "publication_sequence_number": number}
-    node.write[topic.name](b"", info)
+    node.write[topic.name](data, info)
 
 
 def lose(node: Subscriptions, clock: Clock, at: float, topic: topics.Topic = topics.L2) -> None:
@@ -156,6 +164,20 @@ def test_numbers_of_a_new_publisher_begin_again(
 ) -> None:
     for at, number in ((1.0, 7), (2.0, 1), (3.0, 2)):
         receive(node, clock, at, number=number)
+    assert not reports
+
+
+def test_numbers_of_a_foreign_publisher_mean_nothing(
+    node: Subscriptions, clock: Clock, reports: list[tuple[float, float]]
+) -> None:
+    for at, number, data in (
+        (1.0, 7, b""),
+        (2.0, 90, FOREIGN),
+        (3.0, 8, b""),
+        (4.0, 1, FOREIGN),
+        (5.0, 9, b""),
+    ):
+        receive(node, clock, at, number=number, data=data)
     assert not reports
 
 

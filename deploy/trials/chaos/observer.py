@@ -27,6 +27,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 
 from deploy.promises.history import LOSS, NO_TARGET, OVERLOAD, InjectedFault, Life
+from deploy.promises.marks import is_babble
 from deploy.promises.observations import FAULTS, PROCESSES
 from deploy.running.recorder import Recorder, clocks, record
 from deploy.trials.chaos.process_monitor import SCAN_PERIOD, ProcessMonitor, Rounds
@@ -65,7 +66,7 @@ def _recording(
     executor = SingleThreadedExecutor(context=context)
     node = ReactiveNode(f"observer_{os.getpid()}", context=context, namespace=namespace)
     executor.add_node(node)
-    record(node, recorder, _report_first, lost)
+    record(node, recorder, _report_first, lost, is_babble)
 
     def spin(ended: threading.Event) -> None:
         rounds = Rounds(overload)
