@@ -15,6 +15,7 @@ from rclpy.task import Future
 from deploy.running import interruption, manifest
 from deploy.running.environment import namespace_of
 from deploy.running.errors import DeploymentError
+from interfaces.service import middleware
 from reactive_node import ReactiveNode
 from reactive_node.executor import create_executor
 
@@ -27,8 +28,9 @@ class Member:
     def __init__(self) -> None:
         """Join. Raises DeploymentError if the environment does not allow it."""
         try:
-            rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
-            self.node = ReactiveNode(f"terminal_{os.getpid()}", namespace=namespace_of(os.environ))
+            with middleware.without_shared_memory():
+                rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+                self.node = ReactiveNode(f"terminal_{os.getpid()}", namespace=namespace_of(os.environ))
         except RuntimeError as error:
             rclpy.try_shutdown()
             raise DeploymentError(f"Cannot join the ROS graph: {error}") from None

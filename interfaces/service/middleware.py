@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from rclpy.utilities import get_rmw_implementation_identifier
@@ -11,16 +13,31 @@ RANGE, PEERS = "ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_STATIC_PEERS"
 PROFILES = "FASTRTPS_DEFAULT_PROFILES_FILE"
 
 
-def avoid_shared_memory() -> None:
-    """
-    Keep this process on this machine by settings of Fast DDS; ROS 2's LOCALHOST would add shared memory.
+@contextmanager
+def without_shared_memory() -> Iterator[None]:
+    """Initialize rclpy and create its first node in this ``with``; child processes inherit no change."""
+    changes = settings()
+    before = {name: os.environ[name] for name in changes}
+    os.environ |= changes
+    try:
+        yield
+    finally:
+        os.environ |= before
 
-    Call this before ``rclpy.init()``. The settings are in ``NAME.localhost.xml`` next to ``NAME.xml``, the
-    profiles file of the environment; without that file, nothing changes. Child processes inherit them.
+
+def settings() -> dict[str, str]:
     """
-    profiles = os.environ.get(PROFILES, "")
-    local = Path(f"{profiles.removesuffix('.xml').removesuffix('.localhost')}.localhost.xml")
+    Return the environment that keeps Fast DDS on this machine without shared memory, which LOCALHOST adds.
+
+    The settings are in ``NAME.localhost.xml`` next to ``NAME.xml``, the profiles file of the environment;
+    without that file, nothing changes.
+    """
     wants_localhost = os.environ.get(RANGE, "").upper() == "LOCALHOST" and not os.environ.get(PEERS)
-    if wants_localhost and local.is_file() and get_rmw_implementation_identifier() == "rmw_fastrtps_cpp":
-        os.environ[RANGE] = "SYSTEM_DEFAULT"  # as the profile says
-        os.environ[PROFILES] = str(local)
+    local = f"{os.environ.get(PROFILES, '').removesuffix('.xml').removesuffix('.localhost')}.localhost.xml"
+    if (
+        wants_localhost
+        and Path(local).is_file()
+        and get_rmw_implementation_identifier() == "rmw_fastrtps_cpp"
+    ):
+        return {RANGE: "SYSTEM_DEFAULT", PROFILES: local}  # the range is in the profile
+    return {}

@@ -57,9 +57,9 @@ def refuse(name: str, reason: str) -> NoReturn:
 def _run(name: str, wire: Callable[[ServiceNode], None]) -> int:
     """Return the exit code."""
     try:
-        middleware.avoid_shared_memory()
-        rclpy.init()
-        node = ServiceNode(name, namespace=os.environ.get(NAMESPACE, ""))
+        with middleware.without_shared_memory():
+            rclpy.init()
+            node = ServiceNode(name, namespace=os.environ.get(NAMESPACE, ""))
     except (*USER_ERRORS, RuntimeError) as error:  # RuntimeError: of domain, discovery or DDS
         rclpy.try_shutdown()
         return _refuse(name, error, 2)

@@ -31,6 +31,7 @@ from deploy.promises.marks import is_babble
 from deploy.promises.observations import FAULTS, PROCESSES
 from deploy.running.recorder import Recorder, clocks, record
 from deploy.trials.chaos.process_monitor import SCAN_PERIOD, ProcessMonitor, Rounds
+from interfaces.service import middleware
 from reactive_node import ReactiveNode
 
 
@@ -62,9 +63,10 @@ def _recording(
     :param overload: receives begin and end of each time in which the thread was not scheduled.
     """
     context = Context()
-    rclpy.init(args=[], context=context, domain_id=domain, signal_handler_options=SignalHandlerOptions.NO)
+    with middleware.without_shared_memory():
+        rclpy.init(args=[], context=context, domain_id=domain, signal_handler_options=SignalHandlerOptions.NO)
+        node = ReactiveNode(f"observer_{os.getpid()}", context=context, namespace=namespace)
     executor = SingleThreadedExecutor(context=context)
-    node = ReactiveNode(f"observer_{os.getpid()}", context=context, namespace=namespace)
     executor.add_node(node)
     record(node, recorder, _report_first, lost, is_babble)
 
