@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 from hypothesis import Phase, settings
 
+from interfaces.service import middleware
 from tests.runtimes import left_out_here
 
 collect_ignore = [*left_out_here()]  # `make test` runs these with RUNTIME=embedded
@@ -32,9 +33,18 @@ def pytest_configure() -> None:
     os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
     if "FASTDDS_DEFAULT_PROFILES_FILE" not in os.environ:  # ROS 2 Kilted warns of the older name
         os.environ["FASTRTPS_DEFAULT_PROFILES_FILE"] = str(Path(__file__).with_name("deploy") / "fastdds.xml")
+    os.environ |= middleware.settings()
     signal.signal(signal.SIGHUP, signal.SIG_DFL)  # nohup ignores it
     signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs ignore it
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # fixtures clean up
+
+
+@pytest.fixture
+def domain_id(domain_id: int, monkeypatch: pytest.MonkeyPatch) -> int:
+    """A free ROS domain; the environment selects it and keeps its traffic on this machine."""
+    for name, value in middleware.settings().items():
+        monkeypatch.setenv(name, value)
+    return domain_id
 
 
 @pytest.hookimpl(wrapper=True)
