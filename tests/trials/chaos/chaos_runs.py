@@ -26,6 +26,7 @@ class ChaosRun:
         self.page = next(directory.glob(f"chaos/*/report{file_suffix(namespace)}.html"))
         self.history: History = record.load(self.page.with_name("record.mcap"), namespace)
         self.findings: dict[str, Finding] = {name: check(self.history) for name, check in CHECKERS.items()}
+        self.left_in_shared_memory: set[Path] = set()
 
     def finding(self, promise: str) -> Finding:
         """Return the finding on a promise, which must not be violated."""
@@ -36,7 +37,15 @@ class ChaosRun:
 
 def chaos_run(run: Path, *options: str) -> ChaosRun:
     """Run `make chaos` with one arm; its files are in a directory."""
-    return ChaosRun(run, *unleash(run, *options))
+    before = fast_dds_files()
+    result = ChaosRun(run, *unleash(run, *options))
+    result.left_in_shared_memory = fast_dds_files() - before
+    return result
+
+
+def fast_dds_files() -> set[Path]:
+    """Return the files of Fast DDS in shared memory; other tests do not have any."""
+    return {*Path("/dev/shm").glob("fast*"), *Path("/dev/shm").glob("sem.fast*")}
 
 
 def unleash(run: Path, *options: str) -> tuple[str, int]:
