@@ -175,7 +175,7 @@ def test_a_node_that_never_spins_keeps_no_announcements_of_peers(
     for _ in range(CYCLES):
         other.destroy_publisher(other.create_publisher(Float64, "flood", 10))
     graph = node._rclpy_graph
-    held = [graph._reader.condition, *(graph._discovery.gone if graph._discovery else ())]
+    held = [graph._peers._reader.condition, *(graph._discovery.gone if graph._discovery else ())]
     deadline = time.monotonic() + SECONDS
     while any(blocking.dds_triggered(condition) for condition in held):
         assert time.monotonic() < deadline, "DDS still holds samples that were never taken"
