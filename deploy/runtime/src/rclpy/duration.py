@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import total_ordering
 from typing import Protocol
 
 import builtin_interfaces.msg
@@ -18,6 +19,7 @@ class DurationType(Protocol):
     def nanoseconds(self) -> int: ...
 
 
+@total_ordering
 class Duration:
     """A duration, possibly negative, with a resolution of one nanosecond."""
 
@@ -58,27 +60,6 @@ class Duration:
     def __lt__(self, other: object) -> bool:
         return (
             self._rclpy_nanoseconds < other._rclpy_nanoseconds
-            if isinstance(other, Duration)
-            else NotImplemented
-        )
-
-    def __le__(self, other: object) -> bool:
-        return (
-            self._rclpy_nanoseconds <= other._rclpy_nanoseconds
-            if isinstance(other, Duration)
-            else NotImplemented
-        )
-
-    def __gt__(self, other: object) -> bool:
-        return (
-            self._rclpy_nanoseconds > other._rclpy_nanoseconds
-            if isinstance(other, Duration)
-            else NotImplemented
-        )
-
-    def __ge__(self, other: object) -> bool:
-        return (
-            self._rclpy_nanoseconds >= other._rclpy_nanoseconds
             if isinstance(other, Duration)
             else NotImplemented
         )

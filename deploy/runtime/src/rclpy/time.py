@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import total_ordering
 from typing import Protocol, overload
 
 import builtin_interfaces.msg
@@ -22,6 +23,7 @@ class TimeHandle(Protocol):
     def clock_type(self) -> ClockType: ...
 
 
+@total_ordering
 class Time:
     """
     A point in time: nanoseconds since the epoch of a clock, and the type of the clock.
@@ -132,37 +134,9 @@ class Time:
             else NotImplemented
         )
 
-    def __ne__(self, other: object) -> bool:
-        return (
-            self._rclpy_nanoseconds != self._rclpy_comparable(other)
-            if isinstance(other, Time)
-            else NotImplemented
-        )
-
     def __lt__(self, other: object) -> bool:
         return (
             self._rclpy_nanoseconds < self._rclpy_comparable(other)
-            if isinstance(other, Time)
-            else NotImplemented
-        )
-
-    def __le__(self, other: object) -> bool:
-        return (
-            self._rclpy_nanoseconds <= self._rclpy_comparable(other)
-            if isinstance(other, Time)
-            else NotImplemented
-        )
-
-    def __gt__(self, other: object) -> bool:
-        return (
-            self._rclpy_nanoseconds > self._rclpy_comparable(other)
-            if isinstance(other, Time)
-            else NotImplemented
-        )
-
-    def __ge__(self, other: object) -> bool:
-        return (
-            self._rclpy_nanoseconds >= self._rclpy_comparable(other)
             if isinstance(other, Time)
             else NotImplemented
         )
