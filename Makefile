@@ -49,7 +49,7 @@ help:
 	@echo "make start    start it in the background          (run, start: SCENARIO=demo, listing_5_9 or a file)"
 	@echo "                                                  (PARAMETERS=file; WEB=off for no page, or its port)"
 	@echo "make terminal attach this terminal to it"
-	@echo "make status   its services: state, pid, uptime, restarts, last output, health"
+	@echo "make status   its rclpy, page and services: state, pid, uptime, restarts, last output, health"
 	@echo "make logs     follow their logs"
 	@echo "make record   record its messages until Ctrl-C     (MCAP for Foxglove and ros2 bag, in .run/records)"
 	@echo "make stop     stop it"

@@ -5,18 +5,18 @@ from __future__ import annotations
 import argparse
 import os
 import signal
-import subprocess
 import sys
 import time
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import closing, contextmanager, suppress
 from typing import TYPE_CHECKING
 
 from deploy.commands.stop import stop
 from deploy.operator.output import say
-from deploy.running import interruption, messages
+from deploy.running import interruption, messages, rclpy_choice
 from deploy.running.environment import NAMESPACE, set_middleware
 from deploy.running.errors import DeploymentError
+from deploy.running.run_directory import RUN
 from deploy.running.supervisord import Program
 from deploy.running.system import System
 
@@ -88,7 +88,7 @@ def attach(system: System) -> None:
 
 
 def status(system: System) -> None:
-    """Print a table of the services."""
+    """Print what the system runs on, the address of its page, and a table of the services."""
     if not _adopt_environment(system):
         print("Nothing runs.")
         return
@@ -98,6 +98,9 @@ def status(system: System) -> None:
 
     programs = system.programs()
     running = [program for program in programs if program.pid]
+    print(f"{rclpy_choice.words()}, {place(os.environ)}")
+    if page := system.page:
+        print(page)
     with Member() as member, heard_healths(member.node) as health:
         _listen(member, running, health, STATUS_LIMIT)
         print(of_services(programs, health))
@@ -109,17 +112,16 @@ def logs(system: System) -> None:
         nothing = f"Nothing runs: make start. The logs of the last run are in {system.logs}"
         raise DeploymentError(messages.unattended(system.run) if system.members() else nothing)
     files = sorted(f"{system.logs.name}/{path.name}" for path in system.logs.glob("*.log"))
-    with subprocess.Popen(["tail", "-n", "10", "-F", "supervisord.log", *files], cwd=system.run) as tail:
-        try:
-            while tail.poll() is None:
-                interruption.check()
-                if system.supervisor_has_ended():
-                    print(messages.how_it_ended(system.run))
-                    break
-                with suppress(subprocess.TimeoutExpired):
-                    tail.wait(0.1)
-        finally:
-            tail.terminate()
+    from deploy.commands.logs import follow, readable
+
+    with closing(follow(system.run, ["supervisord.log", *files])) as lines:
+        for line in lines:
+            interruption.check()
+            if line is not None:
+                print(readable(line).decode(errors="replace"), flush=True)
+            elif system.supervisor_has_ended():
+                print(messages.how_it_ended(system.run))
+                break
 
 
 def record(system: System) -> None:
@@ -194,6 +196,7 @@ def _last_words(system: System, program: Program, begin: int) -> str:
     with suppress(OSError), (system.logs / f"{program.name}.log").open("rb") as log:
         log.seek(begin)
         lines = dict.fromkeys(log.read().decode(errors="replace").splitlines())  # each attempt says the same
+        lines = {line: None for line in lines if not line.startswith(RUN)}
         return "\n".join(list(lines)[-LOG_LINES:]) or program.error
     return program.error
 

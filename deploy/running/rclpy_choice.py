@@ -12,6 +12,13 @@ RUNTIME = "RUNTIME"
 """Environment variable: "embedded" for the rclpy of this checkout, "" for ROS 2's own."""
 
 
+def words() -> str:
+    """Name the rclpy of this environment for the user."""
+    if file := sourced_rclpy():
+        return f"rclpy of the sourced ROS 2 ({file})"
+    return "embedded rclpy" if os.environ.get(RUNTIME) else "rclpy of ROS 2's wheels"
+
+
 def sourced_rclpy() -> str:
     """The file of the rclpy of a sourced ROS 2, which is in PYTHONPATH; '' without one."""
     path = [entry for entry in os.environ.get("PYTHONPATH", "").split(os.pathsep) if entry]

@@ -6,6 +6,7 @@ import fcntl
 import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ SETTINGS = "settings"  # in the run directory: where services keep the values th
 PAGE_FILE = "page.txt"  # in the settings: the line that tells the address of the page
 PARAMETERS = "parameters.yaml"  # in the run directory: the ROS parameter file of all services
 ALL, KEY = "/**", "ros__parameters"  # the form of ROS 2's parameter files
+RUN = 20 * "-"  # begins the line between two runs in a log
 NOT_YET = -1.0  # scenario_epoch: the scenario waits until this parameter is set
 
 
@@ -49,6 +51,13 @@ class RunDirectory:
     def is_wanted(self) -> bool:
         """Whether the system was started and not stopped since."""
         return self.parameters.exists()
+
+    def part_logs(self) -> None:
+        """Write a line into each log, between the last run and the next one."""
+        for path in self.logs.glob("*.log"):
+            with suppress(OSError), path.open("ab") as log:  # a full disk
+                if log.tell():
+                    log.write(f"{RUN} {datetime.now():%Y-%m-%d %H:%M:%S} {RUN}\n".encode())
 
     def write_parameters(self, parameters: Mapping[str, object]) -> None:
         """Write the parameter file; services read the old one or the new one."""

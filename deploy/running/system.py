@@ -141,6 +141,7 @@ class System(RunDirectory):
 
     def _start_supervisor(self) -> None:
         self._end_members()
+        self.part_logs()
         try:
             inherited = environment.of_supervisord(self._environment, self.run)
             self._supervisor = os.pidfd_open(supervisord.start(self.run, inherited, self._within))

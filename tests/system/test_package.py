@@ -96,7 +96,7 @@ def test_installed_arm_starts_from_its_own_files(site: Site, prefix: Path) -> No
     }
     assert paths == {str(prefix / "share" / PACKAGE)}
     code, table = site.do_command(*command(prefix, "arm", "status"))
-    rows = [line.split() for line in table.splitlines()[1:]]
+    rows = [line.split() for line in table[table.index("SERVICE") :].splitlines()[1:]]
     assert (code, [name for name, *_ in rows]) == (0, [each.name for each in manifest.programs()])
     # supervisord calls a process STARTING for its first second; all services have reported before that.
     assert {state for _, state, *_ in rows} <= {"STARTING", "RUNNING"}

@@ -21,6 +21,7 @@ from std_msgs.msg import Bool, Float64, String
 
 from deploy.running import processes
 from deploy.running.rclpy_choice import sourced_rclpy
+from deploy.running.system import System
 from interfaces import topics
 from tests.system.sites import LIMIT, ROOT, STEADY, Peer, Site
 
@@ -36,7 +37,8 @@ def _system(module_site: Site) -> Iterator[None]:
 
 def rows(table: str) -> dict[str, list[str]]:
     """The rows of `make status` by service."""
-    return {row[0]: row[1:] for row in (re.split(r"  +", line) for line in table.splitlines()[1:])}
+    lines = table[table.index("SERVICE") :].splitlines()[1:]
+    return {row[0]: row[1:] for row in (re.split(r"  +", line) for line in lines)}
 
 
 def status(site: Site, until: Callable[[list[str]], bool]) -> dict[str, list[str]]:
@@ -48,6 +50,18 @@ def status(site: Site, until: Callable[[list[str]], bool]) -> dict[str, list[str
         services = rows(printed)
         if all(map(until, services.values())) or time.monotonic() > deadline:
             return services
+
+
+def test_status_tells_the_runtime_and_the_address_of_the_page(module_site: Site) -> None:
+    code, printed = module_site.do("status")
+    assert code == 0, printed
+    where, page, header, *_ = printed.splitlines()
+    expected = "embedded rclpy" if os.environ.get("RUNTIME") else "rclpy of "
+    assert where.startswith(expected)
+    assert f"ROS domain {module_site.domain}" in where
+    assert page == System(module_site.run).page
+    assert page.startswith("The page: http://127.0.0.1:")
+    assert header.startswith("SERVICE")
 
 
 def test_status_shows_every_service_running(module_site: Site) -> None:

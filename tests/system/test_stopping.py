@@ -113,10 +113,15 @@ def test_make_stop_elsewhere_ends_terminal_and_logs(small_site: Site) -> None:
     code, printed = small_site.do("logs")
     assert code == 1
     assert printed == f"Nothing runs: make start. The logs of the last run are in {small_site.run / 'logs'}"
+    log = small_site.run / "logs" / "engine_controller.log"
+    log.parent.mkdir(parents=True, exist_ok=True)
+    with log.open("a") as last_run:
+        last_run.write("of the last run\n")
     terminal = small_site.begin("run", STEADY)
     terminal.await_line("Engines are off")
     logs = small_site.begin("logs")
     logs.await_line("logs/engine_controller.log")
+    logs.await_line(r"-{20} \d{4}-\d\d-\d\d \d\d:\d\d:\d\d -{20}")  # between the runs
     assert small_site.do("stop")[0] == 0
     for command in (terminal, logs):
         command.await_line("The system has ended")
