@@ -1,0 +1,79 @@
+"""The verdicts on random histories stay what they were before the table of effects: `verdicts.txt` has them.
+
+After a wanted change of a promise, write them again:
+
+    .venv/bin/python -m tests.promises.test_verdicts
+"""
+
+from __future__ import annotations
+
+import random
+from pathlib import Path
+
+import pytest
+
+from deploy.promises.history import ALL, NO_TARGET, OPERATOR, PROGRAMS, History, InjectedFault
+from deploy.promises.promises import CHECKERS
+from interfaces.topics import OFF, TURN_OFF
+
+from .histories import added, faulty, good, killed, silent, with_value
+
+FILE = Path(__file__).with_name("verdicts.txt")
+SUSPENDING = ("stop", "hang", "slow", "crash_loop")
+LASTING = (*SUSPENDING, "partition", "bad_line", "flood", "overload", "loss", "stuck_drive")
+TARGETS = {"partition": OPERATOR, "bad_line": ALL}
+TOPICS = ("operator_heartbeat", "operator_presence", "engines/state", "effector/position", "/diagnostics")
+
+
+def random_history(seed: int) -> History:
+    """Return the good minute with kills, faults, silences and turned-off engines at random moments."""
+    rng = random.Random(seed)
+
+    def moment() -> float:
+        return round(rng.uniform(8.0, 50.0), 3)
+
+    history = good()
+    for _ in range(rng.randrange(4)):
+        history = killed(history, rng.choice(PROGRAMS), moment(), rng.choice((0.3, 0.8, 1.6, 2.6, 6.0)))
+    for _ in range(rng.randrange(4)):
+        kind, begin = rng.choice(LASTING), moment()
+        programs = PROGRAMS if kind in SUSPENDING else (NO_TARGET,)
+        target = TARGETS.get(kind, rng.choice(programs))
+        pid = next((life.pid for life in history.lives if life.program == target), 0)
+        end = begin + rng.choice((0.2, 1.0, 6.0))
+        history = faulty(history, InjectedFault(kind, target, begin, end, pid))
+    for _ in range(rng.randrange(3)):
+        begin = moment()
+        history = silent(history, rng.choice(TOPICS), begin, begin + rng.choice((0.5, 1.5, 6.0, 12.0)))
+    if rng.random() < 0.5:
+        begin = moment()
+        history = with_value(history, "engines/state", OFF, begin, begin + rng.choice((0.3, 60.0)))
+        if rng.random() < 0.5:
+            history = added(history, "engines", (begin, TURN_OFF))
+    return history
+
+
+def verdicts(seed: int) -> list[str]:
+    """Return a line for each promise: its verdict, its figures and its first evidence."""
+    history = random_history(seed)
+    # S4 would search for long which values explain the positions after a killed source.
+    findings = [check(history) for promise, check in CHECKERS.items() if promise != "S4"]
+    return [
+        f"{seed} {each.promise} {each.verdict} {each.cases} {each.unknown} {len(each.evidence)}: "
+        f"{each.measured}; {each.evidence[0].text if each.evidence else ''}".rstrip("; ")
+        for each in findings
+        if each.cases or each.unknown or each.evidence
+    ]
+
+
+RECORDED = FILE.read_text(encoding="utf-8").splitlines() if FILE.exists() else []
+SEEDS = range(20)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_verdicts_on_a_random_history_stay(seed: int) -> None:
+    assert verdicts(seed) == [line for line in RECORDED if line.startswith(f"{seed} ")]
+
+
+if __name__ == "__main__":
+    FILE.write_text("".join(f"{line}\n" for seed in SEEDS for line in verdicts(seed)), encoding="utf-8")
