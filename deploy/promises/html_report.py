@@ -47,8 +47,8 @@ def verdict(findings: Sequence[Finding]) -> str:
     return "All exercised promises hold"
 
 
-def page(title: str, remarks: Sequence[str], findings: Sequence[Finding], history: History) -> str:
-    """Return the whole page."""
+def html(title: str, remarks: Sequence[str], findings: Sequence[Finding], history: History) -> str:
+    """Return the whole report."""
     picture, *_ = timeline(history, findings)
     lines = [
         "<!doctype html><html lang=en><meta charset=utf-8>",

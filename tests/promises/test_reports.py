@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 from deploy.promises.charts import framed, timeline
 from deploy.promises.findings import Finding, count, how_often
 from deploy.promises.history import ALL, NO_TARGET, History, InjectedFault
-from deploy.promises.html_report import page
+from deploy.promises.html_report import html
 from deploy.promises.promises import CHECKERS, overloads
 from deploy.promises.text_report import text
 
@@ -19,7 +19,7 @@ from .histories import END, faulty, good, killed, silent, with_value
 
 def faults_of(history: History) -> list[list[str]]:
     """Return the cells of the page's list of faults."""
-    found = page("title", [], [], history).partition("<h2>Faults</h2>")[2].partition("</table>")[0]
+    found = html("title", [], [], history).partition("<h2>Faults</h2>")[2].partition("</table>")[0]
     rows = found.split("<tr>")[2:]
     return [[unescape(cell) for cell in re.split(r"<td[^>]*>", row)[1:]] for row in rows]
 
@@ -110,7 +110,7 @@ def test_heading_states_the_verdict() -> None:
         ],
     }
     for heading, findings in headings.items():
-        assert f"<h1 class={heading}</h1>" in page("title", [], findings, good())
+        assert f"<h1 class={heading}</h1>" in html("title", [], findings, good())
 
 
 def test_picture_is_well_formed_and_shows_every_fault() -> None:

@@ -16,10 +16,10 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from deploy.promises import observations as record
+from deploy.promises import observations
 from deploy.promises.charts import framed, timeline
 from deploy.promises.findings import HOLDS, count, overall
-from deploy.promises.html_report import page, verdict
+from deploy.promises.html_report import html, verdict
 from deploy.promises.promises import CHECKERS, overloads
 from deploy.promises.text_report import text
 from deploy.running import interruption, processes
@@ -77,10 +77,10 @@ def unleash(options: argparse.Namespace) -> int:
 
 def judge(path: Path, title: str, name: str = "report") -> int:
     """Check the promises for each arm of a record, and write the reports; return the exit code."""
-    namespaces = record.namespaces(path)
+    namespaces = observations.namespaces(path)
     if not namespaces:
         raise DeploymentError(f"{path} contains no arm")
-    if remark := record.remark(path):
+    if remark := observations.remark(path):
         print(remark)
     broken = [namespace for namespace in namespaces if not _holds(path, title, namespace, name)]
     if len(namespaces) > 1:
@@ -92,7 +92,7 @@ def judge(path: Path, title: str, name: str = "report") -> int:
 def _holds(path: Path, title: str, namespace: str, name: str) -> bool:
     """Report on one arm; return whether promises hold, and none is violated."""
     interruption.check()
-    history = record.load(path, namespace)
+    history = observations.load(path, namespace)
     findings = []
     for checker in CHECKERS.values():
         interruption.check()
@@ -108,7 +108,7 @@ def _holds(path: Path, title: str, namespace: str, name: str) -> bool:
         overloaded,
     ]
     report = path.with_name(f"{name}{file_suffix(namespace)}.html")
-    report.write_text(page(title, remarks, findings, history), encoding="utf-8")
+    report.write_text(html(title, remarks, findings, history), encoding="utf-8")
     heading = f"{faults} in {history.end:.0f} s: {verdict(findings).lower()}"
     picture = framed(*timeline(history, findings), heading)
     report.with_suffix(".svg").write_text(picture, encoding="utf-8")

@@ -16,8 +16,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from deploy.promises.history import OPERATOR
-from deploy.promises.history import SWITCH as PROGRAM
+from deploy.promises.history import OPERATOR, SWITCH
 from deploy.running import manifest, processes
 from deploy.running.system import System
 from deploy.trials.chaos.arm import RealArm
@@ -139,13 +138,13 @@ class TwoHosts(Testbed):
     def start(self, arm: RealArm, parameters: Mapping[str, object]) -> None:
         """Start the arm without its switch, and the switch alone on the operator's host."""
         arm.system.start(parameters)
-        arm.system.halt(PROGRAM)
-        program = next(program for program in manifest.programs() if program.name == PROGRAM)
+        arm.system.halt(SWITCH)
+        program = next(program for program in manifest.programs() if program.name == SWITCH)
         service = [sys.executable, "-m", program.module, *program.arguments]
         subprocess.Popen(
             [*self._on_operators_host, *service, "--ros-args", "--params-file", str(arm.system.parameters)],
             cwd=processes.ROOT,
-            env={**os.environ, processes.MARK: str(self._operator.run), "SUPERVISOR_PROCESS_NAME": PROGRAM},
+            env={**os.environ, processes.MARK: str(self._operator.run), "SUPERVISOR_PROCESS_NAME": SWITCH},
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,

@@ -5,7 +5,7 @@ would keep a small machine busy. ::
 
     with Testbed(directory) as testbed:
         testbed.inject([schedule])
-    history = record.load(testbed.record)
+    history = observations.load(testbed.record)
 """
 
 from __future__ import annotations
@@ -181,10 +181,10 @@ class Testbed:
         now = time.monotonic()
         self._say(f"{now - self._origin:7.1f} s  {arm.namespace:7} {kind} {target_name(target)}")
         undo = self.faults[kind].inject(arm, target)
-        self._report(InjectedFault(kind, target, now, now + duration, pid, arm.clock.ahead), arm)
+        self._record(InjectedFault(kind, target, now, now + duration, pid, arm.clock.ahead), arm)
         return (now + duration, undo) if undo else None
 
-    def _report(self, fault: InjectedFault, arm: RealArm) -> None:
+    def _record(self, fault: InjectedFault, arm: RealArm) -> None:
         """Let the observer record a fault."""
         assert self._observer.stdin is not None
         self._observer.stdin.write(json.dumps(fault._asdict() | {"namespace": arm.namespace}) + "\n")
@@ -203,7 +203,7 @@ class Testbed:
                 asleep = InjectedFault(SILENCE, OPERATOR, morning + pressed["to"], morning + day)
                 conditions.append(asleep)
         for arm, condition in itertools.product(self.arms, conditions):
-            self._report(condition, arm)
+            self._record(condition, arm)
 
     def _parameters(self) -> dict[str, object]:
         """Return the parameters of all arms, with an origin of the scenario that they share."""

@@ -7,6 +7,7 @@ from rclpy.serialization import deserialize_message, serialize_message
 from rclpy_simulation.host import SECOND
 from std_msgs.msg import Header, String
 
+from deploy.promises.history import CONTROLLER, WATCHDOG
 from deploy.promises.marks import is_babble
 from deploy.trials.replay.lives import Latch, begins_away, latch, lives
 from deploy.trials.replay.record import Message, Record, text
@@ -28,9 +29,6 @@ from interfaces.topics import (
     Topic,
     is_latched,
 )
-
-WATCHDOG = OPERATOR_PRESENCE.publishers[0]
-CONTROLLER = ENGINES_STATE.publishers[0]
 
 Chain = tuple[str, ...]
 CHAINS: tuple[Chain, ...] = (

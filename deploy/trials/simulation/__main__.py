@@ -15,7 +15,7 @@ from pathlib import Path
 
 from deploy.promises.findings import count, how_often
 from deploy.promises.history import STUCK_DRIVE
-from deploy.promises.html_report import page, verdict
+from deploy.promises.html_report import html, verdict
 from deploy.promises.text_report import text
 from deploy.running import interruption, processes
 from deploy.running.errors import DeploymentError
@@ -157,13 +157,13 @@ def _conclude(outcome: Outcome, title: str) -> int:
     experiment = outcome.experiment
     directory = processes.run_directory() / "simulation"
     name = "".join(each if each.isalnum() else "-" for each in experiment.seed)
-    schedule, html = directory / f"{name}.yaml", directory / f"{name}.html"
+    schedule, written = directory / f"{name}.yaml", directory / f"{name}.html"
     make_directory(directory)
     schedule_file.save(experiment, schedule)
     remarks = [f"{title} · {count(len(experiment.faults), 'fault')} in {experiment.length:.0f} s"]
-    html.write_text(page(title, remarks, outcome.findings, outcome.history), encoding="utf-8")
+    written.write_text(html(title, remarks, outcome.findings, outcome.history), encoding="utf-8")
     print(f"\n{text(outcome.findings)}\n\n{verdict(outcome.findings)}")
-    print(f"Report: {html}\nRun it again: make simulate SCHEDULE={schedule}")
+    print(f"Report: {written}\nRun it again: make simulate SCHEDULE={schedule}")
     return int(bool(outcome.violated()))
 
 

@@ -22,7 +22,7 @@ from mcap_files import McapFile
 from rclpy.serialization import deserialize_message
 from rclpy_simulation import Delay
 
-from deploy.promises import observations as record
+from deploy.promises import observations
 from deploy.promises.findings import percentile
 from deploy.promises.history import SOURCES, History, Life
 from deploy.promises.promises import CHECKERS
@@ -54,7 +54,7 @@ def load() -> Calibration:
 
 def measure(path: Path) -> Calibration:
     """Measure the durations in a record of one arm."""
-    history = record.load(path)
+    history = observations.load(path)
     created = _created(path, history)
     silences = [time for times in CHECKERS["L1"](history).times.values() for time in times]
     samples = [each for samples in history.streams.values() for each in samples]

@@ -7,7 +7,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from deploy.promises import observations as record
+from deploy.promises import observations
 from deploy.promises.findings import Finding
 from deploy.promises.history import History
 from deploy.promises.promises import CHECKERS
@@ -23,8 +23,8 @@ class ChaosRun:
     def __init__(self, directory: Path, output: str, code: int, namespace: str = "/") -> None:
         self.output = output
         self.code = code
-        self.page = next(directory.glob(f"chaos/*/report{file_suffix(namespace)}.html"))
-        self.history: History = record.load(self.page.with_name("record.mcap"), namespace)
+        self.report = next(directory.glob(f"chaos/*/report{file_suffix(namespace)}.html"))
+        self.history: History = observations.load(self.report.with_name("record.mcap"), namespace)
         self.findings: dict[str, Finding] = {name: check(self.history) for name, check in CHECKERS.items()}
         self.left_in_shared_memory: set[Path] = set()
 

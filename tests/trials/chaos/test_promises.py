@@ -78,7 +78,7 @@ def test_every_output_flows_at_the_end(run: ChaosRun) -> None:
 def test_exit_code_output_and_page_show_cost_and_verdict(run: ChaosRun) -> None:
     assert run.code == 0, run.output
     assert f") in {len(PROGRAMS) + 1} processes per arm" in run.output
-    page = run.page.read_text(encoding="utf-8")
+    page = run.report.read_text(encoding="utf-8")
     assert "All exercised promises hold" in page
     assert page.count("<svg") >= 2
     page = page.replace("http://www.w3.org/2000/svg", "")  # a name, not an address
