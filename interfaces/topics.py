@@ -172,8 +172,26 @@ L1 = Topic("l1", Float64, _STATE, "m", ("config_l1",), _CONFIGURED, "length of t
 L2 = Topic(
     "l2", Float64, _STATE, "m", ("config_l2",), _CONFIGURED, "length of the second link", _not_a_length
 )
+DRIVEN_TIME = Topic(
+    "driven_time",
+    Float64,
+    _qos(1, lifespan=DRIVE_TIMEOUT),
+    "s",
+    ("drive",),
+    ("config_theta1", "config_theta2"),
+    "for how long the drive has moved the joints; only in a scenario with a drive, by which they then move",
+    _not_a_length,
+)
 THETA1 = Topic(
-    "theta1", Float64, _STATE, "rad", ("config_theta1",), _CONFIGURED, "angle of the first joint", _not_finite
+    "theta1",
+    Float64,
+    _STATE,
+    "rad",
+    ("config_theta1",),
+    _CONFIGURED,
+    "angle of the first joint",
+    _not_finite,
+    follows=DRIVEN_TIME.name,
 )
 THETA2 = Topic(
     "theta2",
@@ -184,6 +202,7 @@ THETA2 = Topic(
     _CONFIGURED,
     "angle of the second joint",
     _not_finite,
+    follows=DRIVEN_TIME.name,
 )
 EFFECTOR_POSITION = Topic(
     "effector/position",
@@ -284,7 +303,7 @@ ENGINES_STATE = Topic(
     _qos(1, latched=True, lifespan=DRIVE_TIMEOUT),
     "",
     ("engine_controller",),
-    ("dead_mans_switch", *OPERATOR_NODES),
+    ("drive", "dead_mans_switch", *OPERATOR_NODES),
     f"`{ON}` or `{OFF}`, on every change and at 10 Hz: the drive accepts an `{ON}` for "
     f"{1000 * DRIVE_TIMEOUT:.0f} ms",
     _not_one_of(ON, OFF),
@@ -315,10 +334,13 @@ CONTRACT: tuple[Topic, ...] = (
     OPERATOR_ACTIVITY,
     ENGINES,
     ENGINES_STATE,
+    DRIVEN_TIME,
     DIAGNOSTICS,
 )
 CONFIGURATION = {topic.name: topic for topic in (L1, L2, THETA1, THETA2)}
 """The four sources of the manipulator's configuration, by topic name (thesis 5.2.1)."""
+JOINTS = (THETA1, THETA2)
+"""The part of the configuration that a drive moves."""
 
 
 def is_latched(qos: QoSProfile) -> bool:

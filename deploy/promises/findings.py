@@ -22,7 +22,7 @@ class Finding:
     """The result for one promise. A case that the record cannot decide counts as unknown."""
 
     promise: str
-    """S1 to S5, L1 to L4."""
+    """S1 to S6, L1 to L4."""
     cases: int
     """How often the promise was exercised and the outcome is known."""
     measured: str

@@ -18,6 +18,7 @@ from interfaces import topics
 PROGRAMS = tuple(program.name for program in manifest.programs())
 SWITCH, WATCHDOG, CONTROLLER = "dead_mans_switch", "operator_watchdog", "engine_controller"
 KINEMATICS, ROBOT_STATE = "kinematics", "robot_state"
+DRIVE = "drive"
 SENTINEL = manifest.SENTINEL
 SOURCES = tuple(f"config_{name}" for name in topics.CONFIGURATION)
 """The publishers of the configuration, in its order."""
@@ -120,6 +121,10 @@ class History:
     faults: list[InjectedFault] = field(default_factory=list)
     absent: frozenset[str] = frozenset()
     """Programs that this arm does not have."""
+
+    def lacks(self, program: str) -> bool:
+        """Return whether the arm does not have a program. Without a drive, that program does nothing."""
+        return program in self.absent or (program == DRIVE and not self.stream(topics.DRIVEN_TIME))
 
     @property
     def injected(self) -> list[InjectedFault]:

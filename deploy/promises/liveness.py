@@ -86,7 +86,7 @@ def _silent_for_good(history: History, found: Sequence[Effect]) -> Iterator[Evid
         for program in PROGRAMS if fault.target == ALL else (fault.target,):
             if (
                 program not in PROGRAMS
-                or program in history.absent
+                or history.lacks(program)
                 or between(history.output(program), begin, end)
             ):
                 continue

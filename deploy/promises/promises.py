@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from deploy.promises import liveness, safety
+from deploy.promises import drive, liveness, safety
 from deploy.promises.findings import Finding, count
 from deploy.promises.history import OVERLOAD, History, merged
 
@@ -15,6 +15,7 @@ CHECKERS: dict[str, Callable[[History], Finding]] = {
     "S3": safety.turned_on_with_operator,
     "S4": safety.valid_speeds_and_positions,
     "S5": safety.single_instances,
+    "S6": drive.joints_stand_in_time,
     "L1": liveness.output_resumes,
     "L2": liveness.other_streams_flow,
     "L3": liveness.right_after_restart,

@@ -76,13 +76,15 @@ class ServiceNode(ReactiveNode):
         topic: Topic,
         *,
         timestamped: bool = False,
+        max_age: float | None = None,
     ) -> Observable[Any]:
         """
         Return the good values of a topic (:attr:`Topic.value`); the others are dropped and reported.
 
         :param timestamped: see :meth:`ReactiveNode.create_observable`.
+        :param max_age: a message that is older [s], or this much ahead of the local clock, is not good.
         """
-        options = self._reading(topic, timestamped, None)
+        options = self._reading(topic, timestamped, max_age)
         return self.create_observable(topic.type, topic.name, topic.qos, every_publisher=True, **options)
 
     def observe_sampled(
@@ -99,7 +101,7 @@ class ServiceNode(ReactiveNode):
         See :meth:`ReactiveNode.create_sampled_observable`.
 
         :param topic: not a latched one.
-        :param max_age: a message that is older [s], or this much ahead of the local clock, is not good.
+        :param max_age: see :meth:`observe`.
         """
         options = self._reading(topic, timestamped, max_age)
         return self.create_sampled_observable(topic.type, topic.name, ticks, topic.qos, **options)

@@ -1,4 +1,4 @@
-"""Plays timelines as observables, from a time of the scenario on [s since its origin]."""
+"""Plays timelines as observables, from a time of the scenario on [s since its origin] or by a drive."""
 
 from __future__ import annotations
 
@@ -21,6 +21,19 @@ def state(timeline: Events[T] | Sweep, elapsed: float) -> Observable[Any]:
     if isinstance(timeline, Sweep):
         return _samples(timeline, elapsed)
     return _items(timeline.since(elapsed), elapsed)
+
+
+def driven(timeline: Events[T] | Sweep, times: Observable[float]) -> Observable[Any]:
+    """
+    Emit the value at each time of a drive.
+
+    While time passes, a value is emitted when it has changed, as by :func:`state`. While time stands still,
+    the value is emitted again and again: a joint that stands tells where.
+    """
+    samples = times.map(lambda time: (time, timeline.at(time))).filter(lambda sample: sample[1] is not None)
+    pairs = samples.start_with((math.nan, None)).pairwise()
+    news = pairs.filter(lambda pair: pair[0][0] == pair[1][0] or pair[0][1] != pair[1][1])
+    return news.map(lambda pair: pair[1][1])
 
 
 def events(timeline: Events[T], elapsed: float, *, resume: bool = False) -> Observable[T]:

@@ -19,6 +19,8 @@ the sources play nothing. ::
       heartbeats: [41.942, 42.991]          # single heartbeats, in addition
     engines:                                # the commands of the virtual operator
       - {at: 5.0, command: turn_on}
+    drive: {rate: 25.0}                     # theta1 and theta2 move only while the engines are on: their time
+                                            # is that of the service `drive`, which tells it at this rate [Hz]
     repeat: 60.0                            # everything except the sweeps starts again every 60 s
 
 Every sample of a moving joint gives a position (``combine_latest``). If both joints move, their samples
@@ -46,6 +48,7 @@ T = TypeVar("T")
 
 LARGEST = 1e9  # of all numbers: a timer waits for no time after the year 9999
 SHORTEST = 0.001  # s, of a period
+DRIVE_RATE = 25.0  # Hz, by default
 
 
 @dataclass(frozen=True)
@@ -57,13 +60,15 @@ class Scenario:
     pressed: Events[bool] | None = None
     heartbeats: Events[bool] | None = None
     commands: Events[str] | None = None
+    drive: float | None = None
+    """The rate [Hz] at which the drive moves the joints; without it, they move by themselves."""
 
 
 def load(path: str | Path) -> Scenario:
     """Read a scenario from a file. Raises UserError: one line with file, key and reason."""
     document = yaml_file.load(path)
     root = _Item({} if document is None else document, str(path), "")
-    root.require(optional={*topics.CONFIGURATION, "operator", "engines", "repeat"})
+    root.require(optional={*topics.CONFIGURATION, "operator", "engines", "drive", "repeat"})
     repeat = root["repeat"].number(SHORTEST) if "repeat" in root else None
     configuration = {
         name: _values(root[name], topic, repeat)
@@ -77,6 +82,7 @@ def load(path: str | Path) -> Scenario:
         pressed=_pressed(operator["pressed"], repeat) if "pressed" in operator else None,
         heartbeats=operator["heartbeats"].events(_heartbeat, repeat) if "heartbeats" in operator else None,
         commands=root["engines"].events(_command, repeat) if "engines" in root else None,
+        drive=_drive(root["drive"]) if "drive" in root else None,
     )
 
 
@@ -179,6 +185,11 @@ def _sweep(item: _Item) -> Sweep:
     if sweep.rest >= sweep.period / 2:
         raise item["rest"].error(f"must be less than half the period, {sweep.period / 2:g} s")
     return sweep
+
+
+def _drive(item: _Item) -> float:
+    item.require(optional={"rate"})
+    return item["rate"].number(1.0, most=1000.0) if "rate" in item else DRIVE_RATE
 
 
 def _pressed(item: _Item, repeat: float | None) -> Events[bool]:

@@ -64,6 +64,19 @@ class Settings:
         self._settings.append(setting)
         return setting
 
+    def recall(self, name: str, default: float) -> float:
+        """Return the number that the last process remembered. Raises UserError if it is no number."""
+        value = self._file.values.get(name, default)
+        if not isinstance(value, float):
+            raise UserError(f"{name} was {value!r}: not a float")
+        return value
+
+    def remember(self, name: str, value: float) -> None:
+        """Keep a number for the next process."""
+        if self._file.values.get(name) != value:
+            self._file.values[name] = value
+            self._save(name)
+
     def _declare_again(self, name: str, value: Any) -> None:
         """Replace the value of a parameter, without the event of a parameter that is set by hand."""
         descriptor, kind = self._node.describe_parameter(name), type(self._node.get_parameter(name).value)

@@ -19,6 +19,11 @@ class Events(Generic[T]):
     repeat: float | None = None
     """The period [s] with which all items come again."""
 
+    def at(self, time: float) -> T | None:
+        """Return the value that holds at a time; None before the first one."""
+        held = list(itertools.takewhile(lambda item: item[0] <= time, self._around(time)))
+        return held[-1][1] if held else None
+
     def since(self, time: float) -> Iterator[tuple[float, T]]:
         """Yield the item that holds at a time, if there is one, then the items after that time."""
         until = list(itertools.takewhile(lambda item: item[0] <= time, self._around(time)))

@@ -198,6 +198,24 @@ def test_demo_has_no_speed_above_its_true_maximum(scheduler: TestScheduler, offs
     assert 0.99 * fastest < max(speeds) <= fastest
 
 
+# Driven
+
+
+@pytest.mark.parametrize(
+    "timeline", [Events(((1.0, "a"), (2.0, "b"))), Events(((1.0, "a"), (2.0, "b")), 5.0)]
+)
+def test_driven_joint_moves_with_its_time_and_tells_where_it_stands(
+    scheduler: TestScheduler, timeline: Events[str]
+) -> None:
+    times = scheduler.create_hot_observable(
+        *(on_next(201.0 + n, time) for n, time in enumerate([0.5, 1.5, 1.5, 1.6, 2.0, 2.0]))
+    )
+
+    values = played(scheduler, playback.driven(timeline, times))
+
+    assert values == [(2.0, "a"), (3.0, "a"), (5.0, "b"), (6.0, "b")]
+
+
 # What a source follows
 
 

@@ -34,6 +34,7 @@ def test_every_key_of_a_scenario(tmp_path: Path) -> None:
         theta2: [{at: 1.5, value: 0.8}, {at: 4.0, value: 1.8}]
         operator: {pressed: [{from: 0.0, to: 40.0}, {from: 50.0}], heartbeats: [1.942, 1.991]}
         engines: [{at: 5.0, command: turn_on}]
+        drive: {rate: 10}
         """,
     )
 
@@ -47,6 +48,7 @@ def test_every_key_of_a_scenario(tmp_path: Path) -> None:
         Events(((0.0, True), (40.0, False), (50.0, True))),
         Events(((1.942, True), (1.991, True))),
         Events(((5.0, TURN_ON),)),
+        10.0,
     )
 
 
@@ -65,6 +67,10 @@ def test_repeat_applies_to_all_events(tmp_path: Path) -> None:
     assert [timeline.repeat for timeline in timelines if isinstance(timeline, Events)] == [5.0] * 4
 
 
+def test_drive_has_a_rate_by_default(tmp_path: Path) -> None:
+    assert [loaded(tmp_path, text).drive for text in ("drive: {}", "l1: 2.0")] == [25.0, None]
+
+
 def test_empty_scenario_drives_nothing(tmp_path: Path) -> None:
     assert loaded(tmp_path, "") == Scenario()
 
@@ -74,11 +80,13 @@ def test_empty_scenario_drives_nothing(tmp_path: Path) -> None:
     [
         (
             "l3: 1.0",
-            "scenario: unknown key 'l3', must be one of engines, l1, l2, operator, repeat, theta1, theta2",
+            "scenario: unknown key 'l3', must be one of drive, engines, l1, l2, operator, repeat, theta1, "
+            "theta2",
         ),
         (
             "- 1",
-            "scenario: must be a mapping with engines, l1, l2, operator, repeat, theta1, theta2, not [1]",
+            "scenario: must be a mapping with drive, engines, l1, l2, operator, repeat, theta1, theta2, "
+            "not [1]",
         ),
         ("l1: -1.0", "l1: -1.0 is negative"),
         ("l1: .nan", "l1: must be from -1e+09 to 1e+09"),

@@ -91,6 +91,8 @@ def test_topics_that_report_single_events_may_be_silent() -> None:
 def test_topics_follow_those_that_they_are_made_of() -> None:
     assert {topic.name: topic.follows for topic in topics.CONTRACT} == {
         **{topic.name: "" for topic in topics.CONTRACT},
+        "theta1": "driven_time",
+        "theta2": "driven_time",
         "effector/speed": "effector/position",
         "operator_presence": "operator_heartbeat",
     }

@@ -19,6 +19,7 @@ RATES: dict[str, float] = {
     "l2": 10.0,
     "theta1": 25.0,
     "theta2": 25.0,
+    "driven_time": 25.0,
     "operator_heartbeat": 20.0,
     "operator_presence": 2.0,
     "engines/state": 10.0,
@@ -59,7 +60,7 @@ def _value(name: str, time: float) -> Any:
         return True
     if name == "engines/state":
         return topics.ON if time >= 5.0 else topics.OFF
-    return time if name == "operator_presence" else value_at(name, time)
+    return time if name in ("operator_presence", "driven_time") else value_at(name, time)
 
 
 def _latest(samples: list[Sample], time: float) -> Any:

@@ -165,4 +165,4 @@ def test_l2_pause_of_all_streams_at_once_is_a_violation() -> None:
     history = killed(good(), "kinematics", AT, 0.6)
     for topic in [name for name in history.streams if name not in ("effector/position", "effector/speed")]:
         history = silent(history, topic, AT + 0.05, AT + 0.5)
-    assert len(CHECKERS["L2"](history).evidence) == 7
+    assert len(CHECKERS["L2"](history).evidence) == 8

@@ -458,7 +458,7 @@ def test_l1_restart_that_waits_for_a_dead_source_is_no_case(program: str) -> Non
 
 def test_l2_holds_if_the_other_streams_flow() -> None:
     finding = CHECKERS["L2"](killed(good(), "kinematics", 20.0, 0.6))
-    assert (finding.verdict, finding.cases) == (HOLDS, 7)
+    assert (finding.verdict, finding.cases) == (HOLDS, 8)
 
 
 def test_l2_detects_a_stream_that_pauses() -> None:
@@ -501,7 +501,7 @@ def test_l2_pause_of_the_machine_does_not_hide_another_pause() -> None:
     assert verdict("L2", faulty(history, InjectedFault("overload", NO_TARGET, 20.05, 20.12))) == VIOLATED
     stalled = faulty(history, InjectedFault("overload", NO_TARGET, 20.05, 20.4))
     finding = CHECKERS["L2"](stalled)
-    assert (finding.verdict, finding.cases, finding.unknown) == (HOLDS, 6, 1)
+    assert (finding.verdict, finding.cases, finding.unknown) == (HOLDS, 7, 1)
     (evidence,) = CHECKERS["L2"](silent(stalled, "l1", 20.41, 20.79)).evidence
     assert "config_l1 is silent" in evidence.text
 

@@ -62,6 +62,7 @@ SCENARIO: dict[str, Any] = {
     "l2": {"center": 3.0, "amplitude": 0.3, "period": 17.0, "rate": 10.0},
     "theta1": {"center": 0.8, "amplitude": 0.8, "period": 13.0},
     "theta2": {"center": 0.8, "amplitude": 0.5, "period": 7.0},
+    "drive": {},
     "operator": {"pressed": [{"from": 0.0, "to": AWAKE}]},
     "engines": [{"at": at, "command": topics.TURN_ON} for at in (1.5, 11.5, 20.5, 28.5)],
     "repeat": DAY,
@@ -71,7 +72,8 @@ SCENARIO: dict[str, Any] = {
 
 def sources(rate: float) -> dict[str, Any]:
     """Return the part of :data:`SCENARIO` that moves the values, with another rate [Hz]."""
-    return {name: {**SCENARIO[name], "rate": rate} for name in topics.CONFIGURATION}
+    moving = {name: {**SCENARIO[name], "rate": rate} for name in topics.CONFIGURATION}
+    return {**moving, "drive": {"rate": rate}}
 
 
 class Testbed:
@@ -131,7 +133,9 @@ class Testbed:
                 arm.environment()
                 # One arm after the other: starting together would take each of them too long.
                 self.await_messages([arm], [topics.ENGINES_STATE], lines)
-            self.await_messages(self.arms, [*OUTPUTS.values()], lines)
+            absent = () if "drive" in self.scenario else (topics.DRIVEN_TIME,)
+            outputs = [topic for topic in OUTPUTS.values() if topic not in absent]
+            self.await_messages(self.arms, outputs, lines)
             self._stack = stack.pop_all()
         return self
 

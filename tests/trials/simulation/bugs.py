@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import NamedTuple
 from unittest import mock
 
-from deploy.promises.history import CONTROLLER, WATCHDOG
+from deploy.promises.history import CONTROLLER, DRIVE, WATCHDOG
 from deploy.running.manifest import Program
 from deploy.running.processes import ROOT
 from deploy.trials.simulation import arm, plan
@@ -67,6 +67,7 @@ BUGS: dict[str, Bug] = {
     ),
     "turn_on needs no presence": Bug(CONTROLLER, "if unseen >= given.max_presence_age:", "if unseen < 0.0:"),
     "the controller does not notice its pause": Bug(CONTROLLER, "(paused or unseen", "(unseen"),
+    "the drive ignores the 400 ms": Bug(DRIVE, "seconds=DRIVE_TIMEOUT - ", "seconds=3600.0 - "),
 }
 """The first four are hidden by the other fail-safes unless one of them stands alone."""
 

@@ -1,0 +1,76 @@
+"""The drive of the virtual joints: it moves them while the engines are on (deploy/SAFETY.md, A1).
+
+User story (ours): as a robot operator, I see the arm stand still when the engines go off, and go on from
+there when I turn them on again.
+
+In a scenario with a drive, the joints play their tracks by the driven time. It is kept as settings are, so a
+restart moves no joint.
+"""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime, timedelta
+from functools import partial
+from typing import NamedTuple
+
+import reactivex as rx
+from reactivex import Observable
+
+from interfaces import service
+from interfaces.service import ServiceNode
+from interfaces.service.epoch import Epoch
+from interfaces.sources.player import Player
+from interfaces.sources.settings import Settings
+from interfaces.topics import DRIVE_TIMEOUT, DRIVEN_TIME, ENGINES_STATE, ON
+
+NEVER = datetime.min.replace(tzinfo=UTC)
+LONGEST_STEP = 2  # periods: after a pause, the joints do not jump
+
+
+class EngineState(NamedTuple):
+    """A state of the engines as it arrived."""
+
+    name: str
+    at: datetime  # of the arrival, on the Rx clock, which is never set
+    age: float  # of the source time at arrival [s]
+
+
+def driven_time(states: Observable[EngineState], begin: float, period: float) -> Observable[float]:
+    """
+    Emit every ``period`` [s] the driven time [s]: it passes while the last state is an accepted ``on``.
+
+    :param begin: the driven time at the beginning.
+    """
+
+    def accepted_until(state: EngineState) -> datetime:
+        return (
+            state.at + timedelta(seconds=DRIVE_TIMEOUT - max(state.age, 0.0)) if state.name == ON else NEVER
+        )
+
+    def step(time: float, tick: tuple[tuple[datetime, float], datetime]) -> float:
+        (now, passed), until = tick
+        return time + min(passed, LONGEST_STEP * period) if now < until else time
+
+    ticks = rx.interval(period).time_interval().timestamp()
+    passing = ticks.map(lambda it: (it.timestamp, it.value.interval.total_seconds()))
+    return passing.with_latest_from(states.map(accepted_until).start_with(NEVER)).scan(step, begin)
+
+
+def wire(node: ServiceNode) -> None:
+    """Connect the recipe with its topics."""
+    epoch = Epoch(node)
+    player, settings = Player(node, epoch), Settings(node, is_restart=epoch.is_past)
+    rate = player.scenario.drive
+    if rate is None:
+        return
+    # The arrival before the age: a pause in between must make a state older, not younger.
+    states = node.observe(ENGINES_STATE, timestamped=True).timestamp()
+    heard = states.map(lambda it: EngineState(it.value.value, it.timestamp, node.age(it.value.timestamp)))
+    times = driven_time(heard, settings.recall("time", 0.0), 1.0 / rate)
+    # Kept before it is published: after a restart, the joints do not move back.
+    kept = times.do_action(partial(settings.remember, "time"))
+    node.publish(DRIVEN_TIME, epoch.start(kept))
+
+
+if __name__ == "__main__":
+    service.run("drive", wire)
