@@ -22,6 +22,7 @@ GUARDS: dict[str, tuple[str, ...]] = {
         "tests/component/test_engine_controller_wiring.py",
         "tests/component/test_readme.py",
     ),
+    "services/drive.py": ("tests/component/test_drive.py",),
     "interfaces/topics.py": (
         "tests/component/test_topics.py",
         "tests/component/test_readme.py",
@@ -93,6 +94,7 @@ GUARDS: dict[str, tuple[str, ...]] = {
     "deploy/promises/effects.py": ("tests/promises/test_effects.py", *_CHECKERS),
     "deploy/promises/promises.py": ("tests/promises/test_checkers.py", "tests/promises/test_reports.py"),
     "deploy/promises/safety.py": _CHECKERS,
+    "deploy/promises/drive.py": ("tests/promises/test_drive.py",),
     "deploy/promises/liveness.py": _CHECKERS,
 }
 """Paths of modules, and of the tests that run for each mutant of the module, quick ones first."""
