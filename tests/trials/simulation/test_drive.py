@@ -9,13 +9,16 @@ from itertools import pairwise
 import pytest
 import yaml
 
-from deploy.promises.history import DRIVE, History, Sample, between
+from deploy.promises.history import CONTROLLER, DRIVE, WATCHDOG, History, Sample, between
 from deploy.running.plugin import SCENARIO
 from deploy.trials.chaos.schedule import PlannedFault
 from deploy.trials.chaos.schedule_file import Experiment
+from deploy.trials.simulation import people
 from deploy.trials.simulation.outcome import Outcome, simulate
 from interfaces import topics
 from interfaces.sources import scenario_file
+
+from .bugs import BUGS, planted
 
 PERIOD = 1.0 / scenario_file.DRIVE_RATE
 DEMO = scenario_file.load(SCENARIO)
@@ -76,3 +79,14 @@ def test_kill_of_drive_or_joint_costs_less_than_a_second_of_motion(killed: str) 
     )
 
     assert undisturbed - 1.5 < disturbed <= undisturbed + PERIOD
+
+
+def test_s6_finds_a_drive_that_ignores_the_400_ms() -> None:
+    # The last `on` comes late in the silence: the watchdog loses its strikes, and the controller stops.
+    faults = [PlannedFault(13.0, "kill", WATCHDOG), PlannedFault(17.0, "stop", CONTROLLER, 15.0)]
+    moving = {**SCENE, **people.sources(people.RATE)}
+    experiment = Experiment("ignored", 24.0, moving, faults)
+    assert simulate(experiment).violated() == []
+
+    with planted(BUGS["the drive ignores the 400 ms"]):
+        assert simulate(experiment).violated() == ["S6"]
