@@ -19,7 +19,7 @@ from reactivex import Observable
 MAX_NONCE_AGE = 0.25  # s; also the longest gap between two beats
 OTHER_PAGE = "another page holds the switch"
 TOO_LATE = "the connection is too slow to hold the switch"
-ENDED = "a beat came too late, or the terminal has released the switch"
+ELSEWHERE = "another hand has taken or released the switch"
 
 
 class Press(NamedTuple):
@@ -60,8 +60,8 @@ class Hold(NamedTuple):
     """Whether the event is the press that this hold begins with."""
     refused: tuple[str, str] | None = None
     """The page whose press does not count, and why."""
-    ended: str = ""
-    """The page that beats although it does not hold the switch any more."""
+    ended: tuple[str, str] | None = None
+    """The page that beats although it does not hold the switch any more, and why it does not."""
 
     def holder(self, now: float, max_age: float = MAX_NONCE_AGE) -> str:
         """Return the page that holds the switch at a time [s]; empty after a gap in its beats."""
@@ -87,11 +87,29 @@ def step(hold: Hold, event: Event, now: float, max_age: float = MAX_NONCE_AGE) -
                 return Hold(refused=(page, TOO_LATE))
             return Hold(page, now, alive=True, pressed=not holder)
         case Beat(page, sent):
-            if not holder or page != holder:
-                return kept._replace(ended=page)
-            return Hold(page, now, alive=True) if now - sent <= max_age else Hold(ended=page)
+            if page != holder:
+                return kept._replace(ended=(page, _loss(hold, page, now)))
+            late = now - sent
+            return (
+                Hold(page, now, alive=True)
+                if late <= max_age
+                else Hold(ended=(page, _lateness(late, max_age)))
+            )
         case Release(page):
             return Hold() if page in ("", holder) else kept
+
+
+def _loss(hold: Hold, page: str, now: float) -> str:
+    """Return why a page that beats holds the switch no more."""
+    if page == hold.page:
+        return f"no beat came for {1000 * (now - hold.seen):.0f} ms"
+    return hold.ended[1] if hold.ended and page == hold.ended[0] else ELSEWHERE
+
+
+def _lateness(age: float, max_age: float) -> str:
+    """Return how late a beat came; a nonce that is forgotten is only known to be too old."""
+    late = f"{1000 * age:.0f}" if age < math.inf else f"more than {1000 * max_age:.0f}"
+    return f"a beat came {late} ms late"
 
 
 def monotonic() -> float:

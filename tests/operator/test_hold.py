@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from reactivex.testing import ReactiveTest, TestScheduler
 
 from deploy.operator.hold import (
+    ELSEWHERE,
     MAX_NONCE_AGE,
     OTHER_PAGE,
     TOO_LATE,
@@ -36,17 +37,17 @@ HELD = Hold(A, 100.0)
         (Hold(), Press(A, 100.0), 100.25, Hold(A, 100.25, alive=True, pressed=True)),
         (Hold(), Press(A, 100.0), 100.26, Hold(refused=(A, TOO_LATE))),
         (Hold(), Press(A, -math.inf), 100.0, Hold(refused=(A, TOO_LATE))),
-        (Hold(), Beat(A, 100.0), 100.0, Hold(ended=A)),
+        (Hold(), Beat(A, 100.0), 100.0, Hold(ended=(A, ELSEWHERE))),
         (Hold(), Release(A), 100.0, Hold()),
         (HELD, Press(A, 100.0), 100.1, Hold(A, 100.1, alive=True)),
         (HELD, Press(A, 99.0), 100.1, Hold(refused=(A, TOO_LATE))),
         (HELD, Press(B, 100.0), 100.1, Hold(A, 100.0, refused=(B, OTHER_PAGE))),
         (HELD, Press(B, 100.2), 100.26, Hold(B, 100.26, alive=True, pressed=True)),
         (HELD, Beat(A, 100.0), 100.25, Hold(A, 100.25, alive=True)),
-        (HELD, Beat(A, 99.9), 100.2, Hold(ended=A)),
-        (HELD, Beat(A, -math.inf), 100.2, Hold(ended=A)),
-        (HELD, Beat(A, 100.2), 100.26, Hold(ended=A)),
-        (HELD, Beat(B, 100.0), 100.1, Hold(A, 100.0, ended=B)),
+        (HELD, Beat(A, 99.89), 100.2, Hold(ended=(A, "a beat came 310 ms late"))),
+        (HELD, Beat(A, -math.inf), 100.2, Hold(ended=(A, "a beat came more than 250 ms late"))),
+        (HELD, Beat(A, 100.2), 100.26, Hold(ended=(A, "no beat came for 260 ms"))),
+        (HELD, Beat(B, 100.0), 100.1, Hold(A, 100.0, ended=(B, ELSEWHERE))),
         (HELD, Release(A), 100.1, Hold()),
         (HELD, Release(B), 100.1, Hold(A, 100.0)),
         (HELD, Release(), 100.1, Hold()),
@@ -54,6 +55,14 @@ HELD = Hold(A, 100.0)
 )
 def test_each_step_of_the_switch(hold: Hold, event: Event, now: float, expected: Hold) -> None:
     assert step(hold, event, now) == expected
+
+
+def test_later_beats_do_not_change_why_the_hold_was_lost() -> None:
+    late = step(HELD, Beat(A, 99.89), 100.2)
+    assert step(late, Beat(A, 100.2), 100.25).ended == (A, "a beat came 310 ms late")
+    assert step(late, Beat(B, 100.2), 100.25).ended == (B, ELSEWHERE)
+    released = step(HELD, Release(), 100.1)
+    assert step(released, Beat(A, 100.1), 100.15).ended == (A, ELSEWHERE)
 
 
 def test_beats_of_a_held_page_are_heartbeats(scheduler: TestScheduler) -> None:

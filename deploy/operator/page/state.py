@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import reactivex as rx
 from reactivex import Observable
 
-from deploy.operator.hold import ENDED, Hold
+from deploy.operator.hold import Hold
 from deploy.running import manifest
 from interfaces import topics
 from interfaces.service.health import healths
@@ -392,7 +392,8 @@ def held(hold: Hold) -> Change:
         beaten = max(state.hands.beaten, hold.seen)
         state = state._replace(hands=state.hands._replace(hold=hold, beaten=beaten))
         if hold.ended:
-            return refuse(hold.ended, BEAT, ENDED)(state)
+            page, why = hold.ended
+            return refuse(page, BEAT, why)(state)
         return refuse(hold.refused[0], "press", hold.refused[1])(state) if hold.refused else state
 
     return change

@@ -256,6 +256,16 @@ def test_refused_press_is_told_to_its_page(play: Play) -> None:
     assert Updates("one", play.clock).refusals(found) == []
 
 
+def test_page_is_told_once_why_its_hold_was_lost(play: Play) -> None:
+    why = "a beat came 310 ms late"
+    for time in (210.0, 210.05):
+        play.note(time, state.held(Hold(ended=("one", why))))
+    found = play.run(211)
+
+    assert Updates("one", play.clock).refusals(found) == [{"type": "released", "why": why}]
+    assert Updates("two", play.clock).refusals(found) == []
+
+
 # The engines
 
 
