@@ -85,10 +85,8 @@ _names: mmap.mmap  # the command line and the environment of this process, for a
 
 def import_libraries() -> None:
     """Import what programs need; what cannot be imported is an error of the program that imports it."""
-    if spec := importlib.util.find_spec("numpy"):
-        sys.modules.setdefault(
-            "numpy", _Late("numpy")
-        ).__file__ = spec.origin  # inspect looks at that of each
+    if (numpy := importlib.util.find_spec("numpy")) and numpy.origin:
+        sys.modules.setdefault("numpy", _Late("numpy", numpy.origin))
     gc.disable()  # imports leave next to no garbage, and to look for it takes a fifth of the time
     for name in libraries():
         with suppress(Exception):
@@ -110,6 +108,10 @@ class _Late(ModuleType):
 
     The message packages of ROS 2 import numpy for types with matrices: 17 MB that no service needs.
     """
+
+    def __init__(self, name: str, file: str) -> None:
+        super().__init__(name)
+        self.__file__ = file  # known without the import: each log message looks at that of all modules
 
     def __getattr__(self, name: str) -> Any:
         del sys.modules[self.__name__]
