@@ -374,8 +374,8 @@ def test_only_latched_messages_from_before_the_arm_are_heard() -> None:
     record = Record(5 * SECOND, 10 * SECOND, 0, {"/l1": [old], "/engines": commands})
     (_, lengths), *_ = chains.inputs(record, "/", ("kinematics",))
     assert lengths == [old]
-    (_, heard), _ = chains.inputs(record, "/", ("engine_controller",))
-    assert heard == commands[1:]
+    heard = {topic.name: messages for topic, messages in chains.inputs(record, "/", ("engine_controller",))}
+    assert heard == {"engines": commands[1:], "operator_presence": []}
 
 
 def transforms(at: float, *arms: str) -> Message:
