@@ -63,7 +63,7 @@ def main() -> int:
         signal.signal(signal.SIGHUP, _interrupt)
     try:
         signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})  # make blocks it until here
-        with _alone():
+        with alone():
             began = time.monotonic()
             ros = sourced_rclpy()
             check_runtime(os.environ, ros)
@@ -145,13 +145,13 @@ def make(ros: str) -> None:
     print(f"Setting up .venv with Python {version}, once; this takes about half a minute.", flush=True)
     STAMP.unlink(missing_ok=True)  # no sooner: a refused set-up leaves the old .venv usable
     venv = [sys.executable, "-m", "venv", "--clear", *(["--system-site-packages"] if ros else []), str(VENV)]
-    _step("a virtual environment", venv, log=None)
+    step("a virtual environment", venv, log=None)
     files = ["system.txt", "build.txt", "develop.txt", *([] if ros else ["embedded.txt"])]
-    _step("packages from PyPI", [*PIP, *_requirements(*files)])
+    step("packages from PyPI", [*PIP, *_requirements(*files)])
     if ros:
         print(f"  rclpy of ROS 2: {Path(ros).parent}")
     elif has_wheels():
-        _step("ROS 2's rclpy from PyPI", [*PIP, "--require-hashes", *_requirements("ros.txt")])
+        step("ROS 2's rclpy from PyPI", [*PIP, "--require-hashes", *_requirements("ros.txt")])
     _write_pth(embedded=not ros)
     for name, program in SCRIPTS.items():
         script = VENV / "bin" / name
@@ -180,7 +180,7 @@ def _refuse_while_running() -> None:
         raise SetupError(f"A running system uses this .venv. Stop it before the set-up: {elsewhere}make stop")
 
 
-def _step(title: str, command: list[str], log: Path | None = LOG) -> None:
+def step(title: str, command: list[str], log: Path | None = LOG) -> None:
     """Run a command; show its title and, on a terminal, pip's progress. Raises SetupError with its errors."""
     live = sys.stdout.isatty()
     print(f"  {title}", end="" if live else "\n", flush=True)
@@ -229,7 +229,7 @@ def _step(title: str, command: list[str], log: Path | None = LOG) -> None:
 
 
 @contextmanager
-def _alone() -> Iterator[None]:
+def alone() -> Iterator[None]:
     """Hold the lock of this checkout's set-up: a second make waits for the first."""
     directory = os.open(ROOT, os.O_RDONLY)
     os.set_inheritable(directory, True)  # a step that outlives a killed set-up still writes into .venv

@@ -150,7 +150,7 @@ def test_a_step_that_fails_on_a_full_disk_tells_the_free_space(
 ) -> None:
     monkeypatch.setattr(shutil, "disk_usage", lambda path: mock.Mock(free=free))
     with pytest.raises(setup.SetupError) as raised:
-        setup._step("a step", ["sh", "-c", "echo no reason; exit 1"], log=None)
+        setup.step("a step", ["sh", "-c", "echo no reason; exit 1"], log=None)
     assert str(raised.value) == f"Set-up failed at a step:\nno reason\n{words}".rstrip()
 
 
@@ -165,7 +165,7 @@ def test_an_interrupt_waits_until_the_step_can_be_ended(monkeypatch: pytest.Monk
 
     monkeypatch.setattr(subprocess, "Popen", Interrupted)
     with pytest.raises(KeyboardInterrupt):
-        setup._step("a long sleep", ["sleep", "60"], log=None)
+        setup.step("a long sleep", ["sleep", "60"], log=None)
     assert begun[0].returncode == -signal.SIGTERM
 
 
@@ -181,7 +181,7 @@ def test_an_interrupted_step_ends_with_all_its_children(tmp_path: Path) -> None:
     interrupter = threading.Thread(target=interrupt)
     interrupter.start()
     with pytest.raises(KeyboardInterrupt):
-        setup._step(
+        setup.step(
             "a long sleep",
             ["sh", "-c", f"sleep 60 & echo $! > {begun}.new; mv {begun}.new {begun}; wait"],
             log=None,
@@ -199,8 +199,8 @@ def test_a_step_that_outlives_a_killed_set_up_keeps_the_lock(checkout: Path) -> 
     begun, end = checkout / "begun", checkout / "end"
     os.mkfifo(begun)
     os.mkfifo(end)
-    step = f"setup._step('a step', ['sh', '-c', ': > {begun}; : < {end}'], log=None)"
-    program = f"from deploy.commands import setup\nwith setup._alone(): {step}"
+    step = f"setup.step('a step', ['sh', '-c', ': > {begun}; : < {end}'], log=None)"
+    program = f"from deploy.commands import setup\nwith setup.alone(): {step}"
     killed = subprocess.Popen([sys.executable, "-c", program], cwd=checkout, stdout=subprocess.DEVNULL)
     begun.read_bytes()
     killed.kill()

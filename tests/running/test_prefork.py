@@ -202,7 +202,7 @@ def test_service_prepares_no_type_and_no_pattern_again(
         "rclpy.init()\n"
         "node = ServiceNode('probe')\n"
         "node.declare_parameter('period', 1.0)\n"
-        "node.health._on_period()\n"
+        "node.health.report()\n"
         f"print(prepared, {NEW})\n"
         "node.destroy_node()\n"
         "rclpy.shutdown()\n"

@@ -173,7 +173,7 @@ def test_actions_are_carried_out_and_reported(wired: Any, spin_until: SpinUntil,
 def test_reason_to_kill_no_silent_service_is_reported(wired: Any, spin_until: SpinUntil) -> None:
     watching = wired()
     watching.policy.kill_inhibited_by = "3 of 4 services are silent at once"
-    spin_until(lambda: watching.service.health._remarks)
+    spin_until(watching.remarks)
 
     assert all(
         each.startswith("sentinel: kills no silent service: 3 of 4 services are silent at once")
@@ -184,7 +184,7 @@ def test_reason_to_kill_no_silent_service_is_reported(wired: Any, spin_until: Sp
 def test_failed_observation_is_reported_and_not_the_last(wired: Any, spin_until: SpinUntil) -> None:
     watching = wired()
     watching.probe.failure = "supervisord has died"
-    spin_until(lambda: watching.service.health._remarks)
+    spin_until(watching.remarks)
     assert watching.remarks()[0].startswith(f"{SENTINEL}: supervisord has died")
 
     watching.probe.failure = ""
@@ -198,7 +198,7 @@ def test_states_are_not_repeated_while_observations_fail(
     watching = wired()
     spin_until(lambda: len(watching.states()) >= 2)
     watching.probe.failure = "supervisord has died"
-    spin_until(lambda: watching.service.health._remarks)
+    spin_until(watching.remarks)
     before = len(watching.states())
     spin_for(1.5)
     assert len(watching.states()) == before

@@ -119,9 +119,9 @@ class World:
         with socket.create_server(("127.0.0.1", 0)) as free:
             port = free.getsockname()[1]
         overrides = {"port": port, "settings": str(folder)} | options
-        self.program = self._service(make_node, "operator_page", operator_page.wire, **overrides)
-        self.switch = self._service(make_node, "dead_mans_switch", dead_mans_switch.wire, rate=20.0)
-        self.l1 = self._service(
+        self.program = self.service(make_node, "operator_page", operator_page.wire, **overrides)
+        self.switch = self.service(make_node, "dead_mans_switch", dead_mans_switch.wire, rate=20.0)
+        self.l1 = self.service(
             make_node, "config_l1", lambda node: config_publisher.wire(node, CONFIGURATION["l1"])
         )
         self.takes = 0
@@ -141,7 +141,7 @@ class World:
         self._spin_until = spin_until
 
     @staticmethod
-    def _service(
+    def service(
         make_node: Callable[..., Any], name: str, wire: Callable[[Any], None], **values: Any
     ) -> ServiceNode:
         overrides = [Parameter(key, value=value) for key, value in values.items()]
@@ -376,7 +376,7 @@ def test_switch_that_is_not_there_is_taken_when_it_comes_back(
         page.press()
         world.until(lambda: page.shown["switch"]["by"] == "this_page")
         world.for_seconds(remote.TIMEOUT + 0.5)
-        world.switch = World._service(make_node, "dead_mans_switch", dead_mans_switch.wire, pressed=True)
+        world.switch = World.service(make_node, "dead_mans_switch", dead_mans_switch.wire, pressed=True)
         world.until(lambda: world.switch.get_parameter("pressed").value is False)
 
 
