@@ -25,6 +25,21 @@ def frame_id(frame: str, namespace: str) -> str:
     return f"{namespace}/{frame}".strip("/")
 
 
+def forward_kinematics(l1: float, l2: float, theta1: float, theta2: float) -> tuple[float, float]:
+    """
+    Return the position x, y [m] of the effector (thesis equation 5.1).
+
+    :param l1, l2: lengths of the links [m].
+    :param theta1, theta2: angles of the joints [rad], the second relative to the first link.
+    """
+    heading = theta1 + theta2
+    if math.isinf(heading):  # of angles beyond 8e307 rad
+        return math.nan, math.nan
+    x = l1 * math.cos(theta1) + l2 * math.cos(heading)
+    y = l1 * math.sin(theta1) + l2 * math.sin(heading)
+    return x, y
+
+
 def transforms(l1: float, l2: float, theta1: float, theta2: float) -> Iterator[tuple[str, str, Transform]]:
     """
     Yield parent, child and transform of each frame but the first.

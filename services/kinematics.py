@@ -6,30 +6,13 @@ effector, a pair of its x and y coordinates.
 
 from __future__ import annotations
 
-import math
-
 import reactivex as rx
 from reactivex import Observable
 
 from interfaces import service
-from interfaces.robot_model import BASE, frame_id
+from interfaces.robot_model import BASE, forward_kinematics, frame_id
 from interfaces.service import ServiceNode
 from interfaces.topics import EFFECTOR_POSITION, L1, L2, THETA1, THETA2, Position
-
-
-def forward_kinematics(l1: float, l2: float, theta1: float, theta2: float) -> tuple[float, float]:
-    """
-    Return the position x, y [m] of the effector (thesis equation 5.1).
-
-    :param l1, l2: lengths of the links [m].
-    :param theta1, theta2: angles of the joints [rad], the second relative to the first link.
-    """
-    heading = theta1 + theta2
-    if math.isinf(heading):  # of angles beyond 8e307 rad
-        return math.nan, math.nan
-    x = l1 * math.cos(theta1) + l2 * math.cos(heading)
-    y = l1 * math.sin(theta1) + l2 * math.sin(heading)
-    return x, y
 
 
 def effector_position(

@@ -10,7 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from reactivex.testing import ReactiveTest, TestScheduler
 
-from services.kinematics import effector_position, forward_kinematics
+from interfaces.robot_model import forward_kinematics
+from services.kinematics import effector_position
 
 on_next, on_completed, subscribe = ReactiveTest.on_next, ReactiveTest.on_completed, ReactiveTest.subscribe
 

@@ -13,10 +13,11 @@ import reactivex as rx
 from reactivex import Observable
 from reactivex.testing import ReactiveTest, TestScheduler
 
+from interfaces.robot_model import forward_kinematics
 from interfaces.sources import playback, scenario_file
 from interfaces.sources.timeline import Events, Sweep
 from interfaces.topics import Position
-from services.kinematics import effector_position, forward_kinematics
+from services.kinematics import effector_position
 from services.velocity import effector_speed
 
 on_next, on_completed, subscribe = ReactiveTest.on_next, ReactiveTest.on_completed, ReactiveTest.subscribe

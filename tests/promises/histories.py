@@ -11,7 +11,7 @@ from typing import Any
 
 from deploy.promises.history import PROGRAMS, History, InjectedFault, Life, Sample
 from interfaces import topics
-from services.kinematics import forward_kinematics
+from interfaces.robot_model import forward_kinematics
 
 END = 60.0
 RATES: dict[str, float] = {

@@ -11,8 +11,8 @@ import pytest
 from deploy.promises.findings import HOLDS, VIOLATED
 from deploy.promises.history import NO_TARGET, History, InjectedFault, Life, between
 from deploy.promises.promises import CHECKERS
+from interfaces.robot_model import forward_kinematics
 from interfaces.topics import CONFIGURATION, OFF, ON, TURN_OFF
-from services.kinematics import forward_kinematics
 
 from .histories import END, added, change, faulty, good, killed, silent, with_value
 

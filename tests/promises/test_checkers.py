@@ -23,8 +23,8 @@ from deploy.promises.history import (
 from deploy.promises.promises import CHECKERS, meaning
 from deploy.promises.text_report import text
 from interfaces import topics
+from interfaces.robot_model import forward_kinematics
 from interfaces.topics import OFF, ON, TURN_OFF
-from services.kinematics import forward_kinematics
 
 from .histories import END, added, change, faulty, good, killed, silent, value_at, with_value
 

@@ -17,8 +17,8 @@ from deploy.promises.marks import TEXT, is_babble, nan
 from deploy.trials.chaos import babbler
 from deploy.trials.chaos.babbler import nonsense
 from interfaces import topics
+from interfaces.robot_model import forward_kinematics
 from services import engine_controller
-from services.kinematics import forward_kinematics
 
 
 @pytest.mark.parametrize("topic", topics.CONTRACT, ids=lambda topic: topic.name)
