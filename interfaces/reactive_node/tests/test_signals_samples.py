@@ -63,7 +63,7 @@ def straight(samples: list[Arrival], time: int, silence: Silence) -> tuple[Any, 
         return a.value + (b.value - a.value) * ((time - a.time) / (b.time - a.time)), CERTAIN
     match silence:
         case Unchanged():
-            is_rest = not after or time < after[0].time - GAP_NS
+            is_rest = time >= a.time + GAP_NS and (not after or time < after[0].time - GAP_NS)
             return a.value, CERTAIN if is_rest else HELD
         case Held():
             return a.value, HELD
@@ -227,7 +227,16 @@ def test_a_resting_state_is_answered_after_lateness_and_gap(scheduler: VirtualTi
 
     *_, (at, answer) = recording.items
     assert at - answer.time / SECOND == pytest.approx(LATENESS + GAP, abs=0.0101)
-    assert all(answer.is_certain for _, answer in recording.items)
+    assert all(answer.is_certain for _, answer in recording.items if answer.time >= GAP_NS)
+
+
+def test_a_state_that_pauses_for_twice_the_gap_is_held(scheduler: VirtualTime) -> None:
+    samples = [Arrival(0, 1.0, 0), Arrival(2 * GAP_NS, 3.0, 0)]
+    signal = linear(arriving(scheduler, samples), lateness=LATENESS, gap=GAP, silence=Unchanged())
+
+    found = answers(scheduler, signal, 0.001)
+
+    assert {each.mark for each in found if 0 < each.time < 2 * GAP_NS} == {HELD}
 
 
 def test_a_held_value_is_answered_after_lateness(scheduler: VirtualTime) -> None:
@@ -267,12 +276,20 @@ def test_late_value_of_a_state_counts_if_it_is_the_newest(scheduler: VirtualTime
     assert {each.value for each in found if each.time > 320 * MS} == {9.0 if is_state else 1.0}
 
 
+def test_the_shortest_lateness_is_a_nanosecond(scheduler: VirtualTime) -> None:
+    assert answers(scheduler, hold(scheduler.hot(), lateness=1e-9))[0] == Answer(0, None, UNKNOWN)
+    with pytest.raises(ValueError, match=r"^the lateness must be more than 0 s, not 1e-10 s$"):
+        hold(scheduler.hot(), lateness=1e-10)
+
+
 def test_sample_on_its_bound_is_too_late(scheduler: VirtualTime) -> None:
     """Its time was settled before."""
+    refused: list[Refused] = []
     samples = [Arrival(0, 1.0, 0), Arrival(200 * MS, 9.0, 100 * MS), Arrival(250 * MS, 3.0, 0)]
-    signal = hold(arriving(scheduler, samples), lateness=LATENESS)
+    signal = hold(arriving(scheduler, samples), lateness=LATENESS, refused=refused.append)
 
     assert answers(scheduler, signal, 0.1)[2:4] == [Answer(200 * MS, 1.0), Answer(300 * MS, 3.0)]
+    assert [each.time for each in refused] == [200 * MS]
 
 
 def test_late_copy_of_the_last_value_is_dropped(scheduler: VirtualTime) -> None:

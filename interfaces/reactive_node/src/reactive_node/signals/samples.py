@@ -43,7 +43,9 @@ class Unchanged(Silence):
     """
     The last value holds: the topic of a state is silent while nothing changes.
 
-    It is certain until the last gap before the next sample, in which the change began, and held there.
+    It is held in the first gap of the silence, in which a change may still go on, and in the last one before
+    the next sample, in which the next change began. In between it is certain. So a publisher that changes
+    something may pause for twice the gap, and its last value is not taken for a rest.
     """
 
 
@@ -244,7 +246,8 @@ class _Interpolated(_Held):
             return self._between(value, values[index + 1], (time - begin) / (end - begin)), CERTAIN
         silence = self._silence
         if isinstance(silence, Unchanged):
-            return value, CERTAIN if end is None or time < end - self._gap else HELD
+            rests = time >= begin + self._gap and (end is None or time < end - self._gap)
+            return value, CERTAIN if rests else HELD
         if isinstance(silence, Held):
             return value, HELD
         if isinstance(silence, Extrapolated) and index > 0 and time - begin <= silence.bound * SECOND:
