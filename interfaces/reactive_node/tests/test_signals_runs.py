@@ -222,6 +222,34 @@ def test_it_completes_when_all_samples_have_come(scheduler: VirtualTime) -> None
     assert len(messages) == 7
 
 
+def test_event_is_answered_at_the_very_time_when_it_is_known(scheduler: VirtualTime) -> None:
+    events = arriving(scheduler, [Arrival(100 * MS, "a", 0)])
+    signal = hold(scheduler.hot(), lateness=LATENESS)
+
+    recording = scheduler.record(signal.snapshot(events, lateness=LATENESS), until=2.0)
+
+    assert [at for at, _ in recording.items] == [pytest.approx(0.1 + LATENESS, abs=2e-7)]
+
+
+def test_nothing_is_looked_at_again_before_its_time() -> None:
+    """An event waits for other events: to look each microsecond would take the processor."""
+    looks: list[float] = []
+
+    class Counting(VirtualTime):
+        def schedule_relative(self, duetime: Any, *others: Any, **options: Any) -> Any:
+            looks.append(duetime)
+            return super().schedule_relative(duetime, *others, **options)
+
+    scheduler = Counting()
+    events = arriving(scheduler, [Arrival(100 * MS, "a", 0)])
+    before = len(looks)
+
+    recording = scheduler.record(constant(1.0).snapshot(events, lateness=0.5), until=2.0)
+
+    assert [pair for _, pair in recording.items] == [("a", Answer(100 * MS, 1.0))]
+    assert len(looks) - before < 5
+
+
 def test_snapshot_completes_when_all_events_are_answered(scheduler: VirtualTime) -> None:
     events = scheduler.create_hot_observable(
         ReactiveTest.on_next(0.1, stamped("a", 100 * MS)), ReactiveTest.on_completed(0.1)
@@ -304,6 +332,28 @@ def test_a_topic_becomes_a_signal_by_the_source_times(
 
     assert found[-1].value == 3.0
     assert before <= found[-1].time <= stamps.to_nanoseconds(stamps.now())
+
+
+@pytest.mark.parametrize("hours", [1, -1])
+def test_clock_that_is_set_begins_again(
+    node: ReactiveNode, spin_until: SpinUntil, monkeypatch: pytest.MonkeyPatch, hours: int
+) -> None:
+    """Nobody asked for the values of the hour that was left out. A state keeps its value."""
+    samples, found = Subject[Any](), list[Answer[float]]()
+    time_of_stamps = node.scheduler.time_of_stamps
+    hold(samples, lateness=0.05).sample(0.01).subscribe(found.append, scheduler=node.scheduler)
+    samples.on_next(stamped(1.0, time_of_stamps()))
+    spin_until(lambda: found and found[-1].value == 1.0)
+    found.clear()
+
+    monkeypatch.setattr(node.scheduler, "time_of_stamps", lambda: time_of_stamps() + hours * 3600 * SECOND)
+    first = node.scheduler.time_of_stamps()
+    spin_until(lambda: [each for each in found if abs(each.time - first) < SECOND])
+
+    after = [each for each in found if abs(each.time - first) < SECOND]
+    assert found[-len(after) :] == after
+    assert len(found) < 100
+    spin_until(lambda: found[-1].value == 1.0)
 
 
 def test_live_answers_are_those_of_virtual_time(

@@ -33,8 +33,6 @@ class Grid:
         """Return the earliest time without an answer [ns]."""
         return self._next
 
-    oldest = next
-
     def is_done(self, are_complete: bool) -> bool:
         """Return whether no sample will come any more."""
         return are_complete
@@ -80,10 +78,6 @@ class Events(Source):
         if self._asked:
             return self._asked[0][0]
         return self.waiting[0][0] if self.waiting else None
-
-    def oldest(self) -> int:
-        """Return a time [ns] before which nothing will be asked."""
-        return self._asked[0][0] if self._asked else self.settled
 
     def is_done(self, are_complete: bool) -> bool:
         """Return whether all events have come and are answered."""

@@ -12,7 +12,7 @@ from reactive_node import stamps
 from reactive_node.scheduler import NodeScheduler
 from reactive_node.signals.source import SECOND, Memory, Source
 
-_SET_BACK = SECOND  # a clock that goes back by more was set
+_SET = SECOND  # a clock that jumps by more was set
 _SHORTEST = 1e-6  # s, the resolution of Rx's clocks
 
 
@@ -34,9 +34,6 @@ class Questions(Protocol):
 
     def next(self) -> int | None:
         """Return the earliest time without an answer [ns]; ``None`` if nothing is asked."""
-
-    def oldest(self) -> int:
-        """Return a time [ns] before which nothing will be asked."""
 
     def is_done(self, are_complete: bool, /) -> bool:
         """Return whether nothing will be asked any more; all sources may be complete."""
@@ -61,15 +58,16 @@ class Run:
         self._timer = SerialDisposable()
         self._armed_for: int | None = None  # [ns]
         self._latest = 0  # [ns]
+        self._ahead: int | None = None  # the clock of the stamps, of that of the scheduler [ns]
 
     def now(self) -> int:
-        """Return the present time by the clock of the stamps [ns]; begin again if it was set back."""
+        """Return the present time by the clock of the stamps [ns]; begin again if it was set."""
         scheduler = self._scheduler
+        now = steady = stamps.to_nanoseconds(scheduler.now)
         if isinstance(scheduler, NodeScheduler):
             now = scheduler.time_of_stamps()
-        else:
-            now = stamps.to_nanoseconds(scheduler.now)
-        if now < self._latest - _SET_BACK:
+        ahead, self._ahead = self._ahead, now - steady
+        if now < self._latest - _SET or (ahead is not None and abs(self._ahead - ahead) > _SET):
             self._restart(now)
             self._latest = now
         self._latest = max(self._latest, now)
@@ -116,9 +114,8 @@ class Run:
         if self._questions.is_done(are_complete):
             self.observer.on_completed()
             return
-        oldest = min(self._questions.oldest(), horizon)
         for memory in reversed(self._memories):  # those first that are made from others
-            memory.forget(oldest + memory.low)
+            memory.forget(horizon + memory.low)  # what was asked up to there is answered
         self._arm(now)
 
     def _restart(self, now: int) -> None:
