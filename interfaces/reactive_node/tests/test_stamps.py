@@ -73,3 +73,7 @@ def test_timestamp_can_be_copied_and_pickled(duplicate: Callable[[Any], Any]) ->
     assert type(twin) is Timestamp
     assert (twin.value, twin.nanoseconds) == (["value"], 1_000_000_001)
     assert (twin.value is item.value) == (duplicate is copy.copy)
+
+
+def test_ros_time_of_nanoseconds_is_exact() -> None:
+    assert stamps.time_message(1_700_000_000_123_456_789) == Time(sec=1_700_000_000, nanosec=123_456_789)

@@ -15,6 +15,7 @@ from builtin_interfaces.msg import Time
 __all__ = [
     "Timestamp",
     "stamped",
+    "time_message",
     "by_header",
     "from_message",
     "from_nanoseconds",
@@ -91,5 +92,10 @@ def from_message(stamp: Time) -> datetime:
 
 def to_message(time: datetime) -> Time:
     """Convert to a ROS time."""
-    seconds, nanoseconds = divmod(to_nanoseconds(time), 10**9)
-    return Time(sec=seconds, nanosec=nanoseconds)
+    return time_message(to_nanoseconds(time))
+
+
+def time_message(nanoseconds: int) -> Time:
+    """Convert nanoseconds since 1970 to a ROS time."""
+    seconds, rest = divmod(nanoseconds, 10**9)
+    return Time(sec=seconds, nanosec=rest)
