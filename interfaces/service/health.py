@@ -25,6 +25,7 @@ from interfaces.topics import DIAGNOSTICS
 PERIOD = 1.0  # [s]
 _PID, _PUBLISHED, _SINCE_OUTPUT = "pid", "published", "seconds_since_output"
 _PARAMETER = "parameter "  # before its name
+_REFUSED = "refused "  # before the subject
 _REASONS, _OTHER_REASONS = 4, "other reasons"  # in a report, for each subject
 
 
@@ -46,6 +47,8 @@ class HealthReporter:
         self._remarks: dict[str, Counter[str]] = {}  # since the last report: subject, reason, how often
         self._logged: set[str] = set()  # the remarks of the last report
         self._parameters: dict[str, str] = {}
+        self._counts: Counter[str] = Counter()
+        self._refused: dict[str, list[tuple[int, int | None]]] = {}  # since the last report, by subject
         self._publisher = node.create_publisher(
             DIAGNOSTICS.type,
             DIAGNOSTICS.name,
@@ -71,6 +74,22 @@ class HealthReporter:
         reasons = self._remarks.setdefault(subject, Counter())
         reasons[reason if reason in reasons or len(reasons) < _REASONS else _OTHER_REASONS] += 1
 
+    def count(self, what: str) -> None:
+        """Count something that is usual: each report tells the number since the start."""
+        self._counts[what] += 1
+
+    def refuse(self, subject: str, reason: str, time: int, taken: int | None) -> None:
+        """
+        Count and remark a sample that a signal refused; the next report tells a replay of it.
+
+        :param time, taken: that of the sample, and that from which it counts, if it was not dropped [ns].
+        """
+        self._refused.setdefault(subject, []).append((time, taken))
+        if taken is None:
+            self.drop(subject, reason)
+        else:
+            self.remark(subject, reason)
+
     def note_parameter(self, name: str, value: object) -> None:
         """Tell in each report that a parameter has another value than its default."""
         self._parameters[f"{_PARAMETER}{name}"] = json.dumps(value)
@@ -85,6 +104,7 @@ class HealthReporter:
             self._node.get_logger().warning("; ".join(sorted(counts)))
         self._logged = set(counts)
         warnings = [remark + (f" ({n} times)" if n > 1 else "") for remark, n in counts.items()]
+        refused, self._refused = self._refused, {}
         now = time.monotonic()
         values = {
             _PID: os.getpid(),
@@ -92,6 +112,8 @@ class HealthReporter:
             _PUBLISHED: self._published,
             "dropped": self._dropped,
             _SINCE_OUTPUT: "" if self._last_output is None else f"{now - self._last_output:.3f}",
+            **self._counts,
+            **{f"{_REFUSED}{subject}": json.dumps(samples) for subject, samples in refused.items()},
             **self._parameters,
         }
         status = DiagnosticStatus(
@@ -122,6 +144,20 @@ def reported_parameters(status: DiagnosticStatus) -> dict[str, Any]:
         for pair in status.values
         if pair.key.startswith(_PARAMETER)
     }
+
+
+def reported_refusals(status: DiagnosticStatus, subject: str) -> list[tuple[int, int | None]]:
+    """
+    Return the samples of a subject that signals refused, in a report. Raises ValueError.
+
+    Of each: its time, and the time from which its value holds instead; ``None`` if it was dropped [ns].
+    """
+    return [
+        (time, taken)
+        for pair in status.values
+        if pair.key == f"{_REFUSED}{subject}"
+        for time, taken in json.loads(pair.value)
+    ]
 
 
 class Health(NamedTuple):
