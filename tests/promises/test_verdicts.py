@@ -12,13 +12,30 @@ from pathlib import Path
 
 import pytest
 
-from deploy.promises.history import ALL, NO_TARGET, OPERATOR, PROGRAMS, History, InjectedFault
+from deploy.promises.history import ALL, NO_TARGET, OPERATOR, History, InjectedFault
 from deploy.promises.promises import CHECKERS
 from interfaces.topics import OFF, TURN_OFF
 
 from .histories import added, faulty, good, killed, silent, with_value
 
 FILE = Path(__file__).with_name("verdicts.txt")
+PROGRAMS = (
+    "config_l1",
+    "config_l2",
+    "config_theta1",
+    "config_theta2",
+    "dead_mans_switch",
+    "kinematics",
+    "velocity",
+    "operator_watchdog",
+    "engine_controller",
+    "robot_state",
+    "operator_page",
+    "sentinel",
+)
+"""Those that the arm had when the verdicts were written; a new service changes none of them."""
+JUDGED = ("S1", "S2", "S3", "S5", "L1", "L3", "L4")
+"""S4 takes long on these histories; L2 counts the streams of the contract, and S6 needs a drive."""
 SUSPENDING = ("stop", "hang", "slow", "crash_loop")
 LASTING = (*SUSPENDING, "partition", "bad_line", "flood", "overload", "loss", "stuck_drive")
 TARGETS = {"partition": OPERATOR, "bad_line": ALL}
@@ -56,8 +73,7 @@ def random_history(seed: int) -> History:
 def verdicts(seed: int) -> list[str]:
     """Return a line for each promise: its verdict, its figures and its first evidence."""
     history = random_history(seed)
-    # S4 would search for long which values explain the positions after a killed source.
-    findings = [check(history) for promise, check in CHECKERS.items() if promise != "S4"]
+    findings = [check(history) for promise, check in CHECKERS.items() if promise in JUDGED]
     return [
         f"{seed} {each.promise} {each.verdict} {each.cases} {each.unknown} {len(each.evidence)}: "
         f"{each.measured}; {each.evidence[0].text if each.evidence else ''}".rstrip("; ")
