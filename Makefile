@@ -15,6 +15,7 @@ RECORD ?=
 REPLAY ?=
 MODULES ?=
 BENCH ?=
+NAME ?=
 SHELL := /bin/sh
 MAKEFLAGS += --no-print-directory
 PY := deploy/commands/venv.sh
@@ -33,6 +34,7 @@ USED_BY_replay := RECORD REPLAY
 USED_BY_test := TESTS
 USED_BY_mutants := MODULES
 USED_BY_bench := BENCH
+USED_BY_new-service := NAME
 # Those of the environment may also stand on the command line of make.
 ENVIRONMENT := ROS_% RMW_% CYCLONEDDS_% FASTRTPS_% FASTDDS_% REACTIVE_ARM_% PIP_% PYTHONPATH PATH
 GOALS := $(or $(MAKECMDGOALS),help)
@@ -42,7 +44,7 @@ GIVEN := $(foreach name,$(.VARIABLES),$(if $(filter command,$(origin $(name))),$
 $(foreach name,$(filter-out $(USED) $(ENVIRONMENT),$(GIVEN)),$(error make $(GOALS) has no variable $(name); it has $(USED)))
 endif
 
-.PHONY: help setup tables run start stop status logs record terminal chaos simulate replay test mutants check bench
+.PHONY: help setup tables run start stop status logs record terminal chaos simulate replay test mutants check bench new-service
 
 help:
 	@echo "make run      start the system, show it in this terminal, stop it with Ctrl-C"
@@ -61,6 +63,7 @@ help:
 	@echo "make mutants  change the safety path in every small way: do the tests notice?  (MODULES= for a part)"
 	@echo "make bench    compare the costs with those of the alternatives  (BENCH=\"--rounds 5\", minutes each)"
 	@echo "make tables   write the tables and the graph of the READMEs from the code"
+	@echo "make new-service  write a new guard, its test and its topic  (NAME=torque_guard)"
 	@echo "make check    ruff, mypy, import rules, shellcheck, yamllint"
 	@echo "make setup    only set up .venv                   (PYTHON= chooses the interpreter, 3.11 to 3.13)"
 	@echo "All of them run on ROS 2's own rclpy from PyPI, or on a sourced ROS 2. RUNTIME=embedded takes our lighter one."
@@ -98,6 +101,10 @@ bench: setup
 
 tables: setup
 	@RUNTIME=embedded $(PY) -m deploy.commands.tables
+
+new-service: export NAME := $(NAME)
+new-service: setup
+	@RUNTIME=embedded $(PY) -m deploy.commands.new_service "$$NAME"
 
 check: setup
 	@$(PY) -m ruff check .

@@ -319,24 +319,8 @@ DIAGNOSTICS = Topic(
     longest_gap=1.0,
 )
 
-CONTRACT: tuple[Topic, ...] = (
-    L1,
-    L2,
-    THETA1,
-    THETA2,
-    EFFECTOR_POSITION,
-    EFFECTOR_SPEED,
-    JOINT_STATES,
-    ROBOT_DESCRIPTION,
-    *([TF] if TF.type else []),
-    OPERATOR_HEARTBEAT,
-    OPERATOR_PRESENCE,
-    OPERATOR_ACTIVITY,
-    ENGINES,
-    ENGINES_STATE,
-    DRIVEN_TIME,
-    DIAGNOSTICS,
-)
+CONTRACT = tuple(each for each in [*globals().values()] if isinstance(each, Topic) and each.type)
+"""All topics above whose type is installed."""
 CONFIGURATION = {topic.name: topic for topic in (L1, L2, THETA1, THETA2)}
 """The four sources of the manipulator's configuration, by topic name (thesis 5.2.1)."""
 JOINTS = (THETA1, THETA2)
