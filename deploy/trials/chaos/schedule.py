@@ -119,9 +119,11 @@ def nonsense() -> Schedule:
 
 
 def briefly() -> Schedule:
-    """Kill every program twice, and once on the next day; while the operator sleeps, only the watchdog."""
-    next_day = [kill._replace(at=DAY + kill.at) for kill in kill_each(1)]
-    return [*kill_each(2), *_kill_every(2.0, AWAKE, DAY, "operator_watchdog"), *next_day]
+    """Kill every program three times in the days; in the first night, only the watchdog."""
+    rounds = int((AWAKE - FIRST_FAULT) / PAUSE) // len(ROUND)  # that a day has time for
+    days = [kill_each(rounds)] * (3 // rounds) + [kill_each(3 % rounds)]
+    first, *others = [[kill._replace(at=DAY * n + kill.at) for kill in day] for n, day in enumerate(days)]
+    return [*first, *_kill_every(2.0, AWAKE, DAY, "operator_watchdog"), *itertools.chain(*others)]
 
 
 def variously() -> Schedule:
