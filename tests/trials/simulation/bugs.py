@@ -39,10 +39,12 @@ class Bug(NamedTuple):
 
 BUGS: dict[str, Bug] = {
     "a presence is stamped now": Bug(
-        WATCHDOG, "stamps.to_message(it.seen)", "stamps.to_message(stamps.now())"
+        WATCHDOG,
+        "presence.map(lambda it: it.seen)",
+        "presence.map(lambda it: __import__('reactive_node').stamps.now())",
     ),
     "a presence is as young as its arrival": Bug(
-        CONTROLLER, "node.age(stamps.from_message(it.value.stamp))", "0.0"
+        CONTROLLER, "Presence(it.timestamp, node.age(it.value))", "Presence(it.timestamp, 0.0)"
     ),
     "a heartbeat counts for nine seconds": Bug(
         WATCHDOG, "lifespan: float = parameter(0.5,", "lifespan: float = parameter(9.0,"
@@ -52,8 +54,8 @@ BUGS: dict[str, Bug] = {
     "a strike takes 4 s": Bug(WATCHDOG, "silence: float = parameter(3.0,", "silence: float = parameter(4.0,"),
     "a released switch is a sign of life": Bug(
         WATCHDOG,
-        "        topics.OPERATOR_HEARTBEAT, t",
-        "        replace(topics.OPERATOR_HEARTBEAT, problem=lambda _: ''), t",
+        "        topics.OPERATOR_HEARTBEAT, reading",
+        "        replace(topics.OPERATOR_HEARTBEAT, problem=lambda _: ''), reading",
     ),
     "a presence from the future counts": Bug(CONTROLLER, "if age < -CLOCK_TOLERANCE:", "if age < -1e12:"),
     "an older presence replaces a newer one": Bug(CONTROLLER, "seen=max(latch.seen, ", "seen=min(event.at, "),
