@@ -23,6 +23,7 @@ from reactive_node.testing import MakeNode, SpinUntil
 
 TOPICS = {topic.full_name("/"): topic for topic in topics.CONTRACT}
 PROGRAMS = {program.name: program for program in manifest.programs() if program.name != manifest.PAGE}
+MOVING = "".join(f"{joint}: {{center: 0, amplitude: 1, period: 9}}\n" for joint in ("theta1", "theta2"))
 
 
 class Started(Exception):
@@ -63,7 +64,7 @@ def test_service_reads_and_publishes_what_the_contract_says(
     with pytest.raises(Started):
         runpy.run_path(importlib.import_module(program.module).__file__ or "", run_name="__main__")
     scenario = tmp_path / "scenario.yaml"
-    scenario.write_text("engines: [{at: 0.0, command: turn_on}]")
+    scenario.write_text("drive: {}\nengines: [{at: 0.0, command: turn_on}]\n" + MOVING)
     played = [Parameter("scenario", value=str(scenario))]
     node: ServiceNode = make_node(program.name, kind=ServiceNode, parameter_overrides=played)
     found[0](node)
