@@ -154,6 +154,13 @@ def test_drive_runs_with_the_engines_and_goes_on_after_a_restart(
     assert times_of(second)[0] == last
 
 
+def test_drive_begins_at_the_beginning(start: Callable[..., Wired], spin_until: SpinUntil) -> None:
+    first = start_drive(start)
+    spin_until(lambda: times_of(first))
+
+    assert times_of(first)[0] == 0.0
+
+
 def test_without_a_drive_in_the_scenario_it_says_nothing(
     make_node: MakeNode, spin_until: SpinUntil, tmp_path: Path
 ) -> None:

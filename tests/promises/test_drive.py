@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from deploy.promises.drive import joints_stand_in_time
@@ -54,7 +56,9 @@ def test_s6_joint_that_was_away_may_have_moved_in_time() -> None:
 
 
 def test_s6_joint_that_stood_all_the_time_is_no_case() -> None:
-    assert joints_stand_in_time(history("theta1", [(12.0, 0.0), (20.0, 0.0)])).cases == 0
+    found = joints_stand_in_time(history("theta1", [(12.0, 0.0), (20.0, 0.0)]))
+
+    assert (found.cases, found.worst) == (0, 0.0)
 
 
 def test_s6_present_operator_may_move_the_joints() -> None:
@@ -78,6 +82,23 @@ def test_s6_operator_may_be_seen_in_an_overload(end: float, expected: tuple[int,
 
     assert (found.cases, len(found.evidence)) == expected
     assert found.unknown == 1 - expected[0]
+
+
+def test_s6_judges_every_silence() -> None:
+    late = [(12.0, 0.25), (13.0, 0.5), (13.25, 0.75), (41.0, 1.0), (42.0, 1.5), (42.25, 2.0)]
+    long = replace(history("theta1", late), end=60.0)
+    assert [each.time for each in joints_stand_in_time(long).evidence] == [12.5, 41.5]
+    assert joints_stand_in_time(long).cases == 2
+
+    blind = [InjectedFault(OVERLOAD, NO_TARGET, at, at + 2.5) for at in (1.5, 30.5)]
+    found = joints_stand_in_time(replace(long, faults=blind))
+    assert (found.cases, found.unknown) == (0, 2)
+
+
+def test_s6_silence_as_long_as_the_limit_is_no_case() -> None:
+    short = replace(history("theta1", [(12.0, 0.25), (12.25, 0.5)]), end=12.5)
+    short.streams["operator_heartbeat"] = samples((1.0, True), (2.0, True))
+    assert joints_stand_in_time(short).cases == 0
 
 
 def test_s6_without_a_drive_says_nothing() -> None:
