@@ -15,9 +15,8 @@ from functools import cached_property
 from operator import attrgetter
 from typing import Any, NamedTuple
 
-from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import Point, PointStamped
+from geometry_msgs.msg import Point, PointStamped, Twist, TwistStamped, Vector3
 from rclpy.duration import Duration
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
@@ -57,9 +56,36 @@ def _position(message: PointStamped) -> Position:
 
 def _point(position: Position) -> PointStamped:
     stamp, x, y, frame = position
-    seconds, nanoseconds = divmod(stamp, 10**9)
-    header = Header(stamp=Time(sec=seconds, nanosec=nanoseconds), frame_id=frame)
+    header = Header(stamp=stamps.time_message(stamp), frame_id=frame)
     return PointStamped(header=header, point=Point(x=x, y=y))
+
+
+class Velocity(NamedTuple):
+    """A velocity of the effector."""
+
+    stamp: int
+    """When it was true [ns since 1970]."""
+    x: float  # [m/s]
+    y: float  # [m/s]
+    turn: float  # [rad/s]
+    frame: str = FRAME
+
+    @property
+    def speed(self) -> float:
+        """How fast the effector moves [m/s]."""
+        return math.hypot(self.x, self.y)
+
+
+def _velocity(message: TwistStamped) -> Velocity:
+    header, linear = message.header, message.twist.linear
+    stamp = header.stamp.sec * 10**9 + header.stamp.nanosec
+    return Velocity(stamp, linear.x, linear.y, message.twist.angular.z, header.frame_id)
+
+
+def _twist(velocity: Velocity) -> TwistStamped:
+    stamp, x, y, turn, frame = velocity
+    header = Header(stamp=stamps.time_message(stamp), frame_id=frame)
+    return TwistStamped(header=header, twist=Twist(linear=Vector3(x=x, y=y), angular=Vector3(z=turn)))
 
 
 _CONVERSIONS: dict[Any, tuple[Conversion, Conversion]] = {
@@ -67,6 +93,7 @@ _CONVERSIONS: dict[Any, tuple[Conversion, Conversion]] = {
     Float64: (attrgetter("data"), lambda value: Float64(data=value)),
     String: (attrgetter("data"), lambda value: String(data=value)),
     PointStamped: (_position, _point),
+    TwistStamped: (_velocity, _twist),
     Header: (
         lambda message: stamps.from_message(message.stamp),
         lambda time: Header(stamp=stamps.to_message(time)),
@@ -96,7 +123,7 @@ class Topic:
     """Return what is wrong with a value; empty for a good one."""
     longest_gap: float = 0.25
     """The longest time [s] between two messages while the arm moves and its operator is present; infinite for
-    a topic that reports single events."""
+    a topic that reports single events, or that is silent while it does not know."""
     follows: str = ""
     """The name of the topic without which this one falls silent; empty if there is none."""
 
@@ -136,6 +163,11 @@ def _not_a_position(position: Position) -> str:
     return "" if math.isfinite(x) and math.isfinite(y) else f"({x}, {y}) is not finite"
 
 
+def _not_a_velocity(velocity: Velocity) -> str:
+    _, *found, _ = velocity
+    return "" if all(map(math.isfinite, found)) else f"{tuple(found)} is not finite"
+
+
 def _not_pressed(beat: bool) -> str:
     return "" if beat else "a released switch is no sign of life"
 
@@ -166,7 +198,7 @@ _EVENTS = _qos(10)
 OPERATOR_NODES = ("terminal", "operator_page")
 """The nodes that show the arm to its operator."""
 _VIEWERS = ("RViz", "Foxglove")
-_CONFIGURED = ("kinematics", "robot_state", *OPERATOR_NODES)
+_CONFIGURED = ("kinematics", "motion", "robot_state", *OPERATOR_NODES)
 
 L1 = Topic("l1", Float64, _STATE, "m", ("config_l1",), _CONFIGURED, "length of the first link", _not_a_length)
 L2 = Topic(
@@ -225,6 +257,18 @@ EFFECTOR_SPEED = Topic(
     _not_a_length,
     follows=EFFECTOR_POSITION.name,
 )
+EFFECTOR_VELOCITY = Topic(
+    "effector/velocity",
+    TwistStamped,
+    _EVENTS,
+    "m/s, rad/s",
+    ("motion",),
+    ("operator_page",),
+    f"x, y and the turn about z in frame `{FRAME}`, at 50 Hz; true at the time in `header.stamp`. "
+    "Silent while it is unknown: where a movement begins or ends, and while a source is dead",
+    _not_a_velocity,
+    longest_gap=math.inf,
+)
 JOINT_STATES = Topic(
     "joint_states",
     JointState,
@@ -232,7 +276,7 @@ JOINT_STATES = Topic(
     "rad",
     ("robot_state",),
     _VIEWERS,
-    "angles of the joints `theta1` and `theta2`",
+    "angles of the joints `theta1` and `theta2`, all of one time",
 )
 ROBOT_DESCRIPTION = Topic(
     "robot_description",
@@ -251,7 +295,8 @@ TF = Topic(
     "m, rad",
     ("robot_state",),
     _VIEWERS,
-    f"from `{FRAME}` to `link1`, `link2` and `effector`; only where the package tf2_msgs is installed",
+    f"from `{FRAME}` to `link1`, `link2` and `effector`, all of one time; only where the package tf2_msgs is "
+    "installed",
 )
 OPERATOR_HEARTBEAT = Topic(
     "operator_heartbeat",

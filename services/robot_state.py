@@ -6,6 +6,7 @@ set-up.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -19,9 +20,11 @@ from std_msgs.msg import Header
 from interfaces import robot_model, service
 from interfaces.robot_model import JOINTS, frame_id, urdf
 from interfaces.service import ServiceNode, parameter
-from interfaces.topics import CONTRACT, JOINT_STATES, L1, L2, ROBOT_DESCRIPTION, TF, THETA1, THETA2
+from interfaces.service.states import observe_state
+from interfaces.topics import CONFIGURATION, CONTRACT, JOINT_STATES, L1, L2, ROBOT_DESCRIPTION, TF
+from reactive_node.signals import UNKNOWN, Answer, Signal, lift
+from reactive_node.stamps import time_message
 
-REPEAT = 0.1  # s: transforms are volatile, and a listener that asks for the present needs young ones
 DESCRIPTION_PERIOD = 1.0  # s: tools build the model again for each description
 
 
@@ -34,20 +37,14 @@ class Configuration(NamedTuple):
     theta2: float
 
 
-def configurations(
-    l1: Observable[float],
-    l2: Observable[float],
-    theta1: Observable[float],
-    theta2: Observable[float],
-    rate: float = 30.0,
-) -> Observable[Configuration]:
-    """Emit the configuration after changes, at most at ``rate`` [Hz], and repeat it while nothing changes."""
+def configurations(states: Iterable[Signal[float]], rate: float = 30.0) -> Observable[Answer[Configuration]]:
+    """
+    Emit the configuration at one common time, ``rate`` times a second, from l1, l2, theta1 and theta2.
 
-    def repeated(changes: Observable[Configuration]) -> Observable[Configuration]:
-        again = rx.interval(REPEAT).with_latest_from(changes).map(lambda pair: pair[1])
-        return rx.merge(changes, again).throttle_first(1 / rate)  # the last change comes with the repetition
-
-    return rx.combine_latest(l1, l2, theta1, theta2).starmap(Configuration).publish(repeated)
+    A held value counts, too: a dead source does not hide the arm.
+    """
+    configuration = lift(Configuration)(*states)
+    return configuration.sample(1 / rate).filter(lambda answer: answer.mark != UNKNOWN)
 
 
 def lengths(l1: Observable[float], l2: Observable[float]) -> Observable[tuple[float, float]]:
@@ -59,7 +56,7 @@ def lengths(l1: Observable[float], l2: Observable[float]) -> Observable[tuple[fl
 class Parameters:
     """Parameters that a user may set."""
 
-    rate: float = parameter(30.0, (5.0, 100.0), "Hz", "`joint_states` and `/tf` come at most this often")
+    rate: float = parameter(30.0, (5.0, 100.0), "Hz", "how often `joint_states` and `/tf` come")
 
 
 def wire(node: ServiceNode) -> None:
@@ -81,13 +78,14 @@ def wire(node: ServiceNode) -> None:
             ]
         )
 
-    l1, l2, theta1, theta2 = map(node.observe, (L1, L2, THETA1, THETA2))
-    states = configurations(l1, l2, theta1, theta2, node.declare(Parameters).rate)
-    stamped = states.map(lambda it: (node.get_clock().now().to_msg(), it)).share()
+    states = [observe_state(node, topic) for topic in CONFIGURATION.values()]
+    answers = configurations(states, node.declare(Parameters).rate)
+    stamped = answers.map(lambda it: (time_message(it.time), it.value)).share()
     # Most of the time nobody looks.
     node.publish(JOINT_STATES, stamped.starmap(joint_state), on_demand=True)
     if TF in CONTRACT:
         node.publish(TF, stamped.starmap(transforms), on_demand=True)
+    l1, l2 = map(node.observe, (L1, L2))
     node.publish(ROBOT_DESCRIPTION, lengths(l1, l2).starmap(lambda l1, l2: urdf(l1, l2, namespace)))
 
 

@@ -27,8 +27,8 @@ Every sample of a moving joint gives a position (``combine_latest``). If both jo
 alternate: a position shows a full step of one joint, but its time since the last position, which is the other
 joint's, is only a part of the step's time. The published speed is then about twice the true speed. Any speed
 is also wrong by as much as `kinematics` is late, because positions are stamped there. In ``demo.yaml`` the
-joints take turns (``phase``, ``rest``), which leaves only the second error. Both errors concern single
-speeds: a speed guard should act on two speeds in a row above its limit.
+joints take turns (``phase``, ``rest``), which leaves only the second error. The topic
+``effector/velocity`` has neither: a speed guard should listen to that.
 """
 
 from __future__ import annotations

@@ -8,8 +8,8 @@ from interfaces import service, topics
 
 
 def too_fast(speeds: Observable[float], limit: float) -> Observable[str]:
-    """Emit `turn_off` when two speeds in a row are above the limit [m/s]: one may be late by a timer."""
-    excess = speeds.pairwise().map(lambda pair: min(pair) > limit).distinct_until_changed()
+    """Emit `turn_off` when a speed is above the limit [m/s]."""
+    excess = speeds.map(lambda speed: speed > limit).distinct_until_changed()
     return excess.filter(bool).map(lambda _: topics.TURN_OFF)
 
 
@@ -20,7 +20,7 @@ class Parameters:
 
 def wire(node: service.ServiceNode) -> None:
     """Connect the recipe with its topics."""
-    speeds = node.observe(topics.EFFECTOR_SPEED)
+    speeds = node.observe(topics.EFFECTOR_VELOCITY).map(lambda velocity: velocity.speed)
     node.publish(topics.ENGINES, too_fast(speeds, node.declare(Parameters).limit))
 
 

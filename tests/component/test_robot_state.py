@@ -19,40 +19,68 @@ from rclpy.node import Node
 from std_msgs.msg import Float64
 
 from interfaces import robot_model
-from interfaces.robot_model import BASE, EFFECTOR, LINK1, LINK2, frame_id, transforms, urdf
+from interfaces.robot_model import (
+    BASE,
+    EFFECTOR,
+    LINK1,
+    LINK2,
+    forward_kinematics,
+    frame_id,
+    transforms,
+    urdf,
+)
 from interfaces.service import ServiceNode
+from interfaces.service.states import state
 from interfaces.topics import CONFIGURATION, CONTRACT, JOINT_STATES, ROBOT_DESCRIPTION, TF
+from reactive_node.signals import Signal
+from reactive_node.stamps import stamped
 from reactive_node.testing import MakeNode, SpinUntil, VirtualTime
-from services.kinematics import forward_kinematics
 from services.robot_state import Configuration, configurations, lengths, wire
 
+NS = 10**9
 link_lengths = st.floats(0, 1e3)
 angles = st.floats(-1e3, 1e3)
 
 
-def test_configuration_follows_changes_at_most_at_the_rate(scheduler: VirtualTime) -> None:
-    still = [scheduler.hot((0.0, value)) for value in (2.0, 3.0, 0.1)]
-    theta2 = scheduler.hot(*((0.451 + at / 1000, float(at)) for at in range(200)))
+def test_configuration_is_that_of_common_times(scheduler: VirtualTime) -> None:
+    """However late the messages of the four sources are."""
 
-    recording = scheduler.record(configurations(*still, theta2, rate=20.0), until=0.81)
+    def source(first: float, slope: float, late: float) -> Signal[float]:
+        times = [first + 0.04 * k for k in range(50)]
+        samples = scheduler.hot(*((t + late, stamped(slope * t, round(t * NS))) for t in times))
+        return state(samples, scheduler.hot((0.0, stamped(True, 0))))
 
-    times = [time for time, _ in recording.items]
-    assert times == pytest.approx([0.451, 0.501, 0.551, 0.601, 0.7, 0.8], abs=0.004)
-    newest = [it.theta2 for _, it in recording.items]
-    assert newest == pytest.approx([0, 50, 100, 150, 199, 199], abs=4)
-    assert newest[-1] == 199
-    assert {it[:3] for _, it in recording.items} == {(2.0, 3.0, 0.1)}
+    states = [
+        source(0.004, 1.0, 0.001),
+        source(0.010, 2.0, 0.049),
+        source(0.02, 3.0, 0.0),
+        source(0.03, -1.0, 0.03),
+    ]
+
+    found = [it for _, it in scheduler.record(configurations(states, rate=20.0), until=1.0).items]
+
+    assert [it.time for it in found] == [k * NS // 20 for k in range(1, len(found) + 1)]
+    assert len(found) >= 17
+    for time, value, _ in found:
+        seconds = time / NS
+        assert value == pytest.approx((seconds, 2 * seconds, 3 * seconds, -seconds), abs=1e-9)
 
 
-def test_configuration_is_repeated_while_nothing_changes(scheduler: VirtualTime) -> None:
-    still = [scheduler.hot((0.01, value)) for value in (2.0, 3.0, 0.1, 0.2)]
+@pytest.mark.parametrize("lives", [True, False])
+def test_resting_configuration_is_repeated_at_the_rate(scheduler: VirtualTime, lives: bool) -> None:
+    """Even after the death of a source: its last value is shown."""
+    alive = [(0.0, stamped(True, 0)), *([] if lives else [(0.5, stamped(False, NS // 2))])]
+    states = [
+        state(scheduler.hot((0.01, stamped(value, NS // 100))), scheduler.hot(*alive))
+        for value in (2.0, 3.0, 0.1, 0.2)
+    ]
 
-    recording = scheduler.record(configurations(*still, rate=100.0), until=2.0)
+    recording = scheduler.record(configurations(states, rate=100.0), until=2.0)
 
-    times = [time for time, _ in recording.items]
-    assert {it for _, it in recording.items} == {Configuration(2.0, 3.0, 0.1, 0.2)}
-    assert max(later - time for time, later in itertools.pairwise(times)) <= 0.111
-    assert len(times) <= 21
+    assert {it.value for _, it in recording.items} == {Configuration(2.0, 3.0, 0.1, 0.2)}
+    times = [it.time for _, it in recording.items]
+    assert {later - time for time, later in itertools.pairwise(times)} == {NS // 100}
+    assert 2.0 - times[-1] / NS < 0.17  # lateness, gap and period
 
 
 def test_lengths_are_emitted_on_change_at_most_once_a_second(scheduler: VirtualTime) -> None:
@@ -211,6 +239,7 @@ sys.modules["tf2_msgs"] = None  # as if it were not installed
 import rclpy
 from interfaces import topics
 from interfaces.service import ServiceNode
+from interfaces.service.states import state
 from services import robot_state
 
 rclpy.init()

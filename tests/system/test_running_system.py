@@ -16,7 +16,7 @@ from contextlib import closing, suppress
 from pathlib import Path
 
 import pytest
-from geometry_msgs.msg import Point, PointStamped
+from geometry_msgs.msg import Point, PointStamped, Twist, TwistStamped, Vector3
 from std_msgs.msg import Bool, Float64, String
 
 from deploy.running import processes
@@ -317,13 +317,13 @@ def test_a_second_arm_runs_in_a_namespace_of_the_same_domain(module_site: Site, 
 
 
 def test_example_of_a_service_joins_the_system(module_site: Site, peer: Peer) -> None:
-    commands, speed = peer.collect(topics.ENGINES), peer.publisher(topics.EFFECTOR_SPEED)
+    commands, velocity = peer.collect(topics.ENGINES), peer.publisher(topics.EFFECTOR_VELOCITY)
     reports = peer.collect(topics.DIAGNOSTICS)
     guard = module_site.begin_python("-m", "services.examples.speed_guard", "--ros-args", "-p", "limit:=3.0")
 
     def it_has_commanded() -> bool:  # the operator watchdog may command as well
-        for value in (2.9, 3.1, 3.2):  # the last two in a row are too fast
-            speed.publish(Float64(data=value))
+        for value in (2.9, 3.1):
+            velocity.publish(TwistStamped(twist=Twist(linear=Vector3(x=value))))
         health = [status for report in reports for status in report.status if status.name == "/speed_guard"]
         published = (
             int(pair.value) for status in health for pair in status.values if pair.key == "published"

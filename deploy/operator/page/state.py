@@ -215,7 +215,7 @@ def while_open(seen: Seen, lines: Observable[Any], namespace: str, clock: Clock)
         rx.of(_forget),
         *(_changes(seen(topic), _configuration(name), clock) for name, topic in topics.CONFIGURATION.items()),
         _changes(seen(topics.EFFECTOR_POSITION), _position, clock),
-        _changes(seen(topics.EFFECTOR_SPEED), _speed, clock),
+        _changes(seen(topics.EFFECTOR_VELOCITY), _speed, clock),
         _changes(seen(topics.OPERATOR_HEARTBEAT), _heartbeat, clock),
         _changes(seen(topics.OPERATOR_PRESENCE), _presence, clock),
         _changes(seen(topics.DIAGNOSTICS), _diagnostics(namespace.rstrip("/")), clock),
@@ -262,7 +262,7 @@ def _position(state: PageState, message: Timestamp[Any], clock: Clock) -> PageSt
 
 
 def _speed(state: PageState, message: Timestamp[Any], clock: Clock) -> PageState:
-    return state._replace(arm=state.arm._replace(speed=message.value))
+    return state._replace(arm=state.arm._replace(speed=message.value.speed))
 
 
 # The operator

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.serialization import deserialize_message, serialize_message
 from rclpy_simulation.host import SECOND
 from std_msgs.msg import Header, String
 
 from deploy.promises.history import CONTROLLER, WATCHDOG
 from deploy.promises.marks import is_babble
-from deploy.trials.replay.lives import Latch, begins_away, latch, lives
+from deploy.promises.observations import time_sent
+from deploy.trials.replay.lives import Latch, begins_away, latch, lives, read_reports
 from deploy.trials.replay.record import Message, Record, text
 from interfaces.robot_model import BASE, frame_id
+from interfaces.service.health import reported_refusals
 from interfaces.topics import (
     CONFIGURATION,
     CONTRACT,
@@ -35,6 +38,7 @@ CHAINS: tuple[Chain, ...] = (
     ("robot_state",),
     ("kinematics",),
     ("velocity",),
+    ("motion",),
     (WATCHDOG, CONTROLLER),
 )
 """
@@ -54,7 +58,8 @@ def inputs(record: Record, namespace: str, chain: Chain) -> list[tuple[Topic, li
     """
     Return the recorded messages that a chain hears, and that none of its services has sent.
 
-    Of those that were sent before the arm began, it hears the latched ones.
+    Of those that were sent before the arm began, it hears the latched ones. A sample that was too late for a
+    signal has the time from which its value counted, or is left out.
     """
     made = outputs(chain)
     found = []
@@ -62,8 +67,37 @@ def inputs(record: Record, namespace: str, chain: Chain) -> list[tuple[Topic, li
         if topic is ENGINES or topic not in made:
             sent = commands(record, namespace)[0] if topic is ENGINES else record.of(topic, namespace)
             heard = [each for each in sent if each.sent >= record.begin or is_latched(topic.qos)]
-            found.append((topic, heard))
+            found.append((topic, as_taken(heard, refusals(record, namespace, chain, topic))))
     return found
+
+
+def refusals(record: Record, namespace: str, chain: Chain, topic: Topic) -> dict[int, list[int | None]]:
+    """Return when the samples that the signals of a chain refused were sent, and from when they counted."""
+    found: dict[int, list[int | None]] = {}
+
+    def note(reported: int, status: DiagnosticStatus) -> None:
+        for stamps in reported_refusals(status, topic.name):
+            sent, taken = (
+                None if stamp is None else int(time_sent(reported, stamp, record.offsets, SECOND))
+                for stamp in stamps
+            )
+            if sent is not None:
+                found.setdefault(sent, []).append(taken)
+
+    for service in chain:
+        read_reports(record, namespace, service, note)
+    return found
+
+
+def as_taken(messages: list[Message], refused: dict[int, list[int | None]]) -> list[Message]:
+    """Return messages as signals took them; of two with one time, the later one was refused."""
+    found = []
+    for message in reversed(messages):
+        taken = refused[message.sent].pop() if refused.get(message.sent) else message.sent
+        if taken is not None:
+            found.append(message._replace(sent=taken))
+    found.reverse()
+    return sorted(found, key=lambda message: message.sent)
 
 
 def has_input(record: Record, namespace: str, chain: Chain) -> bool:

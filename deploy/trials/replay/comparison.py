@@ -51,8 +51,9 @@ class Bounds(NamedTuple):
 BOUNDS: dict[str, Bounds] = {
     topics.EFFECTOR_POSITION.name: Bounds(1e-9, "m", 0.25, lost=0.05, near=0.2),
     topics.EFFECTOR_SPEED.name: Bounds(1e-9, "m/s", 0.25, lost=0.1, near=math.inf),
-    topics.JOINT_STATES.name: Bounds(0.1, "rad", 0.25),
-    topics.TF.name: Bounds(0.1, "", 0.25),
+    topics.EFFECTOR_VELOCITY.name: Bounds(1e-9, "m/s", 0.25, lost=0.1, near=math.inf),
+    topics.JOINT_STATES.name: Bounds(1e-9, "rad", 0.25, lost=0.1, near=0.1),
+    topics.TF.name: Bounds(1e-9, "", 0.25, lost=0.1, near=0.1),
     topics.ROBOT_DESCRIPTION.name: Bounds(0.1, "m", 1.25),
     topics.OPERATOR_PRESENCE.name: Bounds(0.25, "s"),
     topics.OPERATOR_ACTIVITY.name: Bounds(),
@@ -61,7 +62,6 @@ BOUNDS: dict[str, Bounds] = {
 }
 """
 By topic. A speed between two messages of a burst is that of their jitter, so a lost one may be any number.
-robot_state thins its output, and may choose other moments.
 """
 
 
@@ -182,9 +182,14 @@ def _pose(message: Any) -> tuple[float, ...]:
     return tuple(found)
 
 
+def _velocity(message: Any) -> tuple[float, ...]:
+    return message.twist.linear.x, message.twist.linear.y, message.twist.angular.z
+
+
 _READ: dict[str, Callable[[Any], Value]] = {
     topics.EFFECTOR_POSITION.name: lambda message: (message.point.x, message.point.y),
     topics.EFFECTOR_SPEED.name: lambda message: (message.data,),
+    topics.EFFECTOR_VELOCITY.name: _velocity,
     topics.JOINT_STATES.name: lambda message: tuple(message.position),
     topics.TF.name: _pose,
     topics.ROBOT_DESCRIPTION.name: lambda message: tuple(map(float, _NUMBER.findall(message.data))),

@@ -15,9 +15,10 @@ from deploy.running import interruption
 from deploy.trials.replay import chains
 from deploy.trials.replay.chains import Chain
 from deploy.trials.replay.comparison import BOUNDS, Comparison, Interval, compare
+from deploy.trials.replay.lives import lives
 from deploy.trials.replay.playback import Playback, replay
 from deploy.trials.replay.record import Message, Record
-from interfaces.topics import ENGINES, Topic
+from interfaces.topics import CONFIGURATION, EFFECTOR_VELOCITY, ENGINES, Topic
 
 START = 2 * SECOND
 """After the begin of the record or of a process, in which nothing is compared: processes discover each other
@@ -81,6 +82,8 @@ def run(record: Record, job: Job) -> Outcome:
         recorded = chains.recorded(record, job.namespace, topic)
         if recorded or topic is ENGINES:  # which nobody may have sent
             excused = _excused(record, playback, topic, chains.known(record, job.namespace, topic))
+            if topic is EFFECTOR_VELOCITY:
+                excused += _without_a_source(record, job.namespace)
             replayed = playback.messages[topic.name]
             comparisons.append(compare(topic, recorded, replayed, excused, record.offsets))
     return Outcome(job, playback.messages, comparisons, playback.failures)
@@ -94,9 +97,22 @@ def _excused(record: Record, playback: Playback, topic: Topic, known: int) -> li
     """
     around = round(BOUNDS[topic.name].time * SECOND)
     found = [(0, max(record.begin, known) + START), (record.end - around, max(record.end, known) + START)]
-    for life in (life for lives in playback.lives.values() for life in lives):
+    for life in (life for each in playback.lives.values() for life in each):
         found.append((life.began - around, life.began + START))
         if life.ended is not None:
             found.append((life.ended - around, life.ended + around))
         found += [(each.begin - around, each.end + CATCH_UP) for each in life.suspensions]
+    return found
+
+
+def _without_a_source(record: Record, namespace: str) -> list[Interval]:
+    """Return when a source was dead: then nothing is certain, but the player of the record lives."""
+    found = []
+    for source in CONFIGURATION.values():
+        (publisher,) = source.publishers
+        processes = lives(record, namespace, publisher)
+        following = [each.began for each in processes[1:]] + [record.end]
+        for life, began in zip(processes, following, strict=True):
+            if life.ended is not None:
+                found.append((life.ended - SECOND, began + START))
     return found

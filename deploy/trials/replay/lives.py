@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from itertools import islice
 from typing import Any, NamedTuple
 
+from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.serialization import deserialize_message
 from rclpy_simulation.host import SECOND
 
@@ -112,20 +113,31 @@ def lives(record: Record, namespace: str, service: str) -> list[ReplayedLife]:
 def _seen(record: Record, namespace: str, service: str) -> dict[int, _Seen]:
     """Return the processes of a service by pid."""
     found: dict[int, _Seen] = {}
+
+    def note(sent: int, status: DiagnosticStatus) -> None:
+        values = {pair.key: pair.value for pair in status.values}
+        pid, created = int(values["pid"]), sent - round(float(values["uptime"]) * SECOND)
+        created = found[pid].created if pid in found else created
+        found[pid] = _Seen(created, sent, reported_parameters(status))
+
+    read_reports(record, namespace, service, note)
+    return found
+
+
+def read_reports(
+    record: Record, namespace: str, service: str, read: Callable[[int, DiagnosticStatus], None]
+) -> None:
+    """Call a function with the health reports of a service, and when each was sent [ns since 1970]."""
     name = f"{namespace.rstrip('/')}/{service}"
     for sent, data in record.of(DIAGNOSTICS, namespace):
         if name.encode() not in data:
             continue
         try:
             for status in deserialize_message(data, DIAGNOSTICS.type).status:
-                values = {pair.key: pair.value for pair in status.values}
-                if status.name == name and "uptime" in values:
-                    pid, created = int(values["pid"]), sent - round(float(values["uptime"]) * SECOND)
-                    created = found[pid].created if pid in found else created
-                    found[pid] = _Seen(created, sent, reported_parameters(status))
+                if status.name == name and any(pair.key == "uptime" for pair in status.values):
+                    read(sent, status)
         except Exception:  # of any type: the message is no report of ours
             continue
-    return found
 
 
 def _begin_of_work(record: Record, namespace: str, service: str, created: int) -> int:
