@@ -62,6 +62,17 @@ class Recorder:
         self._counts: Counter[str] = Counter()
         self._writer.add_metadata(METADATA, {"origin": str(self._origin + self._offset)})
 
+    def monotonic(self, time_of_day: int, moment: tuple[int, int]) -> int:
+        """
+        Convert a time since 1970 to the monotonic clock [ns].
+
+        :param moment: what :func:`clocks` returns. The error of reading two clocks changes no time: replayed
+            velocities follow from the differences of source times.
+        """
+        now, epoch = moment
+        set_by = round(epoch - now - self._offset, -6)  # to ms
+        return time_of_day - self._offset - set_by
+
     def message(self, topic: str, type_name: str, qos: str, data: bytes, received: int, sent: int) -> None:
         """Record a serialized message; without effect after :meth:`close`. Times: monotonic clock [ns]."""
         with self._lock:
@@ -167,9 +178,10 @@ def _writer(
         if is_first:
             first(name)
             is_first = False
-        now, epoch = clocks()
-        recorder.message(name, topic.type_name, offered, data, now, now - (epoch - source_time))
-        return now
+        moment = clocks()
+        sent = recorder.monotonic(source_time, moment)
+        recorder.message(name, topic.type_name, offered, data, moment[0], sent)
+        return moment[0]
 
     return write
 

@@ -246,3 +246,13 @@ def test_of_a_flood_of_heartbeats_the_newest_are_recorded(
     assert len(recorded) <= 210
     assert recorded[-1] == (b"", 1_999_900_000)
     assert max(later - sent for (_, sent), (_, later) in itertools.pairwise(recorded)) < 51_000_000
+
+
+def test_recorded_source_times_are_exact(tmp_path: Path) -> None:
+    """Clocks that are read one after the other change no time; a clock that is set by hand does."""
+    file = recorder.Recorder(tmp_path / "record.mcap", 5_000, 1_700_000_000_000_000_000)
+    source = 1_700_000_001_000_000_123
+
+    assert file.monotonic(source, (9_000, 1_700_000_000_000_004_321)) == 1_000_005_123
+    assert file.monotonic(source, (9_000, 1_700_000_003_000_004_321)) == 1_000_005_123 - 3 * 10**9
+    file.close()
