@@ -22,7 +22,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from deploy.benchmarks import scale
+from deploy.benchmarks import scale, signals
 from deploy.benchmarks.alternatives import ALTERNATIVES, CHAINS, IMAGES, Alternative
 from deploy.benchmarks.measurement import (
     CHAIN_SCENARIOS,
@@ -37,12 +37,13 @@ from deploy.benchmarks.table import chain_tables, image_tables, tables
 from deploy.running import interruption
 from deploy.running.processes import run_directory
 
-COMPARISON, CHAIN, IMAGE, SCALE = "comparison", "chain", "images", "scale"
+COMPARISON, CHAIN, IMAGE, SCALE, SIGNALS = "comparison", "chain", "images", "scale", "signals"
 TABLES: dict[str, Callable[[Any], str]] = {
     COMPARISON: tables,
     CHAIN: chain_tables,
     IMAGE: image_tables,
     SCALE: scale.tables,
+    SIGNALS: signals.table,
 }
 WORK: dict[str, tuple[Sequence[Alternative], Sequence[Scenario]]] = {
     COMPARISON: (ALTERNATIVES, SCENARIOS),
@@ -112,6 +113,7 @@ def main(arguments: Sequence[str]) -> int:
         CHAIN: "the arm's own services and the same in plain callbacks",
         IMAGE: "images from one process to another",
         SCALE: "many arms, many subscribers",
+        SIGNALS: "whether signals answer, how exact they are, and what they cost",
     }
     shown = "; ".join(f"{name}: {meaning}" for name, meaning in kinds.items())
     parser.add_argument("kind", nargs="?", choices=kinds, default=COMPARISON, metavar="KIND", help=shown)
@@ -125,6 +127,9 @@ def main(arguments: Sequence[str]) -> int:
     try:
         if options.kind == SCALE:
             _scale(results)
+        elif options.kind == SIGNALS:
+            print(machine(), flush=True)
+            results |= {name: row for name, *row in signals.measure()}
         else:
             _compare(results, options.kind, options.rounds)
     except interruption.Interrupted:

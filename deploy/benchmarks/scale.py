@@ -59,7 +59,8 @@ class Fleet:
         self.arms: list[RealArm] = []
         self._directory = directory
         self._shared = shared
-        self._domain = 0
+        self.domain = 0
+        """The ROS domain of the last arm."""
         self._stack = ExitStack()
 
     def __enter__(self) -> Fleet:
@@ -76,10 +77,10 @@ class Fleet:
         """
         name = f"arm{len(self.arms) + 1}"
         arm = RealArm(f"/{name}", System(self._directory / name))
-        if not self._domain or not self._shared:
-            self._domain = self._stack.enter_context(reserved_domain())
+        if not self.domain or not self._shared:
+            self.domain = self._stack.enter_context(reserved_domain())
         environment = os.environ | {
-            "ROS_DOMAIN_ID": str(self._domain),
+            "ROS_DOMAIN_ID": str(self.domain),
             "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
             "REACTIVE_ARM_RUN_DIR": str(arm.system.run),
             NAMESPACE: arm.namespace,
