@@ -44,6 +44,7 @@ from reactive_node.signals import (
     lift,
     linear,
 )
+from reactive_node.signals.integral import Integral
 from reactive_node.signals.source import Source
 from reactive_node.stamps import stamped
 from reactive_node.testing import SpinUntil, VirtualTime
@@ -79,6 +80,26 @@ def test_replay_gives_the_answers_of_a_run_with_late_samples(
 
 
 # Memory and clocks
+
+
+def test_integral_forgets_and_is_exact(scheduler: VirtualTime, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its signal forgets the values between two questions that are far apart."""
+    kept: list[int] = []
+    forget = Integral.forget
+
+    def forgotten(self: Integral, time: int) -> None:
+        forget(self, time)
+        kept.append(len(self._sums))
+
+    monkeypatch.setattr(Integral, "forget", forgotten)
+    samples = rx.interval(0.02).map(lambda count: stamped(2.0, count * 20 * MS))
+    signal = linear(samples, lateness=LATENESS, gap=GAP).integral(0.05)
+
+    recording = scheduler.record(signal.sample(5.0), until=61.0)
+
+    found = [answer.value for _, answer in recording.items]
+    assert found == pytest.approx([10.0 * number for number in range(13)])
+    assert 0 < max(kept[100:]) <= 5
 
 
 def test_memory_is_flat(scheduler: VirtualTime, monkeypatch: pytest.MonkeyPatch) -> None:
