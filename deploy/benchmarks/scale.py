@@ -34,7 +34,7 @@ SUBSCRIBERS = "subscribers of a topic"
 FULL = 0.9  # of all cores: further arms would only take time from each other
 SETTLE = 5.0  # s after a start
 SECONDS = 20.0  # s of a measurement
-LAUNCH = [sys.executable, "-m", "deploy.commands.launcher", "start", "demo"]
+LAUNCH = [sys.executable, "-m", "deploy.commands.launcher", "start"]
 RATE = 100.0  # Hz of the topic with many subscribers
 _LOOK = 0.1  # s between two looks for an interruption
 
@@ -54,11 +54,12 @@ HEADINGS = {OWN_DOMAINS: _ARM, ONE_DOMAIN: _ARM, SUBSCRIBERS: _ITEM}
 class Fleet:
     """Arms on this machine; they end with the block."""
 
-    def __init__(self, directory: Path, *, shared: bool) -> None:
+    def __init__(self, directory: Path, *, shared: bool, scenario: str = "demo") -> None:
         """:param shared: whether all arms are in one ROS domain."""
         self.arms: list[RealArm] = []
         self._directory = directory
         self._shared = shared
+        self._scenario = scenario
         self.domain = 0
         """The ROS domain of the last arm."""
         self._stack = ExitStack()
@@ -87,7 +88,7 @@ class Fleet:
         }
         self._stack.callback(arm.system.stop)
         process = subprocess.Popen(
-            LAUNCH,
+            [*LAUNCH, self._scenario],
             cwd=ROOT,
             env=environment,
             stdin=subprocess.DEVNULL,
