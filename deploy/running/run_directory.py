@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import fcntl
 import os
-from collections.abc import Iterator, Mapping
+import shutil
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from datetime import datetime
 from pathlib import Path
@@ -58,6 +59,19 @@ class RunDirectory:
             with suppress(OSError), path.open("ab") as log:  # a full disk
                 if log.tell():
                     log.write(f"{RUN} {datetime.now():%Y-%m-%d %H:%M:%S} {RUN}\n".encode())
+
+    def forget_settings(self, programs: Sequence[str]) -> None:
+        """
+        Begin without settings, with an empty file for each program.
+
+        A service that starts late and finds its file is no successor that has lost what was set by hand.
+        """
+        directory = self.run / SETTINGS
+        shutil.rmtree(directory, ignore_errors=True)
+        make_directory(directory)
+        for program in programs:
+            with suppress(OSError):  # a full disk: the service makes it, and reports what it cannot keep
+                (directory / f"{program}.yaml").write_text("{}\n")
 
     def write_parameters(self, parameters: Mapping[str, object]) -> None:
         """Write the parameter file; services read the old one or the new one."""

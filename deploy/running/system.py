@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import os
-import shutil
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import NoReturn
 
-from deploy.running import environment, messages, processes, supervisord
+from deploy.running import environment, manifest, messages, processes, supervisord
 from deploy.running.errors import DeploymentError
-from deploy.running.run_directory import SETTINGS, RunDirectory
+from deploy.running.run_directory import RunDirectory
 from deploy.running.supervisord import Program, Supervisord
 
 SERVICE_GRACE = 1.0  # s from SIGTERM to SIGKILL of a service, as in supervisord.conf
@@ -125,7 +124,7 @@ class System(RunDirectory):
         if pid := self.supervisor():
             where = f"supervisord has pid {pid} and works in {self.run}"
             raise DeploymentError(f"Already running: {where}. make terminal shows it, make stop ends it")
-        shutil.rmtree(self.run / SETTINGS, ignore_errors=True)
+        self.forget_settings([program.name for program in manifest.programs()])
         self.write_parameters(parameters)
 
     def _end_members(self) -> None:

@@ -18,6 +18,7 @@ from rclpy.parameter import Parameter
 from rclpy.qos import qos_profile_parameter_events
 from reactivex import Observable
 
+from deploy.running.run_directory import RunDirectory
 from interfaces import topics
 from interfaces.service import ServiceNode, UserError, parameter
 from interfaces.service.epoch import EPOCH, Epoch
@@ -387,6 +388,12 @@ def test_restart_without_its_settings_presses_no_switch(
 ) -> None:
     assert [restart(), restart()] == [[False], [False]]
     assert (tmp_path / "settings" / "source.yaml").read_text() == "pressed: false\n"
+
+
+def test_late_first_start_is_no_restart(restart: Callable[[], list[bool]], tmp_path: Path) -> None:
+    RunDirectory(tmp_path).forget_settings(["source"])
+
+    assert restart() == [True]  # as the scenario says
 
 
 def test_setting_that_cannot_be_kept_leaves_no_old_one(
