@@ -14,7 +14,7 @@ from deploy.benchmarks.alternatives import Alternative
 from deploy.benchmarks.measurement import MeasurementFailed
 from deploy.running.rclpy_choice import sourced_rclpy
 from deploy.running.system import System
-from deploy.trials.chaos.arm import Arm
+from deploy.trials.chaos.arm import RealArm
 from deploy.trials.chaos.cost import Cost
 
 pytestmark = pytest.mark.timeout(120)
@@ -62,7 +62,7 @@ def test_cost_is_that_of_one_arm(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(scale, "Cost", mock.Mock(now=lambda arms: next(costs)))
     monkeypatch.setattr(scale, "_packets", lambda: next(packets))
     fleet = scale.Fleet(tmp_path, shared=True)
-    fleet.arms = [Arm("/arm1", System(tmp_path)), Arm("/arm2", System(tmp_path))]
+    fleet.arms = [RealArm("/arm1", System(tmp_path)), RealArm("/arm2", System(tmp_path))]
     assert fleet.cost(0.0) == {"cpu": 10.0, "megabytes": 200.0, "packets": 200.0}
 
 

@@ -78,9 +78,11 @@ def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Bench]:
     monkeypatch.setattr(benches, "_ALLOWANCE", 1.0)
     checkout = tmp_path / "checkout"
     (checkout / "deploy" / "mutants").mkdir(parents=True)
-    (checkout / "tests").mkdir()
-    for name in ("conftest.py", "tests/runtimes.py", "pyproject.toml", "deploy/mutants/runner.py"):
+    for name in ("pyproject.toml", "deploy/mutants/runner.py"):
         shutil.copy(ROOT / name, checkout / name)
+    (checkout / "conftest.py").write_text(
+        'from hypothesis import settings\n\nsettings.register_profile("mutants")\n'
+    )
     (checkout / "clamp.py").write_text(CLAMP)
     (checkout / "test_clamp.py").write_text(
         "from clamp import clamp\n\ndef test_clamp():\n    assert (clamp(8), clamp(10)) == (8, 9)\n"

@@ -56,7 +56,7 @@ def test_names_the_topics_without_a_message(fleet: Any, monkeypatch: pytest.Monk
     observer = Observer(monkeypatch, seen([*ARMS[1:]]), fleet.lead)
     with pytest.raises(DeploymentError) as error:
         fleet.await_messages(fleet.arms, list(OUTPUTS.values()), observer)
-    topics = "/arm1/effector/position, /arm1/effector/speed, /arm1/engines/state and 7 more topics"
+    topics = "/arm1/driven_time, /arm1/effector/position, /arm1/effector/speed and 8 more topics"
     assert str(error.value) == f"No message on {topics} within 60 s: try fewer --arms"
     assert observer.now == pytest.approx(fleet.lead + START_TIMEOUT, abs=1.0)
 
