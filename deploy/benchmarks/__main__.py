@@ -143,7 +143,6 @@ def main(arguments: Sequence[str]) -> int:
 
 
 def _compare(results: dict[str, Any], kind: str, rounds: int) -> None:
-    """Collect the rounds of each figure, by alternative."""
     alternatives, scenarios = WORK[kind]
     found = present(alternatives)
     if kind == CHAIN and any(each.build for each in found):  # the source of the heartbeats is in C
@@ -163,7 +162,6 @@ def _scale(results: dict[str, Any]) -> None:
 
 
 def _write(kind: str, results: dict[str, Any]) -> None:
-    """Write the figures to a file."""
     directory = run_directory() / "bench"
     directory.mkdir(parents=True, exist_ok=True)
     file = directory / f"{kind}.json"

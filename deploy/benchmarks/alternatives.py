@@ -33,7 +33,6 @@ def job_command(alternative: Alternative, job: Job) -> list[str]:
 
 
 def processes(alternative: Alternative, jobs: Sequence[Job]) -> list[list[str]]:
-    """Return a command for each job."""
     return [job_command(alternative, job) for job in jobs]
 
 
@@ -57,8 +56,6 @@ def c_processes_with_defaults(alternative: Alternative, jobs: Sequence[Job]) -> 
 
 @dataclass(frozen=True)
 class Alternative:
-    """One way to connect three processes."""
-
     title: str
     link: str
     """The module of :mod:`deploy.benchmarks.links`, or the program of :mod:`deploy.benchmarks.c_program`."""
@@ -70,7 +67,6 @@ class Alternative:
 
     @property
     def environment(self) -> dict[str, str]:
-        """The environment of its processes."""
         paths = filter(None, (str(ROOT), os.environ.get("PYTHONPATH")))
         return os.environ | {"PYTHONPATH": os.pathsep.join(paths), RUNTIME: "" if self.ros else "embedded"}
 

@@ -26,8 +26,6 @@ REPORTS = "reports"
 
 @dataclass(frozen=True)
 class Job:
-    """What one process of a measurement does."""
-
     link: str
     """The module of :mod:`deploy.benchmarks.links`."""
     role: str
@@ -46,7 +44,6 @@ class Job:
 
     @property
     def depth(self) -> int:
-        """How many items a queue holds."""
         return 1000 if self.size <= 1000 else 10
 
 

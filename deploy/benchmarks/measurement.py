@@ -43,8 +43,6 @@ class MeasurementFailed(Exception):
 
 @dataclass(frozen=True)
 class Scenario:
-    """One kind of work."""
-
     name: str
     """`pipeline`, `flood`, `start`, `subscribers`, `image`, `chain` (angle to speed) or `watchdog`."""
     size: int
@@ -70,7 +68,6 @@ class Scenario:
 
     @property
     def charged(self) -> tuple[str, ...]:
-        """The roles whose cost counts."""
         return (SOURCE, SINK) if self.name == IMAGE else self.middle or (SINK,)
 
 
@@ -256,7 +253,6 @@ class _Run:
         return lines[-1] if lines else ""
 
     def _end(self) -> None:
-        """End all processes."""
         for process in reversed(self._processes):
             process.terminate()
         for process in self._processes:

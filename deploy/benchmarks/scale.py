@@ -133,7 +133,6 @@ def measure() -> Iterator[tuple[str, str, dict[str, float]]]:
 
 
 def tables(results: Mapping[str, Results]) -> str:
-    """Return a table for each kind."""
     return "\n\n".join(table(kind, rows, HEADINGS[kind]) for kind, rows in results.items())
 
 
@@ -162,7 +161,6 @@ def subscribers(sizes: Sequence[int] = SIZES) -> Rows:
 
 
 def _packets() -> int:
-    """Return how many packets the loopback interface has received."""
     lines = Path("/proc/net/dev").read_text().splitlines()
     (counts,) = (line.partition(":")[2] for line in lines if line.strip().startswith("lo:"))
     return int(counts.split()[1])
@@ -176,6 +174,5 @@ def _wait(seconds: float) -> None:
 
 
 def _end(process: subprocess.Popen[str]) -> None:
-    """End a launcher, which stops what it has begun to start."""
     process.terminate()
     process.communicate()

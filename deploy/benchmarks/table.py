@@ -58,7 +58,6 @@ def chain_tables(results: Results) -> str:
 
 
 def image_tables(results: Results) -> str:
-    """Return all tables of the images."""
     rates = {1_000_000: (20, 100, 300), 10_000_000: (4, 20)}
     work = {f"{size}.{rate}": f"{SIZES[size]}, {rate} Hz" for size in rates for rate in rates[size]}
     titles = {
@@ -78,8 +77,6 @@ def image_tables(results: Results) -> str:
 
 
 def tables(results: Results) -> str:
-    """Return all tables of the comparison."""
-
     def ordered(title: str, figure: str) -> str:
         return table(title, results, _by_size(figure))
 

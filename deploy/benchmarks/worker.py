@@ -24,15 +24,12 @@ _TURN = 0.1  # s at most between two looks whether to end
 
 
 class Reports:
-    """The way back to the measurement."""
-
     def __init__(self, job: Job) -> None:
         self._role = job.role
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
         self._socket.connect(f"{job.directory}/{REPORTS}")
 
     def send(self, event: str, **figures: float) -> None:
-        """Report an event of this process."""
         self._socket.send(json.dumps({"role": self._role, "event": event, **figures}).encode())
 
 
@@ -49,7 +46,6 @@ class Meter:
         self._latencies: list[int] = []
 
     def receive(self, item: Any) -> None:
-        """Note the latency of an item."""
         now = time.monotonic_ns()
         self._latencies.append(now - int.from_bytes(item[:8], "little"))
         if not self._phase_began:
@@ -72,8 +68,6 @@ class Meter:
 
 
 class Life:
-    """Whether this process continues."""
-
     def __init__(self) -> None:
         self._parent = os.getppid()
         self._ended = False
@@ -103,7 +97,6 @@ def publish(link: Link, job: Job, life: Life) -> None:
 
 
 def main() -> None:
-    """Do the job until the end."""
     life = Life()
     job = Job(**json.loads(Path(sys.argv[1]).read_text()))
     reports = Reports(job)

@@ -76,7 +76,6 @@ def start(system: System, scenario: str, parameter_file: str) -> None:
 
 
 def attach(system: System) -> None:
-    """Show a running system in this terminal."""
     if not _adopt_environment(system):
         raise DeploymentError("Nothing runs: make start")
     from deploy.commands.member import Member
@@ -167,7 +166,6 @@ def _started(system: System, scenario: str, parameter_file: str) -> Iterator[Mem
 
 
 def _await_services(system: System, member: Member, log_sizes: dict[str, int]) -> None:
-    """Wait until every service has reported its health."""
     from interfaces.service.health import heard_healths
 
     deadline = time.monotonic() + START_LIMIT

@@ -15,7 +15,6 @@ HEAD = (
 
 
 def main() -> None:
-    """Bring tables and graph up to date."""
     for page in PAGES:
         path = ROOT / page
         path.write_text(updated(page, path.read_text(encoding="utf-8")), encoding="utf-8")

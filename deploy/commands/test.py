@@ -27,8 +27,6 @@ IGNORE = "--ignore="
 
 
 class Part(NamedTuple):
-    """Tests that run on one rclpy."""
-
     rclpy: str
     runtime: str
     """the value of the environment variable RUNTIME"""

@@ -166,7 +166,6 @@ def report(scores: dict[str, Score], equivalent: dict[str, dict[str, str]]) -> i
 
 
 def _quoted(change: str) -> str:
-    """Return a change as `equivalent.toml` names it."""
     return json.dumps(change, ensure_ascii=False)
 
 

@@ -102,7 +102,6 @@ class Bench:
         return line
 
     def _end_processes(self, but: int = 0) -> None:
-        """End the processes that tests have left."""
         mark = f"{MARK}={self._mark}".encode()
         for entry in Path("/proc").iterdir():
             if entry.name.isdigit() and int(entry.name) != but:

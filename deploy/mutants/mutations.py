@@ -20,8 +20,6 @@ from mutmut.mutation.pragma_handling import IgnoredCode
 
 @dataclass(frozen=True)
 class Mutant:
-    """A module with one change."""
-
     module: str
     """The path of the module in the checkout."""
     line: int
@@ -54,13 +52,11 @@ def _assignment(node: cst.Assign | cst.AnnAssign) -> Iterator[cst.CSTNode]:
 
 
 def _call_for_its_effect(node: cst.Expr) -> Iterator[cst.Pass]:
-    """Leave out a statement that only calls."""
     if isinstance(node.value, cst.Call):
         yield cst.Pass()
 
 
 def _condition(node: cst.If | cst.While | cst.CompIf) -> Iterator[cst.CSTNode]:
-    """Negate a condition."""
     inner = node.test.with_changes(lpar=[cst.LeftParen()], rpar=[cst.RightParen()])
     yield node.with_changes(test=cst.UnaryOperation(cst.Not(), inner))
 

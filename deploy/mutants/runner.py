@@ -34,12 +34,10 @@ class ExamplesFirst:
     """A plugin of pytest: tests with drawn examples, which take longer, run last."""
 
     def pytest_collection_modifyitems(self, items: list[Any]) -> None:
-        """Sort the tests."""
         items.sort(key=lambda item: item.get_closest_marker("hypothesis") is not None)
 
 
 def main() -> None:
-    """Answer requests until the standard input ends."""
     sys.path[0] = os.getcwd()
     pytest, *_ = [importlib.import_module(name) for name in ("pytest", *LIBRARIES)]
     print("ready", flush=True)

@@ -17,8 +17,6 @@ from deploy.benchmarks.link import Item, Job, Link
 
 
 class Connection(Link):
-    """A node with publishers and subscriptions."""
-
     make_node: Callable[[str], Node] = Node
     make_executor: Callable[[], Executor] = SingleThreadedExecutor
     message_type: Any = UInt8MultiArray

@@ -6,6 +6,4 @@ from deploy.benchmarks.links import callbacks_events, chain
 
 
 class Connection(chain.Connection):
-    """A node of the chain."""
-
     make_executor = callbacks_events.Connection.make_executor

@@ -48,7 +48,6 @@ _executor: Executor | None = None
 
 
 def __getattr__(name: str) -> ModuleType:
-    """Import a submodule, such as ``rclpy.executors``, on its first use."""
     if importlib.util.find_spec(f"{__name__}.{name}") is None:
         raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
     return importlib.import_module(f"{__name__}.{name}")

@@ -143,8 +143,6 @@ def remove_ros_args(argv: list[str] | None) -> list[str]:
 
 
 class _Parser:
-    """One pass over a command line."""
-
     def __init__(self, argv: list[str]) -> None:
         self._argv = argv
         self._remaps: list[RemapRule] = []

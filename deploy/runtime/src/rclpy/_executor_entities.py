@@ -175,7 +175,6 @@ class ExecutorEntities:
     # The contents of the wait set
 
     def _rclpy_update_entities(self) -> None:
-        """Update the wait set to the current entities of the nodes."""
         self._rclpy_entities_changed = False  # first: later changes are handled in the next round
         nodes = self.get_nodes() if self._rclpy_only_nodes is None else self._rclpy_only_nodes
         seen = [(node, node._rclpy_entities_version) for node in nodes]
@@ -199,7 +198,6 @@ class ExecutorEntities:
             self._rclpy_drop_others({*self._rclpy_timers, *self._rclpy_guards, *wanted.values()})
 
     def _rclpy_update_handles(self, wanted: dict[int, Entity]) -> None:
-        """Wait for these entities, by DDS handle, and for no others."""
         for handle in [handle for handle in self._rclpy_tokens if handle not in wanted]:
             token = self._rclpy_tokens.pop(handle)
             if self._rclpy_attached.pop(token, None) is not None:
@@ -213,7 +211,6 @@ class ExecutorEntities:
                     self._rclpy_attached[self._rclpy_last_token] = (entity, handle)
 
     def _rclpy_update_waitables(self, waitables: list[Waitable]) -> None:
-        """Update what the waitables of users wait for."""
         if self._rclpy_watch is None and waitables:
             from rclpy._wait_set import WaitableWatch  # here: few programs have waitables
 
@@ -222,7 +219,6 @@ class ExecutorEntities:
             self._rclpy_watch.update(waitables)
 
     def _rclpy_drop_others(self, present: set[Any]) -> None:
-        """Drop ready entities of nodes that were removed or destroyed."""
         if self._rclpy_watch is not None:
             present.update(self._rclpy_watch.entities)
         left = [one for one in self._rclpy_ready if one[0].__class__ is Task or one[0] in present]
@@ -246,7 +242,6 @@ class ExecutorEntities:
                 self._rclpy_blocked[token] = (entity, handle)
 
     def _rclpy_unblock(self) -> None:
-        """Wait again for entities whose callback group is free again."""
         self._rclpy_groups_changed = False
         for token, (entity, handle) in list(self._rclpy_blocked.items()):
             if self.can_execute(entity):

@@ -89,7 +89,6 @@ class ExecutorOffers(ExecutorEntities):
             self._rclpy_end_execution(entity)
 
     def _rclpy_release(self, entity: Any) -> None:
-        """Wait for a reserved entity again."""
         self._rclpy_reserved.discard(entity)
         self._rclpy_groups_changed = True
         self.wake()

@@ -260,7 +260,6 @@ class Graph(GraphQueries):
             guard.close()
 
     def _nodes(self) -> Iterator[tuple[bytes, NodeEntities]]:
-        """Every known node, with its participant's GUID."""
         with self._lock:
             own: list[NodeEntities] = [*self._own.values()]
             known = {**self._peers.nodes(self._discovered), self.participant.gid: own}

@@ -20,11 +20,9 @@ class GraphQueries:
         self._topics: dict[bool, tuple[list[Endpoint], NamesAndTypes]] = {}
 
     def _discovered(self) -> Discovery:
-        """The endpoints and participants that DDS has discovered."""
         raise NotImplementedError
 
     def _nodes(self) -> Iterator[tuple[bytes, NodeEntities]]:
-        """Every known node, with its participant's GUID."""
         raise NotImplementedError
 
     def node_names(self) -> list[tuple[str, str, str]]:

@@ -64,7 +64,6 @@ class NodeParameters(NodeNames):
         self._post_set_parameters_callbacks: list[Callable[[list[Parameter]], None]] = []
 
     def _rclpy_declare_overrides(self) -> None:
-        """Declare a parameter for each override (`automatically_declare_parameters_from_overrides`)."""
         self.declare_parameters(
             "",
             [(p.name, p.value, ParameterDescriptor()) for p in self._parameter_overrides.values()],
@@ -72,7 +71,6 @@ class NodeParameters(NodeNames):
         )
 
     def _rclpy_publish_parameter_event(self, event: ParameterEvent) -> None:
-        """Publish a change on `/parameter_events`."""
         raise NotImplementedError
 
     # Declaring
@@ -498,8 +496,6 @@ def _check_names(names: list[str]) -> None:
 
 
 def _is_listed(name: str, prefixes: list[str], depth: int) -> bool:
-    """Return whether `list_parameters` lists a name."""
-
     def is_shallow(rest: str) -> bool:
         return depth == _DEPTH_RECURSIVE or rest.count(PARAMETER_SEPARATOR_STRING) < depth
 

@@ -90,8 +90,6 @@ class _Loader(yaml.SafeLoader):
 
 
 class _InvalidKey(Exception):
-    """An error at a key of a file."""
-
     def __init__(self, node: yaml.Node, key: str, reason: str) -> None:
         self.line = node.start_mark.line + 1
         self.key = key
@@ -99,7 +97,6 @@ class _InvalidKey(Exception):
 
 
 def _read_nodes(mapping: yaml.Node, namespace: str, nodes: ParametersOfNodes) -> None:
-    """Collect the parameters of the nodes in `namespace`."""
     for key_node, value_node in _items(mapping, namespace, "names of nodes"):
         name = key_node.value
         if name != _PARAMETERS_KEY:
@@ -113,7 +110,6 @@ def _read_nodes(mapping: yaml.Node, namespace: str, nodes: ParametersOfNodes) ->
 
 
 def _read_parameters(mapping: yaml.Node, node: str, prefix: str, parameters: dict[str, Parameter]) -> None:
-    """Collect the parameters below `prefix`."""
     for key_node, value_node in _items(mapping, f"{node}: {prefix}".rstrip(": ."), "parameters"):
         name = f"{prefix}{key_node.value}"
         if isinstance(value_node, yaml.MappingNode):
@@ -126,7 +122,6 @@ def _read_parameters(mapping: yaml.Node, node: str, prefix: str, parameters: dic
 
 
 def _items(mapping: yaml.Node, key: str, content: str) -> list[tuple[yaml.ScalarNode, yaml.Node]]:
-    """Return the items of a mapping with scalar keys."""
     if not isinstance(mapping, yaml.MappingNode):
         raise _InvalidKey(mapping, key, f"expected a mapping of {content}, found {_describe(mapping)}")
     items: list[tuple[yaml.ScalarNode, yaml.Node]] = mapping.value
@@ -187,7 +182,6 @@ def _scalar(node: yaml.ScalarNode) -> bool | int | float | str:
 
 
 def _reason(error: yaml.YAMLError) -> str:
-    """Return place and problem of a YAML error in one line."""
     mark = getattr(error, "problem_mark", None)
     problem = getattr(error, "problem", None) or str(error)
     place = f"line {mark.line + 1}: " if mark else ""

@@ -57,7 +57,6 @@ def __getattr__(name: str) -> Any:
 
 
 def _guard_condition(context: object) -> Any:
-    """Create a guard condition, given the handle of its context."""
     from rclpy.guard_condition import GuardCondition
 
     return GuardCondition(callback=None, callback_group=None).handle

@@ -40,8 +40,6 @@ class QoSSubscriptionEventType(IntEnum):
 
 @dataclass
 class _Count:
-    """A count since creation, and its change since the last report."""
-
     total_count: int
     total_count_change: int
 

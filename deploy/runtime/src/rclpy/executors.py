@@ -154,7 +154,6 @@ class Executor(ExecutorOffers, AbstractContextManager["Executor"]):
         self._rclpy_wake_if_waiting()
 
     def _rclpy_continue_later(self, task: Task) -> None:
-        """Continue a task when the future that it awaits is over."""
         offered = task in self._rclpy_offers
         resume = self._rclpy_change_offers if offered else partial(self._rclpy_schedule, task)
         awaited = task._rclpy_awaited
@@ -342,7 +341,6 @@ class Executor(ExecutorOffers, AbstractContextManager["Executor"]):
         _raise_exception_of(task)
 
     def _rclpy_is_idle(self) -> bool:
-        """Whether no thread spins or runs a callback."""
         return self._rclpy_spinning_thread is None
 
     def shutdown(self, timeout_sec: float | None = None) -> bool:
@@ -396,7 +394,6 @@ class _BuiltInExecutor(Executor):
     """These end the spinning without an error."""
 
     def spin(self) -> None:
-        """Run callbacks until the context or this executor is shut down."""
         if self._rclpy_overrides("spin_once", "wait_for_ready_callbacks"):
             super().spin()
             return

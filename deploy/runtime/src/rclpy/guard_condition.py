@@ -64,7 +64,6 @@ class GuardCondition:
     # The interface that executors use for every entity.
 
     def _rclpy_is_ready(self) -> bool:
-        """Whether it is triggered and its callback has not started."""
         return self._rclpy_last_trigger != self._rclpy_last_call and not self._rclpy_destroyed
 
     def _rclpy_take(self) -> tuple[()] | None:

@@ -232,7 +232,6 @@ class Node(NodeParameters, NodeGraph):
             executor._rclpy_entities_have_changed()
 
     def _rclpy_waitables(self) -> list[Any]:
-        """The entities that an executor waits for in DDS."""
         return [
             *list(self._subscriptions),
             *list(self._services),
@@ -242,7 +241,6 @@ class Node(NodeParameters, NodeGraph):
         ]
 
     def _rclpy_entities(self) -> list[Any]:
-        """All entities with a callback."""
         timers = (timer for action in list(self._rclpy_actions) for timer in action._rclpy_timers)
         entities = [*self._rclpy_waitables(), *list(self._rclpy_added_waitables)]
         return [*entities, *list(self._timers), *timers, *list(self._guards)]

@@ -243,7 +243,6 @@ def parameter_dict_from_yaml_file(
 
 
 def _flatten(namespace: str, parameters: dict[str, Any]) -> dict[str, ParameterMsg]:
-    """Join the names of nested parameters with dots."""
     messages: dict[str, ParameterMsg] = {}
     for key, value in parameters.items():
         name = f"{namespace}{key}"

@@ -188,7 +188,6 @@ class ParameterEventHandler:
         self._callbacks.remove_parameter_event_callback(handle)
 
     def _resolve_path(self, node_path: str | None = None) -> str:
-        """Return the fully qualified name of a node."""
         if not node_path:
             return self.node.get_fully_qualified_name()
         if node_path.startswith("/"):

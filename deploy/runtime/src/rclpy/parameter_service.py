@@ -26,7 +26,6 @@ class ParameterService:
     """The six parameter services of a node. They do not keep the node alive."""
 
     def __init__(self, node: Node) -> None:
-        """Create the services, such as `<node>/describe_parameters`."""
         self._node_weak_ref = weakref.ref(node)
         services: dict[str, tuple[Any, Any]] = {
             "describe_parameters": (DescribeParameters, self._rclpy_describe_parameters),

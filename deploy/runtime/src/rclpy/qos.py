@@ -248,7 +248,6 @@ class QoSProfile:
         return f"{type(self).__name__}({policies})"
 
     def _rclpy_copy(self) -> QoSProfile:
-        """Return a copy."""
         return QoSProfile(**{slot[1:]: getattr(self, slot) for slot in self.__slots__})
 
 

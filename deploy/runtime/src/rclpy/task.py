@@ -66,7 +66,6 @@ class Future:
         return self._rclpy_done
 
     def _rclpy_is_over(self) -> bool:
-        """Return whether the future is done or cancelled."""
         return self._rclpy_done or self._rclpy_cancelled
 
     def result(self) -> Any:

@@ -28,7 +28,6 @@ class TimeSource:
     """Sets the attached clocks to the time that a simulator publishes."""
 
     def __init__(self, *, node: Node | None = None) -> None:
-        """Create a time source, and attach `node` if it is given."""
         self._clock_sub: Subscription | None = None
         self._rclpy_timeout: Timer | None = None
         self._node_weak_ref: weakref.ReferenceType[Node] | None = None
@@ -168,7 +167,6 @@ class TimeSource:
         )
 
     def _rclpy_check(self, parameters: list[Parameter]) -> SetParametersResult:
-        """Reject values of `use_sim_time` that are not bool."""
         for parameter in parameters:
             if parameter.name == USE_SIM_TIME_NAME and parameter.type_ is not Parameter.Type.BOOL:
                 reason = f"{USE_SIM_TIME_NAME} parameter set to something besides a bool"
@@ -178,7 +176,6 @@ class TimeSource:
         return SetParametersResult(successful=True)
 
     def _rclpy_follow(self, parameters: list[Parameter]) -> None:
-        """Apply `use_sim_time` after all callbacks have accepted it."""
         for parameter in parameters:
             if parameter.name == USE_SIM_TIME_NAME:
                 self.ros_time_is_active = parameter.value

@@ -20,7 +20,6 @@ class TypeDescriptionService:
     """Describes the types of a node, unless its parameter ``start_type_description_service`` is false."""
 
     def __init__(self, node: Node) -> None:
-        """Declare the parameter, and create the service if it is true."""
         self._rclpy_node = node
         self._rclpy_service: Any = None
         from rcl_interfaces.msg import ParameterDescriptor

@@ -40,7 +40,6 @@ def _problem(name: str) -> tuple[str, int] | None:
 
 
 def _character_problem(name: str) -> tuple[str, int] | None:
-    """Find characters in invalid places, and unbalanced braces."""
     opened: int | None = None
     for index, character in enumerate(name):
         if character == "_" or (character.isascii() and character.isalnum()):

@@ -46,8 +46,6 @@ def wait_for_message(
 
 
 class _NodeWithOneSubscription:
-    """Looks to an executor like a node with a single subscription."""
-
     timers = ()
     guards = ()
     _rclpy_added_waitables = ()

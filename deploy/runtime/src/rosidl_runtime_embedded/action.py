@@ -45,7 +45,6 @@ def action_class(name: str) -> type[Action]:
 
 
 def _make_action_class(full_name: str) -> type[Action]:
-    """Make the class of an action type."""
     definition = action_definition(full_name)
     name = full_name.rpartition("/")[2]
     transport = {

@@ -39,12 +39,10 @@ class Generator:
         return name
 
     def _variable(self) -> str:
-        """A new name for a variable of the code."""
         self._variables += 1
         return f"v{self._variables}"
 
     def _compiled(self, name: str, code: list[str]) -> Callable[[Any], Any]:
-        """The function ``name`` that the code defines."""
         generated.run("\n".join(code), self._names)
         function: Callable[[Any], Any] = self._names[name]
         function.__qualname__ = f"{self._definition.name.rpartition('/')[2]}._{name}"

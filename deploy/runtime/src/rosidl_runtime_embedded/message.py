@@ -185,7 +185,6 @@ class Message:
 
     @property
     def _check_fields(self) -> bool:
-        """Whether this message checks assigned values."""
         return bool(getattr(self, _FLAG, _CHECK_FIELDS))
 
     @_check_fields.setter
@@ -201,7 +200,6 @@ class Message:
         return dict(cls._fields_and_field_types)
 
     def __repr__(self) -> str:
-        """The text of rclpy, where an ``array.array`` looks like a list."""
         values = ((name, getattr(self, name)) for name in self._fields_and_field_types)
         fields = (
             f"{name}={value.tolist() if isinstance(value, array) else value!r}" for name, value in values
@@ -210,7 +208,6 @@ class Message:
         return f"{module}{'.' if module else ''}{type(self).__name__}({', '.join(fields)})"
 
     def __eq__(self, other: object) -> bool:
-        """Whether both have the same type and equal fields."""
         if not isinstance(other, self.__class__):
             return False
         for name in self._fields_and_field_types:
@@ -237,7 +234,6 @@ def message_class(name: str) -> type[Message]:
 
 
 def _make_message_class(definition: MessageDefinition) -> type[Message]:
-    """Make the class of a message type."""
     package, kind, name = definition.name.split("/")
     namespace: dict[str, Any] = {
         "__doc__": f"Message {definition.name}.",

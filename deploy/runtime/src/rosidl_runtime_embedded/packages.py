@@ -110,7 +110,6 @@ class _MessagePackages:
         """Leave the creation to the import system."""
 
     def exec_module(self, module: ModuleType) -> None:
-        """Let the module provide its classes, or the package its modules."""
         name, members = module.__name__, vars(module)
         match name.count("."):
             case 0:

@@ -162,7 +162,6 @@ class _SerializerGenerator(Generator):
         self._position = None
 
     def _flush(self) -> None:
-        """Emit code that checks and writes the collected values."""
         if self._checks:
             wrong = " or ".join(self._checks)
             if self._indent > 2:

@@ -49,6 +49,5 @@ def service_class(name: str) -> type[Service]:
 
 
 def _make_service_class(definition: ServiceDefinition) -> type[Service]:
-    """Make the class of a service type."""
     parts = {part: message_class(f"{definition.name}_{part}") for part in SERVICE_PARTS}
     return make_class(Service, definition.name, {"__doc__": f"Service {definition.name}.", **parts})

@@ -40,7 +40,6 @@ _TITLES = {"msg": "Messages", "srv": "Services", "action": "Actions"}
 
 
 def _literal(value: object) -> str:
-    """Source code of a value, with the quotes that formatters prefer."""
     text = repr(value)
     return text.replace("'", '"') if isinstance(value, (bytes, str)) and '"' not in text else text
 
@@ -63,7 +62,6 @@ def stub(package: str, kind: str) -> str:
 
 
 def _service(service: ServiceDefinition) -> list[str]:
-    """The classes of a service."""
     name = service.name.rpartition("/")[2]
     aliases = (f"    {part}: TypeAlias = {name}_{part}" for part in ("Request", "Response", "Event"))
     messages = map(_message, (service.request, service.response, service.event))
@@ -71,7 +69,6 @@ def _service(service: ServiceDefinition) -> list[str]:
 
 
 def _action(action: ActionDefinition) -> list[str]:
-    """The classes of an action."""
     name = action.name.rpartition("/")[2]
     transport = {
         "SendGoalService": f"{name}_SendGoal",
@@ -96,7 +93,6 @@ def _action(action: ActionDefinition) -> list[str]:
 
 
 def _imports(body: str, module: str) -> list[str]:
-    """Import sections for the classes of a stub."""
     standard = {
         "array[": "from array import array",
         "Iterable[": "from collections.abc import Iterable",

@@ -83,7 +83,6 @@ class Participant:
             self._announce()
 
     def _announce(self) -> None:
-        """Announce all changes of this moment together."""
         self._note_news()
         if not self._is_announcing and not self.has_left:
             self._is_announcing = True
@@ -322,7 +321,6 @@ class Domains:
             self._meet_again(first, second)
 
     def _across(self, pair: frozenset[str]) -> Iterator[tuple[Participant, Participant]]:
-        """Yield the pairs of participants of one domain on both hosts."""
         members = [each for each in self.participants if each.host.name in pair]
         for one, other in itertools.combinations(members, 2):
             if one.host is not other.host and one.domain_id == other.domain_id:

@@ -231,7 +231,6 @@ def _replacements(domains: Domains) -> list[tuple[Any, str, Any]]:
 
 
 def _method_in_process(simulated: Callable[..., Any], real: Callable[..., Any]) -> Callable[..., Any]:
-    """As :func:`_in_process`, for a method."""
     call = _in_process(simulated, real)
     return lambda it, *arguments, **options: call(it, *arguments, **options)
 

@@ -204,7 +204,6 @@ class Process:
             self.output.write(f"Exception in thread {name}:\n{trace(error)}")
 
     def _clear(self) -> None:
-        """Unwind the threads, and forget all that the process had."""
         for thread in self._threads:
             thread.throw()
         self.kernel.load(None)

@@ -34,7 +34,6 @@ _MAIN = "__main__"
 
 
 def _rclpy_state() -> list[tuple[State, Callable[[], Any]]]:
-    """Return the module variables of rclpy with their first values."""
     vars(task._running).setdefault("awaited", None)
     return [
         ((vars(task._running), "awaited"), lambda: None),
@@ -244,10 +243,7 @@ class Simulation:
 
 
 class _Environment(dict[str, str]):
-    """The environment variables of a process, in the place of ``os.environ``."""
-
     def copy(self) -> dict[str, str]:
-        """Return a copy."""
         return dict(self)
 
 

@@ -147,7 +147,6 @@ class McapFile:
         return True
 
     def _scan(self) -> None:
-        """Read the whole file to know what it contains."""
         for record in self._records():
             if isinstance(record, Schema):
                 self.schemas[record.id] = record

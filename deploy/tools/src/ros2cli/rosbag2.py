@@ -159,7 +159,6 @@ def _from_dict(directory: Path, document: dict[str, Any]) -> Metadata:
 
 
 def _of_files(directory: Path, paths: list[Path]) -> Metadata:
-    """The metadata in the files of a bag."""
     from mcap_files import McapFile, UnreadableError
 
     topics: dict[str, Topic] = {}

@@ -59,7 +59,6 @@ def set_message_fields(
 
 
 def _converted(value: Any, current: Any) -> Any:
-    """The value as the type that the field has now."""
     if isinstance(current, array.array):
         return array.array(current.typecode, value)
     if type(current).__name__ == "ndarray":

@@ -108,7 +108,6 @@ def _matrix(transform: Transform) -> Matrix:
 
 
 def _points(points: list[Point] | list[Point32], transform: TransformStamped) -> list[list[float]]:
-    """Return the coordinates of points in another frame."""
     matrix = _matrix(transform.transform)
     rows = np.array([(point.x, point.y, point.z) for point in points]).reshape(-1, 3)
     moved: list[list[float]] = (rows @ matrix[:3, :3].T + matrix[:3, 3]).tolist()

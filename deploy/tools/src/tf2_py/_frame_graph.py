@@ -13,7 +13,6 @@ _SHORTEST = 100_000
 def _known(
     frames: Mapping[str, TimeCache | StaticCache | None],
 ) -> Iterator[tuple[str, TimeCache | StaticCache, str]]:
-    """Yield each frame with a parent, its transforms, and its parent."""
     for frame, cache in frames.items():
         latest = None if cache is None else cache.at(0)
         if cache is not None and latest is not None:

@@ -60,8 +60,6 @@ def execution(client: ActionClient, name: str, goal: Any, scheduler: abc.Schedul
 
 
 class _Execution:
-    """A goal that was sent, from its acceptance to its end."""
-
     def __init__(self, name: str, observer: abc.ObserverBase[Any], scheduler: abc.SchedulerBase) -> None:
         self._name = name
         self._observer = observer

@@ -82,7 +82,6 @@ class _Worker(Generic[_T, _R]):
         self._begin(item)
 
     def complete(self) -> None:
-        """Complete when no item is in work."""
         with self._lock:
             self._source_completed = True
             if self._busy:
@@ -90,7 +89,6 @@ class _Worker(Generic[_T, _R]):
         self._observer.on_completed()
 
     def stop(self) -> None:
-        """Begin no run any more."""
         with self._lock:
             self._stopped = True
             self._waiting = _NOTHING

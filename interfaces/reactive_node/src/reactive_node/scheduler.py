@@ -63,7 +63,6 @@ class NodeScheduler(PeriodicScheduler):
     _before_jump: int  # [ns]
 
     def __init__(self, node: Node) -> None:
-        """Schedule on the executor of ``node``, in its default callback group."""
         super().__init__()
         self._node = node
         self._lock = threading.RLock()
@@ -203,7 +202,6 @@ class NodeScheduler(PeriodicScheduler):
     # The timer
 
     def _arm(self) -> None:
-        """Set the timer to the earliest item, or stop it."""
         if self._disposed:
             return
         if not self._heap:

@@ -80,7 +80,6 @@ class SharedReader:
         self._subscriptions.append(self._create(self._receive))
 
     def _finish(self) -> None:
-        """Destroy the reader."""
         subscriptions, self._subscriptions = self._subscriptions, []
         if self._retained is not None:
             self._retained.clear()

@@ -176,20 +176,15 @@ class _Reader:
 
 
 class _Timer:
-    """A timer."""
-
     def __init__(self, timer: Timer, create_task: CreateTask) -> None:
         self.handle = timer.handle
         self._timer = timer
 
     def callback(self) -> Any:
-        """Call back, and return a coroutine if the callback is one."""
         return self._timer.callback() if _lives(self._timer) else None
 
 
 class _Server:
-    """A service."""
-
     def __init__(self, service: Service, create_task: CreateTask) -> None:
         self.handle = service.handle
         self.srv_type = service.srv_type
@@ -201,7 +196,6 @@ class _Server:
         return self._service.callback(request, response) if _lives(self._service) else None
 
     def send_response(self, response: Any, header: Any) -> None:
-        """Send the response, at once or when the coroutine returns it."""
         if inspect.iscoroutine(response):
             self._create_task(self._send_later(response, header))
         elif response is not None or _lives(self._service):
@@ -220,7 +214,6 @@ class _Event:
         self._changes: list[str] | None = None  # the names of the numbers that tell of a change
 
     def take(self) -> None:
-        """Call back if there was an event."""
         try:
             if self._changes is None:
                 self._handler.add_to_wait_set(self)
@@ -234,17 +227,13 @@ class _Event:
             self._create_task(self._handler.execute(status))
 
     def add_event(self, event: Any) -> int:
-        """Return the index of the event."""
         return 0
 
     def is_ready(self, kind: str, index: int) -> bool:
-        """Return True."""
         return True
 
 
 class _Waitable:
-    """A part of an action."""
-
     def __init__(self, waitable: Waitable, create_task: CreateTask) -> None:
         self._waitable = waitable
 
@@ -259,6 +248,5 @@ class _Waitable:
             return None
 
     async def execute(self, taken_data: Any) -> None:
-        """Call back with what has come."""
         if taken_data is not None:
             await self._waitable.execute(taken_data)

@@ -70,7 +70,6 @@ class Transforms:
     def _fill(
         self, observer: abc.ObserverBase[Any], scheduler: abc.SchedulerBase | None = None
     ) -> abc.DisposableBase:
-        """Put what arrives into a new buffer, and emit then."""
         buffer = self._buffer = BufferCore()
 
         def listen(

@@ -211,7 +211,6 @@ class _Endpoint(Handle):
         status.watch(self.handle, statuses)
 
     def watch_also(self, name: str) -> None:
-        """Watch a further status."""
         status.watch_also(self.handle, name)
 
     def changed(self, name: str) -> dict[str, int] | None:

@@ -90,8 +90,6 @@ class ClientGoalHandle:
 
 
 class _Calls(Client):
-    """The calls of one of the action's services."""
-
     kind = ""
 
     def _rclpy_ignore_reply(self) -> None:

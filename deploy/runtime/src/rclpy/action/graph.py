@@ -43,7 +43,6 @@ def get_action_names_and_types(node: Node) -> NamesAndTypes:
 
 
 def _actions(topics: NamesAndTypes) -> NamesAndTypes:
-    """The actions whose feedback topics are among these topics."""
     return [
         (name.removesuffix(_TOPIC), [type_.removesuffix(_TYPE) for type_ in types])
         for name, types in topics

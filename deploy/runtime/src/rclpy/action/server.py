@@ -424,7 +424,6 @@ class ActionServer(ActionWaitable):
         return self._node.get_clock().now().nanoseconds
 
     def _rclpy_publish_status(self) -> None:
-        """Publish the states of all goals that are kept."""
         with self._rclpy_lock:
             statuses = [
                 GoalStatus(goal_info=goal_handle._goal_info, status=goal_handle._rclpy_state)

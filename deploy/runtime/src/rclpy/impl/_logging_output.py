@@ -79,8 +79,6 @@ def _switch(variable: str) -> bool | None:
 
 
 class _Console:
-    """The console, configured by environment variables."""
-
     def __init__(self) -> None:
         self.use_stdout = bool(_switch("RCUTILS_LOGGING_USE_STDOUT"))
         self.flush = _switch("RCUTILS_LOGGING_BUFFERED_STREAM") is not None

@@ -18,7 +18,6 @@ _internal_callers = [__file__]
 
 
 def _find_caller(frame: FrameType) -> FrameType:
-    """Return the first frame outside the logging modules."""
     caller: FrameType | None = frame
     while caller is not None and caller.f_code.co_filename in _internal_callers:
         caller = caller.f_back
@@ -94,7 +93,6 @@ def _is_clock(value: Any) -> bool:
 
 
 def _requested(options: dict[str, Any]) -> set[str]:
-    """Return the names of the filters in keyword arguments."""
     return {option.split("_")[0] for option, value in options.items() if value}
 
 

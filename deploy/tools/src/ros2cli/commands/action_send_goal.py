@@ -93,7 +93,6 @@ def _uninterrupted(action: Callable[[], object]) -> None:
 
 
 def _cancel(node: Node, accepting: Future) -> None:
-    """Cancel a goal, as soon as it is accepted."""
     if not accepting.done():
         graph.spin(node, accepting, CANCEL_TIMEOUT)
     handle: ClientGoalHandle | None = accepting.result()

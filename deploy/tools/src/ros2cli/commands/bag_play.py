@@ -171,8 +171,6 @@ def _are_matched(node: Node, publishers: dict[str, Publisher]) -> bool:
 
 
 class _Player:
-    """Publishes recorded messages at the pace of their log times."""
-
     def __init__(
         self,
         node: Node,

@@ -136,8 +136,6 @@ def _error(text: str) -> click.ClickException:
 
 
 class _Recorder:
-    """Subscribes to the selected topics and writes what they receive."""
-
     def __init__(
         self,
         node: Node,
@@ -154,7 +152,6 @@ class _Recorder:
         self._known: set[str] = set()
 
     def subscribe(self) -> None:
-        """Subscribe to the selected topics that are new in the graph."""
         for name, type_ in self._selection.topics().items():
             if name not in self._known:
                 self._known.add(name)

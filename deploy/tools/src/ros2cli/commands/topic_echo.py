@@ -100,7 +100,6 @@ def echo(
 
 
 def _matching(node: Node, topic: str, options: dict[str, Any]) -> QoSProfile:
-    """The preset, with reliability and durability that match all publishers."""
     from rclpy.qos import DurabilityPolicy, QoSPresetProfiles, ReliabilityPolicy
 
     profile = copy(QoSPresetProfiles.get_from_short_key(options["qos_profile"]))

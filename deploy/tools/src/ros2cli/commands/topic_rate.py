@@ -69,7 +69,6 @@ class _Rate:
         self._printed: int | None = None
 
     def count(self) -> None:
-        """Note that a message has arrived."""
         now = self._clock.now().nanoseconds
         if now == 0:  # simulated time has not begun
             if self._intervals:
@@ -133,11 +132,9 @@ class _Bandwidth:
         self._messages: deque[tuple[int, int]] = deque(maxlen=window)
 
     def count(self, data: bytes) -> None:
-        """Note the arrival of a serialized message."""
         self._messages.append((self._clock.now().nanoseconds, len(data)))
 
     def report(self) -> None:
-        """Print the bandwidth, as soon as two messages have arrived."""
         if len(self._messages) < 2:
             return
         duration = self._clock.now().nanoseconds - self._messages[0][0]

@@ -59,7 +59,6 @@ class Integral(Memory):
     def _add(
         self, sum_: tuple[Any, int], before: tuple[Any, int], time: int, elapsed: int
     ) -> tuple[Any, int]:
-        """Return a sum and the trapezoid that ends at a time."""
         after = self._node.at(time)
         mark = max(sum_[1], before[1], after[1])
         if mark == UNKNOWN:

@@ -46,7 +46,6 @@ class Run:
     """One evaluation, from its subscription to its disposal."""
 
     def __init__(self, observer: abc.ObserverBase[Any], scheduler: abc.SchedulerBase | None) -> None:
-        """Begin with nothing asked."""
         if scheduler is None:
             raise ValueError("a signal needs a clock: subscribe(…, scheduler=node.scheduler)")
         self.observer = observer

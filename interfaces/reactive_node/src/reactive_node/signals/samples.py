@@ -198,8 +198,6 @@ class _Held(Source):
 
 
 class _Interpolated(_Held):
-    """Evaluates :func:`interpolate`."""
-
     def __init__(
         self,
         run: Run,

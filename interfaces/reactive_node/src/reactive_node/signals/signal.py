@@ -36,7 +36,6 @@ class Signal(Generic[T]):
     """
 
     def __init__(self, begin: Callable[[Run], Node]) -> None:
-        """Describe a signal by what begins its evaluation."""
         self.begin = begin
 
     # Questions
@@ -244,8 +243,6 @@ class _OfTime:
 
 
 class _Several:
-    """A signal that needs several others at the same time."""
-
     def __init__(self, *nodes: Node) -> None:
         self._nodes = nodes
 

@@ -27,6 +27,5 @@ def trapezoid(sum_: Any, a: Any, b: Any, seconds: float) -> Any:
 
 
 def _like(example: tuple[Any, ...], items: Any) -> Any:
-    """Return a tuple of the type of another one."""
     make = getattr(type(example), "_make", None)  # of a NamedTuple
     return tuple(items) if make is None else make(items)
