@@ -48,13 +48,11 @@ def run(*arguments: str, cwd: Path, **environment: str) -> str:
 
 @pytest.fixture(scope="module", params=FOLDERS)
 def name(request: pytest.FixtureRequest) -> str:
-    """The name of a distribution."""
     return str(request.param)
 
 
 @pytest.fixture(scope="module")
 def built(name: str, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder of its wheel and its source distribution."""
     directory = tmp_path_factory.mktemp("built")
     build = ["-m", "hatchling", "build", "-d", str(directory)]
     run(*build, cwd=FOLDERS[name], AMENT_PREFIX_PATH=str(directory))  # as of a sourced ROS 2

@@ -1,5 +1,3 @@
-"""What the launcher prints."""
-
 from __future__ import annotations
 
 from pathlib import Path

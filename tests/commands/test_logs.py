@@ -1,5 +1,3 @@
-"""The lines of `make logs`."""
-
 from __future__ import annotations
 
 import time

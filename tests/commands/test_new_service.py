@@ -1,5 +1,3 @@
-"""`make new-service` in a copy of the checkout."""
-
 from __future__ import annotations
 
 import errno
@@ -31,7 +29,6 @@ def make(directory: Path, name: str) -> str:
 
 
 def content(directory: Path) -> dict[Path, bytes]:
-    """Return the files of a checkout."""
     return {
         path: path.read_bytes()
         for folder in ("services", "interfaces", "tests", "deploy")

@@ -1,5 +1,3 @@
-"""The table of `make status`."""
-
 from __future__ import annotations
 
 import time

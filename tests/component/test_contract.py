@@ -31,12 +31,10 @@ class Started(Exception):
 
 
 def used(endpoints: Any) -> set[str]:
-    """Return the topics of the contract that subscriptions or publishers have."""
     return {TOPICS[each.topic_name].name for each in endpoints if each.topic_name in TOPICS}
 
 
 def promised(node: str) -> tuple[set[str], set[str]]:
-    """Return what a node reads and publishes by the contract."""
     return (
         {topic.name for topic in topics.CONTRACT if node in topic.subscribers},
         {topic.name for topic in topics.CONTRACT if {node, "every service"} & set(topic.publishers)},

@@ -49,7 +49,6 @@ def driven(
 
 
 def on(begin: float, end: float, age: float = 0.0) -> list[tuple[float, str, float]]:
-    """Return the states of a controller that repeats `on`."""
     return [(begin + 0.1 * n, ON, age) for n in range(round((end - begin) / 0.1))]
 
 
@@ -115,7 +114,6 @@ SCENARIO = "theta1: {center: 0.0, amplitude: 1.0, period: 8.0}\n"
 
 @pytest.fixture
 def start(make_node: MakeNode, spin_until: SpinUntil, tmp_path: Path) -> Callable[..., Wired]:
-    """Starts the drive or a joint in a running scenario."""
     file = tmp_path / "scenario.yaml"
     file.write_text(SCENARIO + "drive: {rate: 50.0}\n")
 

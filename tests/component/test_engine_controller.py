@@ -1,5 +1,3 @@
-"""The recipe of the engine controller."""
-
 from __future__ import annotations
 
 from datetime import UTC, datetime, timedelta

@@ -1,5 +1,3 @@
-"""The engine controller between its topics."""
-
 from __future__ import annotations
 
 import itertools
@@ -35,8 +33,6 @@ def wired(make_node: MakeNode, spin_until: SpinUntil, monkeypatch: pytest.Monkey
 
 
 class Controller(Wired):
-    """A controller, its operator and its commands."""
-
     def see(self, age: float = 0.0) -> None:
         """Report an operator who was seen `age` seconds ago; return when the controller knows."""
         before = len(self.states)

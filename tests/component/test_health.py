@@ -1,5 +1,3 @@
-"""Reading health reports."""
-
 from __future__ import annotations
 
 import socket

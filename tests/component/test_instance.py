@@ -1,5 +1,3 @@
-"""The claim of a service on its name."""
-
 from __future__ import annotations
 
 import os
@@ -16,7 +14,6 @@ LONG = NAME + "a" * 200
 
 
 def node(name: str, domain: int = 7) -> Any:
-    """What a claim needs of a node."""
     context = SimpleNamespace(get_domain_id=lambda: domain)
     return SimpleNamespace(context=context, get_fully_qualified_name=lambda: name)
 

@@ -73,8 +73,6 @@ LISTING = """
 
 
 class Arm:
-    """All recipes, wired with subjects for topics, in virtual time."""
-
     def __init__(self, path: Path) -> None:
         self.scheduler = TestScheduler()
         self.topics: dict[str, Subject[Any]] = {topic.name: Subject() for topic in topics.CONTRACT}

@@ -1,5 +1,3 @@
-"""The operator watchdog between its topics."""
-
 from __future__ import annotations
 
 import threading

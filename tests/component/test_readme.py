@@ -1,5 +1,3 @@
-"""The pages of the repository agree with the code."""
-
 from __future__ import annotations
 
 import re

@@ -1,5 +1,3 @@
-"""Timelines, and how they are played, in virtual time."""
-
 from __future__ import annotations
 
 import math
@@ -26,7 +24,6 @@ DEMO = Path(__file__).parents[2] / "deploy" / "scenarios" / "demo.yaml"
 
 
 def played(scheduler: TestScheduler, observable: Observable[Any]) -> list[tuple[float, Any]]:
-    """Return what an observable emits, with the time since its subscription."""
     messages = scheduler.start(lambda: observable, disposed=220.0).messages
     return [
         (pytest.approx(message.time - 200, abs=1e-9), message.value.value)

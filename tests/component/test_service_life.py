@@ -110,8 +110,6 @@ process._SHUTDOWN_TIMEOUT = 3600.0
 
 
 class Process:
-    """A Python process with captured output."""
-
     def __init__(self, *arguments: str) -> None:
         self.output = ""  # after the end
         self.popen = subprocess.Popen(

@@ -1,5 +1,3 @@
-"""The node of a service: bad messages, health, parameters."""
-
 from __future__ import annotations
 
 import dataclasses
@@ -38,14 +36,12 @@ SpinFor = Callable[[float], None]
 
 
 def one(name: str, default: Any, within: Any, meaning: str, *, unit: str = "", settable: bool = False) -> Any:
-    """A dataclass of one parameter."""
     field = parameter(default, within, unit, meaning, settable=settable)
     return dataclasses.make_dataclass("Parameters", [(name, type(default), field)], frozen=True)
 
 
 @pytest.fixture
 def service(make_node: Make, monkeypatch: pytest.MonkeyPatch) -> ServiceNode:
-    """A service that reports its health on demand."""
     monkeypatch.setattr("interfaces.service.health.PERIOD", 3600.0)
     node: ServiceNode = make_node("service", kind=ServiceNode)
     return node
@@ -59,7 +55,6 @@ def peer(make_node: Make) -> Node:
 
 @pytest.fixture
 def health(service: ServiceNode, peer: Node, spin_until: SpinUntil) -> Callable[[], dict[str, Any]]:
-    """Lets a health report become due, and returns it."""
     heard: list[Any] = []
     topic = topics.DIAGNOSTICS
     peer.create_subscription(topic.type, topic.name, heard.append, topic.qos)
@@ -318,7 +313,6 @@ class Readers:
         return self.alive[-1]
 
     def receive(self, message: Any, *seconds: float) -> None:
-        """Receive a message once for each source time."""
         for at in seconds:
             info = {"source_timestamp": to_nanoseconds(at_time(at))}
             for callback in [reader.callback for reader in self.alive]:

@@ -20,8 +20,6 @@ NS = 10**9
 
 
 class Observed:
-    """A service that asks for a state, and its publisher."""
-
     def __init__(self, make_node: MakeNode, spin_until: SpinUntil) -> None:
         self.service: ServiceNode = make_node("service", kind=ServiceNode)
         self.peer = make_node("peer")

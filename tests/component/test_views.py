@@ -19,7 +19,6 @@ PANELS = FOXGLOVE["configById"]
 
 
 def shown(layout: Any) -> Iterator[str]:
-    """Yield the panels of a layout."""
     if isinstance(layout, str):
         yield layout
     else:
@@ -28,7 +27,6 @@ def shown(layout: Any) -> Iterator[str]:
 
 
 def paths() -> list[tuple[str, str]]:
-    """Return topic and field of each plotted value."""
     given = [path["value"] for panel in PANELS.values() for path in panel.get("paths", ())]
     return [(topic, field) for topic, _, field in (value.rpartition(".") for value in given)]
 

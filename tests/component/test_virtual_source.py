@@ -42,8 +42,6 @@ class Parameters:
 
 @pytest.fixture
 def make_source(make_node: Make) -> Callable[..., ServiceNode]:
-    """Makes the node of a virtual source, with these parameters."""
-
     def make(**values: Any) -> ServiceNode:
         overrides = [Parameter(name, value=value) for name, value in values.items()]
         node: ServiceNode = make_node("source", kind=ServiceNode, parameter_overrides=overrides)
@@ -54,7 +52,6 @@ def make_source(make_node: Make) -> Callable[..., ServiceNode]:
 
 
 def emitted(node: ServiceNode, items: Observable[Any]) -> list[Any]:
-    """Return a list that receives what an observable emits."""
     received: list[Any] = []
     items.subscribe(received.append, scheduler=node.scheduler)
     return received

@@ -28,7 +28,6 @@ class Wired:
         namespace: str = "",
         **parameters: Any,
     ) -> None:
-        """Wire a service with these values of its parameters."""
         self.spin_until = spin_until
         self.peer: Node = make_node("peer", kind=Node, namespace=namespace)
         self.heard: dict[str, list[Any]] = {}
@@ -51,7 +50,6 @@ class Wired:
         spin_until(self.reports)  # the peer hears all further ones
 
     def publish(self, topic: Topic, message: Any) -> None:
-        """Publish a message to the service, once that has a reader."""
         publisher = self._publishers[topic.name]
         own = topic.name in self.heard  # the peer may hear itself
         self.spin_until(lambda: publisher.get_subscription_count() > own)

@@ -1,5 +1,3 @@
-"""Mutants: how they are made, tested and judged."""
-
 from __future__ import annotations
 
 import shutil
@@ -74,7 +72,6 @@ def test_modules_and_their_tests_exist() -> None:
 
 @pytest.fixture
 def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Bench]:
-    """A bench for a checkout of one module and one test."""
     monkeypatch.setattr(benches, "_ALLOWANCE", 1.0)
     checkout = tmp_path / "checkout"
     (checkout / "deploy" / "mutants").mkdir(parents=True)

@@ -1,5 +1,3 @@
-"""The hold-to-run switch of the pages, in virtual time."""
-
 from __future__ import annotations
 
 import math

@@ -53,8 +53,6 @@ ENVIRONMENT = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path), "TERM": "xt
 
 
 class User:
-    """Types at a terminal, and reads what the program shows there."""
-
     def __init__(self, shell: str = 'exec "$@"', term: str = "xterm", program: str = PROGRAM) -> None:
         """Run a program as `"$@"` in a shell that controls the terminal."""
         self.output = b""
@@ -91,7 +89,6 @@ class User:
         assert termios.tcgetattr(self.terminal) == self.modes
 
     def close_terminal(self) -> None:
-        """Close it, and wait until the shell ends."""
         os.close(self._keyboard)
         self._keyboard = -1
         self._process.wait(LIMIT)
@@ -114,7 +111,6 @@ class User:
 
 @pytest.fixture
 def user(request: pytest.FixtureRequest) -> Iterator[User]:
-    """A user at a terminal, with the parameters of the test."""
     user = User(**getattr(request, "param", {}))
     try:
         yield user

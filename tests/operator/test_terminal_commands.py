@@ -1,5 +1,3 @@
-"""The commands at the operator's terminal reach the arm."""
-
 from __future__ import annotations
 
 import os
@@ -29,8 +27,6 @@ Live = Callable[[Callable[[], object]], None]
 
 
 class Operator:
-    """Types at a terminal."""
-
     def __init__(self, node: Node, terminal: Terminal, keyboard: int) -> None:
         self.node = node
         self._terminal = terminal
@@ -41,7 +37,6 @@ class Operator:
         self.live()
 
     def live(self) -> None:
-        """Let the terminal do what it does all the time."""
         self._terminal.refresh()
 
 
@@ -60,8 +55,6 @@ def operator(make_node: MakeNode, monkeypatch: pytest.MonkeyPatch) -> Iterator[O
 
 
 class Controller:
-    """An engine controller that repeats its state."""
-
     def __init__(self, make_node: MakeNode) -> None:
         self.engines = ON
         self.commands: list[str] = []
@@ -101,8 +94,6 @@ def test_turn_on_ends_the_repetition_of_turn_off(
 
 
 class Switch:
-    """A dead man's switch, and what is heard of the operator."""
-
     def __init__(self, make_node: MakeNode, **values: object) -> None:
         self.heartbeats: list[float] = []
         given = [Parameter(name, value=value) for name, value in values.items()]
@@ -120,13 +111,11 @@ class Switch:
         return bool(self.node.get_parameter("pressed").value)
 
     def set(self, pressed: bool) -> None:
-        """Set the parameter, as other hands do."""
         self.node.set_parameters([Parameter("pressed", value=pressed)])
 
 
 @pytest.fixture
 def said(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """What the terminal says of the hand."""
     said: list[str] = []
     monkeypatch.setattr(hand, "say", said.append)
     return said
@@ -148,7 +137,6 @@ def live_until(operator: Operator, executor: Executor) -> Live:
 
 @pytest.fixture
 def held(operator: Operator, make_node: MakeNode, live_until: Live) -> Switch:
-    """A switch that the terminal has taken from a latched parameter."""
     switch = Switch(make_node, pressed=True)
     operator.type("press")
     live_until(lambda: not switch.pressed)

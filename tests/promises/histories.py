@@ -31,7 +31,6 @@ def _times(rate: float) -> list[float]:
 
 
 def value_at(topic: str, time: float) -> float:
-    """Return the value of a configuration topic at a time."""
     return 2.0 + math.sin(time * (1 + len(topic)) / 7)
 
 
@@ -85,13 +84,11 @@ def with_value(history: History, topic: str, value: Any, begin: float, end: floa
 
 
 def added(history: History, topic: str, *samples: tuple[float, Any]) -> History:
-    """Return the history with additional messages."""
     new = [Sample(t, t + 0.001, value) for t, value in samples]
     return replace(history, streams=history.streams | {topic: sorted([*history.streams[topic], *new])})
 
 
 def faulty(history: History, *faults: InjectedFault) -> History:
-    """Return the history with additional faults."""
     return replace(history, faults=sorted([*history.faults, *faults], key=lambda f: f.begin))
 
 

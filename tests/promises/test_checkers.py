@@ -30,7 +30,6 @@ from .histories import END, added, change, faulty, good, killed, silent, value_a
 
 
 def verdict(promise: str, history: History) -> str:
-    """Return the verdict of a checker."""
     return CHECKERS[promise](history).verdict
 
 
@@ -549,7 +548,6 @@ def test_l3_is_unknown_if_a_value_may_have_been_missed() -> None:
 
 
 def hung(replaced_after: float) -> History:
-    """Return the history in which kinematics is stopped for 15 s."""
     history = silent(good(), "effector/position", 20.0, 20.0 + replaced_after)
     return faulty(history, InjectedFault("stop", "kinematics", 20.0, 35.0, 105))
 

@@ -1,5 +1,3 @@
-"""The checker of S6."""
-
 from __future__ import annotations
 
 from dataclasses import replace

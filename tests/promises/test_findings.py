@@ -221,7 +221,6 @@ def test_s2_counts_kills_while_the_engines_are_on_and_the_operator_is_present() 
 
 
 def two_lives(program: str, began: float) -> list[Life]:
-    """Return the processes of a program whose second one began then."""
     return [Life(program, 1, 0.0, began - 0.01), Life(program, 2, began, None)]
 
 
@@ -234,7 +233,6 @@ def bad_line(begin: float, end: float) -> InjectedFault:
 
 
 def heard_but_in(*silences: tuple[float, float]) -> list[tuple[float, bool]]:
-    """Return heartbeats from 0.25 s on, with these silences."""
     return [beat for beat in steps(0.25, 40) if not any(begin < beat[0] < end for begin, end in silences)]
 
 

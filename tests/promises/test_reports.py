@@ -18,7 +18,6 @@ from .histories import END, faulty, good, killed, silent, with_value
 
 
 def faults_of(history: History) -> list[list[str]]:
-    """Return the cells of the page's list of faults."""
     found = html("title", [], [], history).partition("<h2>Faults</h2>")[2].partition("</table>")[0]
     rows = found.split("<tr>")[2:]
     return [[unescape(cell) for cell in re.split(r"<td[^>]*>", row)[1:]] for row in rows]

@@ -24,13 +24,11 @@ LIMIT = 10  # bytes of a log until it is rolled over
 
 
 def log_to(file: Path) -> closing[loggers.Logger]:
-    """A logger as supervisord makes one."""
     return closing(loggers.Logger(handlers=[LossyLog(str(file), "a", LIMIT, 1)]))
 
 
 @contextmanager
 def own_signals() -> Iterator[None]:
-    """Restore what signals wake."""
     before = signal.set_wakeup_fd(-1)
     try:
         yield
@@ -39,7 +37,6 @@ def own_signals() -> Iterator[None]:
 
 
 def interface_of(*states: int, poller: Any) -> ArmInterface:
-    """The interface of a supervisord whose programs are in these states."""
     processes = {
         str(number): SimpleNamespace(get_state=lambda state=state: state)
         for number, state in enumerate(states)

@@ -1,5 +1,3 @@
-"""Errors in a user's parameter file."""
-
 from __future__ import annotations
 
 import re

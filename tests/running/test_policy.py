@@ -20,8 +20,6 @@ def program(name: str, state: str = "RUNNING", uptime: float = 0.0, restarts: in
 
 
 class Run:
-    """A policy that observes programs every quarter of a second."""
-
     def __init__(self, *programs: Program) -> None:
         self.policy = Policy(TIMEOUTS)
         self.programs = {each.name: each for each in programs}
@@ -29,12 +27,10 @@ class Run:
         self.last_health: dict[tuple[str, int], float] = {}
 
     def hear(self, names: Iterable[str]) -> None:
-        """Note a report of each program."""
         for name in names:
             self.last_health[name, self.programs[name].pid] = self.now
 
     def decide(self, *, stopped: Iterable[str] = (), duplicates: Iterable[Process] = ()) -> list[Action]:
-        """Return the actions at the present time."""
         return self.policy.decide(
             Observation(
                 self.now,

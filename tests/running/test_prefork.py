@@ -32,7 +32,6 @@ WORDS = ("Zürich", "", "--ros-args")
 def run(
     folder: Path, program: str, *, more: str = "", python: str = PYTHON
 ) -> subprocess.CompletedProcess[str]:
-    """Run the module `probe` as a fork of supervisord does."""
     path = [os.environ["PYTHONPATH"]] if "PYTHONPATH" in os.environ else []  # where ROS 2 has its packages
     (folder / "probe.py").write_text("import atexit, os, signal, sys, threading\n" + program)
     return subprocess.run(

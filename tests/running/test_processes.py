@@ -1,5 +1,3 @@
-"""The processes of a system, and their end."""
-
 from __future__ import annotations
 
 import os

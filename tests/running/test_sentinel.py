@@ -24,7 +24,6 @@ PERIOD = Timeouts.period
 
 
 def program(name: str, state: str = "RUNNING", pid: int | None = None, uptime: float = 0.0) -> Program:
-    """A supervised program."""
     up = state in ("RUNNING", "STARTING")
     return Program(name, state, (pid or PIDS[name]) if up else 0, uptime, 0, "", "")
 
@@ -46,7 +45,6 @@ class Run:
         stopped: Iterable[int] = (),
         duplicates: Iterable[Process] = (),
     ) -> list[tuple[float, Action]]:
-        """The actions within so many seconds, each with its time."""
         decided = []
         for _ in range(round(seconds / PERIOD)):
             self.now += PERIOD
@@ -256,8 +254,6 @@ def test_a_supervisord_of_another_version_is_named(monkeypatch: pytest.MonkeyPat
 
 
 class Machine:
-    """A supervisord and its processes, with a clock of its own."""
-
     def __init__(self, monkeypatch: pytest.MonkeyPatch, run: Path) -> None:
         self.now = 0.0
         self.questions: list[float] = []

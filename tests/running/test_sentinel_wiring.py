@@ -30,8 +30,6 @@ VELOCITY = Program("velocity", "RUNNING", 501, 3.0, 2, "code 1", "")
 
 
 class Probe:
-    """Observes what the test has prepared."""
-
     def __init__(self) -> None:
         self.programs = [VELOCITY]
         self.failure = ""
@@ -52,8 +50,6 @@ class Probe:
 
 
 class Policy:
-    """Decides what the test has prepared."""
-
     def __init__(self) -> None:
         self.kill_inhibited_by = ""
         self.reasons: dict[str, str] = {"velocity": "no health"}
@@ -211,10 +207,7 @@ def test_states_are_not_repeated_while_observations_fail(
 
 
 class Answering(Supervisord):
-    """A supervisord that answers."""
-
     def watch(self) -> list[Program]:
-        """Return no program."""
         return []
 
 

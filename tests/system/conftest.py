@@ -13,7 +13,6 @@ from tests.system.sites import Checkout, Peer, Site, make_small_arm
 
 @pytest.fixture
 def site(tmp_path: Path, domain_id: int) -> Iterator[Site]:
-    """A site for a system of this test."""
     with closing(Site(tmp_path / "run", domain_id)) as site:
         yield site
 
@@ -48,6 +47,5 @@ def checkout(small_arm: Path, domain_id: int) -> Iterator[Checkout]:
 
 @pytest.fixture
 def peer(module_site: Site) -> Iterator[Peer]:
-    """A node of the test that joins the module's system."""
     with closing(Peer(module_site.domain)) as peer:
         yield peer

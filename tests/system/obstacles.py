@@ -14,7 +14,6 @@ from tests.system.sites import Command, Site
 
 @contextmanager
 def another_at_work(site: Site) -> Iterator[None]:
-    """Hold the lock of a start or stop."""
     logs = site.run / "logs"
     logs.mkdir(parents=True, exist_ok=True)
     directory = os.open(logs, os.O_RDONLY)

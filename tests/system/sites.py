@@ -57,17 +57,14 @@ class Command:
 
     @property
     def pid(self) -> int:
-        """Its process id."""
         return self._process.pid
 
     @property
     def is_alive(self) -> bool:
-        """Whether it has not ended yet."""
         return self._process.poll() is None
 
     @property
     def output(self) -> str:
-        """Its whole output."""
         return "\n".join(text for _, text in self.lines)
 
     def await_line(self, pattern: str, seconds: float = LIMIT, after: int = 0) -> re.Match[str]:
@@ -91,7 +88,6 @@ class Command:
         return found
 
     def type(self, text: str) -> None:
-        """Write to its standard input."""
         assert self._process.stdin is not None
         self._process.stdin.write(text)
         self._process.stdin.flush()
@@ -105,7 +101,6 @@ class Command:
             self.type(text)
 
     def signal(self, number: int) -> None:
-        """Send a signal to its process group, as a terminal does."""
         os.killpg(self._process.pid, number)
 
     def wait(self, seconds: float = LIMIT) -> int:
@@ -118,7 +113,6 @@ class Command:
         return code
 
     def close(self) -> None:
-        """End it, if it has not ended yet."""
         if self._process.poll() is None:
             self.signal(signal.SIGKILL)
         self._process.wait()
@@ -158,7 +152,6 @@ class Site:
         }
 
     def begin_python(self, script: str, *arguments: str) -> Command:
-        """Begin a script that uses the checkout."""
         path = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])
         return self._begin([sys.executable, script, *arguments], PYTHONPATH=path)
 
@@ -167,7 +160,6 @@ class Site:
         return self._begin(self._command(arguments))
 
     def begin_command(self, *command: str) -> Command:
-        """Begin any command."""
         return self._begin(list(command))
 
     def begin_in_terminal(self, *command: str) -> Command:
@@ -215,14 +207,12 @@ class Site:
         return {each.name for each in manifest.programs(self.directory / "deploy" / "supervisord.conf")}
 
     def await_members(self, condition: Callable[[dict[str, int]], bool]) -> None:
-        """Wait until the live processes fulfil a condition."""
         deadline = time.monotonic() + LIMIT
         while not condition(self.members):
             assert time.monotonic() < deadline, f"{self.members} after {LIMIT} s"
             time.sleep(LOOK)
 
     def close(self) -> None:
-        """End all commands and the system."""
         try:
             self._commands.close()
         finally:
@@ -237,7 +227,6 @@ class Checkout(Site):
 
     @property
     def environment(self) -> dict[str, str]:
-        """The variables of a shell with .venv/bin on the PATH."""
         path = f"{self.directory / '.venv' / 'bin'}{os.pathsep}{os.environ['PATH']}"
         return os.environ | {"ROS_DOMAIN_ID": str(self.domain), "PATH": path}
 
@@ -262,7 +251,6 @@ def make_small_arm(parent: Path, programs: Sequence[str] = SMALL) -> Path:
 
 
 def _leave_programs(path: Path, names: Sequence[str]) -> None:
-    """Remove all other programs from a manifest."""
     conf = configparser.RawConfigParser(inline_comment_prefixes=(" ;",))
     conf.read(path)
     for section in conf.sections():
@@ -287,8 +275,6 @@ def _set_up(directory: Path) -> None:
 
 
 class Peer:
-    """A node of the test in a site's domain."""
-
     def __init__(self, domain: int) -> None:
         self._context = Context()
         rclpy.init(args=[], context=self._context, domain_id=domain)
@@ -303,22 +289,18 @@ class Peer:
         return messages
 
     def publisher(self, topic: topics.Topic) -> Publisher:
-        """A publisher on a topic."""
         return self.node.create_publisher(topic.type, topic.name, topic.qos)
 
     def spin_until(self, condition: Callable[[], object], seconds: float = LIMIT) -> None:
-        """Run callbacks until a condition is true."""
         deadline = time.monotonic() + seconds
         while not condition():
             assert time.monotonic() < deadline, f"not within {seconds} s"
             self.spin_once(0.1)
 
     def spin_once(self, seconds: float) -> None:
-        """Run the next callback, if there is one within a time."""
         self._executor.spin_once(timeout_sec=seconds)
 
     def close(self) -> None:
-        """Leave the domain."""
         self._executor.shutdown()
         self.node.destroy_node()
         self._context.try_shutdown()

@@ -35,7 +35,6 @@ def lines(output: str) -> Iterator[tuple[float, str, list[float]]]:
 
 
 def by_words(output: str) -> dict[str, list[tuple[float, list[float]]]]:
-    """The times and numbers of the lines with the same words."""
     grouped: dict[str, list[tuple[float, list[float]]]] = defaultdict(list)
     for time, words, numbers in lines(output):
         grouped[words].append((time, numbers))

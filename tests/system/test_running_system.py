@@ -36,7 +36,6 @@ def _system(module_site: Site) -> Iterator[None]:
 
 
 def rows(table: str) -> dict[str, list[str]]:
-    """The rows of `make status` by service."""
     lines = table[table.index("SERVICE") :].splitlines()[1:]
     return {row[0]: row[1:] for row in (re.split(r"  +", line) for line in lines)}
 

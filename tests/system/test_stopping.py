@@ -81,7 +81,6 @@ def test_ctrl_c_before_the_start_ends_without_a_traceback(small_site: Site) -> N
 
 
 def caught_signals(pid: int) -> set[int]:
-    """The signals that a process handles."""
     status = Path(f"/proc/{pid}/status").read_text()
     mask = int(status.partition("SigCgt:")[2].split()[0], 16)
     return {number for number in range(1, 65) if mask >> (number - 1) & 1}

@@ -33,7 +33,6 @@ from std_srvs.srv import Trigger
 
 @pytest.fixture
 def executor(context: Context) -> Iterator[SingleThreadedExecutor]:
-    """The executor that rclpy documents, in the test's context."""
     with SingleThreadedExecutor(context=context) as executor:
         yield executor
 
@@ -53,7 +52,6 @@ def make_node(context: Context) -> Iterator[Callable[..., Node]]:
 
 @pytest.fixture
 def node(make_node: Callable[..., Node], executor: SingleThreadedExecutor) -> Node:
-    """A node in the test's executor."""
     node = make_node()
     executor.add_node(node)
     return node
@@ -105,14 +103,12 @@ class UserExecutor(Executor):
 
 @pytest.fixture
 def user_executor(context: Context) -> Iterator[UserExecutor]:
-    """A user's executor in the test's context."""
     with UserExecutor(context=context) as executor:
         yield executor
 
 
 @pytest.fixture
 def clock() -> ROSClock:
-    """Simulated time at 1 µs, which only the test advances."""
     clock, simulator = ROSClock(), TimeSource()
     simulator.ros_time_is_active = True
     simulator.attach_clock(clock)
@@ -122,7 +118,6 @@ def clock() -> ROSClock:
 
 @pytest.fixture
 def host(tmp_path: Path) -> Iterator[Host]:
-    """A host with the loopback interface only."""
     for program, package in (("ip", "iproute2"), ("unshare", "util-linux"), ("nsenter", "util-linux")):
         if shutil.which(program) is None:
             pytest.skip(f"no {program} here: apt-get install {package}")
@@ -145,6 +140,5 @@ def host(tmp_path: Path) -> Iterator[Host]:
 
 @pytest.fixture
 def host_with_network(host: Host) -> Host:
-    """A host with another interface, eth0."""
     host.add_interface("eth0", ADDRESS)
     return host

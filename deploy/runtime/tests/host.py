@@ -43,8 +43,6 @@ def wait_until(condition: Callable[[], object], seconds: float = TIMEOUT) -> Non
 
 
 class Process:
-    """A Python program on a host, with its output so far."""
-
     def __init__(self, command: list[str], environment: dict[str, str], output: Path) -> None:
         self._output = output
         with output.open("w") as file:
@@ -65,7 +63,6 @@ class Process:
         wait_until(lambda: "ready" in self.lines())
 
     def end(self) -> None:
-        """Close its standard input and wait until it has ended."""
         try:
             self._process.communicate(timeout=TIMEOUT)
         finally:
@@ -110,7 +107,6 @@ class Host:
         self.run("ip", *arguments.split())
 
     def add_interface(self, name: str, *addresses: str) -> None:
-        """Add an interface with a cable to nothing."""
         self.ip(f"link add {name} type veth peer name {name}-end")
         for end in (name, f"{name}-end"):
             self.ip(f"link set {end} addrgenmode none")  # the kernel sends nothing of its own
@@ -120,7 +116,6 @@ class Host:
             self.ip(f"link set {end} up")
 
     def sent(self, name: str) -> int:
-        """Return the number of packets that an interface has sent."""
         lines = self.run("cat", "/proc/net/dev").splitlines()
         return next(int(line.split()[9]) for line in lines if line.split()[0] == f"{name}:")
 

@@ -14,7 +14,6 @@ from std_srvs.srv import Trigger
 
 
 def talker() -> None:
-    """Publish numbers and names, and serve a service."""
     rclpy.init()
     node = rclpy.create_node("talker")
     numbers = node.create_publisher(Int64, "numbers", 10)
@@ -26,7 +25,6 @@ def talker() -> None:
 
 
 def listener() -> None:
-    """Publish what was heard, and call the service."""
     rclpy.init()
     node = rclpy.create_node("listener")
     heard = node.create_publisher(Int64, "heard", 10)

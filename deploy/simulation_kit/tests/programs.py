@@ -79,7 +79,6 @@ def _spin_for(node: Node, seconds: float) -> None:
 
 
 def talker() -> None:
-    """Publish what the listener shall note."""
     rclpy.init()
     node = Node("talker")
     note: dict[str, Any] = {"incompatible": {}}
@@ -139,7 +138,6 @@ def talker() -> None:
 
 
 def listener() -> None:
-    """Note what happens until the talker is gone."""
     rclpy.init()
     node = Node("listener")
     received: dict[str, list[int]] = {topic: [] for topic in PROFILES}

@@ -21,7 +21,6 @@ pytestmark = pytest.mark.timed  # lifespans and leases of real processes
 
 @pytest.fixture(scope="module")
 def real(module_domain_id: int) -> tuple[Record, Record]:
-    """What the talker and the listener note in real processes."""
     environment = os.environ | {"ROS_DOMAIN_ID": str(module_domain_id)}
 
     def start(name: str) -> subprocess.Popen[str]:
@@ -38,7 +37,6 @@ def real(module_domain_id: int) -> tuple[Record, Record]:
 
 @pytest.fixture(scope="module")
 def simulated() -> tuple[Record, Record]:
-    """What they note in a simulation."""
     with Simulation(seed=1) as simulation:
         talker = simulation.start(programs.talker)
         simulation.run_until(lambda: "early" in talker.output.text)
@@ -50,20 +48,17 @@ def simulated() -> tuple[Record, Record]:
 
 @pytest.fixture(params=["real", "simulated"])
 def notes(request: pytest.FixtureRequest) -> tuple[Record, Record]:
-    """What the talker and the listener note."""
     found: tuple[Record, Record] = request.getfixturevalue(request.param)
     return found
 
 
 @pytest.fixture
 def talker(notes: tuple[Record, Record]) -> Record:
-    """What the talker notes."""
     return notes[0]
 
 
 @pytest.fixture
 def listener(notes: tuple[Record, Record]) -> Record:
-    """What the listener notes."""
     return notes[1]
 
 

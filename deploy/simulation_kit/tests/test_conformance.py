@@ -13,7 +13,6 @@ NAMES = ("between_nodes", "events", "executors", "lifecycle", "parameter_client"
 
 
 def main() -> None:
-    """Run pytest as a simulated program."""
     from rclpy_simulation import Simulation
 
     files = [str(CONFORMANCE / f"test_{name}.py") for name in NAMES]

@@ -17,7 +17,6 @@ PATIENCE = 2.0  # s that the client waits for it
 
 
 def serve() -> None:
-    """Run the server."""
     rclpy.init()
     node = Node("server")
 

@@ -15,8 +15,6 @@ RELIABLE = QoSProfile(depth=10)
 
 
 class Talker(Node):
-    """Counts, ten times a second."""
-
     def __init__(self, profile: QoSProfile) -> None:
         super().__init__("talker")
         self.numbers = self.create_publisher(Int64, "numbers", profile)
@@ -24,27 +22,22 @@ class Talker(Node):
         self.create_timer(0.1, self.on_timer)
 
     def on_timer(self) -> None:
-        """Publish the next number."""
         self.count += 1
         self.numbers.publish(Int64(data=self.count))
 
 
 class Listener(Node):
-    """Keeps the numbers."""
-
     def __init__(self, profile: QoSProfile, heard: list[int]) -> None:
         super().__init__("listener")
         self.create_subscription(Int64, "numbers", lambda message: heard.append(message.data), profile)
 
 
 def talk(profile: QoSProfile) -> None:
-    """Run the talker."""
     rclpy.init()
     rclpy.spin(Talker(profile))
 
 
 def listen(profile: QoSProfile, heard: list[int]) -> None:
-    """Run the listener."""
     rclpy.init()
     rclpy.spin(Listener(profile, heard))
 

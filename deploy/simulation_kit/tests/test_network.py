@@ -67,7 +67,6 @@ class Listener:
 
 
 def publish(simulation: Simulation, process: Any, talker: Talker, *numbers: int) -> None:
-    """Let the talker publish numbers now."""
     process.interrupt(lambda: [talker.publisher.publish(Int64(data=each)) for each in numbers])
     simulation.run(0.0)
 

@@ -25,7 +25,6 @@ NOW = Delay(0.0, 0.0)
 
 
 def run(simulation: Simulation, program: Callable[[], Any]) -> Process:
-    """Run a program to its end."""
     process = simulation.start(program, name="program", delay=NOW)
     simulation.run_until(lambda: process.ended, 7200.0)
     return process

@@ -16,7 +16,6 @@ __all__ = ["executor", "make_node", "node", "other_context"]
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Register the mark `own`."""
     config.addinivalue_line("markers", "own: needs the tools of this distribution")
 
 

@@ -18,8 +18,6 @@ LATENESS = 0.1  # s
 
 
 class Arrival(NamedTuple):
-    """A sample and how long it takes to arrive."""
-
     time: int  # ns
     value: Any
     delay: int  # ns
@@ -42,7 +40,6 @@ def arrivals(
 
 
 def arriving(scheduler: VirtualTime, samples: Sequence[Arrival]) -> Any:
-    """Return an observable of samples that arrive after their delays."""
     inputs = [((time + delay) / SECOND, stamped(value, time)) for time, value, delay in samples]
     return scheduler.hot(*sorted(inputs, key=lambda item: item[0]))
 
@@ -50,10 +47,8 @@ def arriving(scheduler: VirtualTime, samples: Sequence[Arrival]) -> Any:
 def answers(
     scheduler: VirtualTime, signal: Signal[Any], period: float = 0.017, until: float = 1.5
 ) -> list[Answer[Any]]:
-    """Return the answers of a signal in virtual time."""
     return items(scheduler, signal.sample(period), until)
 
 
 def items(scheduler: VirtualTime, observable: Observable[Any], until: float = 1.5) -> list[Any]:
-    """Return what an observable emits in virtual time."""
     return [item for _, item in scheduler.record(observable, until=until).items]

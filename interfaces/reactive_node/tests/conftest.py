@@ -33,6 +33,5 @@ def node(make_node: MakeNode) -> ReactiveNode:
 
 @pytest.fixture
 def peer(make_node: MakeNode) -> Node:
-    """An ordinary node in the same domain."""
     peer: Node = make_node("peer", kind=Node)
     return peer

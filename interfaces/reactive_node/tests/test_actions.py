@@ -1,5 +1,3 @@
-"""Goals of actions as observables."""
-
 from __future__ import annotations
 
 import gc
@@ -30,8 +28,6 @@ except ModuleNotFoundError:  # ROS 2's wheels
 
 
 class Server:
-    """An action server whose goals end when the test says so."""
-
     def __init__(self, node: Node) -> None:
         self.goals: list[int] = []
         self.accept = True
@@ -92,8 +88,6 @@ class Server:
 
 
 class Watch:
-    """What an execution has emitted."""
-
     def __init__(self, execution: rx.Observable[Any], node: ReactiveNode) -> None:
         self.items: list[Any] = []
         self.errors: list[Exception] = []

@@ -257,8 +257,6 @@ def test_unobserved_error_of_work_is_raised_by_spin(
 
 
 class Item:
-    """A value that can be counted while it is alive."""
-
     def __init__(self, value: int) -> None:
         self.value = value
 

@@ -1,5 +1,3 @@
-"""Service calls as observables."""
-
 from __future__ import annotations
 
 import threading

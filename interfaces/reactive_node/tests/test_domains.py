@@ -1,5 +1,3 @@
-"""A reserved ROS domain has one owner."""
-
 from __future__ import annotations
 
 import socket

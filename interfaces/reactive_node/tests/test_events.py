@@ -1,5 +1,3 @@
-"""QoS events as observables."""
-
 from __future__ import annotations
 
 from typing import Any

@@ -50,7 +50,6 @@ def executor(context: Context) -> Any:
 
 @pytest.fixture
 def fault(context: Context) -> Any:
-    """An executor of rclpy, as it is."""
     with EventsExecutor(context=context) as executor:
         yield executor
 

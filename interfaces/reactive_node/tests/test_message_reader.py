@@ -1,5 +1,3 @@
-"""Items of messages, and messages of every publisher."""
-
 from __future__ import annotations
 
 import inspect
@@ -26,8 +24,6 @@ VOLATILE = DurabilityPolicy.VOLATILE
 
 
 class Reader:
-    """Stands in for a reader."""
-
     def __init__(self, callback: Callable[..., None]) -> None:
         self.callback = callback
 
@@ -38,8 +34,6 @@ class Reader:
 
 
 class Readers:
-    """Stands in for a node and the readers that it creates."""
-
     def __init__(self) -> None:
         self.created: list[Reader] = []
         self.qos: list[Any] = []
@@ -85,7 +79,6 @@ def publisher(peer: Node) -> Publisher:
 
 
 def half(message: Float64) -> float | None:
-    """Return half of a positive number."""
     return message.data / 2 if message.data > 0 else None
 
 

@@ -26,8 +26,6 @@ LATCHED = QoSProfile(depth=3, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 class Talker:
-    """Publishes strings on a topic."""
-
     def __init__(self, peer: Node, spin_until: SpinUntil, qos: QoSProfile | int = 10) -> None:
         self.publisher: Publisher = peer.create_publisher(String, "topic", qos)
         self.spin_until = spin_until

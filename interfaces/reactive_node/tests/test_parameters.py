@@ -1,5 +1,3 @@
-"""Parameters as observables."""
-
 from __future__ import annotations
 
 import gc

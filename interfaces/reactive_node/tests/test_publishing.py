@@ -1,5 +1,3 @@
-"""Observables as topics."""
-
 from __future__ import annotations
 
 import gc

@@ -1,5 +1,3 @@
-"""The README's Python blocks run as they stand."""
-
 from __future__ import annotations
 
 import os
@@ -40,7 +38,6 @@ NAME = re.compile(r"# (\w+\.py)\n")
 
 @pytest.fixture
 def files(tmp_path: Path) -> Path:
-    """A directory with the README's files."""
     for block in BLOCKS:
         if name := NAME.match(block):
             (tmp_path / name[1]).write_text(block)
@@ -49,7 +46,6 @@ def files(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def listings(domain_id: int) -> Iterator[dict[str, Any]]:
-    """The names that the README's listings define."""
     names: dict[str, Any] = {}
     try:
         for block in BLOCKS:

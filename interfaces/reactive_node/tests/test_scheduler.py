@@ -1,5 +1,3 @@
-"""An Rx scheduler on a node's executor and clock."""
-
 from __future__ import annotations
 
 import threading
@@ -224,8 +222,6 @@ def test_now_begins_with_time_of_day(scheduler: NodeScheduler) -> None:
 
 
 class Simulation:
-    """A node in simulated time, and a publisher of that time."""
-
     def __init__(self, make_node: MakeNode, spin_until: SpinUntil) -> None:
         self.spin_until = spin_until
         self.clock = make_node("simulator")

@@ -1,5 +1,3 @@
-"""Services that recipes answer."""
-
 from __future__ import annotations
 
 import gc
@@ -33,8 +31,6 @@ def answered(request: SetBool.Request, message: str = "") -> Answer:
 
 
 class Caller:
-    """Calls the service of the node under test from another node."""
-
     def __init__(self, peer: Node, spin_until: SpinUntil) -> None:
         self.client: Client = peer.create_client(SetBool, "switch")
         self.spin_until = spin_until

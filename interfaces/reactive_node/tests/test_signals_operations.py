@@ -72,7 +72,6 @@ def meaning(scheduler: VirtualTime, samples: list[Arrival]) -> tuple[Signal[floa
 
 
 def lifted(function: Callable[..., Any], *values: Value) -> Value:
-    """The meaning of `lift` at one time."""
     marks = [mark for _, mark in values]
     if UNKNOWN in marks:
         return None, UNKNOWN
@@ -80,7 +79,6 @@ def lifted(function: Callable[..., Any], *values: Value) -> Value:
 
 
 def check(found: list[Answer[Any]], at: Function, count: int = 55) -> None:
-    """Compare answers with a function."""
     assert len(found) >= count
     for time, value, mark in found:
         expected, expected_mark = at(time)

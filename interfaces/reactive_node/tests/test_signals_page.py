@@ -17,7 +17,6 @@ FILES = re.findall(r"^```python\n# (\w+\.py)\n(.*?)^```$", PAGE, re.DOTALL | re.
 
 @pytest.fixture
 def files(tmp_path: Path) -> Path:
-    """A directory with the programs of the page."""
     for name, content in FILES:
         (tmp_path / name).write_text(content)
     (tmp_path / "conftest.py").write_text('pytest_plugins = ["reactive_node.testing"]\n')

@@ -199,8 +199,6 @@ def test_clock_that_goes_back_a_little_does_not_begin_again() -> None:
 
 
 class _Clock(VirtualTime):
-    """A clock that is set by hand."""
-
     def __init__(self) -> None:
         super().__init__()
         self.time = 0.0

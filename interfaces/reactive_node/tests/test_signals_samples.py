@@ -44,13 +44,11 @@ GAP_NS = round(GAP * SECOND)
 
 
 def held(samples: list[Arrival], time: int) -> tuple[Any, int]:
-    """The meaning of `hold`."""
     before = [sample for sample in samples if sample.time <= time]
     return (before[-1].value, CERTAIN) if before else (None, UNKNOWN)
 
 
 def straight(samples: list[Arrival], time: int, silence: Silence) -> tuple[Any, int]:
-    """The meaning of `linear`."""
     before = [sample for sample in samples if sample.time <= time]
     after = [sample for sample in samples if sample.time > time]
     if not before:
@@ -139,7 +137,6 @@ Quaternion = tuple[float, float, float, float]
 
 
 def product(a: Quaternion, b: Quaternion) -> Quaternion:
-    """The rotation b, followed by a."""
     (ax, ay, az, aw), (bx, by, bz, bw) = a, b
     return (
         aw * bx + ax * bw + ay * bz - az * by,

@@ -1,5 +1,3 @@
-"""Times of messages."""
-
 from __future__ import annotations
 
 import copy

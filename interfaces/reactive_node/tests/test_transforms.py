@@ -1,5 +1,3 @@
-"""Transforms between coordinate frames as observables."""
-
 from __future__ import annotations
 
 from typing import Any

@@ -1,5 +1,3 @@
-"""Transforms need tf2 and its messages; nothing else does."""
-
 from __future__ import annotations
 
 import subprocess

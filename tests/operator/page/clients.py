@@ -30,8 +30,6 @@ TOKEN = "s3cr3t-token"
 
 
 class Arm:
-    """A page server and what it has received."""
-
     def __init__(self, files: Path, tls: ssl.SSLContext | None = None) -> None:
         scheme = "https" if tls else "http"
         self.received: queue.SimpleQueue[server.Event] = queue.SimpleQueue()
@@ -58,7 +56,6 @@ class Arm:
             raise failure
 
     def next(self, kind: type | None = None, seconds: float = 5.0) -> Any:
-        """The next event, or the next event of a kind."""
         deadline = time.monotonic() + seconds
         while True:
             event = self.received.get(timeout=max(0.0, deadline - time.monotonic()))
@@ -66,7 +63,6 @@ class Arm:
                 return event
 
     def request(self, raw: bytes) -> bytes:
-        """The answer to raw bytes."""
         with socket.create_connection(("127.0.0.1", self.port), timeout=5.0) as client:
             with contextlib.suppress(OSError):
                 client.sendall(raw)
@@ -77,7 +73,6 @@ class Arm:
             return answer
 
     def get(self, path: str, method: str = "GET", **headers: str) -> tuple[int, str, bytes]:
-        """Status, header lines and body of a response."""
         headers = {"Host": self.host} | {name.replace("_", "-"): value for name, value in headers.items()}
         lines = "".join(f"{name}: {value}\r\n" for name, value in headers.items() if value)
         answer = self.request(f"{method} {path} HTTP/1.1\r\n{lines}\r\n".encode())
@@ -90,7 +85,6 @@ class Arm:
 
     @contextlib.contextmanager
     def page(self) -> Iterator[ClientConnection]:
-        """A page that was welcomed."""
         with self.connect() as page:
             page.send(json.dumps({"type": "hello", "token": TOKEN}))
             assert message(page)["type"] == "welcome"
@@ -108,14 +102,12 @@ def update(page: ClientConnection) -> Any:
 
 
 def close_code(page: ClientConnection) -> int:
-    """The code with which the server closes the connection."""
     closed = end(page)
     assert closed.rcvd, "the server has not said why"
     return closed.rcvd.code
 
 
 def end(page: ClientConnection) -> ConnectionClosed:
-    """How the connection ends."""
     deadline = time.monotonic() + 5.0
     while time.monotonic() < deadline:
         try:
@@ -179,11 +171,9 @@ class Link:
             thread.start()
 
     def stall(self) -> None:
-        """Hold back all bytes in both directions."""
         self._flows.clear()
 
     def heal(self) -> None:
-        """Pass all bytes on, and those that were held back."""
         self._flows.set()
 
     def _relay(self, source: socket.socket, target: socket.socket) -> None:
@@ -216,11 +206,9 @@ class Hand:
             thread.start()
 
     def say(self, kind: str, **fields: Any) -> None:
-        """Send a message."""
         self._connection.send(json.dumps({"type": kind, **fields}))
 
     def press(self) -> None:
-        """Begin to hold."""
         with self._lock:
             self.say("press", nonce=self._nonce)
             self._holds = True
@@ -234,7 +222,6 @@ class Hand:
             return now
 
     def close(self) -> None:
-        """Close the page."""
         self._holds = False
         self._connection.close_socket()
         for thread in self._threads:

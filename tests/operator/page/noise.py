@@ -7,7 +7,6 @@ from collections.abc import Iterator, Sequence
 
 
 def noise(texts: Sequence[str], count: int, seed: str) -> Iterator[str]:
-    """Random text, damaged messages, and objects of random parts of messages."""
     chance = random.Random(seed)
     parts = [
         *(repr(word) for text in texts if text.startswith("{") for word in text.split('"')[1::2] if word),

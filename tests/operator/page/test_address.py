@@ -1,5 +1,3 @@
-"""Where the page listens, and what keeps its address."""
-
 from __future__ import annotations
 
 import socket
@@ -19,7 +17,6 @@ LINE = "The page: http://127.0.0.1:8650/#tok-en_1"
 
 @pytest.fixture
 def taken() -> Iterator[int]:
-    """A port that another socket listens on."""
     with socket.create_server(("127.0.0.1", 0)) as other:
         yield other.getsockname()[1]
 

@@ -47,7 +47,6 @@ def received(arm: Arm) -> list[server.Event]:
 
 
 def request(chance: random.Random, host: str, origin: str) -> bytes:
-    """A random request, often almost a good one."""
     lines = [
         chance.choice([b"GET", b"POST", b"get", b"", chance.randbytes(3)])
         + b" "
@@ -80,7 +79,6 @@ def request(chance: random.Random, host: str, origin: str) -> bytes:
 
 
 def frame(chance: random.Random) -> bytes:
-    """A random WebSocket frame, often almost a good one."""
     first = chance.choice([0x81, 0x81, 0x82, 0x88, 0x89, 0x8A, 0x01, 0x00, chance.randrange(256)])
     body = chance.randbytes(chance.randrange(60))
     size = chance.choice([len(body), len(body), len(body) + 1, 126, 127])

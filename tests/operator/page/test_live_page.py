@@ -31,14 +31,12 @@ LATCHED = 0.3  # s: the age of a nonce, and a heartbeat on its way
 
 @pytest.fixture(scope="module")
 def module_site(tmp_path_factory: pytest.TempPathFactory, module_domain_id: int) -> Iterator[Site]:
-    """A site for the system of this module."""
     with closing(Site(tmp_path_factory.mktemp("page") / "run", module_domain_id)) as site:
         yield site
 
 
 @pytest.fixture(scope="module", autouse=True)
 def address(module_site: Site) -> str:
-    """The line that tells the address of the page."""
     code, printed = module_site.do("start", STEADY)
     assert code == 0, printed
     (line,) = (line for line in printed.splitlines() if line.startswith("The page: "))
@@ -47,8 +45,6 @@ def address(module_site: Site) -> str:
 
 
 class Observer:
-    """Sees what the topics show, with the times of arrival."""
-
     def __init__(self, domain: int) -> None:
         self.heartbeats: list[float] = []
         self.engines = ""
@@ -69,12 +65,10 @@ class Observer:
         return time.monotonic()
 
     def watch(self, seconds: float) -> None:
-        """See what happens for some time."""
         end = time.monotonic() + seconds
         self._peer.spin_until(lambda: time.monotonic() >= end)
 
     def after(self, time: float) -> list[float]:
-        """The heartbeats after a time, in seconds since then."""
         return [at - time for at in self.heartbeats if at > time]
 
     def close(self) -> None:

@@ -92,7 +92,6 @@ class Page:
         self.say("release")
 
     def live(self) -> None:
-        """Take what has come, and answer an update with a beat."""
         with contextlib.suppress(TimeoutError):
             while True:
                 message = json.loads(self._connection.recv(timeout=0.0))
@@ -170,7 +169,6 @@ class World:
         self.until(lambda: self._clock() >= end)
 
     def delay(self, seconds: float) -> None:
-        """Let time pass in which the program takes no turn."""
         end = self._clock() + seconds
         while self._clock() < end:
             self._clock.step(self._pages)
@@ -317,7 +315,6 @@ def test_released_parameter_releases_a_page(world: World) -> None:
 
 @pytest.fixture
 def terminal(world: World, make_node: Callable[..., Any]) -> Hand:
-    """The hand at a terminal that lives."""
     hand = Hand(make_node("terminal_7", kind=ReactiveNode))
     world.hand = hand
     world.for_seconds(0.5)  # it meets the switch

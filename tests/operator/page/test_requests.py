@@ -20,7 +20,6 @@ PROGRAMS = {"velocity": Program(pid=7)}
 
 @pytest.fixture
 def sent(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[Any]:
-    """The signals that are sent."""
     signals: list[Any] = []
 
     def send_signal(*arguments: Any) -> bool:

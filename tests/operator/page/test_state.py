@@ -55,8 +55,6 @@ class Play:
         return [present for since, present in self.controllers if since <= self.now()][-1]
 
     def run(self, until: float, initial: PageState | None = None, *, opened: float = 200.5) -> PageState:
-        """The state at a time."""
-
         def seen(topic: topics.Topic) -> rx.Observable[Any]:
             return self._scheduler.create_hot_observable(*self.messages.get(topic.name, []))
 

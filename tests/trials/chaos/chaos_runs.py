@@ -18,8 +18,6 @@ TIMEOUT = 150.0  # s
 
 
 class ChaosRun:
-    """The result of `make chaos` with one arm."""
-
     def __init__(self, directory: Path, output: str, code: int, namespace: str = "/") -> None:
         self.output = output
         self.code = code

@@ -154,7 +154,6 @@ def await_members(system: System, count: int) -> list[processes.Process]:
 
 @pytest.fixture
 def babbler(arm: RealArm, domain_id: int) -> Iterator[int]:
-    """Start a babbler next to the arm."""
     undo: Undo | None = FAULT_KINDS["babble"].inject(arm, NO_TARGET)
     assert undo is not None
     try:
@@ -166,7 +165,6 @@ def babbler(arm: RealArm, domain_id: int) -> Iterator[int]:
 
 @pytest.fixture
 def velocity(arm: RealArm, babbler: int) -> Iterator[subprocess.Popen[bytes]]:
-    """Start a process of the arm next to the babbler."""
     environment = arm.environment() | {"SUPERVISOR_PROCESS_NAME": "velocity"}
     with subprocess.Popen(
         [sys.executable, "-c", "import signal; signal.pause()"], env=environment
@@ -272,7 +270,6 @@ def test_a_process_that_is_reaped_while_it_is_found_leaves_no_handle(
 
 
 def monitor_of(arm: RealArm, seen: list[Life]) -> ProcessMonitor:
-    """Return a monitor that lists the processes of an arm."""
     return ProcessMonitor({arm.system.run: "/"}, lambda _, life: seen.append(life), lambda *_: None)
 
 

@@ -23,7 +23,6 @@ pytestmark = [pytest.mark.timed, pytest.mark.timeout(120)]
 
 @pytest.fixture(scope="module")
 def history(tmp_path_factory: pytest.TempPathFactory) -> History:
-    """The history on the robot's side."""
     if reason := missing():
         pytest.skip(reason)
     return chaos_run(tmp_path_factory.mktemp("partition"), "--scenario", "partition").history
@@ -31,7 +30,6 @@ def history(tmp_path_factory: pytest.TempPathFactory) -> History:
 
 @pytest.fixture(scope="module")
 def cut(history: History) -> InjectedFault:
-    """The partition."""
     (fault,) = (fault for fault in history.faults if fault.kind == "partition")
     return fault
 
@@ -107,6 +105,5 @@ def test_next_start_cleans_up_after_a_killed_chaos_monkey(tmp_path: Path) -> Non
 
 
 def hosts() -> list[str]:
-    """Return the named network namespaces of this machine."""
     listed = subprocess.run(["ip", "netns", "list"], check=True, capture_output=True, text=True)
     return [line.split()[0] for line in listed.stdout.splitlines()]

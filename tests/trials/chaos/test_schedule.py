@@ -1,5 +1,3 @@
-"""Schedules: random faults and named scenarios."""
-
 from __future__ import annotations
 
 from itertools import pairwise

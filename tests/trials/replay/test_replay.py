@@ -64,7 +64,6 @@ def replay(
 
 
 def verdicts(done: subprocess.CompletedProcess[str]) -> dict[str, str]:
-    """Return what the command says about each topic."""
     rows = re.findall(r"^(\S+) .* (equal|DIFFERENT|unknown) ", done.stdout, re.MULTILINE)
     return dict(rows)
 

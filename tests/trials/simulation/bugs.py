@@ -30,8 +30,6 @@ EVERY = 5.0  # s between two random faults, as by default
 
 
 class Bug(NamedTuple):
-    """A change of a service."""
-
     program: str
     right: str
     wrong: str

@@ -115,7 +115,6 @@ ASLEEP = 4.0  # s
 
 
 def with_a_bug(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let the simulated arm run an engine controller with a bug."""
     broken = [
         Program(each.name, "tests.trials.simulation.deaf_controller", ())
         if each.name == "engine_controller"

@@ -1,5 +1,3 @@
-"""The random operator of a simulation."""
-
 from __future__ import annotations
 
 import itertools

@@ -17,8 +17,6 @@ from deploy.trials.simulation.outcome import simulate
 
 
 class Day(NamedTuple):
-    """The moments of a day, and the cases at them."""
-
     moments: list[systematic.Point]
     cases: Sequence[Experiment]
     title: str
@@ -26,7 +24,6 @@ class Day(NamedTuple):
 
 @pytest.fixture(scope="module")
 def day() -> Day:
-    """The day of a seed, simulated once."""
     moments = systematic.points("1")
     with mock.patch.object(systematic, "points", {"1": moments}.__getitem__):
         return Day(moments, *systematic.cases("1"))

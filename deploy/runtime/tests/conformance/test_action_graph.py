@@ -41,7 +41,6 @@ def fibonacci(goal_handle: ServerGoalHandle) -> Fibonacci.Result:
 
 @pytest.fixture
 def server(node: Node) -> Iterator[ActionServer]:
-    """The server of the action ``fibonacci``, on the node ``node``."""
     server = ActionServer(node, Fibonacci, "fibonacci", fibonacci)
     yield server
     with suppress(ValueError):  # rclpy, of a server that the test has destroyed
@@ -50,7 +49,6 @@ def server(node: Node) -> Iterator[ActionServer]:
 
 @pytest.fixture
 def client(make_node: MakeNode, executor: SingleThreadedExecutor) -> Iterator[ActionClient]:
-    """A client of the action ``fibonacci``, on the node ``asker``."""
     node = make_node("asker", namespace="/far")
     executor.add_node(node)
     client = ActionClient(node, Fibonacci, "/fibonacci")

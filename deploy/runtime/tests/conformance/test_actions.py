@@ -37,7 +37,6 @@ SUCCEEDED, CANCELED, ABORTED = (
 
 
 def fibonacci(goal_handle: ServerGoalHandle) -> Fibonacci.Result:
-    """Reach the goal, with feedback for each element."""
     sequence = [0, 1]
     for _ in range(goal_handle.request.order):
         sequence.append(sequence[-2] + sequence[-1])
@@ -55,8 +54,6 @@ def keep(goal_handle: ServerGoalHandle) -> None:
 
 
 class Task:
-    """An execute callback that waits until the test ends the goal."""
-
     def __init__(self) -> None:
         self.goals: list[ServerGoalHandle] = []
         self.ends: list[Future] = []
@@ -79,7 +76,6 @@ def task() -> Task:
 
 @pytest.fixture
 def serve(node: Node) -> Iterator[MakeServer]:
-    """Makes the server of the action ``fibonacci``."""
     servers = []
 
     def make(execute: Callable[[ServerGoalHandle], Any] = fibonacci, **options: Any) -> ActionServer:
@@ -109,8 +105,6 @@ def client(
 
 
 class Goal:
-    """A goal that was sent, and what arrives of it."""
-
     def __init__(self, client: ActionClient, spin_until: SpinUntil, order: int, **options: Any) -> None:
         assert client.wait_for_server(timeout_sec=10)
         self.spin_until = spin_until

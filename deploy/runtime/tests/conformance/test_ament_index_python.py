@@ -1,5 +1,3 @@
-"""ament_index_python: packages and resources in AMENT_PREFIX_PATH."""
-
 from __future__ import annotations
 
 import os
@@ -33,7 +31,6 @@ def _resource(prefix: Path, kind: str, name: str, content: str = "") -> None:
 
 @pytest.fixture
 def prefixes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[str, str]:
-    """An overlay and an underlay, which both have the package `both`."""
     overlay, underlay = tmp_path / "overlay", tmp_path / "underlay"
     for prefix, package in ((overlay, "arm"), (overlay, "both"), (underlay, "both"), (underlay, "base")):
         _resource(prefix, "packages", package)

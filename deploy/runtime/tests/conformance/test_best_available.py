@@ -1,5 +1,3 @@
-"""QoS policies chosen at creation: best available and unknown."""
-
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -58,12 +56,10 @@ def policies(qos: QoSProfile) -> tuple[object, ...]:
 
 
 def requested(create: Create) -> tuple[object, ...]:
-    """The policies that a best available subscription to ``x`` requests."""
     return policies(create("subscription", qos=qos_profile_best_available))
 
 
 def offered(create: Create) -> tuple[object, ...]:
-    """The policies that a best available publisher on ``x`` offers."""
     return policies(create("publisher", qos=qos_profile_best_available))
 
 

@@ -59,7 +59,6 @@ def server(make_node: MakeNode, executor: SingleThreadedExecutor) -> Node:
 
 @pytest.fixture
 def asking(make_node: MakeNode, executor: SingleThreadedExecutor) -> Node:
-    """The node from which the tests observe the server."""
     node = make_node("asking", namespace="/arm")
     executor.add_node(node)
     return node
@@ -67,7 +66,6 @@ def asking(make_node: MakeNode, executor: SingleThreadedExecutor) -> Node:
 
 @pytest.fixture
 def client(server: Node, asking: Node, spin_until: SpinUntil) -> AsyncParameterClient:
-    """Access to the server's parameters."""
     client = AsyncParameterClient(asking, "/arm/server")
     spin_until(client.services_are_ready)
     return client
@@ -75,8 +73,6 @@ def client(server: Node, asking: Node, spin_until: SpinUntil) -> AsyncParameterC
 
 @pytest.fixture
 def result(spin_until: SpinUntil) -> Result:
-    """Waits for the result of a call."""
-
     def wait(future: Future) -> Any:
         spin_until(future.done)
         return future.result()
@@ -86,7 +82,6 @@ def result(spin_until: SpinUntil) -> Result:
 
 @pytest.fixture
 def events(client: AsyncParameterClient, spin_until: SpinUntil) -> list[ParameterEvent]:
-    """The server's messages on ``/parameter_events`` from now on."""
     heard: list[ParameterEvent] = []
 
     def hear(event: ParameterEvent) -> None:
@@ -295,7 +290,6 @@ def test_callbacks_get_their_parameter_or_all_events(
 
 
 def overridden(**policies: object) -> list[Parameter]:
-    """Overrides for the publisher and the subscription of ``/arm/x``."""
     return [
         Parameter(f"qos_overrides./arm/x.{kind}.{name}", value=value)
         for kind in ("publisher", "subscription")

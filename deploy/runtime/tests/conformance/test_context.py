@@ -1,5 +1,3 @@
-"""Contexts: init, shutdown, shutdown callbacks, logging and signal handlers."""
-
 from __future__ import annotations
 
 import threading

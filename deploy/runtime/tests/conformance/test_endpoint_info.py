@@ -1,5 +1,3 @@
-"""Endpoint information, serialization, type support and hidden names."""
-
 from __future__ import annotations
 
 from typing import Any

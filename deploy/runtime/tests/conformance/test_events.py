@@ -1,5 +1,3 @@
-"""QoS events of publishers and subscriptions."""
-
 from __future__ import annotations
 
 import importlib
@@ -41,7 +39,6 @@ def ignore(message: Float64) -> None:
 
 
 def counts(info: QoSPublisherMatchedInfo | QoSSubscriptionMatchedInfo) -> tuple[int, int, int, int]:
-    """Total and current matches, each with its change."""
     return info.total_count, info.total_count_change, info.current_count, info.current_count_change
 
 
@@ -170,7 +167,6 @@ def test_a_message_is_not_delivered_after_its_lifespan(node: Node, spin_until: S
     node.create_publisher(Float64, "x", latched).publish(Float64(data=2.0))
 
     def kept() -> list[float]:
-        """The samples that a late subscription gets now."""
         received: list[float] = []
         subscription = node.create_subscription(
             Float64, "x", lambda message: received.append(message.data), latched

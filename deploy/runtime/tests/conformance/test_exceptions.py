@@ -1,5 +1,3 @@
-"""The texts of rclpy's exceptions."""
-
 from __future__ import annotations
 
 from rclpy import exceptions

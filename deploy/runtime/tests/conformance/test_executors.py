@@ -1,5 +1,3 @@
-"""Executors: order, threads, timeouts, wake-ups and shutdown."""
-
 from __future__ import annotations
 
 import threading
@@ -526,8 +524,6 @@ def test_a_second_thread_cannot_spin_the_same_executor(
             errors.append(error)
 
     class Group(MutuallyExclusiveCallbackGroup):
-        """Starts a second spin while the first asks for a callback."""
-
         def can_execute(self, entity: object) -> bool:
             if not errors:
                 second = threading.Thread(target=spin)

@@ -37,8 +37,6 @@ RCLError = rclpy_implementation.RCLError
 
 
 class Machine(LifecycleNode):
-    """Records its callbacks, which return what the test wants."""
-
     def __init__(self, context: Context, **options: Any) -> None:
         self.calls: list[tuple[str, str]] = []
         self.results: dict[str, Any] = {}
@@ -72,7 +70,6 @@ class Machine(LifecycleNode):
 
 @pytest.fixture
 def machine(context: Context, executor: SingleThreadedExecutor) -> Any:
-    """A lifecycle node in the test's executor."""
     machine = Machine(context)
     executor.add_node(machine)
     yield machine
@@ -81,8 +78,6 @@ def machine(context: Context, executor: SingleThreadedExecutor) -> Any:
 
 @pytest.fixture
 def call(node: Node, machine: Machine, spin_until: SpinUntil) -> Call:
-    """Calls a service of the lifecycle node from another node."""
-
     def call(srv_type: Any, name: str, **request: Any) -> Any:
         client = node.create_client(srv_type, f"machine/{name}")
         spin_until(client.service_is_ready)
@@ -95,7 +90,6 @@ def call(node: Node, machine: Machine, spin_until: SpinUntil) -> Call:
 
 @pytest.fixture
 def state(call: Call) -> Callable[[], str]:
-    """Asks the node for its state."""
     return lambda: str(call(GetState, "get_state").current_state.label)
 
 

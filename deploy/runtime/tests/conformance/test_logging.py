@@ -1,5 +1,3 @@
-"""Loggers: levels and filters."""
-
 from __future__ import annotations
 
 from collections.abc import Iterator

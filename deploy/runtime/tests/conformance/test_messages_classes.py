@@ -1,5 +1,3 @@
-"""Message classes: values, defaults, copies."""
-
 from __future__ import annotations
 
 import copy

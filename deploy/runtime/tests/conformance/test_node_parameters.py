@@ -59,17 +59,14 @@ class Node(rclpy.node.Node):
         return super().create_publisher(msg_type, *arguments, **options)
 
     def values(self) -> dict[str, Any]:
-        """The values of the parameters that the test declared."""
         names = self.own(self.list_parameters([], 0).names)
         return {parameter.name: parameter.value for parameter in self.get_parameters(names)}
 
     def own(self, names: Iterable[str]) -> list[str]:
-        """The names of parameters that the test declared."""
         return [name for name in names if name not in self._initial_names]
 
 
 def changes(event: ParameterEvent) -> tuple[list[str], list[str], list[str]]:
-    """Return the names of new, changed and deleted parameters."""
     return (
         [parameter.name for parameter in event.new_parameters],
         [parameter.name for parameter in event.changed_parameters],

@@ -71,8 +71,6 @@ def test_create_timer_may_know_only_period_and_callback(make: Make) -> None:
 
 
 class OfFourArguments(Node):
-    """A node that knows four arguments of a subscription."""
-
     def __init__(self, *args: Any, **options: Any) -> None:
         self.subscribed: list[tuple[Any, str]] = []
         super().__init__(*args, **options)

@@ -1,5 +1,3 @@
-"""Parameters: types, messages, text and files."""
-
 from __future__ import annotations
 
 import array

@@ -38,8 +38,6 @@ class Client:
 
 
 class Node:
-    """A node that keeps its clients and subscriptions."""
-
     def __init__(self, namespace: str = "/ns") -> None:
         self.namespace = namespace
         self.clients: dict[str, Client] = {}

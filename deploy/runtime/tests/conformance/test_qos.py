@@ -1,5 +1,3 @@
-"""QoS profiles, policies, presets and their compatibility."""
-
 from __future__ import annotations
 
 import pytest
@@ -96,7 +94,6 @@ def test_a_policy_kind_has_a_name() -> None:
 
 
 def profile(**policies: object) -> QoSProfile:
-    """Return a profile that leaves no policy to the middleware."""
     return QoSProfile(**{"depth": 1, "liveliness": LivelinessPolicy.AUTOMATIC, **policies})
 
 

@@ -30,8 +30,6 @@ def negate(request: SetBool.Request, response: SetBool.Response) -> SetBool.Resp
 
 
 class Introspected:
-    """A service, its client, and the events of both."""
-
     def __init__(self, node: Node, spin_until: SpinUntil) -> None:
         self.node = node
         self.service: Service = node.create_service(SetBool, "negate", negate)
@@ -49,7 +47,6 @@ class Introspected:
         self._spin_until(lambda: self.node.count_publishers("negate/_service_event") == publishers)
 
     def call(self) -> list[SetBool.Event]:
-        """The events of a call, in the order of their types."""
         self.events.clear()
         future = self.client.call_async(SetBool.Request(data=True))
         self._spin_until(lambda: future.done() and len(self.events) == 4)

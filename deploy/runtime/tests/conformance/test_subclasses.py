@@ -91,8 +91,6 @@ class Threaded(SingleThreadedExecutor):
 
 
 class Pool(MultiThreadedExecutor):
-    """An executor with attributes as users name them."""
-
     def __init__(self, context: Context) -> None:
         super().__init__(2, context=context)
         self._threads, self._errors, self._pool, self._in_pool = [], {}, None, "none"

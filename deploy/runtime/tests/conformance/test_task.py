@@ -12,8 +12,6 @@ from rclpy.task import Future, Task
 
 
 class ManualExecutor:
-    """An executor that keeps its tasks until the test runs them."""
-
     def __init__(self) -> None:
         self.tasks: list[Task] = []
 
@@ -22,7 +20,6 @@ class ManualExecutor:
         return self.tasks[-1]
 
     def run(self) -> None:
-        """Run each task once."""
         for task in list(self.tasks):
             task()
 

@@ -1,5 +1,3 @@
-"""Times and durations: values, comparison, arithmetic and messages."""
-
 from __future__ import annotations
 
 import operator

@@ -1,5 +1,3 @@
-"""Timers, rates and clocks."""
-
 from __future__ import annotations
 
 import threading

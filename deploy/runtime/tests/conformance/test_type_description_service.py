@@ -38,7 +38,6 @@ def node(make_node: MakeNode, executor: SingleThreadedExecutor) -> Node:
 
 @pytest.fixture
 def ask(node: Node, make_node: MakeNode, executor: SingleThreadedExecutor, spin_until: SpinUntil) -> Ask:
-    """Requests the description of a type from another node."""
     other = make_node("other")
     executor.add_node(other)
     client = other.create_client(GetTypeDescription, "node/get_type_description")

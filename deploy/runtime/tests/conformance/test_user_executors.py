@@ -41,7 +41,6 @@ def subscribe(node: Node, topic: str, **options: Any) -> tuple[list[float], Call
 
 
 def run_all(executor: Executor, until: Callable[[], object]) -> None:
-    """Run what is ready until a condition holds."""
     while not until():
         executor.wait_for_ready_callbacks(10)[0]()
 

@@ -84,7 +84,6 @@ class Ticker(Waitable):
 
 @pytest.fixture
 def bell(node: Node, context: Context) -> Iterator[Bell]:
-    """A waitable of the node."""
     bell = Bell(context, node.default_callback_group)
     node.add_waitable(bell)
     yield bell

@@ -1,5 +1,3 @@
-"""Peers of the tests: nodes on each rclpy."""
-
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
@@ -31,5 +29,4 @@ def peer_on(start_peer: StartPeer) -> PeerOn:
 
 @pytest.fixture
 def topic() -> str:
-    """The name of a topic that no other test uses."""
     return f"/interop/topic_{next(NUMBERS)}"

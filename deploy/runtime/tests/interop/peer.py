@@ -58,19 +58,16 @@ class Peer:
         self._incompatible: dict[str, list[str]] = {}
 
     def advertise(self, topic: str, type_name: str, qos: dict[str, Any]) -> None:
-        """Create the publisher of a topic."""
         events = PublisherEventCallbacks(incompatible_qos=self._note_incompatible(topic))
         self._publishers[topic] = self._node.create_publisher(
             _type(type_name), topic, _profile(**qos), event_callbacks=events
         )
 
     def publish(self, topic: str, *messages: str) -> None:
-        """Publish messages, one directly after the other."""
         for text in messages:
             self._publishers[topic].publish(_message(text))
 
     def subscribe(self, topic: str, type_name: str, qos: dict[str, Any]) -> None:
-        """Create the subscription of a topic."""
         received = self._received.setdefault(topic, [])
         self._subscriptions[topic] = self._node.create_subscription(
             _type(type_name),
@@ -89,24 +86,19 @@ class Peer:
         return self._incompatible[topic]
 
     def received(self, topic: str) -> list[str]:
-        """Return the messages of the subscription so far."""
         return self._received[topic]
 
     def readers(self, topic: str) -> int:
-        """Return the number of readers that the publisher has found."""
         return self._publishers[topic].get_subscription_count()
 
     def writers(self, topic: str) -> int:
-        """Return the number of writers that the subscription has found."""
         return self._subscriptions[topic].get_publisher_count()
 
     def nodes(self) -> list[str]:
-        """Return the full names of all nodes of the domain."""
         found = self._node.get_node_names_and_namespaces()
         return sorted(f"{namespace.rstrip('/')}/{name}" for name, namespace in found)
 
     def graph(self) -> dict[str, Any]:
-        """Return the types of the topics and services of the domain."""
         return {
             "topics": dict(self._node.get_topic_names_and_types()),
             "services": dict(self._node.get_service_names_and_types()),
@@ -137,7 +129,6 @@ class Peer:
         self._node.create_service(SetBool, service, answer)
 
     def calls(self) -> list[bool]:
-        """Return the requests that the services of this node have got."""
         return self._calls
 
     def find(self, service: str) -> bool:
@@ -151,7 +142,6 @@ class Peer:
         return repr(await self._clients[service].call_async(SetBool.Request(data=data)))
 
     def actions(self) -> dict[str, list[str]]:
-        """Return the types of the actions of the domain."""
         return dict(get_action_names_and_types(self._node))
 
     def serve_action(self, action: str) -> None:
@@ -171,7 +161,6 @@ class Peer:
         return list((await goal_handle.get_result_async()).result.sequence)
 
     def declare(self, parameter: str, value: Any) -> None:
-        """Declare a parameter."""
         self._node.declare_parameter(parameter, value)
 
     async def set(self, node: str, name: str, value: Any) -> dict[str, Any]:
@@ -229,7 +218,6 @@ def _endpoint(info: TopicEndpointInfo) -> dict[str, Any]:
 
 
 def main(name: str, namespace: str) -> None:
-    """Obey the lines of the standard input."""
     rclpy.init(args=[])
     node = Node(name, namespace=namespace)
     executor = SingleThreadedExecutor()

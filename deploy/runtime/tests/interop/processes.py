@@ -39,7 +39,6 @@ def python(rclpy: str) -> str:
 
 
 def environment(rclpy: str) -> dict[str, str]:
-    """Return the environment variables of a process on an rclpy."""
     # A wheel starts its interpreter again with the libraries of its own environment, but only once.
     not_inherited = ("LD_LIBRARY_PATH", "_ROS_WHEELS_BOOTSTRAP_COMPLETE")
     inherited = {name: value for name, value in os.environ.items() if name not in not_inherited}

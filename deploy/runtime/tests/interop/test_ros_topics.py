@@ -66,12 +66,10 @@ def reader(request: pytest.FixtureRequest, peer_on: PeerOn) -> PeerProcess:
 
 
 def value(number: float) -> str:
-    """A Float64."""
     return f"std_msgs.msg.Float64(data={number})"
 
 
 def matched(writer: PeerProcess, reader: PeerProcess, topic: str) -> Callable[[], object]:
-    """Whether both have found each other."""
     return lambda: writer("readers", topic) and reader("writers", topic)
 
 

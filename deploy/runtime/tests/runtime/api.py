@@ -36,7 +36,6 @@ def members(cls: type) -> dict[str, Any]:
 
 
 def entry(value: Any) -> dict[str, Any]:
-    """What is compared of a class, a function or a constant."""
     if not isinstance(value, type):
         return {"parameters": parameters(value)} if inspect.isroutine(value) else {}
     found = {"bases": [base.__name__ for base in value.__bases__], "methods": members(value)}
@@ -61,7 +60,6 @@ def is_public(module: Any, name: str, value: Any) -> bool:
 
 
 def module_api(name: str) -> dict[str, Any]:
-    """The public names of a module."""
     module = importlib.import_module(name)
     return {key: entry(value) for key, value in vars(module).items() if is_public(module, key, value)}
 

@@ -102,7 +102,6 @@ def modules() -> list[Module]:
 
 
 def tools() -> list[Module]:
-    """Look for what public programs import from ROS 2's tools."""
     rows = []
     for name, wanted in TOOLS.items():
         rows.append(row := Module(name))

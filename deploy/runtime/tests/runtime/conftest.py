@@ -1,5 +1,3 @@
-"""Fixtures for tests of the embedded runtime."""
-
 from __future__ import annotations
 
 from collections.abc import Iterator

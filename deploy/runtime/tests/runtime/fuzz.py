@@ -51,8 +51,6 @@ ADDRESSES = resource.getrlimit(resource.RLIMIT_AS)  # made now: without memory, 
 
 
 class Decoder(NamedTuple):
-    """A decoder, and what it gets."""
-
     read: Callable[[bytes], Any]
     """Raises ValueError, and nothing else, for malformed input."""
     samples: list[bytes]

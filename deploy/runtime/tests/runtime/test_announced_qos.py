@@ -28,7 +28,6 @@ def policies(qos: str) -> list[str]:
 
 
 def recorded(kind: str) -> dict[str, list[str]]:
-    """Return the policies of each recorded endpoint by its topic."""
     rows = (line.split(" ", 4) for line in RECORD.splitlines() if line.startswith(f"{kind} "))
     return {topic: policies(qos) for _, _, topic, _, qos in rows}
 

@@ -1,5 +1,3 @@
-"""The memory that malformed samples cost."""
-
 from __future__ import annotations
 
 import resource

@@ -56,17 +56,14 @@ class Peer:
         self._writers[topic] = self._participant.create_writer(topic, type_name, LATCHED, user_data)
 
     def call(self, service: str, type_name: str) -> None:
-        """Be a client of a service."""
         self.read(f"rr/{service}Reply", f"{type_name}_Response_", f"clientid={len(service)};")
         self.write(f"rq/{service}Request", f"{type_name}_Request_", f"clientid={len(service)};")
 
     def serve(self, service: str, type_name: str) -> None:
-        """Be a server of a service."""
         self.read(f"rq/{service}Request", f"{type_name}_Request_", f"serviceid={len(service)};")
         self.write(f"rr/{service}Reply", f"{type_name}_Response_", f"serviceid={len(service)};")
 
     def match(self) -> None:
-        """Wait until each endpoint has found another."""
         self._spin_until(
             lambda: all(each.matched() for each in (*self._readers.values(), *self._writers.values()))
         )

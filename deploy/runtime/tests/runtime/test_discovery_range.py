@@ -45,7 +45,6 @@ sys.stdin.read()
 
 
 def assert_meet(first: Process, second: Process) -> None:
-    """Both nodes get messages of the other."""
     wait_until(lambda: "second" in first.lines())
     wait_until(lambda: "first" in second.lines())
 

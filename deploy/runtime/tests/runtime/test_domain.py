@@ -23,8 +23,6 @@ UP, LOOPBACK = 0x1, 0x8  # flags of network interfaces
 
 @pytest.fixture(autouse=True)
 def names(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Resolve every host name except ``nowhere``."""
-
     def look_up(name: str, *_: object) -> list[object]:
         if name == "nowhere":
             raise socket.gaierror(socket.EAI_NONAME, "Name or service not known")

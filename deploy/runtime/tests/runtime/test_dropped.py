@@ -28,8 +28,6 @@ MakeNode = Callable[..., Node]
 
 
 class FullNode(Node):
-    """A node with one entity of each kind."""
-
     def __init__(self, name: str, **options: Any) -> None:
         super().__init__(name, **options)
         self.create_publisher(Float64, "x", 1)
@@ -50,15 +48,12 @@ class FullNode(Node):
 
 
 class FailingNode(FullNode):
-    """A node whose subclass fails in its constructor."""
-
     def __init__(self, name: str, **options: Any) -> None:
         super().__init__(name, **options)
         raise ZeroDivisionError("planted")
 
 
 def sees_no_other(node: Node) -> bool:
-    """Whether ``node`` discovers no other node and no endpoint of one."""
     ends = node.count_publishers("x"), node.count_subscribers("x"), node.count_services("trigger")
     return node.get_node_names() == [node.get_name()] and ends == (0, 0, 0)
 

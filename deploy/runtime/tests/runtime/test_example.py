@@ -1,5 +1,3 @@
-"""The example program of the runtime's README, unchanged."""
-
 from __future__ import annotations
 
 import re

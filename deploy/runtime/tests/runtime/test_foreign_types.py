@@ -15,8 +15,6 @@ REASON = r"<class '.*Generated'> was generated for ROS 2's own rclpy.*AMENT_PREF
 
 
 class Metaclass_Generated(type):
-    """What rosidl_generator_py writes for each class."""
-
     _TYPE_SUPPORT = None
 
     @classmethod

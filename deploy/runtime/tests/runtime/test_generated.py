@@ -1,5 +1,3 @@
-"""Running generated code."""
-
 from __future__ import annotations
 
 import subprocess

@@ -1,5 +1,3 @@
-"""The announcements of nodes on the wire."""
-
 from __future__ import annotations
 
 import json
@@ -32,7 +30,6 @@ def recorded(kind: str) -> dict[str, tuple[str, str]]:
 
 
 def announced(endpoints: list[object]) -> dict[str, tuple[str, str]]:
-    """The same of the discovered endpoints."""
     return {
         endpoint.topic: (endpoint.type_name, re.sub(r"serviceid=[^;]*;", "serviceid;", endpoint.user_data))
         for endpoint in endpoints

@@ -1,5 +1,3 @@
-"""What programs load that do not need it."""
-
 from __future__ import annotations
 
 import subprocess

@@ -42,7 +42,6 @@ TYPE_NAME = "std_msgs::msg::dds_::UInt8MultiArray_"
 
 
 def image(size: int = MEGABYTE, octet: int = 7) -> Image:
-    """An image whose octets are all the same."""
     return Image(height=1, width=size, encoding="mono8", step=size, data=bytes([octet]) * size)
 
 
@@ -137,13 +136,11 @@ def test_message_may_grow_while_its_publisher_waits(node: Node, monkeypatch: pyt
 
 @pytest.fixture
 def writer(participant: Participant) -> Writer:
-    """A writer that is matched with the test's reader."""
     return participant.create_writer("rt/x", TYPE_NAME, QOS, "")
 
 
 @pytest.fixture
 def reader(participant: Participant) -> Reader:
-    """A reader of the test's participant."""
     return participant.create_reader("rt/x", TYPE_NAME, QOS, "")
 
 
@@ -159,7 +156,6 @@ def lent(reader: Reader) -> Any:
 
 
 def octets(value: int) -> bytes:
-    """A serialized UInt8MultiArray of a megabyte of equal octets."""
     message: Any = UInt8MultiArray(data=bytes([value]) * MEGABYTE)
     return bytes(message._serialize(message))
 
@@ -223,7 +219,6 @@ Pass = Callable[[Image], Image]
 
 @pytest.fixture
 def passed(node: Node, spin_until: SpinUntil) -> Pass:
-    """Publishes a message and returns what arrives."""
     received: list[Image] = []
     node.create_subscription(Image, "x", received.append, 10)
     publisher = node.create_publisher(Image, "x", 10)

@@ -1,5 +1,3 @@
-"""Loggers: levels, filters, console format, environment variables and /rosout."""
-
 from __future__ import annotations
 
 import sys

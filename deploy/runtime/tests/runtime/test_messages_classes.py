@@ -1,5 +1,3 @@
-"""Message classes: equality, accepted and refused values, signatures."""
-
 from __future__ import annotations
 
 import inspect

@@ -42,7 +42,6 @@ NUMBERS = itertools.count()
 
 
 def elements(type_: FieldType) -> st.SearchStrategy[Any]:
-    """Values of a field's base type."""
     if type_.is_message:
         return messages(type_.base)
     if type_.base in ("float", "double"):
@@ -59,7 +58,6 @@ def elements(type_: FieldType) -> st.SearchStrategy[Any]:
 
 
 def messages(name: str) -> st.SearchStrategy[Any]:
-    """Messages of a type with arbitrary values."""
     fields = {}
     for field in message_definition(name).fields:
         size = field.type.array_size
@@ -71,7 +69,6 @@ def messages(name: str) -> st.SearchStrategy[Any]:
 
 
 def as_rosbags(message: Any) -> Any:
-    """The same message for rosbags."""
     cls = STORE.types[message._TYPE_NAME]
     values = {}
     for field in message._DEFINITION.fields:
@@ -147,14 +144,12 @@ PLURALS = st.sampled_from(["", "", "", "[]", "[<=2]", "[1]", "[3]"])
 
 
 def definitions(bases: list[str]) -> st.SearchStrategy[str]:
-    """Definition files with arbitrary fields."""
     types = st.lists(st.builds(str.__add__, st.sampled_from(bases), PLURALS), max_size=6)
     return types.map(lambda types: "".join(f"{type_} field{n}\n" for n, type_ in enumerate(types)))
 
 
 @pytest.fixture(scope="module")
 def prefix(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """A directory in AMENT_PREFIX_PATH."""
     with pytest.MonkeyPatch.context() as monkeypatch:
         path = tmp_path_factory.mktemp("prefix")
         monkeypatch.setenv("AMENT_PREFIX_PATH", str(path))

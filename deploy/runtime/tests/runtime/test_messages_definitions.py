@@ -48,7 +48,6 @@ Define = Callable[..., str]
 
 @pytest.fixture
 def define(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Define]:
-    """Makes a package of definition files, named ``<Name>.<kind>``, in AMENT_PREFIX_PATH."""
     monkeypatch.setenv("AMENT_PREFIX_PATH", f"/nowhere:{tmp_path}")
     packages = []
 

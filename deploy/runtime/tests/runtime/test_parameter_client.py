@@ -1,5 +1,3 @@
-"""Parameter event handlers that change during a call."""
-
 from __future__ import annotations
 
 from collections.abc import Callable

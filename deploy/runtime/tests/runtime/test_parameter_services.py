@@ -51,7 +51,6 @@ class Node(NodeParameters):
         self.services[srv_name] = (srv_type, callback, qos_profile)
 
     def call(self, srv_type: Any, name: str, **request: Any) -> Any:
-        """Call the service of the node with that name."""
         registered_type, callback, _ = self.services[f"node/{name}"]
         assert registered_type is srv_type
         return callback(srv_type.Request(**request), srv_type.Response())

@@ -1,5 +1,3 @@
-"""QoS overrides: declared parameters, their effect, and refused values."""
-
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -31,7 +29,6 @@ MakeNode = Callable[..., Node]
 
 
 def overrides(entity: str, **policies: Any) -> list[Parameter]:
-    """Overrides for an entity of ``/chatter``."""
     return [
         Parameter(f"qos_overrides./chatter.{entity}.{name}", value=value) for name, value in policies.items()
     ]

@@ -1,5 +1,3 @@
-"""The DDS reader behind every subscription, service and client."""
-
 from __future__ import annotations
 
 import tracemalloc
@@ -17,18 +15,15 @@ PROFILE = QoSProfile(depth=10)
 
 @pytest.fixture
 def writer(participant: Participant) -> Writer:
-    """A writer that is matched with the test's reader."""
     return participant.create_writer("rt/x", "Octets_", PROFILE, "")
 
 
 @pytest.fixture
 def reader(participant: Participant) -> Reader:
-    """A reader of the test's participant."""
     return participant.create_reader("rt/x", "Octets_", PROFILE, "")
 
 
 def wait(reader: Reader) -> None:
-    """Wait until a sample can be taken."""
     waitset = WaitSet()
     waitset.attach(reader.condition, 0)
     waitset.wait(INFINITY)

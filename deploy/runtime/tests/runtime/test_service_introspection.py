@@ -1,5 +1,3 @@
-"""The identifiers of clients in service events."""
-
 from __future__ import annotations
 
 from collections.abc import Callable

@@ -1,5 +1,3 @@
-"""Cancelled and timed-out calls."""
-
 from __future__ import annotations
 
 from collections.abc import Callable

@@ -50,7 +50,6 @@ def endpoints(node: Node) -> tuple[int, int, int]:
 
 
 def churn(node: Node, cycles: int, failures: list[BaseException]) -> None:
-    """Create and destroy an entity of each kind, again and again."""
     try:
         for number in range(cycles):
             name = f"s{threading.get_ident()}"
@@ -84,7 +83,6 @@ class Flood:
 
 @pytest.fixture
 def other(other_context: Context) -> Iterator[Node]:
-    """A node of another participant."""
     node = Node("flooding", context=other_context)
     yield node
     node.destroy_node()
@@ -129,7 +127,6 @@ def test_a_thousand_entities_of_each_kind_leave_nothing_behind(flood: Flood, con
     node, other = flood.node, flood.other
 
     def wait_for(condition: Callable[[], object]) -> None:
-        """Wait for discovery."""
         assert node._rclpy_graph.wait_for(lambda: bool(condition()), SECONDS, context.ok)
 
     def run(cycles: int) -> None:

@@ -1,5 +1,3 @@
-"""The DDS wait set behind every executor."""
-
 from __future__ import annotations
 
 import threading

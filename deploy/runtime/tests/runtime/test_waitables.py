@@ -26,8 +26,6 @@ SpinUntil = Callable[..., None]
 
 
 class Recorder(Waitable):
-    """Runs when any entity of one kind is ready."""
-
     def __init__(self, kind: str, *handles: Any) -> None:
         super().__init__(ReentrantCallbackGroup())
         self.kind, self.handles = kind, handles

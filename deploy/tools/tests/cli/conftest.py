@@ -26,8 +26,6 @@ TIMEOUT = 60.0
 
 
 class Lab(Node):
-    """A node with one of everything that commands show."""
-
     def __init__(self, context: Context) -> None:
         super().__init__("lab", namespace="/arm", context=context)
         described = ParameterDescriptor(
@@ -99,8 +97,6 @@ def start(module_domain_id: int) -> Iterator[Start]:
 
 @pytest.fixture
 def ros2(start: Start) -> Ros2:
-    """Runs a command to its end."""
-
     def run(*arguments: str, input: str | None = None) -> subprocess.CompletedProcess[str]:
         options = {} if input is None else {"stdin": subprocess.PIPE}
         process = start(*arguments, **options)
@@ -112,8 +108,6 @@ def ros2(start: Start) -> Ros2:
 
 @pytest.fixture
 def wait_until() -> Callable[[Callable[[], object]], None]:
-    """Waits until a condition holds."""
-
     def wait(condition: Callable[[], object]) -> None:
         deadline = time.monotonic() + TIMEOUT
         while not condition():

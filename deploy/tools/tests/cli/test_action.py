@@ -1,5 +1,3 @@
-"""`ros2 action list`, `info` and `send_goal`."""
-
 from __future__ import annotations
 
 import re
@@ -62,7 +60,6 @@ class Server(Node):
 
 @pytest.fixture(scope="module")
 def server(module_domain_id: int) -> Iterator[Server]:
-    """An action server in the domain of the module."""
     context = Context()
     context.init([], domain_id=module_domain_id)
     node = Server(context)

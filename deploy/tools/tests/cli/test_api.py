@@ -52,7 +52,6 @@ def publish(node: Node, message_type: Any, topic: str) -> None:
 
 
 def wait_for_type(node: Node, message_type: Any, topic: str) -> None:
-    """Wait until a node knows that a topic has this type."""
     name = f"std_msgs/msg/{message_type.__name__}"
     deadline = time.monotonic() + LIMIT
     while name not in dict(node.get_topic_names_and_types()).get(topic, []):
@@ -62,7 +61,6 @@ def wait_for_type(node: Node, message_type: Any, topic: str) -> None:
 
 @pytest.fixture
 def talker(node: Node) -> Node:
-    """A node with a topic and a hidden topic."""
     publish(node, String, "/chatter")
     publish(node, Float64, "/_hidden")
     return node
@@ -119,7 +117,6 @@ LAB = "/arm/lab"
 
 @pytest.fixture
 def asker(lab: Any, module_domain_id: int, monkeypatch: pytest.MonkeyPatch) -> Iterator[Node]:
-    """A node that sees the lab."""
     monkeypatch.setenv("ROS_DOMAIN_ID", str(module_domain_id))
     rclpy.init(args=[])
     node = rclpy.create_node("asker")

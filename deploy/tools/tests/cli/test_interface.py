@@ -1,5 +1,3 @@
-"""`ros2 interface show` and `ros2 interface list`."""
-
 from __future__ import annotations
 
 from pathlib import Path

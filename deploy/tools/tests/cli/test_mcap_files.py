@@ -30,7 +30,6 @@ def write(writer: Writer, count: int = MESSAGES) -> None:
 
 
 def written(path: Path, *, profile: str = "ros2", **options: Any) -> Path:
-    """Write a whole file with options of MCAP's writer."""
     with path.open("wb") as file:
         writer = Writer(file, **options)
         writer.start(profile=profile, library="test")
@@ -41,7 +40,6 @@ def written(path: Path, *, profile: str = "ros2", **options: Any) -> Path:
 
 
 def numbers(path: Path, **limits: Any) -> list[int]:
-    """Read the messages of the topic."""
     with McapFile(path) as file:
         messages = [message.data for _, message in file.messages(["/chatter"], **limits)]
     return [int.from_bytes(data[4:], "little") for data in messages]

@@ -1,5 +1,3 @@
-"""`ros2 node list` and `ros2 node info`."""
-
 from __future__ import annotations
 
 from typing import Any

@@ -1,5 +1,3 @@
-"""`ros2 param list`, `get`, `set`, `dump` and `describe`."""
-
 from __future__ import annotations
 
 from typing import Any

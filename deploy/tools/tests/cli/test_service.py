@@ -1,5 +1,3 @@
-"""`ros2 service list`, `type` and `call`."""
-
 from __future__ import annotations
 
 from typing import Any

@@ -1,5 +1,3 @@
-"""`ros2 topic list`, `info`, `echo`, `hz`, `bw` and `pub`."""
-
 from __future__ import annotations
 
 import re

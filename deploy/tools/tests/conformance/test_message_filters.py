@@ -1,5 +1,3 @@
-"""Filters of messages: subscriber, cache, exact and approximate synchronization."""
-
 from __future__ import annotations
 
 from collections.abc import Callable

@@ -56,7 +56,6 @@ def buffer() -> Buffer:
 
 @pytest.fixture
 def later() -> Iterator[Callable[..., None]]:
-    """Calls a function on another thread, a little later."""
     threads: list[threading.Thread] = []
 
     def start(function: Callable[..., Any], *args: Any) -> None:
@@ -192,8 +191,6 @@ def test_a_buffer_of_a_node_has_a_service_with_all_frames(
 
 
 class Marker:
-    """An object with a header and a position."""
-
     header: Header
     x: float = 0.0
 

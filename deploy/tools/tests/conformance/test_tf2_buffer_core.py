@@ -28,7 +28,6 @@ Number4 = tuple[float, float, float, float]
 
 
 def about_z(degrees: float) -> Number4:
-    """A rotation as a quaternion (x, y, z, w)."""
     return 0.0, 0.0, math.sin(math.radians(degrees) / 2), math.cos(math.radians(degrees) / 2)
 
 
@@ -77,7 +76,6 @@ def fill(buffer: BufferCore, *transforms: TransformStamped) -> None:
 
 
 def multiply(one: Number4, two: Number4) -> Number4:
-    """The product of two quaternions."""
     x1, y1, z1, w1 = one
     x2, y2, z2, w2 = two
     return (
@@ -89,7 +87,6 @@ def multiply(one: Number4, two: Number4) -> Number4:
 
 
 def apply(message: TransformStamped, point: tuple[float, ...]) -> tuple[float, ...]:
-    """A point after a transform, with the product of quaternions."""
     quaternion = rotation(message)
     conjugate = (-quaternion[0], -quaternion[1], -quaternion[2], quaternion[3])
     rotated = multiply(multiply(quaternion, (*point, 0.0)), conjugate)  # type: ignore[arg-type]

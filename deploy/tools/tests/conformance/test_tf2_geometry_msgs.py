@@ -1,5 +1,3 @@
-"""Messages of geometry_msgs in other frames."""
-
 from __future__ import annotations
 
 import math

@@ -1,5 +1,3 @@
-"""Transforms between nodes: broadcasters, listener, buffer client."""
-
 from __future__ import annotations
 
 import threading
@@ -55,7 +53,6 @@ def x_of(buffer: Buffer, target: str, source: str) -> float:
 
 @pytest.fixture
 def other(make_node: MakeNode, executor: SingleThreadedExecutor) -> Node:
-    """A second node of the executor."""
     other = make_node("other")
     executor.add_node(other)
     return other
@@ -63,7 +60,6 @@ def other(make_node: MakeNode, executor: SingleThreadedExecutor) -> Node:
 
 @pytest.fixture
 def spin_in_background(context: Context) -> Iterator[Callable[[Node], None]]:
-    """Spins nodes on another thread until the end of the test."""
     executor = MultiThreadedExecutor(3, context=context)
     thread = threading.Thread(target=executor.spin)
 

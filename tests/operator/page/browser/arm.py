@@ -51,7 +51,6 @@ class Arm:
         self.record = Record(domain, namespace)
 
     def close(self) -> None:
-        """Stop the system."""
         self.record.close()
         self.site.close()
 

@@ -110,7 +110,6 @@ def launch(started: Any, *, executable: str = CHROMIUM) -> Any:
 
 
 def processes_of(browser: Any) -> list[int]:
-    """The pids of a Chromium, parents first."""
     infos = browser.new_browser_cdp_session().send("SystemInfo.getProcessInfo")["processInfo"]
     (root,) = (info["id"] for info in infos if info["type"] == "browser")
     return [root, *_descendants(root)]
@@ -133,8 +132,6 @@ def signal_all(pids: list[int], number: signal.Signals) -> None:
 
 
 class HandOnPage:
-    """The page, and a hand in front of it."""
-
     def __init__(self, context: Any, url: str, *scripts: str) -> None:
         """:param scripts: JavaScript that runs before the page's own."""
         self.context = context
@@ -149,7 +146,6 @@ class HandOnPage:
         self.await_live()
 
     def begin_anew(self) -> None:
-        """Load the page again, with nothing pressed."""
         for key in (" ", "Enter"):
             self.page.keyboard.up(key)
         self.up()
@@ -157,21 +153,17 @@ class HandOnPage:
         self.await_live()
 
     def await_live(self) -> None:
-        """Wait until the page shows what the server says."""
         self.page.wait_for_selector("html[data-connection=live]", timeout=1000 * LIMIT)
 
     @property
     def state(self) -> str:
-        """The state of the button."""
         return str(self.page.get_attribute("#hold", "data-state"))
 
     @property
     def why(self) -> str:
-        """Why the hold ended or was refused."""
         return self.page.text_content("#hold-why") or ""
 
     def await_state(self, *states: str) -> None:
-        """Wait until the button is in one of some states."""
         selector = ", ".join(f"#hold[data-state={state}]" for state in states)
         self.page.wait_for_selector(selector, timeout=1000 * LIMIT)
 
@@ -180,17 +172,14 @@ class HandOnPage:
         return int(self.page.evaluate("kind => sent.filter(it => it.type === kind).length", kind))
 
     def point(self) -> tuple[float, float]:
-        """A point within the button."""
         box = self.page.locator("#hold").bounding_box()
         return box["x"] + 40, box["y"] + 30
 
     def down(self) -> None:
-        """Put the mouse on the button and press it."""
         self.page.mouse.move(*self.point())
         self.page.mouse.down()
 
     def up(self) -> None:
-        """Let the mouse go."""
         self.page.mouse.up()
 
     def hold(self, down: Callable[[], None] | None = None, up: Callable[[], None] | None = None) -> None:
@@ -207,7 +196,6 @@ class HandOnPage:
             (up or self.up)()
 
     def await_drawing(self) -> None:
-        """Wait until the page has drawn what it knows now."""
         self.page.evaluate("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
 
     @property

@@ -23,7 +23,6 @@ def playwright() -> Iterator[Any]:
 
 @pytest.fixture(scope="module")
 def arm(playwright: Any, tmp_path_factory: pytest.TempPathFactory, module_domain_id: int) -> Iterator[Arm]:
-    """A system of the module."""
     run = tmp_path_factory.mktemp("arm") / "run"
     with closing(Arm(run, module_domain_id, names=f"127.0.0.1 {LINK}")) as arm:
         yield arm
@@ -31,7 +30,6 @@ def arm(playwright: Any, tmp_path_factory: pytest.TempPathFactory, module_domain
 
 @pytest.fixture(scope="module")
 def browser(playwright: Any) -> Iterator[Any]:
-    """A Chromium of the module."""
     with closing(chromium.launch(playwright)) as browser:
         yield browser
 
@@ -52,6 +50,5 @@ def hand(arm: Arm, browser: Any, request: pytest.FixtureRequest) -> Iterator[Han
 
 @pytest.fixture
 def link(arm: Arm) -> Iterator[Link]:
-    """A link of the test between page and server."""
     with closing(Link(LINK, ("127.0.0.1", arm.port))) as link:
         yield link

@@ -42,7 +42,6 @@ class Desktop:
     """An X server with keyboard and mouse, without a window manager."""
 
     def __init__(self) -> None:
-        """Start the server."""
         from Xlib import X, display
 
         reading, writing = os.pipe()
@@ -62,20 +61,16 @@ class Desktop:
         self._input(self._x.KeyPress, self._display.keysym_to_keycode(keysym))
 
     def lift(self, keysym: int) -> None:
-        """Lift a key."""
         self._input(self._x.KeyRelease, self._display.keysym_to_keycode(keysym))
 
     def press_mouse(self, x: float, y: float) -> None:
-        """Put the mouse somewhere and press it."""
         self._display.xtest_fake_input(self._x.MotionNotify, x=round(x), y=round(y))
         self._input(self._x.ButtonPress, LEFT)
 
     def lift_mouse(self) -> None:
-        """Let the mouse go."""
         self._input(self._x.ButtonRelease, LEFT)
 
     def lift_all(self) -> None:
-        """Lift what is pressed."""
         for kind, detail in list(self._down):
             self._input(kind + 1, detail)  # a release follows its press
 
@@ -89,7 +84,6 @@ class Desktop:
         self._display.sync()
 
     def focus(self) -> None:
-        """Give the focus to the browser."""
         deadline = time.monotonic() + LIMIT
         while not (windows := list(self._windows())):
             assert time.monotonic() < deadline, "the browser shows no window"
@@ -136,7 +130,6 @@ class Desktop:
         self._display.sync()
 
     def close(self) -> None:
-        """Stop the server."""
         self._display.close()
         self._server.terminate()
         self._server.wait()
@@ -146,7 +139,6 @@ class PlainPage:
     """The page in a Chromium; as much of Playwright's interface as :class:`HandOnPage` needs."""
 
     def __init__(self, url: str, display: str) -> None:
-        """Start the browser."""
         self._url = url
         self._numbers = itertools.count(1)
         with ExitStack() as stack:
@@ -194,7 +186,6 @@ class PlainPage:
         self._call("Page.addScriptToEvaluateOnNewDocument", self._session, source=script)
 
     def reload(self) -> None:
-        """Load the page."""
         self._call("Page.enable", self._session)
         self._call("Page.navigate", self._session, url="about:blank")
         self._call("Page.navigate", self._session, url=self._url)
@@ -210,11 +201,9 @@ class PlainPage:
         return show_again
 
     def bring_to_front(self) -> None:
-        """Show this tab, with the focus in the page."""
         self._call("Page.bringToFront", self._session)
 
     def evaluate(self, expression: str) -> Any:
-        """The value of an expression, or that of its promise."""
         options = {"expression": expression, "returnByValue": True, "awaitPromise": True}
         answer = self._call("Runtime.evaluate", self._session, **options)
         assert "exceptionDetails" not in answer, answer
@@ -230,11 +219,9 @@ class PlainPage:
             time.sleep(0.02)
 
     def get_attribute(self, selector: str, name: str) -> Any:
-        """The value of an attribute of an element."""
         return self.evaluate(f"document.querySelector({json.dumps(selector)}).getAttribute('{name}')")
 
     def text_content(self, selector: str) -> Any:
-        """The text of an element."""
         return self.evaluate(f"document.querySelector({json.dumps(selector)}).textContent")
 
 
@@ -250,7 +237,6 @@ class HandAtDesktop(HandOnPage):
         self.begin_anew()
 
     def begin_anew(self) -> None:
-        """Load the page, with nothing pressed and the button focused."""
         self.desktop.lift_all()
         self.page.reload()
         self.page.wait_for_selector("html[data-connection=live]")
@@ -260,14 +246,12 @@ class HandAtDesktop(HandOnPage):
         self.page.evaluate("document.querySelector('#hold').focus()")
 
     def until(self, expression: str) -> None:
-        """Wait until an expression is true."""
         deadline = time.monotonic() + LIMIT
         while not self.page.evaluate(expression):
             assert time.monotonic() < deadline, f"not {expression}"
             time.sleep(0.02)
 
     def point(self) -> tuple[float, float]:
-        """A point of the screen within the button."""
         x, y = self.page.evaluate(
             "(({ x, y }) => [screenX + x + 40, screenY + outerHeight - innerHeight + y + 30])"
             "(document.querySelector('#hold').getBoundingClientRect())"
@@ -275,15 +259,12 @@ class HandAtDesktop(HandOnPage):
         return x, y
 
     def down(self) -> None:
-        """Put the mouse on the button and press it."""
         self.desktop.press_mouse(*self.point())
 
     def up(self) -> None:
-        """Let the mouse go."""
         self.desktop.lift_mouse()
 
     def tab_to(self, selector: str) -> None:
-        """Press Tab until an element has the focus."""
         for _ in range(100):
             if self.page.evaluate(f"document.activeElement.matches('{selector}')"):
                 return

@@ -12,7 +12,6 @@ class Link:
     """Passes on bytes between the clients of an address and a server, or lets them wait."""
 
     def __init__(self, address: str, server: tuple[str, int]) -> None:
-        """Listen on an address, at the port of the server."""
         self._server = server
         self._from_page, self._from_server = threading.Event(), threading.Event()
         self._sockets: list[socket.socket] = []
@@ -22,7 +21,6 @@ class Link:
         self._start(self._accept)
 
     def hold_up_page(self) -> None:
-        """Let the bytes of the page wait."""
         self._from_page.clear()
 
     def cut(self) -> float:
@@ -33,12 +31,10 @@ class Link:
         return time.time()
 
     def mend(self) -> None:
-        """Let everything through, first what has waited."""
         self._from_page.set()
         self._from_server.set()
 
     def close(self) -> None:
-        """Close all connections."""
         for each in (self._listener, *self._sockets):
             with contextlib.suppress(OSError):
                 each.shutdown(socket.SHUT_RDWR)

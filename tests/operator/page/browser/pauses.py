@@ -12,15 +12,12 @@ _USUAL = 0.01  # [s] by which a sleeping thread may be late on a busy machine
 
 
 class Pauses:
-    """The time by which a sleeping thread was late."""
-
     def __init__(self) -> None:
         self.total = 0.0
         """[s]"""
         self._end = threading.Event()
 
     def watch(self) -> None:
-        """Count until :meth:`end`."""
         while not self._end.is_set():
             begin = time.monotonic()
             time.sleep(_INTERVAL)
@@ -29,13 +26,11 @@ class Pauses:
                 self.total += late
 
     def end(self) -> None:
-        """Stop counting."""
         self._end.set()
 
 
 @contextmanager
 def watched() -> Iterator[Pauses]:
-    """Count the pauses within the block."""
     pauses = Pauses()
     watcher = threading.Thread(target=pauses.watch)
     watcher.start()

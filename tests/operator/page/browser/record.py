@@ -25,8 +25,6 @@ RECORDED = (topics.OPERATOR_HEARTBEAT, topics.ENGINES_STATE)
 
 
 class State(NamedTuple):
-    """A message on ``engines/state``."""
-
     time: float
     engines: str
 
@@ -72,7 +70,6 @@ class Record:
         return [beat for beat in self.beats if beat > moment]
 
     def await_beats(self, moment: float, count: int = 1) -> None:
-        """Wait for heartbeats that were published after a moment."""
         self.until(lambda: len(self.beats_after(moment)) >= count)
 
     def silence_after(self, moment: float, seconds: float = 0.5) -> None:
@@ -114,7 +111,6 @@ class Record:
         return min(stopped, last_on + topics.DRIVE_TIMEOUT)
 
     def close(self) -> None:
-        """Leave the domain."""
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         self._process.stdin.close()

@@ -50,7 +50,6 @@ def arm(full: Callable[[str], str], tmp_path: Path, domain_id: int) -> Iterator[
 
 @pytest.fixture
 def hand(playwright: Any, full: Callable[[str], str], arm: Arm, tmp_path: Path) -> Iterator[HandOnPage]:
-    """A hand on the operator's host."""
     script = tmp_path / "chromium"
     script.write_text(f'#!/bin/sh\nexec ip netns exec {full(CONTROL)} {CHROMIUM} "$@"\n')
     os.chmod(script, 0o700)

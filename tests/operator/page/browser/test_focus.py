@@ -23,20 +23,17 @@ KEYS = pytest.mark.parametrize("key", [SPACE, RETURN], ids=["space", "return"])
 
 @pytest.fixture(scope="module")
 def shared(arm: Arm) -> Iterator[HandAtDesktop]:
-    """A hand and its desktop, for all tests of the module."""
     with hand_at_desktop(arm.url, PAD) as hand:
         yield hand
 
 
 @pytest.fixture
 def hand(shared: HandAtDesktop) -> HandAtDesktop:
-    """A hand in front of a fresh page."""
     shared.begin_anew()
     return shared
 
 
 def key_of(hand: HandAtDesktop, key: int) -> tuple[Callable[[], None], Callable[[], None]]:
-    """What presses and lifts a key."""
     return lambda: hand.desktop.press(key), lambda: hand.desktop.lift(key)
 
 

@@ -42,20 +42,16 @@ window.Date = class extends Date {
 
 
 class Fingers:
-    """Fingers on the page's screen, by the browser's own input."""
-
     def __init__(self, hand: HandOnPage) -> None:
         self._session = hand.context.new_cdp_session(hand.page)
         self._down: dict[int, tuple[float, float]] = {}
 
     def put(self, finger: int, point: tuple[float, float]) -> None:
-        """Put a finger down, or move it."""
         kind = "touchMove" if finger in self._down else "touchStart"
         self._down[finger] = point
         self._dispatch(kind, self._down)
 
     def lift(self, finger: int = 0) -> None:
-        """Lift a finger."""
         point = self._down.pop(finger)
         self._dispatch("touchEnd", {finger: point} if self._down else {})
 
@@ -94,7 +90,6 @@ def test_hand_is_released_within_150_ms_at_p99(arm: Arm, hand: HandOnPage) -> No
 
 
 def quantile(values: list[float], q: float) -> float:
-    """The quantile of sorted values, by the nearest rank."""
     return values[max(0, -int(-q * len(values) // 1) - 1)]
 
 

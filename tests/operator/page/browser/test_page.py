@@ -172,7 +172,6 @@ def is_disconnected(hand: HandOnPage) -> bool:
 
 
 def tab_to(hand: HandOnPage, selector: str) -> None:
-    """Press Tab until an element has the focus."""
     for _ in range(TABS):
         if hand.page.evaluate("it => document.activeElement.matches(it)", selector):
             return

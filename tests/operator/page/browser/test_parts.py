@@ -108,7 +108,6 @@ async (script) => {
 
 @pytest.fixture
 def page(browser: Any) -> Iterator[Any]:
-    """A page that is connected to nothing."""
     with closing(Arm(STATIC)) as arm, closing(browser.new_context()) as context:
         page = context.new_page()
         page.goto(f"http://{arm.host}/")
