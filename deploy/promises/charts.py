@@ -126,7 +126,6 @@ def _bars(history: History, row: str) -> Iterator[tuple[float, float, str, int, 
 
 
 def _joined(intervals: Iterable[tuple[float, float]]) -> Iterator[tuple[float, float]]:
-    """Yield intervals that touch each other as one."""
     last: tuple[float, float] | None = None
     for begin, end in intervals:
         if last and last[1] == begin:
@@ -161,14 +160,12 @@ def _marks(history: History, row: str, x: Callable[[float], float], top: int) ->
 
 
 def _rows(fault: InjectedFault) -> tuple[str, ...]:
-    """Return the rows that show a fault."""
     if fault.kind == "kill_supervisor":
         return (SUPERVISORD,)
     return PROGRAMS if fault.target == ALL else (target_name(fault.target),)
 
 
 def _legend(y: float, history: History, findings: Sequence[Finding]) -> Iterator[str]:
-    """Yield the symbols of a timeline and their meaning."""
     symbols = [
         ("flow", "output flows"),
         ("one", "one process"),
@@ -226,7 +223,6 @@ def histograms(durations: dict[str, list[float]], bounds: Sequence[float]) -> st
 
 
 def _histogram(values: Sequence[float], x: Callable[[float], float], axis: float) -> Iterator[str]:
-    """Yield the bars of a histogram."""
     counts = [0] * (int(axis / BIN) + 1)
     for value in values:
         counts[min(int(value / BIN), len(counts) - 1)] += 1

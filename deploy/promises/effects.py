@@ -72,7 +72,6 @@ class Effect(NamedTuple):
     """The fault, the process that starts, or the history."""
 
     def concerns(self, program: str) -> bool:
-        """Return whether it concerns a program."""
         return program in self.programs or ALL in self.programs
 
 
@@ -146,12 +145,10 @@ def _of_silence(history: History) -> Iterator[Effect]:
 
 
 def _from(time: float) -> float:
-    """Return the begin of an effect that includes this time."""
     return math.nextafter(time, -math.inf)
 
 
 def _to(time: float) -> float:
-    """Return the end of an effect that includes this time."""
     return math.nextafter(time, math.inf)
 
 

@@ -37,12 +37,10 @@ class Finding:
 
     @property
     def verdict(self) -> str:
-        """HOLDS, VIOLATED or UNKNOWN."""
         return VIOLATED if self.evidence else HOLDS if self.cases else UNKNOWN
 
     @property
     def summary(self) -> str:
-        """The figures, or why there are none."""
         if self.verdict != UNKNOWN:
             return self.measured
         return "outcome unknown" if self.unknown else "not exercised"

@@ -75,8 +75,6 @@ NEEDED_AT_START = dict.fromkeys((KINEMATICS, ROBOT_STATE), SOURCES)
 
 
 class Sample(NamedTuple):
-    """A message as the observer received it."""
-
     sent: float
     """DDS source time."""
     received: float
@@ -132,7 +130,6 @@ class History:
         return [fault for fault in self.faults if fault.kind not in CONDITIONS]
 
     def stream(self, topic: topics.Topic) -> list[Sample]:
-        """Return the messages of a topic."""
         return self.streams.get(topic.name, [])
 
     def output(self, program: str) -> list[Sample]:
@@ -142,7 +139,6 @@ class History:
         return [s for s in self.stream(topics.DIAGNOSTICS) if s.value[0] == program]
 
     def signs_of_life(self) -> list[Sample]:
-        """Return the heartbeats of a pressed switch."""
         return [s for s in self.stream(topics.OPERATOR_HEARTBEAT) if s.value is True]
 
     def lives_of(self, program: str) -> list[Life]:

@@ -48,7 +48,6 @@ def verdict(findings: Sequence[Finding]) -> str:
 
 
 def html(title: str, remarks: Sequence[str], findings: Sequence[Finding], history: History) -> str:
-    """Return the whole report."""
     picture, *_ = timeline(history, findings)
     lines = [
         "<!doctype html><html lang=en><meta charset=utf-8>",
@@ -94,7 +93,6 @@ def _evidence(finding: Finding) -> str:
 
 
 def _faults(history: History) -> str:
-    """Return the list of all faults."""
     columns = {
         "no.": "number",
         "time": "number",
@@ -144,7 +142,6 @@ def effect(history: History, fault: InjectedFault) -> str:
 
 
 def _is_hit(life: Life, fault: InjectedFault) -> bool:
-    """Return whether a fault hit a process."""
     if life.began > fault.begin or (life.ended is not None and life.ended < fault.begin):
         return False
     if fault.target == ALL:

@@ -15,8 +15,6 @@ HUNG = 5.0  # L4: from a hang until the output flows again
 
 
 class Durations(NamedTuple):
-    """The durations that a finding lists."""
-
     title: str
     limits: tuple[float, ...]
 

@@ -42,6 +42,5 @@ def _cases(finding: Finding) -> tuple[object, ...]:
 
 
 def meaning(promise: str) -> str:
-    """Return the promise in one sentence."""
     sentence = (CHECKERS[promise].__doc__ or "").partition(": ")[2].strip().replace("`", "")
     return sentence[:1].upper() + sentence[1:]

@@ -15,7 +15,6 @@ DURATIONS_HEADER = ("", "SERVICE", "CASES", "P50", "P99")
 
 
 def text(findings: Sequence[Finding]) -> str:
-    """Return the report."""
     blocks = [table([HEADER, *(_row(finding) for finding in findings)])]
     for finding in findings:
         if finding.verdict == VIOLATED:
