@@ -18,8 +18,6 @@ PID_TIMEOUT = 2.0  # s to wait for a program that is being restarted
 
 
 class RealArm:
-    """An arm into which faults are injected."""
-
     def __init__(self, namespace: str, system: System) -> None:
         self.namespace = namespace
         self.system = system

@@ -27,8 +27,6 @@ def missing() -> str:
 
 
 class Clock:
-    """The time of day of one arm."""
-
     def __init__(self, path: Path) -> None:
         """:param path: of the file that the arm's processes read."""
         self.ahead = 0.0

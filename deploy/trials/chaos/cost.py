@@ -14,8 +14,6 @@ from deploy.trials.chaos.arm import RealArm
 
 @dataclass(frozen=True)
 class Cost:
-    """The resources used at one moment."""
-
     time: float
     """[s], monotonic clock."""
     busy: float
@@ -28,7 +26,6 @@ class Cost:
 
     @classmethod
     def now(cls, arms: Sequence[RealArm]) -> Cost:
-        """Measure the arms now."""
         processes = threads = 0
         memory = 0.0
         for arm in arms:

@@ -42,8 +42,6 @@ Undo = Callable[[], None]
 
 
 class FaultKind(NamedTuple):
-    """A kind of fault."""
-
     inject: Callable[[RealArm, str], Undo | None]
     """Injects the fault into an arm and a target; returns how to end it, or ``None`` if it is momentary."""
     targets: tuple[str, ...]
@@ -80,7 +78,6 @@ def hog(arm: RealArm, program: str) -> None:
 
 
 def kill_all(arm: RealArm, target: str) -> None:
-    """SIGKILL all programs at once."""
     pids = [process.pid for process in arm.system.members() if process.program not in ("", BABBLER)]
     handles = processes.open_handles(arm.system.run, pids)
     for handle in handles:
@@ -104,7 +101,6 @@ def kill_supervisor(arm: RealArm, target: str) -> Undo:
 
 
 def double(arm: RealArm, program: str) -> Undo:
-    """Start a second instance of a program."""
     command = []
     with suppress(OSError):  # it has just ended
         command = Path(f"/proc/{arm.pid(program)}/cmdline").read_bytes().decode().split("\0")[1:-1]

@@ -7,8 +7,6 @@ from collections.abc import Callable, Hashable
 
 
 class NestedFaults:
-    """Counts the faults that are under way."""
-
     def __init__(self) -> None:
         self._under_way: Counter[Hashable] = Counter()
 

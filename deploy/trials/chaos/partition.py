@@ -90,7 +90,6 @@ def namespaces() -> Iterator[Callable[[str], str]]:
 
 
 def _delete_abandoned() -> None:
-    """Delete the namespaces of processes that have ended."""
     for name, pid in re.findall(r"^(arm(\d+)-\w+)", _ip("netns", "list"), re.MULTILINE):
         if not Path("/proc", pid).exists():
             with suppress(subprocess.CalledProcessError):  # another chaos monkey was faster
@@ -102,7 +101,6 @@ def _ip(*arguments: str) -> str:
 
 
 def _queue(bridge: str, verb: str, *kind: str) -> None:
-    """Change the queues of the bridge's ports."""
     for host in (ROBOT, CONTROL):
         command = ["tc", "-n", bridge, "qdisc", verb, "dev", host, "root", *kind]
         subprocess.run(command, check=True, capture_output=True, text=True)
@@ -125,7 +123,6 @@ class TwoHosts(Testbed):
         }
 
     def prepare(self, stack: ExitStack) -> None:
-        """Create the hosts and their network."""
         self._full = stack.enter_context(namespaces())
         within = {name: ("ip", "netns", "exec", self._full(name)) for name in (ROBOT, CONTROL)}
         self.observe_within = within[ROBOT]
@@ -162,7 +159,6 @@ class TwoHosts(Testbed):
         return heal
 
     def _degrade(self, arm: RealArm, target: str) -> Undo:
-        """Lose, delay and reorder packets between the hosts."""
         _queue(self._full(BRIDGE), "replace", *NETEM)
 
         def heal() -> None:

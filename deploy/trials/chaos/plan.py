@@ -104,7 +104,6 @@ def _scheduled(path: Path) -> Plan:
 
 
 def _fleet(arms: int) -> Callable[..., Testbed]:
-    """Return a testbed with several arms, each in another namespace."""
     namespaces = tuple(f"/arm{number}" for number in range(1, arms + 1))
     return partial(Testbed, namespaces=namespaces, scenario={**SCENARIO, **sources(FLEET_RATE)})
 

@@ -58,7 +58,6 @@ class ProcessMonitor:
         self._alive: dict[int, tuple[str, Life]] = {}  # by pidfd
 
     def run(self, ended: threading.Event) -> None:
-        """Monitor until an event is set."""
         self._rounds.note(time.monotonic())
         while not ended.is_set():
             self.scan()
@@ -69,7 +68,6 @@ class ProcessMonitor:
             os.close(handle)
 
     def scan(self) -> None:
-        """Find new processes."""
         pids = {int(name) for name in os.listdir("/proc") if name.isdigit()}
         now = time.monotonic()
         self._pending |= dict.fromkeys(pids - self._known, now)

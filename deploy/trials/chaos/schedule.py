@@ -26,8 +26,6 @@ ROUND = PROGRAMS[::2] + PROGRAMS[1::2]
 
 
 class PlannedFault(NamedTuple):
-    """A fault to be injected."""
-
     at: float
     """[s] since the beginning of the operator's day."""
     kind: str

@@ -37,7 +37,6 @@ class Experiment:
 
 
 def save(experiment: Experiment, path: Path) -> None:
-    """Write an experiment to a file."""
     document = {
         "seed": experiment.seed,
         "length": experiment.length,

@@ -148,7 +148,6 @@ class Testbed:
         """Prepare the hosts of the arms."""
 
     def start(self, arm: RealArm, parameters: Mapping[str, object]) -> None:
-        """Start an arm."""
         arm.system.start(parameters)
 
     def inject(self, schedules: Sequence[Schedule], until: float = 0.0) -> None:
@@ -189,7 +188,6 @@ class Testbed:
         return (now + duration, undo) if undo else None
 
     def _record(self, fault: InjectedFault, arm: RealArm) -> None:
-        """Let the observer record a fault."""
         assert self._observer.stdin is not None
         self._observer.stdin.write(json.dumps(fault._asdict() | {"namespace": arm.namespace}) + "\n")
         self._observer.stdin.flush()
@@ -259,14 +257,12 @@ def _no_message(topic_names: Sequence[str], arms: int) -> str:
 
 
 def _packet_loss(percent: float) -> dict[str, str]:
-    """Return the environment in which Cyclone DDS loses packets."""
     if not percent:
         return {}
     return _configured(f"<Internal><Test><XmitLossiness>{10 * percent:.0f}</XmitLossiness></Test></Internal>")
 
 
 def _configured(setting: str) -> dict[str, str]:
-    """Return the environment in which Cyclone DDS has one more setting."""
     return {"CYCLONEDDS_URI": ",".join(filter(None, [os.environ.get("CYCLONEDDS_URI"), setting]))}
 
 
@@ -299,7 +295,6 @@ def _observer(command: Sequence[str], environment: Mapping[str, str]) -> Iterato
 
 
 def _lines(process: subprocess.Popen[str]) -> queue.Queue[str]:
-    """Return the lines that a process prints, as they come."""
     lines: queue.Queue[str] = queue.Queue()
     assert process.stdout is not None
     stream = os.fdopen(os.dup(process.stdout.fileno()), "r")

@@ -72,7 +72,6 @@ def _parse(arguments: Sequence[str]) -> argparse.Namespace:
 
 
 def _jobs(record: Record, options: argparse.Namespace, directory: Path) -> list[Job]:
-    """Return the chains that have recorded input."""
     namespaces = record.namespaces()
     if options.namespace is not None:
         if options.namespace not in namespaces:
@@ -97,7 +96,6 @@ def _jobs(record: Record, options: argparse.Namespace, directory: Path) -> list[
 
 
 def _write(path: Path, record: Record, outcomes: Sequence[Outcome]) -> None:
-    """Write the replayed messages in the order of their times."""
     new = path.with_name(f".{path.name}.new")
     new.unlink(missing_ok=True)
     recorder = Recorder(new, record.begin, record.begin)

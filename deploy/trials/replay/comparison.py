@@ -77,8 +77,6 @@ class Difference(NamedTuple):
 
 @dataclass
 class Comparison:
-    """The comparison of one topic."""
-
     topic: str
     bounds: Bounds
     recorded: int

@@ -27,8 +27,6 @@ CATCH_UP = SECOND  # ns after a suspension in which nothing is compared
 
 
 class Job(NamedTuple):
-    """A chain to replay."""
-
     namespace: str
     chain: Chain
     parameters: Path | None
@@ -36,8 +34,6 @@ class Job(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """What a replay shows."""
-
     job: Job
     messages: dict[str, list[Message]]
     """By topic name of the contract, in the order of sending."""
@@ -74,7 +70,6 @@ def _run(job: Job) -> Outcome:
 
 
 def run(record: Record, job: Job) -> Outcome:
-    """Replay a chain, and compare its output."""
     record = record.of_arm(job.namespace)
     playback = replay(record, job.namespace, job.chain, job.parameters)
     comparisons = []

@@ -75,8 +75,6 @@ class ReplayedLife(NamedTuple):
 
 
 class _Seen(NamedTuple):
-    """What the health reports of a process say."""
-
     created: int
     """When its node was created."""
     last: int
@@ -111,7 +109,6 @@ def lives(record: Record, namespace: str, service: str) -> list[ReplayedLife]:
 
 
 def _seen(record: Record, namespace: str, service: str) -> dict[int, _Seen]:
-    """Return the processes of a service by pid."""
     found: dict[int, _Seen] = {}
 
     def note(sent: int, status: DiagnosticStatus) -> None:
@@ -197,7 +194,6 @@ def _watchdog_parameters(life: ReplayedLife) -> operator_watchdog.Parameters:
 
 
 def _conclusions(record: Record, namespace: str, life: ReplayedLife) -> list[tuple[int, str]]:
-    """Return the conclusions of a watchdog and their times."""
     end = record.end if life.ended is None else life.ended
     return [
         (message.sent, text(message, OPERATOR_ACTIVITY))
@@ -274,7 +270,6 @@ def _suspensions(record: Record, namespace: str) -> dict[int, list[Suspension]]:
 
 
 def _time(record: Record, seconds: float) -> int:
-    """Return the time of an event of the chaos monkey."""
     return record.origin + round(seconds * SECOND)
 
 

@@ -38,8 +38,6 @@ NETWORK = Network(latency=Delay(0.0002, 0.0002), discovery=Delay(0.01, 0.01), ma
 
 @dataclass
 class Playback:
-    """The output of a chain of services."""
-
     messages: dict[str, list[Message]] = field(default_factory=dict)
     """By topic name of the contract, in the order of sending; with the health."""
     lives: dict[str, list[ReplayedLife]] = field(default_factory=dict)
@@ -93,7 +91,6 @@ class _Player:
     # The services
 
     def start(self, service: str, parameters: Path | None) -> None:
-        """Let the processes of a service live as they did."""
         module = next(each.module for each in manifest.programs() if each.name == service)
         arguments = ["--params-file", str(parameters)] if parameters else []
         if service == WATCHDOG:
@@ -139,7 +136,6 @@ class _Player:
     # The messages
 
     def hear(self, chain: Chain) -> None:
-        """Keep what the services of a chain publish."""
         made = [*chains.outputs(chain), DIAGNOSTICS]
         kept = self.result.messages = {topic.name: [] for topic in made}
         heard = {f"rt{topic.full_name(self._namespace)}": kept[topic.name] for topic in made}
@@ -173,7 +169,6 @@ class _Player:
         self._publish(following, player, publishers)
 
     def _publish(self, following: Iterator[Any], player: Process, publishers: list[Publisher]) -> None:
-        """Schedule the next message, which schedules the one after it."""
         upcoming = next(following, None)
         if upcoming is None:
             return

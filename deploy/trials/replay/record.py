@@ -40,8 +40,6 @@ class Message(NamedTuple):
 
 
 class Record(NamedTuple):
-    """The messages of a record."""
-
     begin: int
     """When the first message of an arm's services was received [ns since 1970]."""
     end: int
@@ -73,7 +71,6 @@ class Record(NamedTuple):
                 yield event
 
     def namespaces(self) -> list[str]:
-        """Return the namespaces of the arms."""
         return _namespaces(self.messages)
 
 

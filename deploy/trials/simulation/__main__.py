@@ -106,7 +106,6 @@ def _run_all(experiments: Sequence[Experiment], title: str, limit: float) -> int
 
 
 def _show(summary: Summary, hours: float, seconds: float, broken: int) -> None:
-    """Show the progress on a terminal."""
     if not sys.stdout.isatty():
         return
     done = BAR * min(1.0, summary.hours / hours)
@@ -140,7 +139,6 @@ def _alone(summary: Summary) -> str:
 
 
 def _explain(experiment: Experiment, title: str) -> int:
-    """Shrink an experiment that violates a promise, and report on it."""
     outcome = simulate(experiment)
     faults = len(experiment.faults)
     print(f"\nLooking for the fewest faults that violate {outcome.violated()[0]}, of {faults}")

@@ -34,8 +34,6 @@ LEAD = 1.0  # s from the start of the arm to the origin of the scenario
 
 
 class SimulatedArm:
-    """The processes of one arm."""
-
     def __init__(
         self,
         simulation: Simulation,
@@ -81,7 +79,6 @@ class SimulatedArm:
         return next((each for each in self.processes() if each.name == program), None)
 
     def processes(self) -> list[Process]:
-        """Return all live processes of the arm."""
         return [each for each in self.simulation.processes if each.name in NAMES]
 
     def start_again(self) -> None:
@@ -103,7 +100,6 @@ class SimulatedArm:
         (self._directory / "parameters.yaml").write_text(yaml.safe_dump(self.parameters))
 
     def spawn(self, name: str, parent: int) -> Process:
-        """Start a process of a program."""
         program = self._programs[name]
         file = str(self._directory / "parameters.yaml")
         process = self.simulation.start(

@@ -94,7 +94,6 @@ def _harms(fault: PlannedFault, release: float) -> bool:
 
 
 def _only_watchdog(rng: random.Random) -> Iterator[PlannedFault]:
-    """Leave F1 alone, while heartbeats are late or released."""
     yield PlannedFault(2.0, FALSE_PRESENCE, NO_TARGET, JUDGED - 2.0)
     yield PlannedFault(0.0, STUCK_DRIVE, NO_TARGET, JUDGED)
     if rng.random() < 0.6:  # they come just before a strike

@@ -46,7 +46,6 @@ class Calibration(NamedTuple):
 
 @cache
 def load() -> Calibration:
-    """Return the durations in ``calibration.json``."""
     document = json.loads(PATH.read_text(encoding="utf-8"))
     start_up, latency, discovery = (Delay(*document[name]) for name in ("start_up", "latency", "discovery"))
     return Calibration(start_up, latency, discovery, document["measured"])

@@ -26,8 +26,6 @@ HELD = (topics.OPERATOR_HEARTBEAT.name, topics.OPERATOR_PRESENCE.name)
 
 
 class FaultKind(NamedTuple):
-    """A kind of fault."""
-
     inject: Callable[[SimulatedArm, str, float], Undo | None]
     """Injects the fault into a target, for a duration; returns how to end it, or ``None``."""
     targets: tuple[str, ...]

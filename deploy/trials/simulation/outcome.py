@@ -27,8 +27,6 @@ KINDS = FAULT_KINDS | ATTACK_KINDS
 
 @dataclass(frozen=True)
 class Outcome:
-    """The result of an experiment."""
-
     experiment: Experiment
     findings: list[Finding]
     history: History
@@ -47,7 +45,6 @@ class Outcome:
         return alone(self.history)
 
     def violated(self) -> list[str]:
-        """Return the violated promises."""
         return [finding.promise for finding in self.findings if finding.evidence]
 
 

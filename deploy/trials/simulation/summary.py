@@ -15,8 +15,6 @@ from deploy.trials.simulation.outcome import Outcome
 
 @dataclass
 class Summary:
-    """The sum of the outcomes of experiments."""
-
     hours: float = 0.0
     experiments: int = 0
     messages: int = 0
@@ -28,7 +26,6 @@ class Summary:
 
     @classmethod
     def of(cls, outcome: Outcome) -> Summary:
-        """Return the summary of one experiment."""
         history = outcome.history
         return cls(
             outcome.experiment.length / 3600.0,
@@ -42,7 +39,6 @@ class Summary:
         )
 
     def add(self, other: Summary) -> None:
-        """Add the experiments of another summary."""
         self.hours += other.hours
         self.experiments += other.experiments
         self.messages += other.messages
@@ -54,21 +50,17 @@ class Summary:
             self.findings[promise] += findings
 
     def total(self) -> list[Finding]:
-        """Return one finding for each promise."""
         return [_sum(findings) for findings in self.findings.values() if findings]
 
     def violated(self) -> list[str]:
-        """Return the violated promises."""
         return [each.promise for each in self.total() if each.evidence]
 
     @property
     def digest(self) -> str:
-        """A hash of all records, in order."""
         return hashlib.sha256("".join(self.digests).encode()).hexdigest()[:16]
 
 
 def _named(finding: Finding, seed: str) -> Finding:
-    """Let the evidence name the experiment."""
     evidence = [Evidence(each.time, f"{each.text} ({seed})") for each in finding.evidence]
     return replace(finding, evidence=evidence)
 

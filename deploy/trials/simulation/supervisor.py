@@ -22,8 +22,6 @@ START_SECONDS = 1.0  # s; supervisor's default of startsecs
 
 @dataclass
 class _Supervised:
-    """A program and its present process."""
-
     name: str
     state: str = "STOPPED"
     process: Process | None = None
@@ -35,8 +33,6 @@ class _Supervised:
 
 
 class Supervisor:
-    """Keeps the processes of an arm alive."""
-
     def __init__(self, simulation: Simulation, programs: list[str], spawn: Callable[[str, int], Process]):
         """
         Start all programs.
@@ -61,7 +57,6 @@ class Supervisor:
         return self.programs()
 
     def programs(self) -> list[Program]:
-        """Return the programs."""
         now = self._simulation.now
         return [
             Program(
@@ -77,14 +72,12 @@ class Supervisor:
         ]
 
     def revive(self, name: str) -> None:
-        """Start a program that was given up."""
         each = self._programs[name]
         if each.state == "FATAL":
             each.early_ends = 0
             self._start(each)
 
     def process(self, name: str) -> Process | None:
-        """Return the process of a program."""
         return self._programs[name].process
 
     def die(self) -> None:
@@ -131,7 +124,6 @@ class Supervisor:
             self._simulation.after(pause + late, lambda: self._start(each))
 
     def _guard(self) -> None:
-        """Kill the sentinel if it hangs."""
         if not self.is_alive:
             return
         sentinel = self._programs.get(SENTINEL)

@@ -15,7 +15,6 @@ from interfaces import topics
 
 
 def view() -> None:
-    """Run the tool until it is killed."""
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     node = Node("viewer", namespace=namespace_of(os.environ))
     newest = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)

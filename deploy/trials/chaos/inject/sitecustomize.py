@@ -12,18 +12,15 @@ from types import FrameType
 
 
 def hang(number: int, frame: FrameType | None) -> None:
-    """An endless loop inside a callback."""
     while True:
         pass
 
 
 def fail(number: int, frame: FrameType | None) -> None:
-    """An unexpected error inside a callback."""
     raise RuntimeError("injected by the chaos monkey")
 
 
 def hog(number: int, frame: FrameType | None) -> None:
-    """Allocate memory until there is none left."""
     hoard = []
     while True:
         hoard.append(bytearray(4 << 20))
