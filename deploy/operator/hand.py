@@ -31,7 +31,6 @@ class Hand:
     """The hand at the terminal of a node."""
 
     def __init__(self, node: ReactiveNode) -> None:
-        """Be released."""
         self._node = node
         self._publisher: Publisher | None = None  # exists while the hand holds: so pages know who holds
         self._events: Subject[hold.Event] = Subject()
@@ -45,7 +44,6 @@ class Hand:
 
     @property
     def holds(self) -> bool:
-        """Whether the hand is on the switch."""
         return self._publisher is not None
 
     def press(self) -> None:

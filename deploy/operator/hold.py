@@ -31,8 +31,6 @@ class Press(NamedTuple):
 
 
 class Beat(NamedTuple):
-    """A page is held."""
-
     page: str
     sent: float
     """See :attr:`Press.sent`."""
@@ -48,8 +46,6 @@ Event = Press | Beat | Release
 
 
 class Hold(NamedTuple):
-    """The switch after an event."""
-
     page: str = ""
     """The page that holds the switch; empty if no page does."""
     seen: float = -math.inf
@@ -100,7 +96,6 @@ def step(hold: Hold, event: Event, now: float, max_age: float = MAX_NONCE_AGE) -
 
 
 def _loss(hold: Hold, page: str, now: float) -> str:
-    """Return why a page that beats holds the switch no more."""
     if page == hold.page:
         return f"no beat came for {1000 * (now - hold.seen):.0f} ms"
     return hold.ended[1] if hold.ended and page == hold.ended[0] else ELSEWHERE

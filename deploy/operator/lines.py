@@ -49,16 +49,12 @@ class Line(NamedTuple):
 
 
 class Batch(NamedTuple):
-    """Lines that are shown together."""
-
     is_asleep: bool | None
     """Whether the operator sleeps, as far as it is known."""
     lines: list[Line]
 
 
 class Complaints(NamedTuple):
-    """What services complain about."""
-
     known: dict[str, str]
     """By the name of the service; empty if it does not complain."""
     new: Timestamp[str]
@@ -81,7 +77,6 @@ def line_batches(
 
 
 def measurements(seen: Seen) -> Observable[Line]:
-    """New configurations, positions and speeds."""
     configuration = rx.combine_latest(*(seen(topic) for topic in topics.CONFIGURATION.values())).map(_joined)
     return rx.merge(
         thinned(configuration).map(_line(Kind.DATA, lambda it: f"### Received new data: {{{_numbers(it)}}}")),

@@ -131,7 +131,6 @@ def wire(node: ServiceNode) -> None:
 
 
 def only(events: Observable[Any], *kinds: type) -> Observable[Any]:
-    """Emit the events of some kinds."""
     return events.filter(lambda event: isinstance(event, kinds))
 
 
@@ -144,7 +143,6 @@ def pages_are_open(events: Observable[server.Event], scheduler: SchedulerBase) -
 
 
 def during(is_open: Observable[bool], items: Observable[Any]) -> Observable[Any]:
-    """Observe items while pages are open."""
     return is_open.switch_map(lambda it: items if it else rx.never())
 
 
@@ -219,7 +217,6 @@ def note(node: ServiceNode, file: address.AddressFile, line: str) -> None:
 
 
 def welcome(given: _Parameters) -> dict[str, Any]:
-    """Return what each page is told first."""
     return {
         "programs": protocol.PROGRAMS,
         "limits": protocol.LIMITS,

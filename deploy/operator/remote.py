@@ -17,8 +17,6 @@ TIMEOUT = 2.0  # s for an answer
 
 
 class ParameterChange(NamedTuple):
-    """A parameter was set."""
-
     program: str
     name: str
     value: Any

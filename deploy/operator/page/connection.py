@@ -45,8 +45,6 @@ class Allowance:
 
 
 class Connection:
-    """The connection to a client."""
-
     def __init__(
         self,
         client: socket.socket,
@@ -89,7 +87,6 @@ class Connection:
 
     @property
     def is_idle(self) -> bool:
-        """Whether all is sent."""
         return not self._unsent
 
     @property
@@ -122,7 +119,6 @@ class Connection:
         self._flush(now)
 
     def ping(self, now: float) -> None:
-        """Ask for an answer."""
         self.has_answered = False
         self._protocol.send_ping(b"")
         self._flush(now)
@@ -134,7 +130,6 @@ class Connection:
         self._flush(now)
 
     def close(self) -> None:
-        """End the connection at once."""
         self.has_ended = True
         self._unsent.clear()
         self.socket.close()
@@ -177,7 +172,6 @@ class Connection:
                 self.fail(BAD_REQUEST, "a message is not UTF-8", now)
 
     def _note_problem(self) -> None:
-        """Note what the library has found outside HTTP and WebSocket."""
         error, sent = self._protocol.handshake_exc, self._protocol.close_sent
         # A browser opens connections that it does not use.
         if error is not None and not isinstance(error.__cause__, EOFError):

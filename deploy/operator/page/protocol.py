@@ -24,20 +24,14 @@ class ProtocolError(Exception):
 
 
 class Hello(NamedTuple):
-    """The first message of a connection."""
-
     token: str
 
 
 class Press(NamedTuple):
-    """The button is pressed."""
-
     nonce: str
 
 
 class Beat(NamedTuple):
-    """The button is held."""
-
     nonce: str
 
 
@@ -46,8 +40,6 @@ class Release(NamedTuple):
 
 
 class Engines(NamedTuple):
-    """A command to the engines."""
-
     command: str
 
 

@@ -40,8 +40,6 @@ UNAUTHORIZED, GOING_AWAY = 4401, 1001  # codes of a close
 
 
 class Opened(NamedTuple):
-    """A page has presented the token."""
-
     page: str
 
 
@@ -82,8 +80,6 @@ class _Client:
 
 
 class PageServer:
-    """Serves one site until it is closed."""
-
     def __init__(
         self,
         listener: socket.socket,
@@ -125,7 +121,6 @@ class PageServer:
         self._thread.start()
 
     def close(self) -> None:
-        """Stop to listen, and end all connections."""
         self._is_closing = True
         self._wake.close()  # which the other end notices
         self._thread.join()
@@ -189,7 +184,6 @@ class PageServer:
         return None if request.path == SOCKET else self._site.file(request.path)
 
     def _take(self, client: _Client, text: str | bytes) -> None:
-        """Handle a message of a client."""
         now = self._clock.now()
         if not client.connection.is_open:
             return  # an earlier message has ended it

@@ -40,8 +40,6 @@ _HOST = re.compile(r"([^:]+)(:[0-9]+)?")
 
 
 class Refusal(NamedTuple):
-    """Why a request is outside the protocol."""
-
     status: http.HTTPStatus
     reason: str
     answer: bytes = b""

@@ -92,8 +92,6 @@ class Recent(NamedTuple):
 
 
 class Arm(NamedTuple):
-    """What the arm does."""
-
     configuration: Mapping[str, float] = {}
     position: tuple[float, float] | None = None
     speed: float | None = None
@@ -103,8 +101,6 @@ class Arm(NamedTuple):
 
 
 class Operator(NamedTuple):
-    """What the operator watchdog concludes."""
-
     seen: float = -math.inf
     """When the operator was seen."""
     activity: str | None = None
@@ -112,8 +108,6 @@ class Operator(NamedTuple):
 
 
 class Hands(NamedTuple):
-    """Who is on the switch."""
-
     hold: Hold = Hold()
     """The page that holds it."""
     beaten: float = -math.inf
@@ -127,8 +121,6 @@ class Hands(NamedTuple):
 
 
 class Engines(NamedTuple):
-    """The engines, and why they are off."""
-
     state: str | None = None
     reported: float = -math.inf
     """When the state was published."""
@@ -178,7 +170,6 @@ Change = Callable[[PageState], PageState]
 
 
 def page_states(changes: Observable[Change], initial: PageState) -> Observable[PageState]:
-    """Emit the state after each change."""
     return changes.scan(lambda state, change: change(state), initial)
 
 
@@ -400,13 +391,11 @@ def held(hold: Hold) -> Change:
 
 
 def refuse(page: str, request: str, reason: str) -> Change:
-    """A request of a page is refused."""
     refusal = (page, request, reason)
     return lambda state: state._replace(refusals=state.refusals.add([refusal], MAX_REFUSALS))
 
 
 def turned_off(now: float) -> Change:
-    """A page turns the engines off."""
     return lambda state: state._replace(engines=state.engines._replace(own_turn_off=now))
 
 

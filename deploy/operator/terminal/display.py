@@ -11,8 +11,6 @@ from deploy.operator.terminal.plain import PlainLines
 
 
 class Display(Protocol):
-    """Shows lines and reads typed ones."""
-
     def show(self, lines: Iterable[str]) -> None:
         """Print lines; never block."""
 

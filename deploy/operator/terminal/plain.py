@@ -12,8 +12,6 @@ from deploy.operator.output import say
 
 
 class PlainLines:
-    """Standard output and input, line by line."""
-
     def __init__(self) -> None:
         """Read standard input, unless it is closed."""
         self._input = None if sys.stdin is None else sys.stdin.fileno()

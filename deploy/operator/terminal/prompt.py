@@ -34,7 +34,6 @@ class Prompt:
     """
 
     def __init__(self, words: Sequence[str]) -> None:
-        """Show the prompt, which completes the words."""
         # Only menus need the cursor's position; to ask the terminal for it doubles the cost of a line.
         os.environ["PROMPT_TOOLKIT_NO_CPR"] = "1"
         self._modes = termios.tcgetattr(0)
