@@ -59,7 +59,6 @@ class LossyLog(RotatingFileHandler):  # type: ignore[misc]
         super().reopen()
 
     def emit(self, record: Any) -> None:
-        """Write a line, or drop it."""
         try:
             if self.stream.closed:
                 self.reopen()
@@ -72,8 +71,6 @@ class LossyLog(RotatingFileHandler):  # type: ignore[misc]
 
 
 class ArmInterface:
-    """The RPC namespace `arm` of one supervisord."""
-
     def __init__(self, supervisord: Any) -> None:
         self._supervisord = supervisord
         self._starts: Counter[str] = Counter()
@@ -184,7 +181,6 @@ def lock_directory() -> None:
 
 
 def make_interface(supervisord: Any, **config: str) -> ArmInterface:
-    """The factory of the RPC interface (plugin.py)."""
     loggers.RotatingFileHandler = LossyLog  # for the programs: each start opens its log
     for handler in supervisord.options.logger.handlers:
         if isinstance(handler, RotatingFileHandler):  # in the foreground, there is a handler for the terminal

@@ -30,7 +30,6 @@ def install() -> None:
 
 
 def check() -> None:
-    """Raise Interrupted if a signal has come."""
     if _noted and not _ignored:
         raise Interrupted
 

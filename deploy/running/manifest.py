@@ -18,8 +18,6 @@ PAGE = "operator_page"
 
 
 class Program(NamedTuple):
-    """A supervised program."""
-
     name: str
     """Also the name of its node."""
     module: str

@@ -57,8 +57,6 @@ class Timeouts:
 
 
 class Policy:
-    """Decides on actions."""
-
     def __init__(self, timeouts: Timeouts | None = None) -> None:
         self.kill_inhibited_by = ""
         """why silent services are not killed; '' if they are"""
@@ -81,7 +79,6 @@ class Policy:
         ] = {}  # by the monotonic and the own clock
 
     def decide(self, observation: Observation) -> list[Action]:
-        """Return the actions that are due."""
         observation = self._in_own_time(observation)
         self._count_restarts(observation)
         running = [program for program in observation.programs if program.state in ("STARTING", "RUNNING")]

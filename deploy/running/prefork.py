@@ -145,7 +145,6 @@ def _use(type_: Any) -> None:
 
 
 def _use_names() -> None:
-    """Let rclpy compile the patterns of names."""
     from rclpy.expand_topic_name import expand_topic_name
     from rclpy.validate_full_topic_name import validate_full_topic_name
 

@@ -32,7 +32,6 @@ class Probe:
         self._duplicates: frozenset[processes.Process] = frozenset()
 
     def hear(self, reports: Mapping[str, Health]) -> None:
-        """Note health reports, by program."""
         for program, health in reports.items():
             self._last_health[program, health.pid] = health.heard
 
@@ -61,11 +60,9 @@ class Probe:
         return Observation(now, self._programs, dict(self._last_health), stopped, self._duplicates)
 
     def _states(self) -> list[tuple[str, int]]:
-        """State and parent of the process of each program."""
         return [_state_of(program.pid) for program in self._programs]
 
     def _runs(self, program: Program, state: tuple[str, int]) -> bool:
-        """Whether supervisord knows nothing new about a program."""
         return program.state == "RUNNING" and state[0] != "Z" and state[1] == self._supervisord.pid
 
     def _find_duplicates(self) -> frozenset[processes.Process]:

@@ -23,8 +23,6 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 class Process(NamedTuple):
-    """One live process of a system."""
-
     pid: int
     program: str
     """the supervised program; '' for supervisord itself"""
@@ -154,6 +152,5 @@ def await_end(handles: Iterable[int], wait: float) -> list[int]:
 
 
 def close(handles: Iterable[int]) -> None:
-    """Close pidfds."""
     for handle in handles:
         os.close(handle)

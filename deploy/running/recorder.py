@@ -90,13 +90,11 @@ class Recorder:
             )
 
     def event(self, topic: str, time: int, event: Mapping[str, object]) -> None:
-        """Record an event as JSON in std_msgs/String."""
         data = serialize_message(String(data=json.dumps(event)))
         self.message(topic, "std_msgs/msg/String", "", data, time, time)
 
     @property
     def count(self) -> int:
-        """The number of recorded messages."""
         return self._counts.total()
 
     def save(self) -> None:
@@ -105,7 +103,6 @@ class Recorder:
             self._writer.save()
 
     def close(self) -> None:
-        """Complete the file."""
         with self._lock:
             self._writer.close()
 

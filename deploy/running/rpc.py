@@ -33,8 +33,6 @@ def call(pid: int, method: str, *arguments: object, timeout: float = LIMIT) -> A
 
 
 class _UnixConnection(http.client.HTTPConnection):
-    """HTTP over a unix socket."""
-
     def __init__(self, path: str, timeout: float) -> None:
         super().__init__("localhost")
         self._path = path
@@ -47,8 +45,6 @@ class _UnixConnection(http.client.HTTPConnection):
 
 
 class _UnixTransport(xmlrpc.client.Transport):
-    """XML-RPC over a unix socket."""
-
     def __init__(self, path: str, timeout: float) -> None:
         super().__init__()
         self._unix_connection = _UnixConnection(path, timeout)

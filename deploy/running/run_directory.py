@@ -25,15 +25,12 @@ NOT_YET = -1.0  # scenario_epoch: the scenario waits until this parameter is set
 
 
 class RunDirectory:
-    """The runtime files of a system."""
-
     def __init__(self, run: Path | None = None) -> None:
         """:param run: the directory; by default that of this checkout."""
         self.run = run or processes.run_directory()
 
     @property
     def logs(self) -> Path:
-        """The directory of the programs' logs."""
         return self.run / "logs"
 
     @property

@@ -21,8 +21,6 @@ READY_LIMIT = 20.0  # s that it has to answer its first call
 
 
 class Program(NamedTuple):
-    """A supervised program as supervisord sees it."""
-
     name: str
     state: str
     """STOPPED, STARTING, RUNNING, BACKOFF, STOPPING, EXITED, FATAL or UNKNOWN"""
@@ -80,7 +78,6 @@ class Supervisord:
         self.pid = pid
 
     def programs(self) -> list[Program]:
-        """All programs as it sees them."""
         return self._programs("arm.programs", rpc.LIMIT)
 
     def watch(self) -> list[Program]:

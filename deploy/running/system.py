@@ -32,7 +32,6 @@ class System(RunDirectory):
         return processes.of_system(self.run)
 
     def supervisor(self) -> int | None:
-        """The pid of the running supervisord."""
         return next((process.pid for process in self.members() if not process.program), None)
 
     def environment(self) -> dict[str, str]:
