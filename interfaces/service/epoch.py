@@ -34,7 +34,6 @@ class Epoch:
     """Tells a process when the scenario begins; the first value is final."""
 
     def __init__(self, node: ServiceNode) -> None:
-        """Declare the parameter on a node."""
         start = time.monotonic()
         epoch = node.declare(_Parameters).scenario_epoch
         self.is_past = 0.0 < epoch < start

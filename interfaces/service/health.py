@@ -60,7 +60,6 @@ class HealthReporter:
         node.create_timer(PERIOD, self._on_period, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def count_output(self) -> None:
-        """Count a published message."""
         self._published += 1
         self._last_output = time.monotonic()
 
@@ -161,8 +160,6 @@ def reported_refusals(status: DiagnosticStatus, subject: str) -> list[tuple[int,
 
 
 class Health(NamedTuple):
-    """The last report of a service."""
-
     heard: float
     """When it arrived, on the monotonic clock [s]."""
     pid: int

@@ -21,8 +21,6 @@ _TYPES = {bool: "true or false", int: "an integer", float: "a number with a deci
 
 
 class Declaration(NamedTuple):
-    """A parameter as a service declares it."""
-
     name: str
     default: Any
     within: tuple[Any, Any] | None

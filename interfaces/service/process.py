@@ -55,7 +55,6 @@ def refuse(name: str, reason: str) -> NoReturn:
 
 
 def _run(name: str, wire: Callable[[ServiceNode], None]) -> int:
-    """Return the exit code."""
     try:
         with middleware.without_shared_memory():
             rclpy.init()

@@ -88,8 +88,6 @@ def load(path: str | Path) -> Scenario:
 
 @dataclass(frozen=True)
 class _Item:
-    """A value in the file, with its place for error messages."""
-
     value: Any
     path: str
     key: str
@@ -104,7 +102,6 @@ class _Item:
         return _Item(self.value[key], self.path, f"{self.key}.{key}" if self.key else key)
 
     def require(self, required: Set[str] = frozenset(), optional: Set[str] = frozenset()) -> None:
-        """Require a mapping with these keys."""
         keys = ", ".join(sorted(required | optional))
         if not isinstance(self.value, dict):
             raise self.error(f"must be a mapping with {keys}, not {self.value!r}")

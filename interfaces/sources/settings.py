@@ -72,7 +72,6 @@ class Settings:
         return value
 
     def remember(self, name: str, value: float) -> None:
-        """Keep a number for the next process."""
         if self._file.values.get(name) != value:
             self._file.values[name] = value
             self._save(name)

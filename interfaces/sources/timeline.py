@@ -30,7 +30,6 @@ class Events(Generic[T]):
         return itertools.chain(until[-1:], self.after(time))
 
     def after(self, time: float) -> Iterator[tuple[float, T]]:
-        """Yield the items after a time."""
         return itertools.dropwhile(lambda item: item[0] <= time, self._around(time))
 
     def _around(self, time: float) -> Iterator[tuple[float, T]]:
@@ -61,7 +60,6 @@ class Sweep:
     """How long it stays at each end [s]; less than half the period."""
 
     def at(self, time: float) -> float:
-        """Return the value at a time."""
         ends, since_end = self._since_end(time)
         moved = min(since_end / (self.period / 2 - self.rest), 1.0)
         return self.center - self.amplitude * math.cos(math.pi * (ends + moved))
