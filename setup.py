@@ -56,7 +56,7 @@ def sources() -> dict[str, list[str]]:
 setup(
     name=PACKAGE,
     version=version(),
-    packages=[PACKAGE, "reactive_node", "mcap_files"],
+    packages=[PACKAGE, "reactive_node", "reactive_node.signals", "mcap_files"],
     package_dir={
         PACKAGE: "deploy/package/executables",
         "reactive_node": "interfaces/reactive_node/src/reactive_node",
