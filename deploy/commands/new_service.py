@@ -81,7 +81,7 @@ def _guard(example: str, name: str) -> str:
     story = f"""The {title}: turns the engines off when a value is too great.
 
 User story (ours): as a robot operator, I find the engines off after a value of
-`{name}/input` was too great twice in a row.
+`{name}/input` was too great.
 """
     for old, new in (
         ("Turns the engines off when the effector is too fast.", story),
@@ -89,15 +89,21 @@ User story (ours): as a robot operator, I find the engines off after a value of
             "The example of a service: engines off when the effector is too fast",
             f"The {title} in virtual time",
         ),
-        (" [m/s]: one may be late by a timer", ": one may be wrong"),
+        (" when a speed is above the limit [m/s]", " when a value is above the limit"),
+        ("lambda speed: speed > limit", "lambda value: value > limit"),
+        ("when_a_speed_is", "when_a_value_is"),
         ('"m/s", "greatest speed allowed"', '"", "greatest value allowed"'),
+        ("(topics.EFFECTOR_VELOCITY).map(lambda velocity: velocity.speed)", f"(topics.{_constant(name)})"),
         ("services.examples.", "services."),
-        ("EFFECTOR_SPEED", _constant(name)),
         ("speed_guard", name),
         ("too_fast", "too_great"),
         ("speeds", "values"),
     ):
         example = example.replace(old, new)
+    if "speed" in example.replace(name, ""):
+        raise Refused(
+            f"{EXAMPLE} or {ITS_TEST}: is no template of a guard any more; adapt {Path(__file__).name}"
+        )
     return example
 
 

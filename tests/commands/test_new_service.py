@@ -153,10 +153,12 @@ def test_failure_of_the_tables_takes_everything_back(checkout: Path) -> None:
 
 def test_error_in_the_contract_is_told_with_its_line(checkout: Path) -> None:
     contract = checkout / "interfaces" / "topics.py"
-    contract.write_text(contract.read_text().replace("DRIVE_TIMEOUT = 0.4", "DRIVE_TIMEOUT = 1 / 0"))
+    before, _, after = contract.read_text().partition("DRIVE_TIMEOUT = 0.4")
+    contract.write_text(f"{before}DRIVE_TIMEOUT = 1 / 0{after}")
+    line = before.count("\n") + 1
     before = content(checkout)
     error = make(checkout, "trial_guard")
-    where = "interfaces/topics.py, line 36: ZeroDivisionError: "
+    where = f"interfaces/topics.py, line {line}: ZeroDivisionError: "
     assert error.startswith(f"make new-service: deploy.commands.tables: {where}")
     assert error.count("\n") == 1
     assert content(checkout) == before
