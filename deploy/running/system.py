@@ -123,8 +123,8 @@ class System(RunDirectory):
         if pid := self.supervisor():
             where = f"supervisord has pid {pid} and works in {self.run}"
             raise DeploymentError(f"Already running: {where}. make terminal shows it, make stop ends it")
-        self.forget_settings([program.name for program in manifest.programs()])
         self.write_parameters(parameters)
+        self.forget_settings([program.name for program in manifest.programs()])
 
     def _end_members(self) -> None:
         """End the live processes without supervisord's help."""
