@@ -26,6 +26,7 @@ from rclpy.publisher import Publisher
 from deploy.running import manifest, processes
 from deploy.running.system import System
 from interfaces import topics
+from interfaces.service import middleware
 
 ROOT = Path(__file__).parents[2]
 LIMIT = 30.0  # s for each awaited event, even on a busy machine
@@ -131,6 +132,12 @@ class Command:
                 self._changed.notify_all()
 
 
+def user_environment() -> dict[str, str]:
+    """The environment of a user's shell: without the profiles that nodes of the tests themselves have."""
+    own = {name: value for name, value in os.environ.items() if name != middleware.PROFILES}
+    return own | ({middleware.RANGE: "LOCALHOST"} if own[middleware.RANGE] == "SYSTEM_DEFAULT" else {})
+
+
 class Site:
     """A run directory, a DDS domain and a ROS namespace for one system of a checkout."""
 
@@ -145,7 +152,7 @@ class Site:
     @property
     def environment(self) -> dict[str, str]:
         """The variables that a user sets for a second system next to the usual one."""
-        return os.environ | {
+        return user_environment() | {
             "REACTIVE_ARM_RUN_DIR": str(self.run),
             "REACTIVE_ARM_NAMESPACE": self.namespace,
             "ROS_DOMAIN_ID": str(self.domain),
@@ -228,7 +235,7 @@ class Checkout(Site):
     @property
     def environment(self) -> dict[str, str]:
         path = f"{self.directory / '.venv' / 'bin'}{os.pathsep}{os.environ['PATH']}"
-        return os.environ | {"ROS_DOMAIN_ID": str(self.domain), "PATH": path}
+        return user_environment() | {"ROS_DOMAIN_ID": str(self.domain), "PATH": path}
 
     def close(self) -> None:
         """End all commands and the system; its files must not meet the next test."""

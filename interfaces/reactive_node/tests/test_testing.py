@@ -18,6 +18,9 @@ def test_environment_selects_domain_on_this_machine(
     monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest
 ) -> None:
     monkeypatch.delenv("ROS_AUTOMATIC_DISCOVERY_RANGE")
+    monkeypatch.delenv(
+        "FASTRTPS_DEFAULT_PROFILES_FILE", raising=False
+    )  # conftest.py replaces the range by a profile
 
     domain_id = request.getfixturevalue("domain_id")
 
