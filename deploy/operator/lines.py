@@ -19,6 +19,7 @@ Span = tuple[datetime, datetime]
 """The times just before and just after a command was published."""
 
 BURST = 6  # lines of a kind in a row before they are thinned
+DISCOVERY = 1.0  # s within which a drive is heard, if there is one
 SIGNAL_BURST = 12  # Listing 5.9 has 11 signals
 FIRST, LAST = datetime.min.replace(tzinfo=UTC), datetime.max.replace(tzinfo=UTC)
 NEVER = (LAST, FIRST)
@@ -78,11 +79,13 @@ def line_batches(
 
 def measurements(seen: Seen) -> Observable[Line]:
     configuration = rx.combine_latest(*(seen(topic) for topic in topics.CONFIGURATION.values())).map(_joined)
+    drive = seen(topics.DRIVEN_TIME).take(1).map(lambda _: True)
+    is_driven = drive.timeout(DISCOVERY, drive.start_with(False)).start_with(True)
+    data = unrepeated(configuration, is_driven, lambda it: it)
+    positions = unrepeated(seen(topics.EFFECTOR_POSITION), is_driven, lambda it: (it.x, it.y))
     return rx.merge(
-        thinned(configuration).map(_line(Kind.DATA, lambda it: f"### Received new data: {{{_numbers(it)}}}")),
-        thinned(seen(topics.EFFECTOR_POSITION)).map(
-            _line(Kind.POSITION, lambda it: f"Position x: {it.x:g} and y: {it.y:g}")
-        ),
+        thinned(data).map(_line(Kind.DATA, lambda it: f"### Received new data: {{{_numbers(it)}}}")),
+        thinned(positions).map(_line(Kind.POSITION, lambda it: f"Position x: {it.x:g} and y: {it.y:g}")),
         thinned(seen(topics.EFFECTOR_SPEED)).map(_line(Kind.SPEED, lambda it: f"Speed: {it:g} [m/s]")),
     )
 
@@ -135,6 +138,21 @@ def services(seen: Seen, namespace: str) -> Observable[Line]:
         seen(topics.DIAGNOSTICS).scan(compare, Complaints({}, Timestamp("", FIRST))).map(lambda it: it.new)
     )
     return thinned(complaints.filter(lambda it: it.value)).map(_line(Kind.SERVICE, str))
+
+
+def unrepeated(
+    items: Observable[Timestamp[Any]], is_driven: Observable[bool], key: Callable[[Any], Any]
+) -> Observable[Timestamp[Any]]:
+    """
+    Emit only changes if a drive moves the joints: a joint that stands publishes its angle again and again.
+
+    Without a drive, all are emitted: Listing 5.9 shows values that are published twice.
+    """
+
+    def is_repeated(before: tuple[Any, bool], now: tuple[Any, bool]) -> bool:
+        return now[1] and key(before[0].value) == key(now[0].value)
+
+    return items.with_latest_from(is_driven).distinct_until_changed(comparer=is_repeated).map(_first)
 
 
 def thinned(items: Observable[Timestamp[Any]], burst: int = BURST) -> Observable[Timestamp[Any]]:
@@ -209,8 +227,8 @@ def _is_own(command: tuple[Timestamp[Any], Span]) -> bool:
     return before <= item.timestamp <= after
 
 
-def _first(command: tuple[Timestamp[Any], Span]) -> Timestamp[Any]:
-    return command[0]
+def _first(pair: tuple[Timestamp[Any], Any]) -> Timestamp[Any]:
+    return pair[0]
 
 
 def _complaints(diagnostics: Any, namespace: str) -> Iterator[tuple[str, str]]:

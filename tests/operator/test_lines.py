@@ -86,6 +86,27 @@ def test_data_appear_when_all_four_values_are_known_and_at_each_change(play: Pla
     ]
 
 
+DRIVEN = [(0.5, topics.DRIVEN_TIME, 0.0)]
+
+
+@pytest.mark.parametrize(("drive", "shown"), [(DRIVEN, [1, 2, 4]), ([], [1, 2, 3, 4])])
+def test_values_of_an_arm_with_a_drive_are_shown_when_they_change(
+    play: Play, drive: list[Message], shown: list[float]
+) -> None:
+    script = values((1, topics.L1, 2), (1, topics.L2, 3), (1, topics.THETA1, 0), (1, topics.THETA2, 0))
+    changes = values((2, topics.THETA1, 1), (3, topics.THETA1, 1), (4, topics.THETA1, 0))
+    assert times(play(drive + script + changes)) == shown
+
+
+@pytest.mark.parametrize(("drive", "shown"), [(DRIVEN, [0.2, 3]), ([], [0.2, 2, 3])])
+def test_positions_of_an_arm_with_a_drive_are_shown_when_they_change(
+    play: Play, drive: list[Message], shown: list[float]
+) -> None:
+    places = {0.2: (2.0, 3.0), 0.4: (2.0, 3.0), 2: (2.0, 3.0), 3: (2.0, 3.5)}
+    positions = [(at, Position(int(at * 1e9), *place)) for at, place in places.items()]
+    assert times(play(drive + [(at, topics.EFFECTOR_POSITION, it) for at, it in positions])) == shown
+
+
 def test_lines_of_a_batch_are_in_the_order_of_their_source_times(play: Play) -> None:
     sent_first = Position(0, -3.4029603, 3.1472500)
     script = [
