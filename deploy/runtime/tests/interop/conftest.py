@@ -15,10 +15,10 @@ NUMBERS = count()
 
 @pytest.fixture(scope="module")
 def start_peer(module_domain_id: int) -> Iterator[StartPeer]:
-    """Starts processes in a domain of the module; they end after the module."""
+    """Starts processes in a domain of the module, with more variables; they end after the module."""
     domain = {"ROS_DOMAIN_ID": str(module_domain_id)}
     with ExitStack() as stack:
-        yield lambda rclpy, name="": stack.enter_context(PeerProcess(rclpy, domain, name))
+        yield lambda rclpy, name="", **more: stack.enter_context(PeerProcess(rclpy, domain | more, name))
 
 
 @pytest.fixture(scope="module")

@@ -15,11 +15,18 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from deploy.runtime.tests.host import TIMEOUT
+from deploy.runtime.tests.host import RANGE, TIMEOUT
 
 PROGRAM = Path(__file__).with_name("peer.py")
 PAIRS = [("embedded", "jazzy"), ("jazzy", "embedded")]
 """The embedded rclpy, and ROS 2's own in the same environment."""
+WITHOUT_SHARED_MEMORY = {
+    "jazzy": {
+        RANGE: "SYSTEM_DEFAULT",  # the profile keeps to loopback; the range would add shared memory
+        "FASTRTPS_DEFAULT_PROFILES_FILE": str(Path(__file__).parents[3] / "fastdds.localhost.xml"),
+    }
+}
+"""For peers that are killed: the environment in which they leave no files in /dev/shm."""
 KILTED_PYTHON = "KILTED_PYTHON"
 """Environment variable: the Python of an environment with ROS 2 Kilted's rclpy from PyPI."""
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from deploy.runtime.tests.host import wait_until
 from deploy.runtime.tests.interop.conftest import PeerOn, StartPeer
-from deploy.runtime.tests.interop.processes import PAIRS
+from deploy.runtime.tests.interop.processes import PAIRS, WITHOUT_SHARED_MEMORY
 
 FLOAT64, POSITION = "std_msgs/msg/Float64", "geometry_msgs/msg/PointStamped"
 PARAMETER_SERVICES = (
@@ -76,7 +76,8 @@ def test_type_has_the_same_hash_on_each_rclpy(
 def test_killed_node_leaves_the_graph_of_the_other(
     watched: str, watching: str, peer_on: PeerOn, start_peer: StartPeer, topic: str
 ) -> None:
-    node, other = start_peer(watched, "killed"), peer_on(watching)
+    node = start_peer(watched, "killed", **WITHOUT_SHARED_MEMORY.get(watched, {}))
+    other = peer_on(watching)
     other("subscribe", topic, FLOAT64, {"depth": 1})
     node("advertise", topic, FLOAT64, {"depth": 1})
     wait_until(lambda: other("writers", topic) == 1 and node.full_name in other("nodes"))
