@@ -33,14 +33,15 @@ README = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
 README = README.replace("example_interfaces", Fibonacci.__module__.partition(".")[0])
 BLOCKS = re.findall(r"^```python\n(.*?)^```$", README, re.DOTALL | re.MULTILINE)
 NAME = re.compile(r"# (\w+\.py)\n")
-"""The first line of a block that is a file."""
+"""The first line of a block that is a file, or a part of an example."""
+EXAMPLES = {path.name: path.read_text() for path in Path(__file__).parents[1].glob("examples/*.py")}
 
 
 @pytest.fixture
 def files(tmp_path: Path) -> Path:
-    for block in BLOCKS:
-        if name := NAME.match(block):
-            (tmp_path / name[1]).write_text(block)
+    shown = {name[1]: block for block in BLOCKS if (name := NAME.match(block))}
+    for name, text in (shown | EXAMPLES).items():
+        (tmp_path / name).write_text(text)
     return tmp_path
 
 
@@ -129,6 +130,11 @@ def test_listings_use_action_service_transform_and_latest(
     assert response is not None
     assert response.result().success is True
     assert counts[0] == len("hello")
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_shown_part_is_in_the_example(name: str) -> None:
+    assert [block for block in BLOCKS if block.removeprefix(f"# {name}\n") in EXAMPLES[name]]
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=lambda number: number.name)
