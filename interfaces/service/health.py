@@ -42,7 +42,7 @@ class HealthReporter:
         self._before_report = before_report
         self._started = time.monotonic()
         self._published = 0
-        self._dropped = 0
+        self.dropped = 0  # messages since the start
         self._last_output: float | None = None
         self._remarks: dict[str, Counter[str]] = {}  # since the last report: subject, reason, how often
         self._logged: set[str] = set()  # the remarks of the last report
@@ -65,7 +65,7 @@ class HealthReporter:
 
     def drop(self, subject: str, reason: str) -> None:
         """Count a dropped message and remark the reason."""
-        self._dropped += 1
+        self.dropped += 1
         self.remark(subject, reason)
 
     def remark(self, subject: str, reason: str) -> None:
@@ -109,7 +109,7 @@ class HealthReporter:
             _PID: os.getpid(),
             "uptime": f"{now - self._started:.3f}",
             _PUBLISHED: self._published,
-            "dropped": self._dropped,
+            "dropped": self.dropped,
             _SINCE_OUTPUT: "" if self._last_output is None else f"{now - self._last_output:.3f}",
             **self._counts,
             **{f"{_REFUSED}{subject}": json.dumps(samples) for subject, samples in refused.items()},

@@ -193,7 +193,7 @@ def test_joint_plays_no_time_that_waited(
     monkeypatch.setattr(stamps, "now", lambda shift=timedelta(seconds=0.5), now=stamps.now: now() + shift)
     joint.publish(DRIVEN_TIME, Float64(data=2.0))
 
-    joint.spin_until(lambda: joint.service.health._dropped)
+    joint.spin_until(lambda: joint.service.health.dropped)
     assert angles(joint) == []
 
 

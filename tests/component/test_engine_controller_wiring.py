@@ -51,7 +51,7 @@ class Controller(Wired):
         self.spin_until(lambda: self.states[-1:] == [state])
 
     def await_rejection(self) -> str:
-        self.spin_until(lambda: self.service.health._dropped)
+        self.spin_until(lambda: self.service.health.dropped)
         (remark,) = self.remarks()
         assert self.reports()[-1]["dropped"] == "1"
         return remark

@@ -71,7 +71,7 @@ def test_heartbeat_older_than_the_lifespan_is_dropped_and_counted(
     watchdog = wired(lifespan=0.4, sampling=0.01)
     monkeypatch.setattr(watchdog.service, "age", lambda _: 0.401)
     watchdog.publish(OPERATOR_HEARTBEAT, Bool(data=True))
-    spin_until(lambda: watchdog.service.health._dropped)
+    spin_until(lambda: watchdog.service.health.dropped)
     spin_for(0.1)
 
     assert data(watchdog, OPERATOR_ACTIVITY) == []
@@ -86,7 +86,7 @@ def test_of_a_burst_of_heartbeats_the_newest_is_judged(
     monkeypatch.setattr(watchdog.service, "age", lambda _: 0.501)
     for _ in range(50):
         watchdog.publish(OPERATOR_HEARTBEAT, Bool(data=True))
-    spin_until(lambda: watchdog.service.health._dropped)
+    spin_until(lambda: watchdog.service.health.dropped)
     spin_for(0.1)
     watchdog.remarks()
     assert int(watchdog.reports()[-1]["dropped"]) < 5

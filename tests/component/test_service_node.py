@@ -132,9 +132,9 @@ def test_bad_messages_are_dropped_and_reported(
     spin_until(lambda: publisher.get_subscription_count() == 1)
 
     for message in bad:
-        before = service.health._dropped
+        before = service.health.dropped
         publisher.publish(message)
-        spin_until(lambda before=before: service.health._dropped == before + 1)
+        spin_until(lambda before=before: service.health.dropped == before + 1)
     for message in good:
         publisher.publish(message)
         spin_until(lambda message=message: received[-1:] == [topic.value(message)])
@@ -177,9 +177,9 @@ def test_truncated_messages_are_dropped_and_reported(
     whole = bytes(serialize_message(message))
 
     for length in range(8, len(whole), 4):  # DDS pads to four octets
-        before = service.health._dropped
+        before = service.health.dropped
         publisher.publish(whole[:length])
-        spin_until(lambda before=before: service.health._dropped == before + 1)
+        spin_until(lambda before=before: service.health.dropped == before + 1)
     publisher.publish(whole)
     spin_until(lambda: received)
 
