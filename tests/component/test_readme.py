@@ -33,6 +33,10 @@ def text_of(page: str) -> str:
     return text if topics.TF in topics.CONTRACT else re.sub(r".*(`/tf` \||-- /tf).*\n", "", text)
 
 
+def programs_of(page: str) -> list[str]:
+    return re.findall(r"```python\n(.*?)```", text_of(page), re.DOTALL)
+
+
 def test_first_page_is_one_screen() -> None:
     assert text_of("README.md").count("\n") <= 120
 
@@ -46,8 +50,16 @@ def test_tables_and_graph_are_current(page: str) -> None:
 @pytest.mark.parametrize("page", RECIPES)
 def test_shown_recipe_is_the_one_of_the_service(page: str) -> None:
     code = (ROOT / RECIPES[page]).read_text()
-    recipe = re.findall(r"```python\n(.*?)```", text_of(page), re.DOTALL)[0]
+    recipe = programs_of(page)[0]
     assert any(textwrap.indent(recipe, " " * depth) in code for depth in (0, 4, 8))
+
+
+def test_shown_simulation_is_a_part_of_the_tested_example() -> None:
+    shown, tested = (
+        {line.partition("  #")[0] for line in programs_of(page)[-1].splitlines()}
+        for page in ("README.md", "deploy/simulation_kit/README.md")
+    )
+    assert shown <= tested
 
 
 @pytest.mark.parametrize("page", PAGES)
