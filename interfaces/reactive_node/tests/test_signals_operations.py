@@ -6,12 +6,13 @@ import math
 from collections.abc import Callable
 from functools import cache
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from reactivex import Observable, never
+from reactivex.notification import OnError
 
 from interfaces.reactive_node.tests.arrivals import (
     LATENESS,
@@ -146,6 +147,52 @@ def test_function_of_time_is_known_at_once(scheduler: VirtualTime) -> None:
     recording = scheduler.record(of_time(lambda time: time / SECOND).sample(0.25), until=1.0)
 
     assert recording.items == [(t, Answer(round(t * SECOND), t)) for t in (0.0, 0.25, 0.5, 0.75, 1.0)]
+
+
+# Tuples
+
+
+class Pair(NamedTuple):
+    x: float
+    y: tuple[float, ...]
+
+
+@pytest.mark.parametrize(
+    ("make", "value"),
+    [
+        (lambda s: s.derivative(0.1), Pair(10.0, (-20.0,))),
+        (lambda s: s.integral(0.1), Pair(0.2, (-0.4,))),
+    ],
+)
+def test_results_have_the_structure_of_the_values(
+    scheduler: VirtualTime, make: Callable[[Signal[Any]], Signal[Any]], value: Pair
+) -> None:
+    moving = of_time(lambda time: Pair(10.0 * time / SECOND, (-20.0 * time / SECOND,)))
+
+    _, _, found, *_ = answers(scheduler, make(moving), 0.1)
+
+    assert type(found.value) is Pair
+    assert (found.value.x, *found.value.y) == pytest.approx((value.x, *value.y))
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda samples: linear(samples, lateness=LATENESS, gap=GAP),
+        lambda samples: hold(samples, lateness=LATENESS).derivative(0.1),
+        lambda samples: hold(samples, lateness=LATENESS).integral(0.05),
+    ],
+    ids=["linear", "derivative", "integral"],
+)
+def test_tuple_that_changes_its_length_is_an_error(
+    scheduler: VirtualTime, make: Callable[[Any], Signal[Any]]
+) -> None:
+    samples = arriving(scheduler, [Arrival(0, (1.0, 2.0), 0), Arrival(200 * MS, (1.0,), 0)])
+
+    *_, end = scheduler.record(make(samples).sample(0.01), until=1.5).messages
+
+    assert isinstance(end.value, OnError)
+    assert "zip()" in str(end.value.exception)
 
 
 # Time

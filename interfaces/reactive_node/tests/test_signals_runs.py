@@ -79,6 +79,15 @@ def test_replay_gives_the_answers_of_a_run_with_late_samples(
     assert not refused
 
 
+def test_each_refusal_concerns_one_sample(scheduler: VirtualTime) -> None:
+    first, copy, other = stamped("a", 5), stamped("a", 5), stamped("b", 5)
+    refused = [Refused(5, "a", "late"), Refused(5, "b", "late", taken=7)]
+
+    taken = as_taken(scheduler.hot((0.1, first), (0.2, copy), (0.3, other)), refused)
+
+    assert items(scheduler, taken) == [stamped("a", 5), stamped("b", 7)]
+
+
 # Memory and clocks
 
 

@@ -131,6 +131,7 @@ def test_linear_follows_the_structure_of_tuples(scheduler: VirtualTime) -> None:
     found = answers(scheduler, linear(samples, lateness=LATENESS, gap=1.0), period=0.25)
 
     assert found[1] == Answer(SECOND // 4, Answer(2.0, (0.25, 15.0), 5.0), CERTAIN)
+    assert type(found[1].value) is Answer
 
 
 Quaternion = tuple[float, float, float, float]
