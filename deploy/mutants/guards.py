@@ -9,7 +9,9 @@ _CHECKERS = (
     "tests/promises/test_bounds.py",
     "tests/promises/test_checkers.py",
 )
-_SIGNALS = tuple(f"{_NODE_TESTS}/test_signals_{name}.py" for name in ("samples", "operations", "runs"))
+_SAMPLES, _OPERATIONS, _RUNS = (
+    f"{_NODE_TESTS}/test_signals_{name}.py" for name in ("samples", "operations", "runs")
+)
 
 GUARDS: dict[str, tuple[str, ...]] = {
     "services/operator_watchdog.py": (
@@ -72,15 +74,15 @@ GUARDS: dict[str, tuple[str, ...]] = {
         f"{_NODE_TESTS}/test_events.py",
         f"{_NODE_TESTS}/test_end.py",
     ),
-    f"{REACTIVE_NODE}/signals/samples.py": _SIGNALS,
-    f"{REACTIVE_NODE}/signals/source.py": _SIGNALS,
-    f"{REACTIVE_NODE}/signals/run.py": _SIGNALS,
-    f"{REACTIVE_NODE}/signals/questions.py": _SIGNALS,
-    f"{REACTIVE_NODE}/signals/signal.py": _SIGNALS,
-    f"{REACTIVE_NODE}/signals/crossings.py": _SIGNALS,
-    f"{REACTIVE_NODE}/signals/integral.py": _SIGNALS,
-    f"{REACTIVE_NODE}/signals/replay.py": _SIGNALS,
-    f"{REACTIVE_NODE}/signals/values.py": _SIGNALS,
+    f"{REACTIVE_NODE}/signals/samples.py": (_SAMPLES, _RUNS),
+    f"{REACTIVE_NODE}/signals/source.py": (_SAMPLES, _OPERATIONS, _RUNS),
+    f"{REACTIVE_NODE}/signals/run.py": (_OPERATIONS, _RUNS),
+    f"{REACTIVE_NODE}/signals/questions.py": (_OPERATIONS, _RUNS),
+    f"{REACTIVE_NODE}/signals/signal.py": (_OPERATIONS, _SAMPLES),
+    f"{REACTIVE_NODE}/signals/crossings.py": (_OPERATIONS,),
+    f"{REACTIVE_NODE}/signals/integral.py": (_OPERATIONS, _RUNS),
+    f"{REACTIVE_NODE}/signals/replay.py": (_RUNS,),
+    f"{REACTIVE_NODE}/signals/values.py": (_SAMPLES, _OPERATIONS),
     "deploy/running/policy.py": (
         "tests/running/test_policy.py",
         "tests/running/test_sentinel.py",
