@@ -115,6 +115,7 @@ def test_lift_applies_a_function_at_each_time(one: list[Arrival], other: list[Ar
         (lambda a, b: a * 3, 24.0),
         (lambda a, b: 3 * a, 24.0),
         (lambda a, b: a / 2, 4.0),
+        (lambda a, b: 2 / a, 0.25),
     ],
 )
 def test_arithmetic_is_that_of_the_values(

@@ -158,6 +158,9 @@ class Signal(Generic[T]):
     def __truediv__(self, other: Any) -> Signal[Any]:
         return lift(operator.truediv)(self, other)
 
+    def __rtruediv__(self, other: Any) -> Signal[Any]:
+        return lift(operator.truediv)(other, self)
+
     def __neg__(self) -> Signal[Any]:
         return lift(operator.neg)(self)
 
