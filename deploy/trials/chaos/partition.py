@@ -129,7 +129,8 @@ class TwoHosts(Testbed):
         self.arms = [RealArm("/", System(self._runs / "run", within[ROBOT]))]
         self._on_operators_host = within[CONTROL]
         self._operator = System(self._runs / "run_operator")
-        self._operator.run.mkdir()  # lets the next start of the chaos monkey find and end the switch
+        # The run directory lets the next start of the chaos monkey find and end the switch.
+        self._operator.forget_settings([SWITCH])
         stack.callback(self._operator.stop)
 
     def start(self, arm: RealArm, parameters: Mapping[str, object]) -> None:
@@ -138,10 +139,12 @@ class TwoHosts(Testbed):
         arm.system.halt(SWITCH)
         program = next(program for program in manifest.programs() if program.name == SWITCH)
         service = [sys.executable, "-m", program.module, *program.arguments]
+        path = os.pathsep.join([str(processes.ROOT), os.environ.get("PYTHONPATH", "")])
+        marks = {processes.MARK: str(self._operator.run), "SUPERVISOR_PROCESS_NAME": SWITCH}
         subprocess.Popen(
             [*self._on_operators_host, *service, "--ros-args", "--params-file", str(arm.system.parameters)],
-            cwd=processes.ROOT,
-            env={**os.environ, processes.MARK: str(self._operator.run), "SUPERVISOR_PROCESS_NAME": SWITCH},
+            cwd=self._operator.run,  # where its settings are
+            env={**os.environ, **marks, "PYTHONPATH": path},
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
