@@ -92,8 +92,8 @@ def test_replay_of_a_real_play_is_equal_and_the_same_each_time(tmp_path: Path) -
 
 POSITION = (
     "kinematics.py",
-    "y = l1 * math.sin(theta1) +",
-    "y = l1 * math.sin(theta1) -",
+    ".starmap(forward_kinematics)",
+    ".starmap(forward_kinematics).map(lambda at: (at[0], -at[1]))",
     "effector/position",
 )
 SPEED = ("velocity.py", "before.y) / seconds", "before.y) / seconds * 1.001", "effector/speed")
