@@ -26,7 +26,7 @@ from rclpy.publisher import Publisher
 from deploy.running import manifest, processes
 from deploy.running.system import System
 from interfaces import topics
-from interfaces.service import middleware
+from tests.environment import user_environment
 
 ROOT = Path(__file__).parents[2]
 LIMIT = 30.0  # s for each awaited event, even on a busy machine
@@ -130,12 +130,6 @@ class Command:
             with self._changed:
                 self.lines.append((time.monotonic(), line.rstrip("\r\n")))
                 self._changed.notify_all()
-
-
-def user_environment() -> dict[str, str]:
-    """The environment of a user's shell: without the profiles that nodes of the tests themselves have."""
-    own = {name: value for name, value in os.environ.items() if name != middleware.PROFILES}
-    return own | ({middleware.RANGE: "LOCALHOST"} if own[middleware.RANGE] == "SYSTEM_DEFAULT" else {})
 
 
 class Site:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 from pathlib import Path
@@ -13,6 +12,7 @@ from deploy.promises.history import History
 from deploy.promises.promises import CHECKERS
 from deploy.running import processes
 from deploy.trials.chaos.arm import file_suffix
+from tests.environment import user_environment
 
 TIMEOUT = 150.0  # s
 
@@ -51,7 +51,7 @@ def unleash(run: Path, *options: str) -> tuple[str, int]:
     process = subprocess.Popen(
         [sys.executable, "-m", "deploy.trials.chaos", *options],
         cwd=processes.ROOT,
-        env={**os.environ, "REACTIVE_ARM_RUN_DIR": str(run)},
+        env=user_environment() | {"REACTIVE_ARM_RUN_DIR": str(run)},
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
