@@ -1,0 +1,51 @@
+"""The permission to move that every drive needs: a young ``on`` (deploy/SAFETY.md, A1)."""
+
+from __future__ import annotations
+
+from datetime import datetime, timedelta
+from typing import NamedTuple
+
+import reactivex as rx
+from reactivex import Observable
+from reactivex.scheduler import ImmediateScheduler
+
+from interfaces.service import ServiceNode
+from interfaces.topics import DRIVE_TIMEOUT, ENGINES_STATE, ON
+
+
+class EngineState(NamedTuple):
+    """A state of the engines as it arrived."""
+
+    name: str
+    at: datetime  # of the arrival, on the Rx clock, which is never set
+    age: float  # of the source time at arrival [s]
+
+
+def permissions(states: Observable[EngineState]) -> Observable[bool]:
+    """
+    Emit whether a drive may move: with each state, and ``False`` as soon as an ``on`` is not young any more.
+
+    An ``on`` is accepted for 400 ms from its source time. It begins with ``False``, and ends with the states.
+    """
+
+    def is_young(state: EngineState) -> bool:
+        return state.name == ON and state.age < DRIVE_TIMEOUT
+
+    def end(state: EngineState) -> Observable[bool]:
+        due = state.at + timedelta(seconds=DRIVE_TIMEOUT - max(state.age, 0.0))
+        return rx.timer(due).map(lambda _: False) if is_young(state) else rx.never()
+
+    def permitted(states: Observable[EngineState]) -> Observable[bool]:
+        ends = states.switch_map(end).take_until(states.last_or_default(None))
+        return rx.merge(rx.just(False, ImmediateScheduler.singleton()), states.map(is_young), ends)
+
+    return states.publish(permitted)
+
+
+def observe(node: ServiceNode) -> Observable[bool]:
+    """Return the permissions of the arm of a node."""
+    # The arrival before the age: a pause in between must make a state older, not younger.
+    states = node.observe(ENGINES_STATE, timestamped=True).timestamp()
+    return permissions(
+        states.map(lambda it: EngineState(it.value.value, it.timestamp, node.age(it.value.timestamp)))
+    )
