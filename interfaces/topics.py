@@ -126,16 +126,22 @@ class Topic:
     a topic that reports single events, or that is silent while it does not know."""
     follows: str = ""
     """The name of the topic without which this one falls silent; empty if there is none."""
+    raw: bool = False
+    """Whether its values are whole messages, whatever their type."""
 
     @cached_property
     def value(self) -> Conversion:
         """Return the value of a message: its ``data``, a :class:`Position`, a datetime, or the message."""
-        return _CONVERSIONS.get(self.type, (_unchanged, _unchanged))[0]
+        return _CONVERSIONS.get(self._converted, (_unchanged, _unchanged))[0]
 
     @cached_property
     def message(self) -> Conversion:
         """Return the message of a value: the inverse of :attr:`value`."""
-        return _CONVERSIONS.get(self.type, (_unchanged, _unchanged))[1]
+        return _CONVERSIONS.get(self._converted, (_unchanged, _unchanged))[1]
+
+    @property
+    def _converted(self) -> Any:
+        return None if self.raw else self.type
 
     @property
     def type_name(self) -> str:

@@ -1,0 +1,94 @@
+"""Turns a real drive on and off: by a service (std_srvs/SetBool), by a file such as a GPIO's, or by both.
+
+User story (ours): as a robot operator, I find the drive off unless the engine controller has said `on` within
+the last 400 ms: also when this process starts, when it ends, and when an order to the drive fails.
+
+The order is repeated every 100 ms. A drive that stops when the repetition ends is safe even while this
+process is killed or stopped; another one stays on until supervisord has started the process again.
+"""
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import reactivex as rx
+from reactivex import Observable
+from std_srvs.srv import SetBool
+
+from interfaces import permission, service
+from interfaces.service import Rejected, ServiceNode, UserError, parameter
+from interfaces.topics import DRIVE_TIMEOUT, ENGINES_STATE
+
+REPEAT = 0.1  # s
+Order = Callable[[bool], Observable[Any]]
+"""Orders a drive on or off; emits an item when it has obeyed, and ends in an error if it has not."""
+
+
+def orders(permissions: Observable[bool], order: Order) -> Observable[bool | Rejected]:
+    """
+    Order the drive on while that is permitted, else off, at once and repeatedly; emit what it has obeyed.
+
+    After an `on` that failed, the drive is off until it has been forbidden and permitted again.
+    """
+
+    def repeated(attempt: Observable[Any]) -> Observable[Any]:
+        # A late answer delays the next repetition, not a change.
+        return rx.timer(0.0, REPEAT).map(lambda _: attempt).exclusive()
+
+    def rejected(error: Exception, _: Any = None) -> Observable[Any]:
+        return rx.just(Rejected(ENGINES_STATE, f"the drive does not obey: {error}"))
+
+    off = repeated(order(False).map(lambda _: False).catch(rejected))
+    on = repeated(order(True).map(lambda _: True))
+    safe = on.catch(lambda error, _: rx.merge(rejected(error), off))
+    return permissions.distinct_until_changed().switch_map(lambda permitted: safe if permitted else off)
+
+
+@dataclass(frozen=True)
+class Parameters:
+    service: str = parameter("", None, "", "name of the driver's service; empty for none")
+    file: str = parameter("", None, "", "file that gets `1` or `0`; empty for none")
+
+
+def wire(node: ServiceNode) -> None:
+    """Connect the recipe with its topic and the drive."""
+    given = node.declare(Parameters)
+    if not given.service and not given.file:
+        raise UserError("no drive: set the parameter service or file")
+    if given.file and not os.access(given.file, os.W_OK):
+        raise UserError(f"file: {given.file} does not exist or cannot be written")
+
+    def write(on: bool) -> None:
+        with open(given.file, "r+", encoding="ascii") as file:
+            file.write(f"{on:d}\n")
+
+    def report(item: bool | Rejected) -> None:
+        if isinstance(item, Rejected):
+            node.health.drop(item.topic.name, item.reason)
+        else:
+            node.health.count_output()
+
+    def connect(order: Order, turn_off: Callable[[], None]) -> None:
+        permissions = permission.observe(node).finally_action(turn_off)  # the end of the node ends them
+        orders(permissions, order).subscribe(report, node.fail, scheduler=node.scheduler)
+
+    if given.file:
+        connect(lambda on: rx.from_callable(lambda: write(on)), lambda: write(False))
+    if given.service:
+        call = node.create_call(SetBool, given.service, timeout=DRIVE_TIMEOUT)
+        client = node.create_client(SetBool, given.service)
+
+        def ask(on: bool) -> Observable[Any]:
+            refused = RuntimeError(f"{given.service} refused {'on' if on else 'off'}")
+            answers = call(SetBool.Request(data=on))
+            return answers.flat_map(lambda it: rx.just(it) if it.success else rx.throw(refused))
+
+        def turn_off() -> None:
+            client.call_async(SetBool.Request(data=False))  # a call would wait for the answer
+
+        connect(ask, turn_off)
+
+
+if __name__ == "__main__":
+    service.run("drive_adapter", wire)

@@ -1,0 +1,80 @@
+"""Lets the velocity commands of a robot pass while the engines are on, and stops the robot otherwise.
+
+User story (ours): as an operator of a mobile robot, I drive it only while I hold the switch.
+
+Commands come on `cmd_vel_in`, the robot listens to `cmd_vel`. A robot that stops when `cmd_vel` falls silent
+stops in time even if this process dies; another one waits until supervisord has started the process again.
+"""
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+import reactivex as rx
+from geometry_msgs.msg import Twist, TwistStamped
+from rclpy.qos import QoSProfile
+from reactivex import Observable
+
+from interfaces import permission, service, topics
+from interfaces.topics import DRIVE_TIMEOUT
+
+
+def _not_finite(command: Any) -> str:
+    twist = getattr(command, "twist", command)
+    parts = [part for it in (twist.linear, twist.angular) for part in (it.x, it.y, it.z)]
+    return "" if all(map(math.isfinite, parts)) else f"{parts} is not finite"
+
+
+COMMANDS = topics.Topic(
+    "cmd_vel_in",
+    Twist,
+    QoSProfile(depth=1),
+    "m/s, rad/s",
+    ("teleoperation or navigation",),
+    ("twist_gate",),
+    "wanted velocity",
+    _not_finite,
+    raw=True,
+)
+REPEAT = 0.1  # s: the zero is repeated, so that a base that starts later gets it
+
+
+def gated(commands: Observable[Any], permissions: Observable[bool], zero: Any) -> Observable[Any]:
+    """Emit the commands while they are permitted, and ``zero`` otherwise, at once and repeatedly."""
+
+    def velocities(permissions: Observable[bool]) -> Observable[Any]:
+        passing = (
+            commands.with_latest_from(permissions).filter(lambda pair: pair[1]).map(lambda pair: pair[0])
+        )
+        zeros = rx.timer(0.0, REPEAT).map(lambda _: zero)
+        return rx.merge(passing, permissions.switch_map(lambda permitted: rx.never() if permitted else zeros))
+
+    return permissions.distinct_until_changed().publish(velocities)
+
+
+@dataclass(frozen=True)
+class Parameters:
+    stamped: bool = service.parameter(
+        False, None, "", "whether the commands are TwistStamped instead of Twist"
+    )
+
+
+def wire(node: service.ServiceNode) -> None:
+    """Connect the recipe with its topics."""
+    kind = TwistStamped if node.declare(Parameters).stamped else Twist
+    source = replace(COMMANDS, type=kind)
+    sink = replace(source, name="cmd_vel", publishers=("twist_gate",), subscribers=("the robot",))
+    # A command that waited in a queue is not what the hand wants now.
+    commands = node.observe(source, max_age=DRIVE_TIMEOUT)
+
+    def now(velocity: Any) -> Any:
+        if kind is TwistStamped and velocity is zero:
+            velocity.header.stamp = node.get_clock().now().to_msg()
+        return velocity
+
+    zero: Any = kind()
+    node.publish(sink, gated(commands, permission.observe(node), zero).map(now))
+
+
+if __name__ == "__main__":
+    service.run("twist_gate", wire)
