@@ -6,7 +6,7 @@ an edited service counts from its next restart.
 
 For the process table, the fork gets the command line and the environment that a new interpreter would have
 (prctl(2), PR_SET_MM_MAP). Where the kernel cannot do that, and for programs that are no modules of this
-environment's Python, supervisord starts a new interpreter as it always does.
+environment's Python or have another directory or path, supervisord starts a new interpreter as usual.
 """
 
 from __future__ import annotations
@@ -153,10 +153,17 @@ def _use_names() -> None:
 
 def executor(execve: Callable[..., NoReturn]) -> Callable[[str, Sequence[str], Mapping[str, str]], NoReturn]:
     """Return a stand-in for :func:`os.execve` that runs a Python module in this process."""
-    programs = Path(sys.executable).parent
+    programs, directory = Path(sys.executable).parent, os.getcwd()
+
+    def is_alike(environment: Mapping[str, str]) -> bool:
+        """Whether a new interpreter would be like this one: these variables count at its start."""
+        names = {name for name in (*os.environ, *environment) if name.startswith(("PYTHON", "LD_"))}
+        same = all(environment.get(name) == os.environ.get(name) for name in names)
+        return same and os.getcwd() == directory
 
     def execute(filename: str, argv: Sequence[str], environment: Mapping[str, str]) -> NoReturn:
-        if argv[1:2] == ["-m"] and Path(filename).parent == programs:
+        is_ours = argv[1:2] == ["-m"] and Path(filename).parent == programs
+        if is_ours and is_alike(environment):
             with suppress(OSError):  # a kernel that cannot do this
                 rename(argv, environment)
                 _run(argv, environment)

@@ -210,3 +210,33 @@ def test_service_prepares_no_type_and_no_pattern_again(
         monkeypatch.setenv("ROS_DOMAIN_ID", str(domain_id))
         done = run(tmp_path, f"{use}{FORKED}", more="prefork.import_libraries()")
     assert done.stdout == "[] []\nTrue\n"
+
+
+CHANGING = """
+executor = prefork.executor
+def changing(execve):
+    execute = executor(execve)
+    def changed(filename, argv, environment):
+        {change}
+        execute(filename, argv, environment)
+    return changed
+prefork.executor = changing
+"""
+
+
+@pytest.mark.parametrize(
+    ("change", "forked"),
+    [
+        ("environment['MINE'] = 'yes'", True),
+        ("environment['PYTHONPATH'] += ':/elsewhere'", False),
+        ("environment['LD_LIBRARY_PATH'] = '/elsewhere:' + environment.get('LD_LIBRARY_PATH', '')", False),
+        ("os.chdir('elsewhere')", False),
+    ],
+)
+def test_program_with_another_path_or_directory_has_its_own_interpreter(
+    tmp_path: Path, change: str, forked: bool
+) -> None:
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "elsewhere" / "probe.py").write_text(f"import sys; {FORKED}")
+    done = run(tmp_path, FORKED, more=CHANGING.format(change=change))
+    assert (done.stdout, done.stderr) == (f"{forked}\n", "")
