@@ -64,9 +64,14 @@ class Process(NamedTuple):
 Message = Hello | Press | Beat | Release | Engines | Set | FollowScenario | Process
 
 
+PROGRAMS = tuple(program.name for program in manifest.programs())
+
+
 def _limits() -> dict[str, tuple[float, float]]:
     limits = {}
     for name, parameters in Parameters.items():
+        if f"config_{name}" not in PROGRAMS:  # a real joint
+            continue
         (value,) = (each for each in declarations(parameters) if each.name == "value")
         assert value.within is not None
         limits[name] = value.within
@@ -74,8 +79,7 @@ def _limits() -> dict[str, tuple[float, float]]:
 
 
 LIMITS: Mapping[str, tuple[float, float]] = _limits()
-"""The least and the greatest value of each source [m or rad]."""
-PROGRAMS = tuple(program.name for program in manifest.programs())
+"""The least and the greatest value of each source that runs [m or rad]."""
 
 
 def parse(text: str | bytes) -> Message:

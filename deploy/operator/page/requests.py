@@ -16,7 +16,6 @@ from deploy.operator.page.server import Request
 from deploy.operator.page.state import Change, Program, follows_scenario, refuse
 from deploy.operator.remote import ParameterChange, RemoteParameters
 from deploy.running import processes
-from interfaces import topics
 from reactive_node import ReactiveNode, stamps
 from reactive_node.stamps import Timestamp
 
@@ -36,7 +35,7 @@ class Configuration:
 
     def __init__(self, node: ReactiveNode) -> None:
         """Create the clients of the sources; they belong to the node."""
-        self._programs = {f"config_{name}": name for name in topics.CONFIGURATION}
+        self._programs = {f"config_{name}": name for name in protocol.LIMITS}
         self._sources = {name: RemoteParameters(node, program) for program, name in self._programs.items()}
 
     def outcomes(self, requests: Observable[Request]) -> Observable[Change]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from deploy.operator.page.protocol import LIMITS
 from deploy.operator.page.state import BEAT, PROGRAMS, RENEWED, Clock, Engines, PageState, Program
 from deploy.running import sentinel
 from interfaces import topics
@@ -46,7 +47,7 @@ def view(state: PageState, page: str, now: float) -> dict[str, Any]:
             "why": _why(engines, is_reported),
             "refused": refused,
         },
-        "sources": {name: "hand" if name in state.by_hand else "scenario" for name in topics.CONFIGURATION},
+        "sources": {name: "hand" if name in state.by_hand else "scenario" for name in LIMITS},
         "processes": [_row(name, state.programs.get(name, Program()), now) for name in PROGRAMS],
     }
 

@@ -46,8 +46,9 @@ export class Sliders {
       const source = sources[name];
       setAttributes(row.source, { "data-source": source ?? null });
       setText(row.source, SOURCES[source] ?? "");
-      slider.disabled = field.disabled = !isLive || arm[name] === null;
-      if (welcome) this._limit(row, welcome.limits?.[name]);
+      const limits = welcome?.limits?.[name]; // none for a joint of the user's own
+      slider.disabled = field.disabled = !isLive || arm[name] === null || !limits;
+      if (limits) setAttributes(field, { min: limits[0], max: limits[1] });
       if (arm[name] === null || now - row.touched < QUIET) continue;
       this._follow(row, arm[name]);
       if (angle) setText(angle, degrees(arm[name]));
@@ -103,10 +104,6 @@ export class Sliders {
     const text = value.toFixed(3);
     if (isSliderFree && row.slider.value !== text) row.slider.value = text;
     if (row.field !== document.activeElement && row.field.value !== text) row.field.value = text;
-  }
-
-  _limit(row, limits) {
-    if (limits) setAttributes(row.field, { min: limits[0], max: limits[1] });
   }
 }
 
