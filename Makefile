@@ -3,6 +3,7 @@
 PYTHON ?=
 SCENARIO ?= demo
 PARAMETERS ?=
+MANIFEST ?=
 WEB ?=
 TESTS ?= tests interfaces/reactive_node --ignore=tests/operator/page
 MINUTES ?= 5
@@ -23,10 +24,10 @@ RUNTIME ?=
 STAMP := .venv/made-from
 # A Python that is still starting answers Ctrl-C with a traceback: SIGINT waits until the command is ready for it.
 HOLD := $(shell env --block-signal=INT echo env --block-signal=INT 2>/dev/null)
-export PYTHON SCENARIO PARAMETERS WEB RUNTIME
+export PYTHON SCENARIO PARAMETERS MANIFEST WEB RUNTIME
 
 # The variables of each command. Others on the command line are refused, except by `make stop`: it must not fail.
-USED_BY_run := SCENARIO PARAMETERS WEB
+USED_BY_run := SCENARIO PARAMETERS MANIFEST WEB
 USED_BY_start := $(USED_BY_run)
 USED_BY_chaos := MINUTES SEED CHAOS
 USED_BY_simulate := HOURS SEED SCHEDULE SIMULATE
@@ -48,8 +49,9 @@ endif
 
 help:
 	@echo "make run      start the system, show it in this terminal, stop it with Ctrl-C"
-	@echo "make start    start it in the background          (run, start: SCENARIO=demo, listing_5_9 or a file)"
-	@echo "                                                  (PARAMETERS=file; WEB=off for no page, or its port)"
+	@echo "make start    start it in the background          (run, start: SCENARIO=demo, listing_5_9, none or a file)"
+	@echo "                                                  (PARAMETERS=file; WEB=off for no page, or its port;"
+	@echo "                                                  MANIFEST=file with programs of your own)"
 	@echo "make terminal attach this terminal to it"
 	@echo "make status   its rclpy, page and services: state, pid, uptime, restarts, last output, health"
 	@echo "make logs     follow their logs"

@@ -8,12 +8,12 @@ import signal
 import sys
 import time
 from collections.abc import Iterator, Mapping
-from contextlib import closing, contextmanager, suppress
+from contextlib import ExitStack, closing, contextmanager, suppress
 from typing import TYPE_CHECKING
 
 from deploy.commands.stop import stop
 from deploy.operator.output import say
-from deploy.running import interruption, messages, rclpy_choice
+from deploy.running import interruption, manifest, messages, rclpy_choice
 from deploy.running.environment import NAMESPACE, set_middleware
 from deploy.running.errors import DeploymentError
 from deploy.running.run_directory import RUN
@@ -44,6 +44,7 @@ ADOPTED = (
     "FASTRTPS_",
     "FASTDDS_",
     NAMESPACE,
+    manifest.VARIABLE,
 )
 LIBRARIES_ARE_KNOWN = "_ROS_WHEELS_BOOTSTRAP_COMPLETE"
 """Environment variable: the wheels of ROS 2 leave the environment of this interpreter as it is."""
@@ -143,9 +144,12 @@ def _started(system: System, scenario: str, parameter_file: str) -> Iterator[Mem
     from deploy.commands import parameters
     from deploy.commands.member import Member
 
-    parameters.check_environment(system)
-    given = parameters.of_system(scenario, parameter_file)
-    with Member() as member:
+    without = manifest.VIRTUAL_JOINTS if scenario == parameters.NONE else ()
+    with ExitStack() as stack:
+        stack.enter_context(manifest.chosen(os.environ.get("MANIFEST", ""), without))
+        parameters.check_environment(system)
+        given = parameters.of_system(scenario, parameter_file)
+        member = stack.enter_context(Member())
         log_sizes = {path.stem: path.stat().st_size for path in system.logs.glob("*.log")}
         interruption.check()  # the last time before there is anything to stop
         system.start(given)

@@ -21,6 +21,8 @@ from interfaces.service import UserError, instance
 from interfaces.sources import scenario_file
 
 SCENARIOS = ROOT / "deploy" / "scenarios"
+NONE = "none"
+"""The scenario without virtual joints, drive and operator."""
 DISCOVERY_RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"  # environment variable
 LIMITS = {"operator_watchdog": ("silence", "strikes"), "engine_controller": ("presence_timeout",)}
 """The parameters of other services that the page shows."""
@@ -37,7 +39,8 @@ def of_system(scenario_name: str, user_file: str) -> dict[str, Any]:
     """
     path = _scenario_file(scenario_name)
     try:
-        scenario_file.load(path)
+        if path:
+            scenario_file.load(path)
         given = parameter_file.load(user_file, namespace_of(os.environ)) if user_file else {}
     except UserError as error:
         raise DeploymentError(str(error)) from error
@@ -48,7 +51,7 @@ def of_system(scenario_name: str, user_file: str) -> dict[str, Any]:
         files = _page_files(user_file, shared | given.get(page, {}).get(KEY, {}))
         if known := files | _limits(given, prefix):
             given.setdefault(page, {KEY: {}})[KEY].update(known)
-    parameters: dict[str, Any] = scenario_parameters(path, NOT_YET)
+    parameters: dict[str, Any] = scenario_parameters(path or "", NOT_YET)
     parameters[ALL][KEY] |= shared
     if (port := _port(os.environ.get(WEB, ""))) is not None:
         given.setdefault(page, {KEY: {}})[KEY]["port"] = port
@@ -98,11 +101,13 @@ def _port(web: str) -> int | None:
     raise DeploymentError(f"WEB={web} is neither off nor a port from 1 to 65535")
 
 
-def _scenario_file(name: str) -> Path:
+def _scenario_file(name: str) -> Path | None:
+    if name == NONE:
+        return None
     for path in (Path(name), SCENARIOS / f"{name}.yaml"):
         if path.is_file():
             return path.resolve()
-    known = ", ".join(sorted(path.stem for path in SCENARIOS.glob("*.yaml")))
+    known = ", ".join([*sorted(path.stem for path in SCENARIOS.glob("*.yaml")), NONE])
     raise DeploymentError(f"SCENARIO={name} is neither a file nor one of: {known}")
 
 

@@ -19,6 +19,7 @@ from deploy.running.errors import DeploymentError
 SETTINGS = "settings"  # in the run directory: where services keep the values that were set by hand
 PAGE_FILE = "page.txt"  # in the settings: the line that tells the address of the page
 PARAMETERS = "parameters.yaml"  # in the run directory: the ROS parameter file of all services
+MANIFEST = "supervisord.conf"  # in the run directory: the manifest of a system, if that is not ours
 ALL, KEY = "/**", "ros__parameters"  # the form of ROS 2's parameter files
 RUN = 20 * "-"  # begins the line between two runs in a log
 NOT_YET = -1.0  # scenario_epoch: the scenario waits until this parameter is set
@@ -132,9 +133,12 @@ def make_directory(path: Path, mode: int = 0o777) -> None:
         ) from None
 
 
-def scenario_parameters(scenario: Path, origin: float, settings: str | Path = SETTINGS) -> dict[str, object]:
+def scenario_parameters(
+    scenario: Path | str, origin: float, settings: str | Path = SETTINGS
+) -> dict[str, object]:
     """The parameters that all services share, as the content of a ROS parameter file.
 
+    :param scenario: its file, '' for none.
     :param origin: of the scenario [s, monotonic clock], or NOT_YET.
     :param settings: the folder of what is set by hand; by default in the run directory.
     """

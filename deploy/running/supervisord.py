@@ -45,7 +45,7 @@ def start(run: Path, environment: Mapping[str, str], within: Sequence[str] = ())
     output = run / "logs" / "supervisord.out"
     with output.open("wb") as file:
         process = subprocess.Popen(
-            [*within, *COMMAND, "--nodaemon", "--silent", "-c", str(manifest.PATH)],
+            [*within, *COMMAND, "--nodaemon", "--silent", "-c", str(manifest.path())],
             cwd=run,
             env=environment,
             stdin=subprocess.DEVNULL,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -10,7 +11,7 @@ from typing import NoReturn
 
 from deploy.running import environment, manifest, messages, processes, supervisord
 from deploy.running.errors import DeploymentError
-from deploy.running.run_directory import RunDirectory
+from deploy.running.run_directory import MANIFEST, RunDirectory
 from deploy.running.supervisord import Program, Supervisord
 
 SERVICE_GRACE = 1.0  # s from SIGTERM to SIGKILL of a service, as in supervisord.conf
@@ -47,8 +48,8 @@ class System(RunDirectory):
         supervisord answers. Raises DeploymentError when a system runs already.
         """
         with self.alone():
-            self._environment = dict(os.environ)  # also for `start_again`
             self._prepare(parameters)
+            self._environment = dict(os.environ)  # also for `start_again`
             self._start_supervisor()
 
     def start_again(self) -> bool:
@@ -125,6 +126,8 @@ class System(RunDirectory):
             raise DeploymentError(f"Already running: {where}. make terminal shows it, make stop ends it")
         self.write_parameters(parameters)
         self.forget_settings([program.name for program in manifest.programs()])
+        if manifest.path() != manifest.PATH:
+            os.environ[manifest.VARIABLE] = shutil.copyfile(manifest.path(), str(self.run / MANIFEST))
 
     def _end_members(self) -> None:
         """End the live processes without supervisord's help."""

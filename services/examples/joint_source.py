@@ -53,7 +53,7 @@ def joint_angle(
 
     def watched(items: Observable[float | Rejected]) -> Observable[float | Rejected]:
         good = items.filter(lambda it: not isinstance(it, Rejected)).start_with(0.0)
-        silences = good.switch_map(lambda _: rx.interval(SILENCE))
+        silences = good.switch_map(lambda _: rx.timer(SILENCE, SILENCE / 2))
         silent = silences.map(lambda _: Rejected(ROBOT_JOINTS, f"{joint}: no angle for {SILENCE:g} s"))
         return rx.merge(items, silent)
 

@@ -127,7 +127,10 @@ def test_a_quote_in_a_variable_of_make_is_no_shell_syntax(checkout: Path) -> Non
 @pytest.mark.parametrize(
     ("words", "problem"),
     [
-        ("run SCENRIO=demo", "run has no variable SCENRIO; it has PYTHON RUNTIME SCENARIO PARAMETERS WEB"),
+        (
+            "run SCENRIO=demo",
+            "run has no variable SCENRIO; it has PYTHON RUNTIME SCENARIO PARAMETERS MANIFEST WEB",
+        ),
         ("SCENARIO=demo", "help has no variable SCENARIO; it has PYTHON RUNTIME"),
         ("chaos MINUTES=1 HOURS=1", "chaos has no variable HOURS; it has PYTHON RUNTIME MINUTES SEED CHAOS"),
         ("help PYTHON=python3 ROS_DOMAIN_ID=1", ""),

@@ -33,7 +33,21 @@ def test_an_error_in_a_scenario_is_reported_before_the_start(
 
 
 def test_an_unknown_scenario_is_reported_with_the_known_ones(site: Site) -> None:
-    assert site.do("run", "tango") == (1, "SCENARIO=tango is neither a file nor one of: demo, listing_5_9")
+    assert site.do("run", "tango") == (
+        1,
+        "SCENARIO=tango is neither a file nor one of: demo, listing_5_9, none",
+    )
+
+
+def test_an_error_in_a_manifest_is_reported_before_the_start(
+    site: Site, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "robot.conf"
+    file.write_text("[program:velocity]\ncommand = python3 -m services.velocity\n")
+    monkeypatch.setenv("MANIFEST", str(file))
+    complaint = "[program:velocity] has the name of a program of the arm: take another name"
+    assert site.do("start", STEADY) == (1, f"{file}: {complaint}")
+    assert not site.run.exists()
 
 
 def test_a_quote_in_scenario_is_no_shell_syntax(site: Site) -> None:

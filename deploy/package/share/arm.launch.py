@@ -6,9 +6,10 @@ from launch.actions import DeclareLaunchArgument, ExecuteProcess
 from launch.substitutions import LaunchConfiguration
 
 ARGUMENTS = {
-    "scenario": ("demo", "demo, listing_5_9 or a file"),
+    "scenario": ("demo", "demo, listing_5_9, none or a file"),
     "namespace": ("/", "ROS namespace of the arm, such as /arm1"),
     "parameters": ("", "ROS parameter file"),
+    "manifest": ("", "file with programs of your own"),
     "web": ("", "port of the operator's page, or off"),
 }
 
@@ -23,7 +24,11 @@ def generate_launch_description() -> LaunchDescription:
             given["scenario"],
             given["parameters"],
         ],
-        additional_env={"REACTIVE_ARM_NAMESPACE": given["namespace"], "WEB": given["web"]},
+        additional_env={
+            "REACTIVE_ARM_NAMESPACE": given["namespace"],
+            "MANIFEST": given["manifest"],
+            "WEB": given["web"],
+        },
         output="screen",
         name="arm",
     )

@@ -26,7 +26,9 @@ GONE = 0.25 + 0.1  # s for which a beat on its way may count: the age of its non
 class Arm:
     """A running system in which nothing moves and nobody holds the switch."""
 
-    def __init__(self, run: Path, domain: int, namespace: str = "", **page: object) -> None:
+    def __init__(
+        self, run: Path, domain: int, namespace: str = "", scenario: str = STEADY, **page: object
+    ) -> None:
         """
         Start the system.
 
@@ -42,7 +44,7 @@ class Arm:
         parameters.write_text(f"operator_page:\n  ros__parameters:{lines}\n")
         within = ["ip", "netns", "exec", namespace] if namespace else []
         launcher = [self.site.python, "-m", "deploy.commands.launcher"]
-        code, printed = self.site.do_command(*within, *launcher, "start", STEADY, str(parameters))
+        code, printed = self.site.do_command(*within, *launcher, "start", scenario, str(parameters))
         assert code == 0, printed
         found = re.fullmatch(r"The page: (\S+)\n", (run / "settings" / "page.txt").read_text())
         assert found

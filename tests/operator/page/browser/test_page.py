@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import time
 from contextlib import closing
+from pathlib import Path
 from typing import Any
 
 import pytest
+from std_msgs.msg import Float64
 
 from deploy.running import manifest
-from tests.system.sites import LIMIT
+from interfaces import topics
+from tests.system.sites import LIMIT, Peer
 
 from .arm import LINK, Arm, hold_with_engines_on
 from .chromium import HandOnPage
@@ -177,6 +181,32 @@ def tab_to(hand: HandOnPage, selector: str) -> None:
             return
         hand.page.keyboard.press("Tab")
     raise AssertionError(f"Tab does not lead to {selector}")
+
+
+def test_page_shows_real_joints_and_does_not_set_them(
+    browser: Any, tmp_path: Path, domain_id: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "robot.conf").write_text(
+        "[program:gate]\ncommand = python3 -m services.examples.twist_gate\n"
+    )
+    monkeypatch.setenv("MANIFEST", str(tmp_path / "robot.conf"))
+    with (
+        closing(Arm(tmp_path / "run", domain_id, scenario="none")) as arm,
+        closing(Peer(domain_id)) as joints,
+        closing(browser.new_context()) as context,
+    ):
+        hand = HandOnPage(context, arm.url)
+        for topic in topics.JOINTS:
+            joints.publisher(topic).publish(Float64(data=0.5))
+        hand.page.wait_for_selector("#set-l1:enabled", timeout=WAIT)
+        deadline = time.monotonic() + LIMIT
+        while hand.page.locator("#set-theta1").input_value() != "0.5":
+            assert time.monotonic() < deadline, "the page does not show the joint"
+            hand.page.wait_for_timeout(50)
+        assert hand.page.locator("#set-theta1:disabled, #set-theta2:disabled").count() == 2
+        hand.page.wait_for_selector("tr[data-process=gate]", timeout=WAIT)
+        assert hand.page.locator("tr[data-process=config_theta1]").count() == 0
+        assert hand.errors == []
 
 
 def test_page_turns_grey_within_500_ms(arm: Arm, browser: Any, link: Link) -> None:

@@ -1,0 +1,171 @@
+"""A robot of the user's own: real joints, a real drive and a base that listens to cmd_vel."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from collections.abc import Iterator
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+from geometry_msgs.msg import Twist, Vector3
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Bool, Header, String
+
+from interfaces.topics import ENGINES, OPERATOR_HEARTBEAT, THETA1, TURN_ON
+from tests.system.sites import Peer, Site
+
+PERIOD = 0.05  # s between two messages of the hand, the driver and the joystick
+BOUND = 1.0 + 0.5 + 0.1 + 0.4  # s: presence timeout, sampling, repetition and drive
+SLACK = 0.5  # s: messages on their way, and a busy machine
+MANIFEST = """
+[program:joint_source]
+command = python3 -m services.examples.joint_source --ros-args -r robot/joint_states:=/robot/joints
+[program:drive_adapter]
+command = python3 -m services.examples.drive_adapter
+[program:twist_gate]
+command = python3 -m services.examples.twist_gate
+[program:own_guard]
+command = python3 -m guard
+"""
+GUARD = """
+from interfaces import service, topics
+
+def wire(node):
+    angles = node.observe(topics.THETA1)
+    node.publish(topics.ENGINES, angles.filter(lambda angle: angle > 2.0).map(lambda _: topics.TURN_OFF))
+
+if __name__ == "__main__":
+    service.run("guard", wire)
+"""
+PARAMETERS = """
+joint_source: {{ros__parameters: {{theta1: shoulder, theta2: elbow}}}}
+drive_adapter: {{ros__parameters: {{file: '{pin}'}}}}
+engine_controller: {{ros__parameters: {{presence_timeout: 1.0}}}}
+"""
+
+
+class Robot:
+    """A base that integrates cmd_vel, the joints of an arm, and a hand on switch and joystick."""
+
+    def __init__(self, peer: Peer) -> None:
+        self.x = 0.0
+        """Where the base is [m]."""
+        self.holds = False
+        self.angle = 0.5
+        self._velocity, self._moved = 0.0, time.monotonic()
+        self.peer, node = peer, peer.node
+        node.create_subscription(Twist, "cmd_vel", self._on_velocity, 1)
+        self._beats = peer.publisher(OPERATOR_HEARTBEAT)
+        self._commands = peer.publisher(ENGINES)
+        self._joystick = node.create_publisher(Twist, "cmd_vel_in", 1)
+        self._joints = node.create_publisher(JointState, "/robot/joints", 10)
+        node.create_timer(PERIOD, self._on_time)
+
+    def turn_on(self) -> None:
+        """Hold the switch and turn the engines on until the base moves."""
+        self.holds, x = True, self.x
+        while self.x == x:
+            self._commands.publish(String(data=TURN_ON))
+            self.spin(0.2)
+
+    def spin(self, seconds: float) -> None:
+        """Let time pass."""
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            self.peer.spin_once(0.05)
+
+    def _on_velocity(self, message: Twist) -> None:
+        self._move()
+        self._velocity = message.linear.x
+
+    def _on_time(self) -> None:
+        self._move()
+        if self.holds:
+            self._beats.publish(Bool(data=True))
+        self._joystick.publish(Twist(linear=Vector3(x=1.0)))
+        now = self.peer.node.get_clock().now()
+        positions = {"elbow": 0.25, "shoulder": self.angle}
+        header = Header(stamp=now.to_msg())
+        self._joints.publish(JointState(header=header, name=[*positions], position=[*positions.values()]))
+
+    def _move(self) -> None:
+        now = time.monotonic()
+        self.x += self._velocity * (now - self._moved)
+        self._moved = now
+
+
+@pytest.fixture
+def pin(tmp_path: Path) -> Path:
+    """The file that turns the drive on."""
+    pin = tmp_path / "value"
+    pin.write_text("0\n")
+    return pin
+
+
+@pytest.fixture
+def robot(site: Site, pin: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Robot]:
+    """A robot under a running system without virtual sources."""
+    (tmp_path / "guard.py").write_text(GUARD)
+    (tmp_path / "robot.conf").write_text(MANIFEST)
+    (tmp_path / "robot.yaml").write_text(PARAMETERS.format(pin=pin))
+    monkeypatch.setenv("MANIFEST", str(tmp_path / "robot.conf"))
+    monkeypatch.setenv("WEB", "off")
+    code, printed = site.do("start", "none", str(tmp_path / "robot.yaml"))
+    assert code == 0, printed
+    monkeypatch.delenv("MANIFEST")  # as in another terminal
+    with closing(Peer(site.domain)) as peer:
+        yield Robot(peer)
+
+
+def test_base_moves_only_while_a_hand_holds_the_switch(robot: Robot, pin: Path) -> None:
+    robot.spin(1.0)
+    assert robot.x == 0.0
+    assert pin.read_text() == "0\n"
+
+    robot.turn_on()
+    robot.spin(0.5)
+    assert robot.x > 0.3
+    assert pin.read_text() == "1\n"
+
+    robot.holds = False
+    robot.spin(BOUND + SLACK)
+    stood = robot.x
+    robot.spin(1.0)
+    assert robot.x == stood
+    assert pin.read_text() == "0\n"
+
+
+def test_own_programs_are_supervised_and_are_the_only_joints(robot: Robot, site: Site) -> None:
+    angles = robot.peer.collect(THETA1)
+    robot.spin(1.5)
+    assert {angle.data for angle in angles} == {0.5}
+    publishers = robot.peer.node.get_publishers_info_by_topic("/theta1")
+    assert [each.node_name for each in publishers] == ["joint_source"]
+
+    status = site.begin("status")
+    while status.is_alive:
+        robot.spin(0.1)
+    assert status.wait() == 0
+    rows = {line.split()[0]: line.split() for line in status.output.splitlines()[2:]}
+    assert {row[-1] for row in rows.values()} == {"ok"}
+    assert {"joint_source", "drive_adapter", "twist_gate", "own_guard", "config_l1"} <= rows.keys()
+    assert not {"config_theta1", "config_theta2", "drive"} & rows.keys()
+
+    killed = site.members["own_guard"]
+    os.kill(killed, signal.SIGKILL)
+    site.await_members(lambda members: members.get("own_guard", killed) != killed)
+    robot.turn_on()
+    robot.angle = 2.5  # the guard turns the engines off again
+    robot.spin(1.5)
+    stood = robot.x
+    robot.spin(0.5)
+    assert robot.x == stood
+
+
+def test_drive_is_off_after_the_end(robot: Robot, site: Site, pin: Path) -> None:
+    robot.turn_on()
+    assert site.do("stop")[0] == 0
+    assert pin.read_text() == "0\n"
