@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from enum import IntEnum, auto
 from typing import Any, NamedTuple
 
 import reactivex as rx
 from reactivex import Observable
 
+from deploy.running.sentinel import reported
+from deploy.running.supervisord import Program
 from interfaces import topics
 from reactive_node.stamps import Timestamp
 
@@ -39,6 +41,7 @@ class Kind(IntEnum):
     ENGINES = auto()
     OTHERS_TURN_OFF = auto()
     SERVICE = auto()
+    PROCESS = auto()
 
 
 class Line(NamedTuple):
@@ -62,6 +65,15 @@ class Complaints(NamedTuple):
     """What was new in the latest message of ``/diagnostics``."""
 
 
+class Restarts(NamedTuple):
+    """The restarts of processes."""
+
+    counts: dict[str, int]
+    """Those that were told, by program."""
+    new: list[Line]
+    """What was new in the latest message of ``/diagnostics``."""
+
+
 def line_batches(
     seen: Seen, own_turn_offs: Observable[Span], ticks: Observable[Any], namespace: str = "/"
 ) -> Observable[list[Line]]:
@@ -72,7 +84,8 @@ def line_batches(
     :param namespace: that of the arm; ``/diagnostics`` carries the health of all arms.
     """
     commands = engines(seen, own_turn_offs)
-    lines = rx.merge(measurements(seen), operator(seen), commands, services(seen, namespace))
+    processes = deaths(seen, namespace)
+    lines = rx.merge(measurements(seen), operator(seen), commands, services(seen, namespace), processes)
     batches: Observable[list[Line]] = lines.buffer(ticks).filter(bool)
     return batches.scan(next_batch, Batch(None, [])).map(lambda batch: batch.lines).filter(bool)
 
@@ -153,6 +166,30 @@ def unrepeated(
         return now[1] and key(before[0].value) == key(now[0].value)
 
     return items.with_latest_from(is_driven).distinct_until_changed(comparer=is_repeated).map(_first)
+
+
+def deaths(seen: Seen, namespace: str) -> Observable[Line]:
+    """Each death of a process, at the time when supervisord has started the next one."""
+
+    def compare(before: Restarts, diagnostics: Timestamp[Any]) -> Restarts:
+        counts, lines = dict(before.counts), []
+        for program in reported(diagnostics.value, namespace.rstrip("/")):
+            deaths = program.restarts - counts.setdefault(program.name, program.restarts)
+            if not deaths or not program.pid:
+                continue  # the return of a process that is away is told later
+            counts[program.name] = program.restarts
+            if deaths > 0:  # a new supervisord begins to count again
+                returned = diagnostics.timestamp - timedelta(seconds=program.uptime)
+                lines.append(Line(returned, Kind.PROCESS, _death(program, deaths)))
+        return Restarts(counts, lines)
+
+    restarts = seen(topics.DIAGNOSTICS).scan(compare, Restarts({}, []))
+    return restarts.flat_map(lambda it: rx.from_iterable(it.new))
+
+
+def _death(program: Program, deaths: int) -> str:
+    how = f"died {deaths} times, last" if deaths > 1 else "died"
+    return f"{program.name} {how} ({program.exit}), back after {program.away:.1f} s"
 
 
 def thinned(items: Observable[Timestamp[Any]], burst: int = BURST) -> Observable[Timestamp[Any]]:

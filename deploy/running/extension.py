@@ -75,6 +75,8 @@ class ArmInterface:
         self._supervisord = supervisord
         self._starts: Counter[str] = Counter()
         self._started: dict[str, float] = {}  # [s, monotonic clock]: laststart would follow the time of day
+        self._ended: dict[str, float] = {}  # the same clock
+        self._away: dict[str, float] = {}  # [s] from the last end to the next start
         self._changed = False
         self._exits: dict[str, str] = {}
         self._guarded = (0, 0.0)  # the sentinel's pid, and the deadline of its next call
@@ -110,6 +112,7 @@ class ArmInterface:
                 "restarts": max(0, self._starts[name] - 1),
                 "exit": self._exits.get(name, ""),
                 "error": process.spawnerr or "",
+                "away": self._away.get(name, 0.0),
             }
             for name, process in self._processes().items()
         ]
@@ -143,7 +146,9 @@ class ArmInterface:
         if isinstance(event, events.ProcessStateStartingEvent):
             self._starts[name] += 1
             self._started[name] = time.monotonic()
+            self._away[name] = self._started[name] - self._ended.get(name, self._started[name])
         elif isinstance(event, _ENDS):
+            self._ended[name] = time.monotonic()
             # supervisord does not keep the number of a signal, nor the code of a process that ended early.
             code = event.process.exitstatus
             early = isinstance(event, events.ProcessStateBackoffEvent)

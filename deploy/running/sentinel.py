@@ -47,6 +47,31 @@ def states(
     ]
 
 
+def reported(message: DiagnosticArray, namespace: str) -> list[Program]:
+    """Return the states in a message that the sentinel of a namespace has published, without errors."""
+    node = f"{namespace}/{SENTINEL}: "
+    found = []
+    for status in message.status:
+        values = {pair.key: pair.value for pair in status.values}
+        if status.name == node + values.get("process", ""):
+            with suppress(KeyError, ValueError):  # not a report of ours
+                found.append(_program(values))
+    return found
+
+
+def _program(values: Mapping[str, str]) -> Program:
+    return Program(
+        name=values["process"],
+        state=values["state"],
+        pid=int(values["pid"]),
+        uptime=float(values["uptime"]),
+        restarts=int(values["restarts"]),
+        exit=values["last exit"],
+        error="",
+        away=float(values["away"]),
+    )
+
+
 def _state(program: Program, reason: str, recent_restarts: int, node: str) -> DiagnosticStatus:
     good = program.state in ("STARTING", "RUNNING")
     level, message = DiagnosticStatus.OK, program.state
@@ -61,7 +86,9 @@ def _state(program: Program, reason: str, recent_restarts: int, node: str) -> Di
         "state": program.state,
         "pid": program.pid,
         "restarts": program.restarts,
+        "uptime": f"{program.uptime:.3f}",
         "last exit": program.exit,
+        "away": f"{program.away:.3f}",
         "why": reason or ("" if good else program.error),
     }
     return DiagnosticStatus(

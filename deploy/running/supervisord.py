@@ -34,6 +34,8 @@ class Program(NamedTuple):
     """how its last process ended, in words; '' before the first end"""
     error: str
     """supervisord's words about the last start or end"""
+    away: float = 0.0
+    """[s] from the last end of a process to the next start; 0 before the first"""
 
 
 def start(run: Path, environment: Mapping[str, str], within: Sequence[str] = ()) -> int:

@@ -13,7 +13,9 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from reactivex import Observable
 from reactivex.testing import ReactiveTest, TestScheduler
 
-from deploy.operator.lines import Allowance, Line, line_batches
+from deploy.operator.lines import Allowance, Kind, Line, line_batches
+from deploy.running.sentinel import states
+from deploy.running.supervisord import Program
 from interfaces import topics
 from interfaces.topics import Position
 from reactive_node.stamps import Timestamp
@@ -194,6 +196,31 @@ def test_new_complaint_of_a_service_is_shown_once(play: Play) -> None:
         health(time, complaint) for time, complaint in enumerate(["", "bad", "bad", "worse", "", "worse"], 1)
     ]
     assert texts(play(script)) == ["velocity: bad", "velocity: worse", "velocity: worse"]
+
+
+def processes(time: float, restarts: int, pid: int = 7, name: str = "kinematics") -> Message:
+    program = Program(name, "RUNNING" if pid else "BACKOFF", pid, 0.25, restarts, "code 1", "", 0.2)
+    return time, topics.DIAGNOSTICS, DiagnosticArray(status=states([program], {}, {}, "/sentinel"))
+
+
+def deaths(lines: Iterable[Line]) -> list[str]:
+    return [line.text for line in lines if line.kind is Kind.PROCESS]
+
+
+def test_death_and_return_of_a_process_are_told_with_their_times(play: Play) -> None:
+    shown = play([processes(1, 2), processes(2, 2), processes(3, 3), processes(4, 3)])
+    assert texts(shown) == ["kinematics died (code 1), back after 0.2 s"]
+    assert times(shown) == [2.75], "when it was back"
+
+
+def test_process_that_is_away_is_told_when_it_returns(play: Play) -> None:
+    shown = play([processes(1, 0), processes(2, 0, pid=0), processes(3, 1, pid=0), processes(4, 2)])
+    assert deaths(shown) == ["kinematics died 2 times, last (code 1), back after 0.2 s"]
+
+
+def test_new_supervisord_is_no_death_of_its_processes(play: Play) -> None:
+    script = [processes(1, 3), processes(2, 0), processes(3, 1)]
+    assert deaths(play(script)) == ["kinematics died (code 1), back after 0.2 s"]
 
 
 def test_fast_lines_are_thinned_to_one_a_second(play: Play) -> None:

@@ -125,6 +125,35 @@ def test_setting_the_clock_changes_no_uptime(monkeypatch: pytest.MonkeyPatch) ->
         assert 0.0 < state["uptime"] < 60.0
 
 
+def test_tells_how_long_a_program_had_no_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(events, "callbacks", [])
+    now = [100.0]
+    monkeypatch.setattr(time, "monotonic", lambda: now[0])
+    velocity = SimpleNamespace(
+        config=SimpleNamespace(name="velocity"),
+        get_state=lambda: ProcessStates.RUNNING,
+        pid=1000,
+        exitstatus=-1,
+        spawnerr=None,
+        backoff=0,
+    )
+    group = SimpleNamespace(processes={"velocity": velocity})
+    options = SimpleNamespace(poller=SimpleNamespace(poll=None))
+    arm = ArmInterface(SimpleNamespace(options=options, process_groups={"arm": group}))
+
+    def notify(at: float, event: Any) -> tuple[int, float]:
+        now[0] = at
+        events.notify(event)
+        (state,) = json.loads(arm.programs())
+        return state["restarts"], round(state["away"], 3)
+
+    starts = events.ProcessStateStartingEvent(velocity, ProcessStates.STOPPED)
+    exits = events.ProcessStateExitedEvent(velocity, ProcessStates.RUNNING)
+    assert notify(100.0, starts) == (0, 0.0)
+    assert notify(105.0, exits) == (0, 0.0)
+    assert notify(105.2, starts) == (1, 0.2)
+
+
 @pytest.mark.parametrize("state", [ProcessStates.STARTING, ProcessStates.BACKOFF, ProcessStates.STOPPING])
 def test_supervisord_sleeps_unless_a_program_changes(state: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(events, "callbacks", [])

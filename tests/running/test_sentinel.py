@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import pytest
-from diagnostic_msgs.msg import DiagnosticStatus
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
 from deploy.running import processes, rpc
 from deploy.running.errors import DeploymentError
@@ -15,7 +15,7 @@ from deploy.running.manifest import SENTINEL
 from deploy.running.policy import Action, Observation, Policy, Timeouts
 from deploy.running.probe import Probe
 from deploy.running.processes import Process
-from deploy.running.sentinel import states
+from deploy.running.sentinel import reported, states
 from deploy.running.supervisord import Program, Supervisord
 
 SERVICES = ("engine_controller", "kinematics", "operator_watchdog", "velocity", SENTINEL)
@@ -224,7 +224,7 @@ def test_warns_of_a_program_that_dies_again_and_again() -> None:
 
 
 def test_publishes_state_pid_restarts_exit_and_reason() -> None:
-    given_up = Program("velocity", "FATAL", 0, 0.0, 7, "code 2", "Exited too quickly")
+    given_up = Program("velocity", "FATAL", 0, 0.0, 7, "code 2", "Exited too quickly", 0.25)
     status, fatal = states([program("kinematics"), given_up], {"velocity": "no health"}, {}, "/sentinel")
     assert (status.level, status.name) == (DiagnosticStatus.OK, "/sentinel: kinematics")
     assert fatal.level == DiagnosticStatus.ERROR
@@ -233,9 +233,27 @@ def test_publishes_state_pid_restarts_exit_and_reason() -> None:
         "state": "FATAL",
         "pid": "0",
         "restarts": "7",
+        "uptime": "0.000",
         "last exit": "code 2",
+        "away": "0.250",
         "why": "no health",
     }
+
+
+def test_states_are_read_as_they_were_published() -> None:
+    programs = [
+        Program("kinematics", "RUNNING", 7, 1.5, 3, "killed by a signal", "", 0.25),
+        program("velocity", "BACKOFF"),
+    ]
+    message = DiagnosticArray(status=states(programs, {}, {}, "/arm/sentinel"))
+    assert reported(message, "/arm") == programs
+    assert reported(message, "") == []
+
+
+def test_states_that_make_no_sense_are_not_read() -> None:
+    (status,) = states([program("kinematics")], {}, {}, "/sentinel")
+    for wrong in (status.values[:3], [KeyValue(key=it.key, value=it.value + "x") for it in status.values]):
+        assert reported(DiagnosticArray(status=[DiagnosticStatus(name=status.name, values=wrong)]), "") == []
 
 
 def test_observes_nothing_when_supervisord_is_gone(tmp_path: Path) -> None:

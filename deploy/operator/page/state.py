@@ -13,6 +13,7 @@ from reactivex import Observable
 
 from deploy.operator.hold import Hold
 from deploy.running import manifest
+from deploy.running.sentinel import reported
 from interfaces import topics
 from interfaces.service.health import healths
 from interfaces.topics import ALIVE, INCAPACITATED, MISSED, ON, TURN_OFF
@@ -331,8 +332,6 @@ def _engines(controllers: Callable[[], frozenset[Any]]) -> Callable[[PageState, 
 
 
 def _diagnostics(namespace: str) -> Callable[[PageState, Any, Clock], PageState]:
-    by_sentinel = f"{namespace}/{manifest.SENTINEL}: "
-
     def change(state: PageState, message: Timestamp[Any], clock: Clock) -> PageState:
         programs, now, engines = dict(state.programs), clock.now(), state.engines
         for name, health in healths(message.value, namespace).items():
@@ -342,23 +341,14 @@ def _diagnostics(namespace: str) -> Callable[[PageState, Any, Clock], PageState]
                 )
             if name == ENGINE_CONTROLLER and (refusal := _REFUSED.search(health.reason)):
                 engines = engines._replace(refused=(now, refusal[1].strip()))
-        for status in message.value.status:
-            name = status.name.removeprefix(by_sentinel)
-            if name != status.name and name in PROGRAMS:
-                values = {pair.key: pair.value for pair in status.values}
-                programs[name] = programs.get(name, Program())._replace(
-                    state=values.get("state", ""),
-                    pid=_integer(values.get("pid", "")),
-                    restarts=_integer(values.get("restarts", "")),
-                    observed=now,
+        for process in reported(message.value, namespace):
+            if process.name in PROGRAMS:
+                programs[process.name] = programs.get(process.name, Program())._replace(
+                    state=process.state, pid=process.pid, restarts=process.restarts, observed=now
                 )
         return state._replace(programs=programs, engines=engines)
 
     return change
-
-
-def _integer(text: str) -> int:
-    return int(text) if text.isdecimal() else 0
 
 
 def _lines(state: PageState, batch: Sequence[Any], clock: Clock) -> PageState:

@@ -30,6 +30,8 @@ class _Supervised:
     early_ends: int = 0
     exit: str = ""
     error: str = ""
+    ended: float | None = None
+    away: float = 0.0
 
 
 class Supervisor:
@@ -67,6 +69,7 @@ class Supervisor:
                 max(0, each.starts - 1),
                 each.exit,
                 each.error,
+                each.away,
             )
             for each in self._programs.values()
         ]
@@ -94,6 +97,7 @@ class Supervisor:
             return
         each.state, each.error = "STARTING", ""
         each.started = self._simulation.now
+        each.away = each.started - (each.started if each.ended is None else each.ended)
         each.starts += 1
         process = each.process = self._spawn(each.name, self.pid)
         process.at_end(lambda: self._note_end(each, process))
@@ -107,6 +111,7 @@ class Supervisor:
         if not self.is_alive or each.process is not process:
             return
         each.process = None
+        each.ended = self._simulation.now
         if each.state == "RUNNING":
             code = process.exit_code or 0
             each.state = "EXITED"

@@ -397,6 +397,7 @@ def process(
     name: str, process_state: str = "RUNNING", pid: str = "7", restarts: str = "2"
 ) -> DiagnosticStatus:
     values = {"process": name, "state": process_state, "pid": pid, "restarts": restarts}
+    values |= {"uptime": "1.0", "last exit": "", "away": "0.0"}
     return DiagnosticStatus(
         name=f"/arm/sentinel: {name}",
         values=[KeyValue(key=key, value=value) for key, value in values.items()],
