@@ -13,6 +13,7 @@ from reactivex import Observable
 from deploy.running.sentinel import reported
 from deploy.running.supervisord import Program
 from interfaces import topics
+from interfaces.service.health import healths
 from reactive_node.stamps import Timestamp
 
 Seen = Callable[[topics.Topic], Observable[Timestamp[Any]]]
@@ -26,6 +27,10 @@ SIGNAL_BURST = 12  # Listing 5.9 has 11 signals
 FIRST, LAST = datetime.min.replace(tzinfo=UTC), datetime.max.replace(tzinfo=UTC)
 NEVER = (LAST, FIRST)
 TURNING_OFF = "Turning off engines..."
+TOGETHER = timedelta(seconds=1)  # between a command and its effect
+ENGINES_ON = f"Engines are {topics.ON}"
+BY_CONTROLLER = "engine_controller saw no operator, or began again"
+WATCHDOG = "operator_watchdog"
 
 
 class Kind(IntEnum):
@@ -39,7 +44,10 @@ class Kind(IntEnum):
     MISSED = auto()
     ASLEEP = auto()
     ENGINES = auto()
+    OWN_TURN_OFF = auto()
     OTHERS_TURN_OFF = auto()
+    STATE = auto()
+    SENDER = auto()
     SERVICE = auto()
     PROCESS = auto()
 
@@ -56,6 +64,12 @@ class Batch(NamedTuple):
     is_asleep: bool | None
     """Whether the operator sleeps, as far as it is known."""
     lines: list[Line]
+    is_on: bool = False
+    """Whether the engines are on."""
+    turned_off: datetime = FIRST
+    """The time of the last command `turn_off`."""
+    went_off: datetime = FIRST
+    """When the engines went off, until the sender of that command is known."""
 
 
 class Complaints(NamedTuple):
@@ -84,8 +98,8 @@ def line_batches(
     :param namespace: that of the arm; ``/diagnostics`` carries the health of all arms.
     """
     commands = engines(seen, own_turn_offs)
-    processes = deaths(seen, namespace)
-    lines = rx.merge(measurements(seen), operator(seen), commands, services(seen, namespace), processes)
+    health = rx.merge(services(seen, namespace), deaths(seen, namespace), senders(seen, namespace))
+    lines = rx.merge(measurements(seen), operator(seen), commands, health)
     batches: Observable[list[Line]] = lines.buffer(ticks).filter(bool)
     return batches.scan(next_batch, Batch(None, [])).map(lambda batch: batch.lines).filter(bool)
 
@@ -129,12 +143,12 @@ def engines(seen: Seen, own_turn_offs: Observable[Span]) -> Observable[Line]:
     )
     return rx.merge(
         thinned(commands.filter(_says(topics.TURN_ON))).map(_line(Kind.ENGINES, "Turning on engines...")),
-        own.map(_first).map(_line(Kind.ENGINES, "Turning off engines, as you asked...")),
+        own.map(_first).map(_line(Kind.OWN_TURN_OFF, "Turning off engines, as you asked...")),
         thinned(others.map(_first)).map(
             _line(Kind.OTHERS_TURN_OFF, "Turning off engines, as another node asked...")
         ),
         thinned(seen(topics.ENGINES_STATE).distinct_until_changed(lambda it: it.value)).map(
-            _line(Kind.ENGINES, lambda it: f"Engines are {it}")
+            _line(Kind.STATE, "Engines are {}".format)
         ),
     )
 
@@ -166,6 +180,18 @@ def unrepeated(
         return now[1] and key(before[0].value) == key(now[0].value)
 
     return items.with_latest_from(is_driven).distinct_until_changed(comparer=is_repeated).map(_first)
+
+
+def senders(seen: Seen, namespace: str) -> Observable[Line]:
+    """Each service that has sent a `turn_off`, by its own health. The watchdog's conclusion says more."""
+
+    def tell(diagnostics: Timestamp[Any]) -> Iterator[Line]:
+        for name, health in healths(diagnostics.value, namespace.rstrip("/")).items():
+            if health.since_turn_off is not None and name != WATCHDOG:
+                sent = diagnostics.timestamp - timedelta(seconds=health.since_turn_off)
+                yield Line(sent, Kind.SENDER, f"{name} turned off the engines")
+
+    return seen(topics.DIAGNOSTICS).flat_map(lambda it: rx.from_iterable(tell(it)))
 
 
 def deaths(seen: Seen, namespace: str) -> Observable[Line]:
@@ -222,10 +248,12 @@ class Allowance:
 
 
 def next_batch(previous: Batch, lines: list[Line]) -> Batch:
-    """Sort lines, and show one command of the operator watchdog for each sleep of the operator."""
-    is_asleep = previous.is_asleep
+    """Sort lines, tell why the engines go off, and show one command of the watchdog for each sleep."""
+    is_asleep, _, is_on, turned_off, went_off = previous
     shown = []
     for line in sorted(lines):
+        if line.kind in (Kind.ASLEEP, Kind.OWN_TURN_OFF, Kind.OTHERS_TURN_OFF):
+            turned_off = line.time
         match line.kind:
             case Kind.ALIVE | Kind.MISSED:
                 is_asleep = False
@@ -235,10 +263,19 @@ def next_batch(previous: Batch, lines: list[Line]) -> Batch:
                 continue  # the watchdog repeats its command
             case Kind.OTHERS_TURN_OFF if is_asleep is None:  # it may do so since before this terminal began
                 is_asleep, line = True, line._replace(text=TURNING_OFF)
+            case Kind.STATE:
+                was_on, is_on = is_on, line.text == ENGINES_ON
+                went_off = line.time if was_on and not is_on else went_off
+                if was_on and not is_on and line.time - turned_off > TOGETHER:
+                    line = line._replace(text=f"{line.text}: {BY_CONTROLLER}")
+            case Kind.SENDER:
+                if abs(line.time - went_off) > TOGETHER:
+                    continue  # it sends again while they are off, or has sent it long ago
+                went_off = FIRST
         shown.append(line)
         if line.kind is Kind.ASLEEP:
             shown.append(Line(line.time, Kind.ENGINES, TURNING_OFF))
-    return Batch(is_asleep, shown)
+    return Batch(is_asleep, shown, is_on, turned_off, went_off)
 
 
 def _line(kind: Kind, text: str | Callable[[Any], str]) -> Callable[[Timestamp[Any]], Line]:

@@ -109,7 +109,7 @@ def wire(node: ServiceNode) -> None:
 
     # What pages show
     changes = rx.merge(
-        state.always(seen, engines, new_watchdogs(node, epoch), controllers(node), clock),
+        state.always(seen, engines, new_watchdogs(node, epoch), controllers(node), strangers(node), clock),
         during(is_open, state.while_open(seen, lines, node.get_namespace(), clock)),
         switch.holds.map(state.held),
         switch.pressed.map(state.pressed),
@@ -169,6 +169,13 @@ def controllers(node: ServiceNode) -> Callable[[], frozenset[tuple[int, ...]]]:
     """Return what returns the identifiers of the publishers of the engines' state."""
     name = node.resolve_topic_name(topics.ENGINES_STATE.name)
     return lambda: frozenset(tuple(each.endpoint_gid) for each in node.get_publishers_info_by_topic(name))
+
+
+def strangers(node: ServiceNode) -> Callable[[], set[str]]:
+    """Return what returns the nodes that may command the engines and report no health, such as a terminal."""
+    name = node.resolve_topic_name(topics.ENGINES.name)
+    services = {program.name for program in manifest.programs()}
+    return lambda: {each.node_name for each in node.get_publishers_info_by_topic(name)} - services
 
 
 def serve(

@@ -24,6 +24,7 @@ from interfaces.topics import DIAGNOSTICS
 
 PERIOD = 1.0  # [s]
 _PID, _PUBLISHED, _SINCE_OUTPUT = "pid", "published", "seconds_since_output"
+_SINCE_TURN_OFF = "seconds_since_turn_off"
 _PARAMETER = "parameter "  # before its name
 _REFUSED = "refused "  # before the subject
 _REASONS, _OTHER_REASONS = 4, "other reasons"  # in a report, for each subject
@@ -44,6 +45,7 @@ class HealthReporter:
         self._published = 0
         self.dropped = 0  # messages since the start
         self._last_output: float | None = None
+        self._last_turn_off: float | None = None
         self._remarks: dict[str, Counter[str]] = {}  # since the last report: subject, reason, how often
         self._logged: set[str] = set()  # the remarks of the last report
         self._parameters: dict[str, str] = {}
@@ -62,6 +64,10 @@ class HealthReporter:
     def count_output(self) -> None:
         self._published += 1
         self._last_output = time.monotonic()
+
+    def note_turn_off(self) -> None:
+        """Tell in each report when the last ``turn_off`` was sent: a message does not name its sender."""
+        self._last_turn_off = time.monotonic()
 
     def drop(self, subject: str, reason: str) -> None:
         """Count a dropped message and remark the reason."""
@@ -111,6 +117,7 @@ class HealthReporter:
             _PUBLISHED: self._published,
             "dropped": self.dropped,
             _SINCE_OUTPUT: "" if self._last_output is None else f"{now - self._last_output:.3f}",
+            **({} if self._last_turn_off is None else {_SINCE_TURN_OFF: f"{now - self._last_turn_off:.3f}"}),
             **self._counts,
             **{f"{_REFUSED}{subject}": json.dumps(samples) for subject, samples in refused.items()},
             **self._parameters,
@@ -168,6 +175,8 @@ class Health(NamedTuple):
     """Why the service is not ok."""
     since_output: float | None
     """Age of the service's last output [s]; ``None`` before the first."""
+    since_turn_off: float | None = None
+    """Age of its last ``turn_off`` [s]; ``None`` before the first."""
 
 
 @contextmanager
@@ -200,13 +209,18 @@ def healths(message: DiagnosticArray, namespace: str) -> dict[str, Health]:
 
 
 def _health(status: DiagnosticStatus, values: dict[str, str]) -> Health:
-    since_output = float(values[_SINCE_OUTPUT]) if values[_SINCE_OUTPUT] else None
-    if since_output is not None and not math.isfinite(since_output):
-        raise ValueError(f"{_SINCE_OUTPUT} is {since_output}")
     return Health(
         heard=time.monotonic(),
         pid=int(values[_PID]),
         ok=status.level == DiagnosticStatus.OK,
         reason=status.message,
-        since_output=since_output,
+        since_output=_age(values, _SINCE_OUTPUT),
+        since_turn_off=_age(values, _SINCE_TURN_OFF),
     )
+
+
+def _age(values: dict[str, str], key: str) -> float | None:
+    age = float(values[key]) if values.get(key) else None
+    if age is not None and not math.isfinite(age):
+        raise ValueError(f"{key} is {age}")
+    return age

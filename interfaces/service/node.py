@@ -19,7 +19,7 @@ from reactivex import Observable
 
 from interfaces.service.health import HealthReporter
 from interfaces.service.parameters import Declaration, declarations
-from interfaces.topics import Topic
+from interfaces.topics import ENGINES, TURN_OFF, Topic
 from reactive_node import ReactiveNode, stamps
 
 T = TypeVar("T")
@@ -152,6 +152,7 @@ class ServiceNode(ReactiveNode):
         """
 
         message_of, problem_of = topic.message, topic.problem
+        commands_engines = topic is ENGINES
 
         def message(value: Any) -> Any:
             if isinstance(value, Rejected):
@@ -162,6 +163,8 @@ class ServiceNode(ReactiveNode):
                 self.health.drop(topic.name, problem)
                 return None
             self.health.count_output()
+            if commands_engines and value == TURN_OFF:
+                self.health.note_turn_off()
             return message_of(value)
 
         self.publish_observable(

@@ -79,6 +79,17 @@ def health(service: ServiceNode, peer: Node, spin_until: SpinUntil) -> Callable[
     return following
 
 
+def test_health_tells_when_the_service_turned_off_the_engines(
+    service: ServiceNode, health: Callable[[], dict[str, Any]]
+) -> None:
+    commands: Subject[str] = Subject()
+    service.publish(topics.ENGINES, commands)
+    commands.on_next(topics.TURN_ON)
+    assert "seconds_since_turn_off" not in health()
+    commands.on_next(topics.TURN_OFF)
+    assert float(health()["seconds_since_turn_off"]) >= 0.0
+
+
 def failing(_: Any) -> str:
     raise LookupError("planted")
 

@@ -9,12 +9,12 @@ from typing import Any
 
 import pytest
 import reactivex as rx
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from reactivex import Observable
 from reactivex.testing import ReactiveTest, TestScheduler
 
 from deploy.operator.lines import Allowance, Kind, Line, line_batches
-from deploy.running.sentinel import states
+from deploy.running import sentinel
 from deploy.running.supervisord import Program
 from interfaces import topics
 from interfaces.topics import Position
@@ -184,6 +184,47 @@ def test_engines_are_shown_when_they_change(play: Play) -> None:
     assert texts(play(script)) == ["Engines are off", "Engines are on"]
 
 
+def turn_off_by(service: str, time: float, age: float) -> Message:
+    values = {"pid": "7", "published": "1", "seconds_since_output": "", "seconds_since_turn_off": str(age)}
+    pairs = [KeyValue(key=key, value=value) for key, value in values.items()]
+    status = DiagnosticStatus(name=f"/{service}", level=DiagnosticStatus.OK, message="", values=pairs)
+    return time, topics.DIAGNOSTICS, DiagnosticArray(status=[status])
+
+
+def states(*changes: tuple[float, str]) -> list[Message]:
+    return [(time, topics.ENGINES_STATE, state) for time, state in changes]
+
+
+OTHER = "Turning off engines, as another node asked..."
+
+
+def test_service_that_turned_off_the_engines_is_named_once(play: Play) -> None:
+    script = states((1, "on"), (2.01, "off")) + activity(topics.ALIVE, 1.5) + commands(topics.TURN_OFF, 2, 3)
+    reports = [turn_off_by("torque_guard", 2.9, 0.9), turn_off_by("torque_guard", 3.9, 0.9)]
+    shown = play(script + reports)
+    assert texts(shown)[2:] == [OTHER, "Engines are off", "torque_guard turned off the engines", OTHER]
+    assert times(shown)[4] == 2.0
+
+
+def test_service_that_turned_off_the_engines_before_is_not_named(play: Play) -> None:
+    script = states((1, "off"), (30, "on"), (31.01, "off")) + commands(topics.TURN_OFF, 31)
+    script += [turn_off_by("torque_guard", at, at - 0.5) for at in (1, 29, 31.5)]
+    assert not any("torque_guard" in text for text in texts(play(script)))
+
+
+def test_engines_that_go_off_without_a_command_say_so(play: Play) -> None:
+    off = "Engines are off: engine_controller saw no operator, or began again"
+    assert texts(play(states((1, "off"), (2, "on"), (3, "off"), (4, "off"))))[1:] == ["Engines are on", off]
+
+
+@pytest.mark.parametrize("conclusion", [True, False])
+def test_watchdog_that_turned_off_the_engines_is_not_named_twice(play: Play, conclusion: bool) -> None:
+    script = states((1, "on"), (13.51, "off")) + commands(topics.TURN_OFF, 13.5)
+    script += activity(topics.ALIVE, 4) + activity(topics.INCAPACITATED, 13.5) if conclusion else []
+    shown = texts(play([*script, turn_off_by("operator_watchdog", 14, 0.5)]))
+    assert shown[-1] == "Engines are off"
+
+
 def test_new_complaint_of_a_service_is_shown_once(play: Play) -> None:
     def health(time: float, complaint: str) -> Message:
         level = DiagnosticStatus.WARN if complaint else DiagnosticStatus.OK
@@ -200,7 +241,7 @@ def test_new_complaint_of_a_service_is_shown_once(play: Play) -> None:
 
 def processes(time: float, restarts: int, pid: int = 7, name: str = "kinematics") -> Message:
     program = Program(name, "RUNNING" if pid else "BACKOFF", pid, 0.25, restarts, "code 1", "", 0.2)
-    return time, topics.DIAGNOSTICS, DiagnosticArray(status=states([program], {}, {}, "/sentinel"))
+    return time, topics.DIAGNOSTICS, DiagnosticArray(status=sentinel.states([program], {}, {}, "/sentinel"))
 
 
 def deaths(lines: Iterable[Line]) -> list[str]:

@@ -23,18 +23,22 @@ from services import engine_controller, operator_watchdog
 
 PROGRAMS = tuple(program.name for program in manifest.programs())
 ENGINE_CONTROLLER = "engine_controller"
+WATCHDOG = "operator_watchdog"
 ECHO = 0.15  # s after a beat of a page for which a heartbeat on the topic is taken for that beat
 TOGETHER = 1.0  # s within which a command or a conclusion explains that the engines are off
+EARLY = 0.3  # s that a command may be older by the sender's health than by its arrival
+REPORTED = 2.0  # s within which each service that sent a command has told so
 RENEWED = 0.5  # s: the drive's 0.4 s and the way of the message
 SAMPLE_PERIOD = 1 / 30  # s between two samples of the trace
 BEAT = "beat"  # the request of a page that is held
 MAX_SAMPLES, MAX_LINES, MAX_REFUSALS = 90, 200, 20  # that are kept for a page that is slow
 
-BY_WATCHDOG = "turned off by the operator watchdog: operator incapacitated"
+BY_WATCHDOG = "turned off by operator_watchdog (operator incapacitated)"
 BY_PAGE = "turned off on a page"
-BY_COMMAND = "turned off by a command of another node, such as the terminal"
-BY_CONTROLLER = "turned off by the engine controller: no operator seen for {:g} s"
-RESTARTED = "turned off as the engine controller was killed or stopped"
+BY_COMMAND = "turned off by a command of another node"
+BY_NODE = "turned off by {}"
+BY_CONTROLLER = "turned off by engine_controller (no operator seen for {:g} s)"
+RESTARTED = "turned off as engine_controller was killed or stopped"
 NOT_YET = "not turned on yet"
 OLDER = "off since before the page was served"
 _REFUSED = re.compile(r"turn_on refused: ([^;]*)")
@@ -128,11 +132,15 @@ class Engines(NamedTuple):
     controllers: frozenset[Any] = frozenset()
     """The publishers of the state when they went on."""
     off_since: float = -math.inf
+    off_at: float | None = None
+    """The same, since the origin of the scenario; ``None`` if it is not known."""
     since_when: str = NOT_YET
     """Why they are off, if no command explains it."""
     cause: str = ""
     """The command or conclusion that has turned them off."""
     caused: float = -math.inf
+    strangers: tuple[str, ...] = ()
+    """The nodes without health that may have sent that command."""
     own_turn_off: float = -math.inf
     """When a page has turned them off."""
     refused: tuple[float, str] | None = None
@@ -145,6 +153,23 @@ class Engines(NamedTuple):
         # The command of the watchdog may overtake its conclusion.
         is_first = not self.cause or (self.cause == BY_COMMAND and now - self.caused < TOGETHER)
         return self._replace(cause=cause, caused=now) if (goes_off or is_older) and is_first else self
+
+    def name(self, service: str, sent: float) -> Engines:
+        """Note that a service sent a command `turn_off` at a time [s]."""
+        if self.cause != BY_COMMAND or not self.caused - EARLY <= sent <= self.caused + TOGETHER:
+            return self
+        return self._replace(cause=BY_WATCHDOG if service == WATCHDOG else BY_NODE.format(service))
+
+    def reason(self, now: float, heard_since: float) -> str:
+        """
+        Return why they are off, at a time [s].
+
+        :param heard_since: since when the health of the services is heard [s].
+        """
+        is_nameless = now - max(self.caused, heard_since) > REPORTED
+        if self.cause == BY_COMMAND and self.strangers and is_nameless:
+            return BY_NODE.format(" or ".join(self.strangers))
+        return self.cause or self.since_when
 
 
 class PageState(NamedTuple):
@@ -161,6 +186,8 @@ class PageState(NamedTuple):
     hands: Hands = Hands()
     engines: Engines = Engines()
     programs: Mapping[str, Program] = {}
+    heard_since: float = -math.inf
+    """Since when the programs are heard."""
     lines: Recent = Recent()
     """The lines of the terminal."""
     refusals: Recent = Recent()
@@ -179,6 +206,7 @@ def always(
     engines: Observable[Timestamp[str]],
     watchdogs: Observable[bool],
     controllers: Callable[[], frozenset[Any]],
+    strangers: Callable[[], Iterable[str]],
     clock: Clock,
 ) -> Observable[Change]:
     """
@@ -187,11 +215,12 @@ def always(
     :param engines: the states of the engines.
     :param watchdogs: emits for each operator watchdog that appears, whether its strikes are known to begin.
     :param controllers: returns the present publishers of the engines' state.
+    :param strangers: returns the present nodes without health that may command the engines.
     """
     return rx.merge(
         watchdogs.map(lambda begins: lambda state: _new_watchdog(state, begins)),
         _changes(seen(topics.OPERATOR_ACTIVITY), _activity, clock),
-        _changes(seen(topics.ENGINES), _command, clock),
+        _changes(seen(topics.ENGINES), _command(strangers), clock),
         _changes(engines, _engines(controllers), clock),
     )
 
@@ -204,7 +233,7 @@ def while_open(seen: Seen, lines: Observable[Any], namespace: str, clock: Clock)
     :param namespace: that of the arm; ``/diagnostics`` carries the health of all arms.
     """
     return rx.merge(
-        rx.of(_forget),
+        rx.of(lambda state: _forget(state, clock.now())),
         *(_changes(seen(topic), _configuration(name), clock) for name, topic in topics.CONFIGURATION.items()),
         _changes(seen(topics.EFFECTOR_POSITION), _position, clock),
         _changes(seen(topics.EFFECTOR_VELOCITY), _speed, clock),
@@ -221,8 +250,9 @@ def _changes(
     return messages.map(lambda message: lambda state: change(state, message, clock))
 
 
-def _forget(state: PageState) -> PageState:
+def _forget(state: PageState, now: float) -> PageState:
     return state._replace(
+        heard_since=now,
         arm=Arm(samples=state.arm.samples.forget()),
         operator=state.operator._replace(seen=-math.inf),
         hands=state.hands._replace(heartbeat=-math.inf),
@@ -291,17 +321,23 @@ def _activity(state: PageState, message: Timestamp[Any], clock: Clock) -> PageSt
 # The engines
 
 
-def _command(state: PageState, message: Timestamp[Any], clock: Clock) -> PageState:
-    if message.value != TURN_OFF:
-        return state
-    if clock.now() - state.engines.own_turn_off < TOGETHER:
-        return _explain(state, BY_PAGE, clock)
-    operator = state.operator
-    if operator.activity is None and state.engines.since_when == OLDER:
-        # A watchdog that is older than this process repeats the command of an earlier conclusion.
-        operator = operator._replace(activity=INCAPACITATED, strikes_left=0)
-    cause = BY_WATCHDOG if operator.activity == INCAPACITATED else BY_COMMAND
-    return _explain(state._replace(operator=operator), cause, clock)
+def _command(strangers: Callable[[], Iterable[str]]) -> Callable[[PageState, Any, Clock], PageState]:
+    def change(state: PageState, message: Timestamp[Any], clock: Clock) -> PageState:
+        if message.value != TURN_OFF:
+            return state
+        if clock.now() - state.engines.own_turn_off < TOGETHER:
+            return _explain(state, BY_PAGE, clock)
+        operator = state.operator
+        if operator.activity is None and state.engines.since_when == OLDER:
+            # A watchdog that is older than this process repeats the command of an earlier conclusion.
+            operator = operator._replace(activity=INCAPACITATED, strikes_left=0)
+        cause = BY_WATCHDOG if operator.activity == INCAPACITATED else BY_COMMAND
+        after = _explain(state._replace(operator=operator), cause, clock)
+        if cause == BY_COMMAND and after.engines is not state.engines:
+            after = after._replace(engines=after.engines._replace(strangers=tuple(sorted(strangers()))))
+        return after
+
+    return change
 
 
 def _explain(state: PageState, cause: str, clock: Clock) -> PageState:
@@ -322,7 +358,7 @@ def _engines(controllers: Callable[[], frozenset[Any]]) -> Callable[[PageState, 
             is_new = not controllers() <= engines.controllers
             is_restarted = is_new or now - engines.reported >= RENEWED
             fallback = RESTARTED if is_restarted else BY_CONTROLLER.format(state.presence_timeout)
-            after = after._replace(off_since=now, since_when=fallback)
+            after = after._replace(off_since=now, off_at=round(clock.elapsed(), 1), since_when=fallback)
         return state._replace(engines=after)
 
     return change
@@ -339,6 +375,8 @@ def _diagnostics(namespace: str) -> Callable[[PageState, Any, Clock], PageState]
                 programs[name] = programs.get(name, Program())._replace(
                     heard=now, ok=health.ok, reason=health.reason, since_output=health.since_output
                 )
+            if health.since_turn_off is not None:
+                engines = engines.name(name, now - health.since_turn_off)
             if name == ENGINE_CONTROLLER and (refusal := _REFUSED.search(health.reason)):
                 engines = engines._replace(refused=(now, refusal[1].strip()))
         for process in reported(message.value, namespace):

@@ -6,10 +6,10 @@ import math
 from typing import Any
 
 from deploy.operator.page.protocol import LIMITS
-from deploy.operator.page.state import BEAT, PROGRAMS, RENEWED, Clock, Engines, PageState, Program
+from deploy.operator.page.state import BEAT, PROGRAMS, RENEWED, Clock, PageState, Program
 from deploy.running import sentinel
 from interfaces import topics
-from interfaces.topics import ON
+from interfaces.topics import OFF, ON
 from services import engine_controller
 
 HEARTBEAT_VISIBLE = 0.25  # s for which a heartbeat shows that the switch is held
@@ -44,7 +44,8 @@ def view(state: PageState, page: str, now: float) -> dict[str, Any]:
         },
         "engines": {
             "state": engines.state if is_reported else None,
-            "why": _why(engines, is_reported),
+            "why": _why(state, now) if is_reported else SILENT_CONTROLLER,
+            "since": engines.off_at if is_reported and engines.state == OFF else None,
             "refused": refused,
         },
         "sources": {name: "hand" if name in state.by_hand else "scenario" for name in LIMITS},
@@ -52,10 +53,8 @@ def view(state: PageState, page: str, now: float) -> dict[str, Any]:
     }
 
 
-def _why(engines: Engines, is_reported: bool) -> str:
-    if not is_reported:
-        return SILENT_CONTROLLER
-    return "" if engines.state == ON else engines.cause or engines.since_when
+def _why(state: PageState, now: float) -> str:
+    return "" if state.engines.state == ON else state.engines.reason(now, state.heard_since)
 
 
 def _row(name: str, program: Program, now: float) -> dict[str, Any]:

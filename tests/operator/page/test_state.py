@@ -23,7 +23,7 @@ from reactive_node.stamps import Timestamp
 
 on_next = ReactiveTest.on_next
 START = datetime(2026, 1, 1, tzinfo=UTC)
-BY_CONTROLLER = "turned off by the engine controller: no operator seen for 10 s"
+BY_CONTROLLER = "turned off by engine_controller (no operator seen for 10 s)"
 
 
 class Play:
@@ -36,6 +36,7 @@ class Play:
         self.changes: list[Any] = []
         self.watchdogs: list[Any] = []
         self.lines: list[Any] = []
+        self.strangers = {"terminal"}
         self.controllers = [(0.0, frozenset({"first"}))]  # since when they are on the graph
 
     def now(self) -> float:
@@ -61,7 +62,12 @@ class Play:
         def create() -> rx.Observable[PageState]:
             hot = self._scheduler.create_hot_observable
             always = state.always(
-                seen, seen(topics.ENGINES_STATE), hot(*self.watchdogs), self.present_controllers, self.clock
+                seen,
+                seen(topics.ENGINES_STATE),
+                hot(*self.watchdogs),
+                self.present_controllers,
+                lambda: self.strangers,
+                self.clock,
             )
             session = state.while_open(seen, hot(*self.lines), "/arm", self.clock)
             changes = rx.merge(
@@ -278,6 +284,7 @@ def test_engines_that_were_never_on_say_so(play: Play) -> None:
     assert view(play.run(211), "page", 210.1)["engines"] == {
         "state": "off",
         "why": state.NOT_YET,
+        "since": None,
         "refused": None,
     }
 
@@ -285,7 +292,12 @@ def test_engines_that_were_never_on_say_so(play: Play) -> None:
 def test_engines_that_are_on_need_no_reason(play: Play) -> None:
     engines(play, (210, OFF), (211, ON))
 
-    assert view(play.run(212), "page", 211.1)["engines"] == {"state": "on", "why": "", "refused": None}
+    assert view(play.run(212), "page", 211.1)["engines"] == {
+        "state": "on",
+        "why": "",
+        "since": None,
+        "refused": None,
+    }
 
 
 def test_silent_controller_is_no_state(play: Play) -> None:
@@ -314,6 +326,61 @@ def test_repeated_on_after_the_command_keeps_its_reason(play: Play) -> None:
     engines(play, (209, OFF), (209.5, ON), (210.01, ON), (210.02, OFF))
 
     assert view(play.run(211), "page", 210.1)["engines"]["why"] == state.BY_COMMAND
+
+
+def sent_turn_off(service: str, ago: float) -> DiagnosticArray:
+    status = health(f"/arm/{service}")
+    status.values.append(KeyValue(key="seconds_since_turn_off", value=str(ago)))
+    return diagnostics(status)
+
+
+def why(found: PageState, now: float) -> str:
+    text: str = view(found, "page", now)["engines"]["why"]
+    return text
+
+
+def test_page_tells_since_when_and_by_which_service_they_are_off(play: Play) -> None:
+    conclude(play, (205, ALIVE))
+    play.say(210.0, topics.ENGINES, TURN_OFF)
+    engines(play, (209, ON), (210.02, OFF), (210.9, OFF), (220, OFF))
+    play.say(210.5, topics.DIAGNOSTICS, sent_turn_off("velocity", 100.0))
+    play.say(210.8, topics.DIAGNOSTICS, sent_turn_off("torque_guard", 0.81))
+
+    shown = view(play.run(221), "page", 220.1)["engines"]
+    assert (shown["why"], shown["since"]) == ("turned off by torque_guard", 210.0)
+
+
+def test_service_that_turned_them_off_is_known_to_a_page_that_opens_later(play: Play) -> None:
+    conclude(play, (205, ALIVE))
+    play.say(210.0, topics.ENGINES, TURN_OFF)
+    engines(play, (209, ON), (210.02, OFF), (249.9, OFF))
+    play.say(249.5, topics.DIAGNOSTICS, sent_turn_off("torque_guard", 39.51))
+
+    assert why(play.run(250, opened=249.4), 250.0) == "turned off by torque_guard"
+
+
+def test_node_without_health_is_named_when_no_service_has_sent_the_command(play: Play) -> None:
+    conclude(play, (205, ALIVE))
+    play.say(210.0, topics.ENGINES, TURN_OFF)
+    engines(play, (209, ON), (210.02, OFF), (213, OFF))
+    found = play.run(214)
+
+    assert why(found, 211.0) == state.BY_COMMAND
+    assert why(found, 213.0) == "turned off by terminal"
+    assert why(found._replace(heard_since=212.0), 213.0) == state.BY_COMMAND, "services may tell yet"
+    nobody = found._replace(engines=found.engines._replace(strangers=()))
+    assert why(nobody, 213.0) == state.BY_COMMAND
+    two = found._replace(engines=found.engines._replace(strangers=("rqt", "terminal")))
+    assert why(two, 213.0) == "turned off by rqt or terminal"
+
+
+def test_watchdog_whose_conclusion_was_lost_is_known_by_its_health(play: Play) -> None:
+    conclude(play, (205, ALIVE))
+    play.say(210.0, topics.ENGINES, TURN_OFF)
+    engines(play, (209, ON), (210.02, OFF))
+    play.say(210.8, topics.DIAGNOSTICS, sent_turn_off("operator_watchdog", 0.8))
+
+    assert why(play.run(211), 210.3) == state.BY_WATCHDOG
 
 
 def test_page_turned_them_off(play: Play) -> None:

@@ -2,7 +2,7 @@
 
 import { alert, announce, onChange } from "./announce.js";
 import { byId, onActivate, setAttributes, setNote, setText } from "./dom.js";
-import { sentence } from "./format.js";
+import { duration, sentence } from "./format.js";
 
 const STATES = {
   on: ["good", "Engines on"],
@@ -32,14 +32,15 @@ export class Engines {
     this._refused = why;
   }
 
-  render({ engines }, isLive) {
+  render({ engines, time }, isLive) {
     const [sign, text] = STATES[engines.state] ?? NO_STATE;
     this._why = sentence(engines.why ?? "");
     setAttributes(byId("engines"), { "data-state": engines.state ?? "unknown" });
     for (const id of ["engines-sign", "mini-engines-sign"]) setAttributes(byId(id), { "data-sign": sign });
     setText(byId("engines-text"), text);
     setText(byId("mini-engines"), engines.state ? text : "Engines: unknown");
-    setText(byId("engines-why"), this._why);
+    const ago = engines.since === null ? "" : `, ${duration(Math.max(0, Math.floor(time - engines.since)))} ago`;
+    setText(byId("engines-why"), sentence((engines.why ?? "") + ago));
     setAttributes(byId("turn-on"), { "data-suggested": engines.state === "off" ? "yes" : null });
     for (const id of ["turn-on", "turn-off"]) setAttributes(byId(id), { "aria-disabled": isLive ? null : true });
     const refused = this._refused || engines.refused;
