@@ -6,6 +6,7 @@ the death of the virtual switch releases nothing.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from rclpy.publisher import Publisher
@@ -24,14 +25,20 @@ BEAT_PERIOD = 0.05  # s
 LONGEST_PAUSE = 1.0  # s between two beats; after a longer one the hand has to press again
 NAME = "terminal"
 TAKEN = "Another hand has taken or released the switch."
-PAUSED = "Released, because this terminal stood still: press again."
+PAUSED = "Released: {}, because this terminal stood still. Press again."
 
 
 class Hand:
     """The hand at the terminal of a node."""
 
-    def __init__(self, node: ReactiveNode) -> None:
+    def __init__(self, node: ReactiveNode, tell: Callable[[str], None] = say) -> None:
+        """
+        Be released.
+
+        :param tell: tells the user what becomes of the hand.
+        """
         self._node = node
+        self._tell = tell
         self._publisher: Publisher | None = None  # exists while the hand holds: so pages know who holds
         self._events: Subject[hold.Event] = Subject()
         self._takes: Subject[None] = Subject()
@@ -40,7 +47,7 @@ class Hand:
         switch = VirtualSwitch(node, hold.monotonic)
         others = switch.by_others(parameter_changes(node))
         others.subscribe(self._give_way, scheduler=node.scheduler)
-        self._takes.switch_map(lambda _: _insistent(switch.take())).subscribe(scheduler=node.scheduler)
+        self._takes.switch_map(lambda _: self._insist(switch.take())).subscribe(scheduler=node.scheduler)
 
     @property
     def holds(self) -> bool:
@@ -63,7 +70,7 @@ class Hand:
 
     def _give_way(self, _: bool) -> None:
         if self.holds:
-            say(TAKEN)
+            self._tell(TAKEN)
             self._events.on_next(hold.Release())
 
     def _follow(self, state: hold.Hold) -> None:
@@ -77,14 +84,13 @@ class Hand:
             self._node.destroy_publisher(self._publisher)
             self._publisher = None
             if state.ended:
-                say(PAUSED)
+                self._tell(PAUSED.format(state.ended[1]))
 
+    def _insist(self, attempt: Observable[bool]) -> Observable[bool]:
+        """Try until the virtual switch answers: a process that is killed loses the request."""
 
-def _insistent(attempt: Observable[bool]) -> Observable[bool]:
-    """Try until the virtual switch answers: a process that is killed loses the request."""
+        def again(error: Exception, _: Any) -> Observable[bool]:
+            self._tell(f"{VIRTUAL_SWITCH} does not answer: trying again until it does")
+            return attempt.retry()
 
-    def insist(error: Exception, _: Any) -> Observable[bool]:
-        say(f"{VIRTUAL_SWITCH} does not answer: trying again until it does")
-        return attempt.retry()
-
-    return attempt.catch(insist)
+        return attempt.catch(again)

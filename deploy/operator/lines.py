@@ -50,6 +50,7 @@ class Kind(IntEnum):
     SENDER = auto()
     SERVICE = auto()
     PROCESS = auto()
+    HAND = auto()
 
 
 class Line(NamedTuple):

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -15,6 +16,7 @@ from std_msgs.msg import Bool, String
 
 from deploy.operator import hand, remote
 from deploy.operator.switch import ECHO
+from deploy.operator.terminal import plain
 from deploy.operator.terminal import terminal as program
 from deploy.operator.terminal.terminal import Terminal
 from interfaces.service import ServiceNode
@@ -116,8 +118,14 @@ class Switch:
 
 @pytest.fixture
 def said(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """What the terminal says of the hand, each with its time."""
     said: list[str] = []
-    monkeypatch.setattr(hand, "say", said.append)
+
+    def say(line: str) -> None:
+        if found := re.fullmatch(r"\[\d+\] ((Released|Another hand|dead_mans_switch).*)", line):
+            said.append(found[1])
+
+    monkeypatch.setattr(plain, "say", say)
     return said
 
 
@@ -166,7 +174,8 @@ def test_terminal_that_stood_still_has_to_press_again(
     spin_for(2 * hand.LONGEST_PAUSE)
     assert held.heartbeats[-1] < time.monotonic() - hand.LONGEST_PAUSE
     assert_silence(held, live_until)
-    assert said == [hand.PAUSED]
+    assert len(said) == 1
+    assert re.fullmatch(hand.PAUSED.format(r"no beat came for \d+ ms"), said[0])
 
     operator.type("press")
     held.heartbeats.clear()

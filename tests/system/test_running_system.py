@@ -276,7 +276,7 @@ def test_terminal_that_is_killed_or_stopped_is_a_silent_operator(
 
     if number == signal.SIGSTOP:
         os.kill(terminal.pid, signal.SIGCONT)
-        terminal.await_line("Released, because this terminal stood still: press again.")
+        terminal.await_line("because this terminal stood still. Press again.")
         heartbeats.clear()
         spin_for(peer, 0.5)
         assert heartbeats == []

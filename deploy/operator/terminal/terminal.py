@@ -15,7 +15,7 @@ from reactivex.subject import Subject
 from std_msgs.msg import String
 
 from deploy.operator.hand import BEAT_PERIOD, Hand
-from deploy.operator.lines import Line, Span, line_batches
+from deploy.operator.lines import Kind, Line, Span, line_batches
 from deploy.operator.output import say
 from deploy.operator.terminal.display import open_display
 from interfaces import topics
@@ -47,7 +47,7 @@ class Terminal:
         self.has_quit = False
         self._node = node
         self._engines = node.create_publisher(String, topics.ENGINES.name, topics.ENGINES.qos)
-        self._hand = Hand(node)
+        self._hand = Hand(node, self._tell)
         self._commands: dict[str, Callable[[], None]] = {
             "press": self._hand.press,
             "release": self._hand.release,
@@ -101,6 +101,9 @@ class Terminal:
 
     def _show(self, lines: list[Line]) -> None:
         self._display.show(f"[{self._milliseconds(line):.0f}] {line.text}" for line in lines)
+
+    def _tell(self, text: str) -> None:
+        self._show([Line(stamps.now(), Kind.HAND, text)])
 
     def _milliseconds(self, line: Line) -> float:
         return (line.time - self._origin) / timedelta(milliseconds=1)
