@@ -11,7 +11,6 @@ import reactivex as rx
 from reactivex import Observable
 
 from deploy.running.sentinel import reported
-from deploy.running.supervisord import Program
 from interfaces import topics
 from interfaces.service.health import healths
 from reactive_node.stamps import Timestamp
@@ -80,11 +79,15 @@ class Complaints(NamedTuple):
     """What was new in the latest message of ``/diagnostics``."""
 
 
-class Restarts(NamedTuple):
-    """The restarts of processes."""
+class Lives(NamedTuple):
+    """The lives of processes, by program."""
 
-    counts: dict[str, int]
-    """Those that were told, by program."""
+    told: dict[str, int]
+    """The restarts that were told."""
+    died: dict[str, tuple[int, datetime]]
+    """The pid of the process, and when the one before it died."""
+    back: dict[str, tuple[int, datetime]]
+    """The pid of the process, and when it first told its health."""
     new: list[Line]
     """What was new in the latest message of ``/diagnostics``."""
 
@@ -196,27 +199,31 @@ def senders(seen: Seen, namespace: str) -> Observable[Line]:
 
 
 def deaths(seen: Seen, namespace: str) -> Observable[Line]:
-    """Each death of a process, at the time when supervisord has started the next one."""
+    """Each death of a process, when the next one has told its health: that is when it is back."""
+    prefix = namespace.rstrip("/")
 
-    def compare(before: Restarts, diagnostics: Timestamp[Any]) -> Restarts:
-        counts, lines = dict(before.counts), []
-        for program in reported(diagnostics.value, namespace.rstrip("/")):
-            deaths = program.restarts - counts.setdefault(program.name, program.restarts)
-            if not deaths or not program.pid:
-                continue  # the return of a process that is away is told later
-            counts[program.name] = program.restarts
-            if deaths > 0:  # a new supervisord begins to count again
-                returned = diagnostics.timestamp - timedelta(seconds=program.uptime)
-                lines.append(Line(returned, Kind.PROCESS, _death(program, deaths)))
-        return Restarts(counts, lines)
+    def compare(before: Lives, diagnostics: Timestamp[Any]) -> Lives:
+        told, died, back, new = dict(before.told), dict(before.died), dict(before.back), []
+        for name, health in healths(diagnostics.value, prefix).items():
+            if back.get(name, (0, FIRST))[0] != health.pid:
+                back[name] = health.pid, diagnostics.timestamp
+        for program in reported(diagnostics.value, prefix):
+            name, pid = program.name, program.pid
+            if died.get(name, (0, FIRST))[0] != pid:  # by the first report, which is not repeated but new
+                died[name] = pid, diagnostics.timestamp - timedelta(seconds=program.uptime + program.away)
+            deaths = program.restarts - told.setdefault(name, program.restarts)
+            if deaths < 0:  # a new supervisord begins to count again
+                told[name] = program.restarts
+            elif deaths and pid and back.get(name, (0, FIRST))[0] == pid:
+                told[name], returned = program.restarts, back[name][1]
+                how = f"died {deaths} times, last" if deaths > 1 else "died"
+                away = (returned - died[name][1]).total_seconds()
+                text = f"{name} {how} ({program.exit}), back after {away:.1f} s"
+                new.append(Line(returned, Kind.PROCESS, text))
+        return Lives(told, died, back, new)
 
-    restarts = seen(topics.DIAGNOSTICS).scan(compare, Restarts({}, []))
-    return restarts.flat_map(lambda it: rx.from_iterable(it.new))
-
-
-def _death(program: Program, deaths: int) -> str:
-    how = f"died {deaths} times, last" if deaths > 1 else "died"
-    return f"{program.name} {how} ({program.exit}), back after {program.away:.1f} s"
+    lives = seen(topics.DIAGNOSTICS).scan(compare, Lives({}, {}, {}, []))
+    return lives.flat_map(lambda it: rx.from_iterable(it.new))
 
 
 def thinned(items: Observable[Timestamp[Any]], burst: int = BURST) -> Observable[Timestamp[Any]]:

@@ -239,29 +239,54 @@ def test_new_complaint_of_a_service_is_shown_once(play: Play) -> None:
     assert texts(play(script)) == ["velocity: bad", "velocity: worse", "velocity: worse"]
 
 
-def processes(time: float, restarts: int, pid: int = 7, name: str = "kinematics") -> Message:
-    program = Program(name, "RUNNING" if pid else "BACKOFF", pid, 0.25, restarts, "code 1", "", 0.2)
+def processes(time: float, restarts: int, pid: int, age: float = 0.25) -> Message:
+    """What the sentinel tells; the process is `age` old, and there was none for 0.05 s before."""
+    state = "RUNNING" if pid else "BACKOFF"
+    program = Program("kinematics", state, pid, age, restarts, "code 1", "", 0.05)
     return time, topics.DIAGNOSTICS, DiagnosticArray(status=sentinel.states([program], {}, {}, "/sentinel"))
+
+
+def alive(time: float, pid: int) -> Message:
+    """The health of the process."""
+    pairs = {"pid": str(pid), "published": "1", "seconds_since_output": ""}
+    values = [KeyValue(key=key, value=value) for key, value in pairs.items()]
+    status = DiagnosticStatus(name="/kinematics", level=DiagnosticStatus.OK, message="running", values=values)
+    return time, topics.DIAGNOSTICS, DiagnosticArray(status=[status])
 
 
 def deaths(lines: Iterable[Line]) -> list[str]:
     return [line.text for line in lines if line.kind is Kind.PROCESS]
 
 
-def test_death_and_return_of_a_process_are_told_with_their_times(play: Play) -> None:
-    shown = play([processes(1, 2), processes(2, 2), processes(3, 3), processes(4, 3)])
-    assert texts(shown) == ["kinematics died (code 1), back after 0.2 s"]
-    assert times(shown) == [2.75], "when it was back"
+DIED = "kinematics died (code 1), back after {} s".format
+
+
+@pytest.mark.parametrize("health", [2.9, 3.5])
+def test_death_and_return_of_a_process_are_told_with_their_times(play: Play, health: float) -> None:
+    """Whether the sentinel or the process itself tells first."""
+    script = [processes(1, 2, pid=7), alive(1.5, pid=7), processes(3, 3, pid=8), alive(health, pid=8)]
+    shown = play([*script, processes(4, 3, pid=8, age=0.9), processes(5, 3, pid=8, age=1.9)])
+    assert texts(shown) == [DIED(round(health - 2.7, 1))]
+    assert times(shown) == [health], "when it was back"
 
 
 def test_process_that_is_away_is_told_when_it_returns(play: Play) -> None:
-    shown = play([processes(1, 0), processes(2, 0, pid=0), processes(3, 1, pid=0), processes(4, 2)])
-    assert deaths(shown) == ["kinematics died 2 times, last (code 1), back after 0.2 s"]
+    away = [processes(1, 0, pid=7), alive(1.5, pid=7), processes(2, 0, pid=0), processes(3, 1, pid=0)]
+    shown = play([*away, processes(4, 2, pid=9), alive(4.1, pid=9), processes(5, 2, pid=9)])
+    assert deaths(shown) == ["kinematics died 2 times, last (code 1), back after 0.4 s"]
+
+
+def test_process_that_dies_before_it_is_back_counts_as_away(play: Play) -> None:
+    script = [processes(1, 0, pid=7), processes(2, 1, pid=8), processes(3, 2, pid=9), alive(3.1, pid=9)]
+    assert deaths(play([*script, processes(4, 2, pid=9)])) == [
+        "kinematics died 2 times, last (code 1), back after 0.4 s"
+    ]
 
 
 def test_new_supervisord_is_no_death_of_its_processes(play: Play) -> None:
-    script = [processes(1, 3), processes(2, 0), processes(3, 1)]
-    assert deaths(play(script)) == ["kinematics died (code 1), back after 0.2 s"]
+    script = [processes(1, 3, pid=7), processes(2, 0, pid=8), alive(2.1, pid=8), processes(3, 0, pid=8)]
+    script += [processes(4, 1, pid=9), alive(4.1, pid=9), processes(5, 1, pid=9)]
+    assert deaths(play(script)) == [DIED(0.4)]
 
 
 def test_fast_lines_are_thinned_to_one_a_second(play: Play) -> None:
