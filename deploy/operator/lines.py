@@ -28,7 +28,7 @@ NEVER = (LAST, FIRST)
 TURNING_OFF = "Turning off engines..."
 TOGETHER = timedelta(seconds=1)  # between a command and its effect
 ENGINES_ON = f"Engines are {topics.ON}"
-BY_CONTROLLER = "engine_controller saw no operator, or began again"
+BY_CONTROLLER = "engine_controller saw no operator, or was killed or stopped"
 WATCHDOG = "operator_watchdog"
 
 

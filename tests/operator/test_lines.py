@@ -213,7 +213,7 @@ def test_service_that_turned_off_the_engines_before_is_not_named(play: Play) -> 
 
 
 def test_engines_that_go_off_without_a_command_say_so(play: Play) -> None:
-    off = "Engines are off: engine_controller saw no operator, or began again"
+    off = "Engines are off: engine_controller saw no operator, or was killed or stopped"
     assert texts(play(states((1, "off"), (2, "on"), (3, "off"), (4, "off"))))[1:] == ["Engines are on", off]
 
 
