@@ -9,7 +9,8 @@ const EXTENT = 330; // of the grid: a wide window shows more than the square
 const PATH_TIME = 8; // s
 const PATH_PARTS = 5; // of falling opacity
 const SUMMARY_PERIOD = 1; // s
-const LABEL = { width: 48, height: 12 }; // of an angle
+const LEAST_ARC = 0.05; // rad; a shorter arc cannot be seen, and has no label
+const LABEL = { width: 48, height: 14 }; // of an angle
 const TOLERANCE = 0.03; // of the reach, between the reported position and the joints'
 
 export class Arm {
@@ -95,8 +96,8 @@ export class Arm {
     arc(this._angles[0].arc, [0, 0], 0, one, 20);
     arc(this._angles[1].arc, elbow, one, arm.theta2, 16);
     const [placeOne, placeTwo] = labelPlaces(one, arm.theta2, elbow);
-    label(this._angles[0].label, placeOne, `θ₁ ${degrees(arm.theta1)}`);
-    label(this._angles[1].label, placeTwo, `θ₂ ${degrees(arm.theta2)}`);
+    label(this._angles[0].label, placeOne, arm.theta1, "θ₁");
+    label(this._angles[1].label, placeTwo, arm.theta2, "θ₂");
 
     const isCurrent = !position || Math.hypot(seen[0] - tip[0], seen[1] - tip[1]) <= TOLERANCE * reach * scale;
     setAttributes(this._svg, { "data-current": isCurrent ? "yes" : "no" });
@@ -173,11 +174,11 @@ export function labelPlaces(one, theta2, elbow) {
   // Beside the elbow, where no link is.
   const free = one + (wrap(theta2) - Math.PI) / 2 + (wrap(theta2) > 0 ? 0 : Math.PI);
   const two = [elbow[0] + 26 * Math.cos(free), elbow[1] - 13 * Math.sin(free)];
-  // Beside the x axis, where link one is not, and not on the other label.
-  const y = Math.sin(one) < 0 ? -7 : 9;
+  // Beside the x axis, where link one is not, and where its arc begins; further out where the other label is.
+  const side = Math.sin(one) < 0 ? -1 : 1;
+  const y = side < 0 ? -7 : 9;
   const isTaken = Math.abs(two[0] - 38) < LABEL.width && Math.abs(two[1] - y) < LABEL.height;
-  const x = two[0] > 0 ? -LABEL.width : LABEL.width;
-  return [[isTaken ? x : 38, y], two];
+  return [[38, isTaken ? two[1] + side * LABEL.height : y], two];
 }
 
 function line(link, from, to) {
@@ -197,9 +198,9 @@ function arc(element, [cx, cy], from, by, radius) {
   setAttributes(element, { d: `M${at(from)}A${radius} ${radius} 0 0 ${turn > 0 ? 0 : 1} ${at(from + turn)}` });
 }
 
-function label(element, [x, y], text) {
+function label(element, [x, y], angle, name) {
   setAttributes(element, { x: x.toFixed(1), y: (y + 2.8).toFixed(1), "text-anchor": "middle" });
-  setText(element, text);
+  setText(element, Math.abs(wrap(angle)) < LEAST_ARC ? "" : `${name} ${degrees(angle)}`);
 }
 
 /** An angle [rad] between −π and π. */

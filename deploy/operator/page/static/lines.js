@@ -1,25 +1,48 @@
-/** The lines that the terminal prints, newest first. */
+/** The lines that the terminal prints, newest first, of the kinds that the user wants to see. */
 
-import { byId, create } from "./dom.js";
+import { byId, create, onActivate, setAttributes } from "./dom.js";
 
-const MOST = 200;
+const MOST = 200; // of each group: positions come fast, and must not push out what matters
+
+/** The groups of kinds that a button shows and hides. */
+const GROUPS = {
+  steady: ["data", "position", "speed", "signal", "alive"],
+  operator: ["missed", "asleep", "hand"],
+  engines: ["engines", "own_turn_off", "others_turn_off", "state", "sender"],
+  processes: ["service", "process"],
+};
+const GROUP_OF = Object.fromEntries(
+  Object.entries(GROUPS).flatMap(([group, kinds]) => kinds.map((kind) => [kind, group])),
+);
 
 export class Lines {
   constructor() {
     this._list = byId("lines");
+    for (const button of byId("line-kinds").children) {
+      const group = button.dataset.shows;
+      const show = (isShown) => {
+        setAttributes(button, { "aria-pressed": isShown });
+        this._list.classList.toggle(`without-${group}`, !isShown);
+      };
+      show(button.ariaPressed === "true");
+      onActivate(button, () => show(button.ariaPressed !== "true"));
+    }
   }
 
   clear() {
     this._list.replaceChildren();
   }
 
-  /** Add lines above the others, and drop the oldest ones. */
+  /** Add lines above the others, and drop the oldest ones of each group. */
   add(lines) {
     if (!lines.length) return;
-    const items = lines.map(({ time, kind, text }) =>
-      create("li", { "data-kind": kind }, create("span", { class: "time" }, `[${Math.round(time)}]`), ` ${text}`),
-    );
+    const items = lines.map(({ time, kind, text }) => {
+      const attributes = { "data-kind": kind, "data-group": GROUP_OF[kind] };
+      return create("li", attributes, create("span", { class: "time" }, `[${Math.round(time)}]`), ` ${text}`);
+    });
     this._list.prepend(...items.reverse());
-    while (this._list.childElementCount > MOST) this._list.lastElementChild.remove();
+    for (const group of Object.keys(GROUPS)) {
+      for (const old of [...this._list.querySelectorAll(`[data-group=${group}]`)].slice(MOST)) old.remove();
+    }
   }
 }

@@ -99,7 +99,7 @@ export class Processes {
     }
     const isBack = entry.back && time - entry.back.time < REMEMBERED;
     setAttributes(entry.row, { "data-back": isBack ? "yes" : null });
-    setText(entry.health, isBack && process.ok ? `back after ${duration(entry.back.after)}` : process.health);
+    setText(entry.health, isBack && process.ok ? `back after ${duration(entry.back.after)}` : complaint(process));
     entry.process = process;
   }
 
@@ -123,6 +123,9 @@ export class Processes {
     if (text) alert(text);
   }
 }
+
+/** Why a process is not healthy; a healthy one has nothing to add to its state. */
+const complaint = ({ ok, health }) => (ok ? "" : health);
 
 /** A name that may be broken after an underscore where there is little room. */
 function breakable(name) {

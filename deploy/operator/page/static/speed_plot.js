@@ -6,8 +6,15 @@ import { GAP, SPAN } from "./model.js";
 import { niceStep } from "./scale.js";
 import { Sheet, drawTimeAxis, frameOf, stroke } from "./sheet.js";
 
-const USUAL = 0.98; // of the samples lie within the usual speeds
-const HEADROOM = 2; // times the usual speed fits into the plot
+const USUAL = 0.9; // of the samples of a moving arm lie within the usual speeds: spikes are rare
+const STILL = 0.01; // m/s; slower is no movement
+const HEADROOM = 1.5; // times the usual speed fits into the plot
+
+/** The speed [m/s] that a moving arm seldom exceeds. */
+export function usualSpeed(speeds) {
+  const moving = speeds.filter((speed) => speed > STILL).sort();
+  return moving[Math.floor(moving.length * USUAL)] ?? 0;
+}
 
 export class SpeedPlot {
   constructor() {
@@ -20,9 +27,8 @@ export class SpeedPlot {
     const begin = trace.from(time - SPAN);
     const speeds = new Float64Array(trace.length - begin);
     for (let row = begin; row < trace.length; row += 1) speeds[row - begin] = trace.at(row, 3) || 0;
-    speeds.sort();
-    const highest = speeds.at(-1) ?? 0;
-    this._choose(speeds[Math.floor(speeds.length * USUAL)] ?? 0, highest);
+    const highest = speeds.reduce((most, each) => Math.max(most, each), 0);
+    this._choose(usualSpeed(speeds), highest);
     const above = highest > this._top ? ", above this plot" : "";
     setText(
       byId("speed-summary"),
@@ -39,7 +45,7 @@ export class SpeedPlot {
   /** Choose the upper edge: a round number, kept for as long as it fits. A jump of the arm may lie above it. */
   _choose(usual, highest) {
     const needed = Math.min(highest, usual * HEADROOM);
-    if (needed <= this._top && needed > this._top * 0.4) return;
+    if (needed <= this._top && needed > this._top * 0.5) return;
     const step = niceStep(Math.max(needed, 0.1) / 2);
     this._top = Math.ceil((needed * 1.05) / step) * step || 1;
   }

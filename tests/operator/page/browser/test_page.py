@@ -20,7 +20,9 @@ from .link import Link
 
 pytestmark = pytest.mark.timed
 
-WIDTHS = {320: 568, 390: 844, 1280: 800, 3840: 2160}
+WIDTHS = {320: 568, 390: 844, 844: 390, 1280: 800, 3840: 2160}
+TARGET = 44  # px
+LEGIBLE = 11  # px, the height of the letters' box
 CONTROLS = ("button", "slider", "spinbutton")
 NAMED = (*CONTROLS, "link", "textbox", "image", "table", "region")
 WAIT = 1000 * LIMIT  # ms
@@ -66,6 +68,15 @@ BEYOND = """
 """
 """The elements that reach beyond the right edge, even where they are cut off."""
 
+SMALL = """
+(least) => [...document.querySelectorAll("button, input, a")].filter((it) =>
+    it.checkVisibility() && !it.matches(".skip")
+).map((it) => [it.id || it.ariaLabel || it.textContent, it.getBoundingClientRect()]).filter(
+    ([, { width, height }]) => Math.min(width, height) < least - 0.5
+).map(([name, { width, height }]) => `${name} ${width} ${height}`)
+"""
+"""The controls that are smaller than a size [px]."""
+
 INLINE = """
 window.violations = [];
 document.addEventListener("securitypolicyviolation", (event) => violations.push(event.effectiveDirective));
@@ -101,6 +112,30 @@ def test_page_fits_into_every_width(shared: HandOnPage, width: int) -> None:
     assert 0 <= box["y"] <= WIDTHS[width] - box["height"], "the button is in sight"
 
 
+@pytest.mark.parametrize("width", WIDTHS)
+def test_every_control_is_large_enough_for_a_finger(shared: HandOnPage, width: int) -> None:
+    shared.page.set_viewport_size({"width": width, "height": WIDTHS[width]})
+    shared.await_drawing()
+    assert shared.page.evaluate(SMALL, TARGET) == []
+
+
+def test_phone_on_its_side_shows_button_engines_and_axes(shared: HandOnPage) -> None:
+    shared.page.set_viewport_size({"width": 844, "height": 390})
+    shared.await_drawing()
+    for top in (0, 600):  # the page is scrolled to the processes, say
+        shared.page.evaluate("top => scrollTo(0, top)", top)
+        shared.await_drawing()
+        for control in ("#hold", "#turn-on", "#turn-off"):
+            box = shared.page.locator(control).bounding_box()
+            assert 0 <= box["y"] <= 390 - box["height"], control
+    heights = shared.page.evaluate(
+        "[...document.querySelectorAll('#arm .ticks text')].map((it) => it.getBoundingClientRect().height)"
+    )
+    assert heights
+    assert min(heights) >= LEGIBLE
+    shared.page.evaluate("scrollTo(0, 0)")
+
+
 def test_every_control_has_a_name(shared: HandOnPage) -> None:
     session = shared.context.new_cdp_session(shared.page)
     nodes = session.send("Accessibility.getFullAXTree")["nodes"]
@@ -110,7 +145,7 @@ def test_every_control_has_a_name(shared: HandOnPage) -> None:
         if role in NAMED and not node["ignored"]:
             names[role].append(node.get("name", {}).get("value", ""))
     assert {role for role in NAMED if "" in names[role]} == set()
-    assert [len(names[role]) for role in CONTROLS] == [4 + 2 * len(manifest.programs()), 4, 4]
+    assert [len(names[role]) for role in CONTROLS] == [8 + 2 * len(manifest.programs()), 4, 4]
     for role in CONTROLS:
         assert len(set(names[role])) == len(names[role]), "each name tells which control it is"
 

@@ -62,6 +62,51 @@ async () => {
 }
 """
 
+ARCS = """
+async () => {
+    const { Arm } = await import("/static/arm.js");
+    const arm = new Arm();
+    const trace = { from: () => 0, length: 0 };
+    const shown = (theta1, theta2) => {
+        arm.render({ arm: { l1: 1, l2: 1, theta1, theta2 }, position: null, trace, time: 0, speed: 0 });
+        return [...document.querySelectorAll("#arm > :last-child .angle-label")].map((it) => it.textContent);
+    };
+    return [shown(0.5, 0), shown(0, -0.5), shown(2 * Math.PI, 0.5)];
+}
+"""
+
+SPEEDS = """
+async () => {
+    const { usualSpeed } = await import("/static/speed_plot.js");
+    const minute = (...speeds) => Float64Array.from({ length: 1800 }, (_, n) => speeds[n % speeds.length]);
+    const spiked = minute(1, 2, 3);
+    spiked.fill(70, 0, 90); // a twentieth of the time
+    const seldom = minute(0);
+    seldom.fill(2, 0, 60);
+    return [minute(0), minute(1, 2, 3), spiked, seldom].map(usualSpeed);
+}
+"""
+
+EVENTS = """
+async () => {
+    const { Lines } = await import("/static/lines.js");
+    const buttons = document.getElementById("line-kinds");
+    buttons.replaceWith(buttons.cloneNode(true)); // which the page's own list does not hear
+    const lines = new Lines();
+    const positions = Array.from({ length: 500 }, () => ({ time: 0, kind: "position", text: "here" }));
+    const list = document.getElementById("lines");
+    const shown = () => [...list.children].filter((it) => it.checkVisibility()).map((it) => it.textContent);
+    lines.add([{ time: 1, kind: "state", text: "off" }, { time: 2, kind: "process", text: "died" }]);
+    lines.add(positions);
+    const first = shown();
+    const press = (group) => document.querySelector(`[data-shows=${group}]`).click();
+    press("engines");
+    const second = shown();
+    press("steady");
+    return [first, second, shown().length];
+}
+"""
+
 STRIKES = """
 async () => {
     const { Operator } = await import("/static/operator.js");
@@ -123,6 +168,18 @@ def test_labels_of_the_angles_never_overlap(page: Any) -> None:
     width, overlaps = page.evaluate(OVERLAPS)
     assert width > 20
     assert overlaps == []
+
+
+def test_angle_without_an_arc_has_no_label(page: Any) -> None:
+    assert page.evaluate(ARCS) == [["θ₁ 28.6°", ""], ["", "θ₂ \N{MINUS SIGN}28.6°"], ["", "θ₂ 28.6°"]]
+
+
+def test_spikes_do_not_spoil_the_scale_of_the_speed(page: Any) -> None:
+    assert page.evaluate(SPEEDS) == [0, 3, 3, 2]
+
+
+def test_positions_are_hidden_until_they_are_wanted_and_push_out_nothing(page: Any) -> None:
+    assert page.evaluate(EVENTS) == [["[2] died", "[1] off"], ["[2] died"], 201]
 
 
 def test_strikes_are_told_as_strikes_that_are_left(page: Any) -> None:
