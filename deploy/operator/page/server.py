@@ -24,9 +24,10 @@ from websockets.http11 import Response
 from deploy.operator import hold
 from deploy.operator.page import protocol
 from deploy.operator.page.connection import BAD_REQUEST, TOO_LATE, TOO_MANY, Allowance, Connection
+from deploy.operator.page.history import History
 from deploy.operator.page.site import SOCKET, Site, respond
 from deploy.operator.page.state import Clock, PageState
-from deploy.operator.page.updates import Updates
+from deploy.operator.page.updates import Updates, lasting
 
 MAX_CONNECTIONS = 32  # a browser opens six to load the page
 MAX_PAGES = 8
@@ -110,6 +111,7 @@ class PageServer:
         self._fail = fail
         self._tls = tls
         self._clients: list[_Client] = []
+        self._history = History()
         self._due = 0.0
         self._selector = selectors.DefaultSelector()
         listener.setblocking(False)
@@ -153,6 +155,8 @@ class PageServer:
         now = self._clock.now()
         if now >= self._due:
             self._due = max(self._due + UPDATE_PERIOD, now)
+            if any(client.page for client in self._clients):
+                self._history.note(round(self._clock.elapsed(), 3), lasting(self._newest(), now))
             for client in list(self._clients):
                 self._tick(client, now)
                 self._settle(client)
@@ -215,7 +219,12 @@ class PageServer:
             client.pinged = now
             connection.deadline = math.inf
             self._receive(Opened(client.page))
-            welcome = {"type": "welcome", "page": client.page, "local": connection.is_local}
+            welcome = {
+                "type": "welcome",
+                "page": client.page,
+                "local": connection.is_local,
+                "history": self._history.changes(),
+            }
             connection.send(_text({**welcome, **self._welcome}), now)
             connection.ping(now)
 

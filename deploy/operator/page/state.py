@@ -31,7 +31,8 @@ REPORTED = 2.0  # s within which each service that sent a command has told so
 RENEWED = 0.5  # s: the drive's 0.4 s and the way of the message
 SAMPLE_PERIOD = 1 / 30  # s between two samples of the trace
 BEAT = "beat"  # the request of a page that is held
-MAX_SAMPLES, MAX_LINES, MAX_REFUSALS = 90, 200, 20  # that are kept for a page that is slow
+MAX_SAMPLES, MAX_LINES = 1800, 400  # those of a minute, for a page that opens later
+MAX_REFUSALS = 20  # that are kept for a page that is slow
 
 BY_WATCHDOG = "turned off by operator_watchdog (operator incapacitated)"
 BY_PAGE = "turned off on a page"

@@ -21,7 +21,20 @@ SILENT_CONTROLLER = "the engine controller is silent, so the drive stops the eng
 
 def view(state: PageState, page: str, now: float) -> dict[str, Any]:
     """Return what a page shows of a state at a time [s], by keys of an update."""
-    arm, operator, hands, engines = state.arm, state.operator, state.hands, state.engines
+    arm = state.arm
+    return {
+        "arm": {name: arm.configuration.get(name) for name in topics.CONFIGURATION},
+        "position": {"x": arm.position[0], "y": arm.position[1]} if arm.position else None,
+        "speed": arm.speed,
+        **moment(state, page, now),
+        "sources": {name: "hand" if name in state.by_hand else "scenario" for name in LIMITS},
+        "processes": [_row(name, state.programs.get(name, Program()), now) for name in PROGRAMS],
+    }
+
+
+def moment(state: PageState, page: str, now: float) -> dict[str, Any]:
+    """Return the part of a view that the page draws over time."""
+    operator, hands, engines = state.operator, state.hands, state.engines
     holder = hands.hold.holder(now)
     is_beating = now - hands.heartbeat <= HEARTBEAT_VISIBLE
     by = "terminal" if hands.pressed or hands.at_terminal else "scenario"
@@ -29,9 +42,6 @@ def view(state: PageState, page: str, now: float) -> dict[str, Any]:
     is_reported = now - engines.reported <= RENEWED
     refused = engines.refused[1] if engines.refused and now - engines.refused[0] <= REFUSAL_VISIBLE else None
     return {
-        "arm": {name: arm.configuration.get(name) for name in topics.CONFIGURATION},
-        "position": {"x": arm.position[0], "y": arm.position[1]} if arm.position else None,
-        "speed": arm.speed,
         "operator": {
             "seen": age <= PRESENCE_VISIBLE,
             "age": round(age, 1) if math.isfinite(age) else None,
@@ -48,9 +58,14 @@ def view(state: PageState, page: str, now: float) -> dict[str, Any]:
             "since": engines.off_at if is_reported and engines.state == OFF else None,
             "refused": refused,
         },
-        "sources": {name: "hand" if name in state.by_hand else "scenario" for name in LIMITS},
-        "processes": [_row(name, state.programs.get(name, Program()), now) for name in PROGRAMS],
     }
+
+
+def lasting(state: PageState, now: float) -> dict[str, Any]:
+    """Return a moment for the history of pages that open later, without what changes all the time."""
+    shown = moment(state, "", now)
+    operator = {**shown["operator"], "age": None}
+    return {"switch": shown["switch"], "operator": operator, "engines": {"state": shown["engines"]["state"]}}
 
 
 def _why(state: PageState, now: float) -> str:

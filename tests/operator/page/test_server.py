@@ -256,6 +256,16 @@ def test_update_tells_all_first_and_then_the_changes(arm: Arm) -> None:
     assert third.keys() == {"type", "nonce", "time", "speed"}
 
 
+def test_page_that_opens_later_gets_the_history(arm: Arm) -> None:
+    arm.state = PageState(hands=state.Hands(heartbeat=1e9))  # held for a long time to come
+    with arm.page() as page:
+        update(page)
+        with arm.connect() as later:
+            later.send(json.dumps({"type": "hello", "token": TOKEN}))
+            ((time, moment),) = message(later)["history"]
+    assert (time, moment["switch"]) == (1.25, {"held": True, "by": "scenario"})
+
+
 def test_refusal_reaches_its_page_only(arm: Arm) -> None:
     with arm.page() as one, arm.page() as two:
         first, _ = arm.next(server.Opened).page, arm.next(server.Opened).page

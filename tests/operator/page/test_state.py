@@ -14,8 +14,9 @@ from reactivex.testing import ReactiveTest, TestScheduler
 
 from deploy.operator.hold import OTHER_PAGE, Hold
 from deploy.operator.page import state
+from deploy.operator.page.history import History
 from deploy.operator.page.state import Arm, Clock, Engines, Operator, PageState, Recent
-from deploy.operator.page.updates import SILENT_CONTROLLER, Updates, view
+from deploy.operator.page.updates import SILENT_CONTROLLER, Updates, lasting, view
 from interfaces import topics
 from interfaces.topics import ALIVE, INCAPACITATED, MISSED, OFF, ON, TURN_OFF
 from reactive_node import stamps
@@ -113,16 +114,17 @@ def test_arm_position_and_speed(play: Play) -> None:
 
 
 def test_trace_is_thinned_and_bounded(play: Play) -> None:
-    for tick in range(2000):
+    for tick in range(8000):
         time = 201 + tick * 0.01
         play.say(time, topics.EFFECTOR_POSITION, position(time - 0.2, tick, 0.0))
 
-    found = play.run(222)
+    found = play.run(282)
 
     times = [sample[0] for sample in found.arm.samples.items]
     assert len(times) == state.MAX_SAMPLES
-    assert 450 <= found.arm.samples.total <= 600, "at most 30 a second"
-    assert times[-1] == pytest.approx(220.8, abs=0.05), "of the stamp, not of the arrival"
+    assert 1800 <= found.arm.samples.total <= 2400, "at most 30 a second"
+    assert times[-1] == pytest.approx(280.8, abs=0.05), "of the stamp, not of the arrival"
+    assert times[-1] - times[0] >= 59.0, "the last minute"
 
 
 def test_new_page_shows_nothing_of_the_last_one(play: Play) -> None:
@@ -553,6 +555,50 @@ def test_first_update_tells_everything_and_the_next_the_changes(play: Play) -> N
     assert third == {"type": "update", "nonce": "n3", "time": 0.0, "speed": 2.0}
 
 
+ON_AT = {"engines": {"state": "on"}}
+OFF_AT = {"engines": {"state": "off"}}
+
+
+def test_history_keeps_the_changes_of_the_last_minute() -> None:
+    history = History()
+    for time in range(64):
+        history.note(float(time), OFF_AT if time in (0, 1, 3) else ON_AT)
+    assert history.changes() == [(2.0, ON_AT), (3.0, OFF_AT), (4.0, ON_AT)], "with what was before"
+
+
+def test_history_does_not_know_what_happened_while_no_page_was_open() -> None:
+    history = History()
+    for time in (0.0, 1.0, 20.0):
+        history.note(time, ON_AT)
+    assert history.changes() == [(0.0, ON_AT), (1.0, None), (20.0, ON_AT)]
+
+
+def test_another_scenario_begins_another_history() -> None:
+    history = History()
+    for time in (100.0, -10.0):
+        history.note(time, ON_AT)
+    assert history.changes() == [(-10.0, ON_AT)]
+
+
+def test_history_changes_only_when_something_happens(play: Play) -> None:
+    play.say(210, topics.OPERATOR_PRESENCE, START + timedelta(seconds=209.7))
+    found = play.run(211)
+    assert lasting(found, 210.1) == lasting(found, 210.5), "the operator is seen, for longer"
+    assert lasting(found, 210.5) != lasting(found, 210.8)
+
+
+def test_page_that_opens_later_gets_the_trace_and_the_lines_of_the_last_minute(play: Play) -> None:
+    for second in range(60):
+        play.say(210 + second, topics.EFFECTOR_POSITION, position(210 + second, second, 0.0))
+    kind = type("Kind", (), {"name": "STATE"})
+    play.lines.append(on_next(211, [Written(START + timedelta(seconds=211), kind, "early")]))
+    found = play.run(270)
+
+    update = Updates("page", play.clock).update(found, "n", 270.0)
+    assert [sample[1] for sample in update["trace"]] == list(range(60))
+    assert [line["text"] for line in update["lines"]] == ["early"]
+
+
 def test_updates_carry_new_samples_and_lines_once(play: Play) -> None:
     updates = Updates("page", play.clock)
     samples = tuple((float(number), 0.0, 0.0, None) for number in range(90))
@@ -573,13 +619,13 @@ def test_updates_carry_new_samples_and_lines_once(play: Play) -> None:
 
 def test_lines_are_numbered_in_milliseconds_of_the_scenario_and_bounded(play: Play) -> None:
     kind = type("Kind", (), {"name": "SPEED"})
-    batch = [Written(START + timedelta(seconds=209.5), kind, f"line {number}") for number in range(300)]
+    batch = [Written(START + timedelta(seconds=209.5), kind, f"line {number}") for number in range(500)]
     play.lines.append(on_next(210, batch))
 
     found = play.run(212)
     assert len(found.lines.items) == state.MAX_LINES
-    assert found.lines.items[-1] == {"time": 209500, "kind": "speed", "text": "line 299"}
-    assert found.lines.total == 300
+    assert found.lines.items[-1] == {"time": 209500, "kind": "speed", "text": "line 499"}
+    assert found.lines.total == 500
 
 
 def test_all_values_of_an_update_are_json(play: Play) -> None:

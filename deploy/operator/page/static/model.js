@@ -4,7 +4,7 @@ import { Changes, Rows } from "./ring.js";
 
 export const SPAN = 60; // s of history
 const SAMPLES = SPAN * 30; // the server sends at most 30 a second
-const MOST_LINES = 200;
+const MOST_LINES = 400;
 /** Without a change for this time [s], a plot shows a gap. */
 export const GAP = 1.5;
 
@@ -39,11 +39,16 @@ export class Model {
     Object.assign(this, INITIAL);
   }
 
-  /** Begin again after a connection; the last minute stays, with a gap. */
+  /** Begin again after a connection; the last minute stays, with a gap. A new page gets it from the server. */
   begin(welcome) {
     this.welcome = welcome;
     this.lines = [];
     Object.assign(this, INITIAL, { time: this.time });
+    if (this.hands.items.length) return; // this page knows more: which hand was its own
+    for (const [time, moment] of welcome.history ?? []) {
+      if (moment) this._note(time, moment);
+      else this._gap(time);
+    }
   }
 
   /** Take over what changed. */
@@ -54,10 +59,14 @@ export class Model {
     if (this.time - before > GAP) this._gap(before);
     for (const sample of message.trace ?? []) this._trace(sample);
     if (message.lines) this.lines = this.lines.concat(message.lines).slice(-MOST_LINES);
-    this.hands.push(this.time, this.switch.held ? (this.switch.by ?? "somewhere") : "released");
-    this.operators.push(this.time, operatorState(this.operator));
-    this.strikes.push(this.time, this._strikesFallen());
-    this.engineStates.push(this.time, this.engines.state);
+    this._note(this.time, this);
+  }
+
+  _note(time, { switch: hold, operator, engines }) {
+    this.hands.push(time, hold.held ? (hold.by ?? "somewhere") : "released");
+    this.operators.push(time, operatorState(operator));
+    this.strikes.push(time, this._strikesFallen(operator));
+    this.engineStates.push(time, engines.state);
   }
 
   /** The lines that came since the last call. */
@@ -67,8 +76,7 @@ export class Model {
     return lines;
   }
 
-  _strikesFallen() {
-    const { strikes_left: left } = this.operator;
+  _strikesFallen({ strikes_left: left }) {
     return left === null || !this.welcome ? null : this.welcome.strikes - left;
   }
 

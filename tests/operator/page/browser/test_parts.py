@@ -87,6 +87,24 @@ async () => {
 }
 """
 
+HISTORY = """
+async () => {
+    const { Model } = await import("/static/model.js");
+    const operator = { seen: true, age: null, activity: "alive", strikes_left: 2 };
+    const hold = { held: true, by: "other_page" };
+    const past = { switch: hold, operator, engines: { state: "on" } };
+    const welcome = { strikes: 3, history: [[10, past], [20, null], [25, past]] };
+    const now = { time: 30, switch: hold, operator, engines: { state: "off", why: "", refused: null } };
+    const model = new Model();
+    const shown = () => [model.hands, model.strikes, model.engineStates].map((it) => it.items);
+    model.begin(welcome);
+    model.update(now);
+    const opened = JSON.stringify(shown());
+    model.begin(welcome);
+    return [JSON.parse(opened), JSON.stringify(shown()) === opened];
+}
+"""
+
 EVENTS = """
 async () => {
     const { Lines } = await import("/static/lines.js");
@@ -176,6 +194,13 @@ def test_angle_without_an_arc_has_no_label(page: Any) -> None:
 
 def test_spikes_do_not_spoil_the_scale_of_the_speed(page: Any) -> None:
     assert page.evaluate(SPEEDS) == [0, 3, 3, 2]
+
+
+def test_new_page_shows_the_last_minute_of_the_server(page: Any) -> None:
+    hands = [[10, "other_page"], [20, None], [25, "other_page"]]
+    strikes = [[10, 1], [20, None], [25, 1]]
+    engines = [[10, "on"], [20, None], [25, "on"], [30, "off"]]
+    assert page.evaluate(HISTORY) == [[hands, strikes, engines], True]
 
 
 def test_positions_are_hidden_until_they_are_wanted_and_push_out_nothing(page: Any) -> None:
