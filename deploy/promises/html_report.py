@@ -28,7 +28,16 @@ th { color: var(--soft); font-weight: 500; font-size: 13px; }
 .verdict { font-weight: 600; white-space: nowrap; } .holds { color: var(--good); }
 .violated { color: var(--bad); } .unknown { color: var(--open); }
 .evidence { color: var(--bad); font-size: 13px; }
-@media (max-width: 700px) { body { padding: 16px; } td, th { padding: 4px 6px; } }
+@media (max-width: 900px) {
+  body { padding: 16px; overflow-wrap: anywhere; }
+  .card { padding: 8px 12px; }
+  table, tbody, tr, td { display: block; }
+  tr { padding: 8px 0; border-bottom: 1px solid var(--line); } tr:last-child { border: 0; }
+  tr:has(th) { display: none; }
+  td, td.number { padding: 2px 0; border: 0; text-align: left; } .sentence { min-width: 0; }
+  td:not([data-title=""])::before { content: attr(data-title) " "; color: var(--soft); font-size: 13px; }
+  td[data-title=""] { font-weight: 600; }
+}
 """
 LEGEND = (
     "The numbers refer to the list of faults. Engines run from an <code>on</code> until an <code>off</code>, "
@@ -114,8 +123,9 @@ def _table(columns: Mapping[str, str], rows: Iterable[Sequence[str]]) -> str:
     """Return a table; ``columns`` has the title and the class of each column."""
     lines = ["<tr>" + "".join(f"<th class='{kind}'>{title}" for title, kind in columns.items())]
     for row in rows:
-        cells = zip(columns.values(), row, strict=True)
-        lines.append("<tr>" + "".join(f"<td class='{kind}'>{cell}" for kind, cell in cells))
+        cells = zip(columns.items(), row, strict=True)
+        found = (f"<td class='{kind}' data-title='{title}'>{cell}" for (title, kind), cell in cells)
+        lines.append("<tr>" + "".join(found))
     return f"<table>{''.join(lines)}</table>"
 
 

@@ -1,0 +1,34 @@
+"""The report of chaos and simulation in a browser."""
+
+from __future__ import annotations
+
+from contextlib import closing
+from typing import Any
+
+import pytest
+
+from deploy.promises.html_report import html
+from deploy.promises.promises import CHECKERS
+from tests.promises.histories import good, killed
+
+LEGIBLE = 12  # px
+TOO_WIDE = """
+() => [...document.querySelectorAll(".card:has(table)")]
+    .filter((it) => it.scrollWidth > it.clientWidth).map((it) => it.textContent)
+"""
+SMALL = """
+(least) => [...document.querySelectorAll("h1, h2, p, td, .evidence")]
+    .filter((it) => parseFloat(getComputedStyle(it).fontSize) < least).map((it) => it.textContent)
+"""
+
+
+@pytest.mark.parametrize("width", [320, 390, 844, 1280])
+def test_report_is_read_without_moving_its_tables(browser: Any, width: int) -> None:
+    history = killed(good(), "kinematics", 20.0, 9.0)
+    findings = [check(history) for check in CHECKERS.values()]
+    with closing(browser.new_context(viewport={"width": width, "height": 844})) as context:
+        page = context.new_page()
+        page.set_content(html("chaos", ["Seed 7."], findings, history))
+        assert page.evaluate("document.documentElement.scrollWidth") <= width
+        assert page.evaluate(TOO_WIDE) == []
+        assert page.evaluate(SMALL, LEGIBLE) == []
