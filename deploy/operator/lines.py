@@ -68,6 +68,8 @@ class Batch(NamedTuple):
     """Whether the engines are on."""
     turned_off: datetime = FIRST
     """The time of the last command `turn_off`."""
+    asked: datetime = FIRST
+    """The time of the last own one."""
     went_off: datetime = FIRST
     """When the engines went off, until the sender of that command is known."""
 
@@ -257,12 +259,14 @@ class Allowance:
 
 def next_batch(previous: Batch, lines: list[Line]) -> Batch:
     """Sort lines, tell why the engines go off, and show one command of the watchdog for each sleep."""
-    is_asleep, _, is_on, turned_off, went_off = previous
+    is_asleep, _, is_on, turned_off, asked, went_off = previous
     shown = []
     for line in sorted(lines):
         if line.kind in (Kind.ASLEEP, Kind.OWN_TURN_OFF, Kind.OTHERS_TURN_OFF):
             turned_off = line.time
         match line.kind:
+            case Kind.OWN_TURN_OFF:
+                asked = line.time
             case Kind.ALIVE | Kind.MISSED:
                 is_asleep = False
             case Kind.ASLEEP:
@@ -277,13 +281,13 @@ def next_batch(previous: Batch, lines: list[Line]) -> Batch:
                 if was_on and not is_on and line.time - turned_off > TOGETHER:
                     line = line._replace(text=f"{line.text}: {BY_CONTROLLER}")
             case Kind.SENDER:
-                if abs(line.time - went_off) > TOGETHER:
-                    continue  # it sends again while they are off, or has sent it long ago
+                if abs(line.time - went_off) > TOGETHER or abs(line.time - asked) <= TOGETHER:
+                    continue  # it sends again while they are off, has sent it long ago, or is the own node
                 went_off = FIRST
         shown.append(line)
         if line.kind is Kind.ASLEEP:
             shown.append(Line(line.time, Kind.ENGINES, TURNING_OFF))
-    return Batch(is_asleep, shown, is_on, turned_off, went_off)
+    return Batch(is_asleep, shown, is_on, turned_off, asked, went_off)
 
 
 def _line(kind: Kind, text: str | Callable[[Any], str]) -> Callable[[Timestamp[Any]], Line]:

@@ -217,6 +217,12 @@ def test_engines_that_go_off_without_a_command_say_so(play: Play) -> None:
     assert texts(play(states((1, "off"), (2, "on"), (3, "off"), (4, "off"))))[1:] == ["Engines are on", off]
 
 
+def test_own_turn_off_needs_no_other_name(play: Play) -> None:
+    script = states((1, "on"), (2.01, "off")) + commands(topics.TURN_OFF, 2)
+    shown = texts(play([*script, turn_off_by("operator_page", 2.5, 0.5)], own=[2]))
+    assert shown[1:] == ["Turning off engines, as you asked...", "Engines are off"]
+
+
 @pytest.mark.parametrize("conclusion", [True, False])
 def test_watchdog_that_turned_off_the_engines_is_not_named_twice(play: Play, conclusion: bool) -> None:
     script = states((1, "on"), (13.51, "off")) + commands(topics.TURN_OFF, 13.5)
