@@ -2,7 +2,7 @@
 
 import { alert, announce, onChange } from "./announce.js";
 import { byId, onActivate, setAttributes, setNote, setText } from "./dom.js";
-import { duration, sentence } from "./format.js";
+import { sentence, wholeSeconds } from "./format.js";
 
 const STATES = {
   on: ["good", "Engines on"],
@@ -39,7 +39,7 @@ export class Engines {
     for (const id of ["engines-sign", "mini-engines-sign"]) setAttributes(byId(id), { "data-sign": sign });
     setText(byId("engines-text"), text);
     setText(byId("mini-engines"), engines.state ? text : "Engines: unknown");
-    const ago = engines.since === null ? "" : `, ${duration(Math.max(0, Math.floor(time - engines.since)))} ago`;
+    const ago = engines.since === null ? "" : `, ${wholeSeconds(time - engines.since)} ago`;
     setText(byId("engines-why"), sentence((engines.why ?? "") + ago));
     setAttributes(byId("turn-on"), { "data-suggested": engines.state === "off" ? "yes" : null });
     for (const id of ["turn-on", "turn-off"]) setAttributes(byId(id), { "aria-disabled": isLive ? null : true });

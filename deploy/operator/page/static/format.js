@@ -25,6 +25,9 @@ export function duration(seconds) {
   return `${Math.floor(minutes / 60)} h ${minutes % 60} min`;
 }
 
+/** A duration [s] without tenths. */
+export const wholeSeconds = (seconds) => (seconds < 10 ? `${Math.max(0, Math.floor(seconds))} s` : duration(seconds));
+
 /** A time since the scenario's origin [s], as minutes and seconds. */
 export function clock(seconds) {
   if (!Number.isFinite(seconds)) return "";
