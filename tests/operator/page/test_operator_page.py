@@ -12,6 +12,7 @@ from typing import Any
 
 import pytest
 from rclpy.parameter import Parameter
+from reactivex.subject import Subject
 from std_msgs.msg import Bool, String
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
@@ -481,6 +482,46 @@ def test_page_tells_why_the_engines_went_off_while_none_was_open(
 
     with world.page() as page:
         assert page.shown["engines"]["why"] == RESTARTED
+
+
+class Controller:
+    """An engine controller that obeys, and repeats its state."""
+
+    def __init__(self, make_node: Callable[..., Any]) -> None:
+        self._state = topics.ON
+        node = make_node("controller")
+        publisher = node.create_publisher(String, "engines/state", topics.ENGINES_STATE.qos)
+        node.create_timer(0.1, lambda: publisher.publish(String(data=self._state)))
+        node.create_subscription(String, "engines", self._obey, topics.ENGINES.qos)
+
+    def _obey(self, _: String) -> None:
+        self._state = topics.OFF
+
+
+def test_page_names_the_service_that_turned_the_engines_off(
+    world: World, make_node: Callable[..., Any]
+) -> None:
+    commands: Subject[str] = Subject()
+    guard = world.service(make_node, "torque_guard", lambda node: node.publish(topics.ENGINES, commands))
+    Controller(make_node)
+    with world.page() as page:
+        world.until(lambda: page.shown["engines"]["state"] == topics.ON)
+        world.for_seconds(0.5)
+        commands.on_next(topics.TURN_OFF)
+        guard.health.report()
+        world.until(lambda: page.shown["engines"]["why"] == "turned off by torque_guard")
+
+
+def test_page_names_the_node_without_health_that_may_have_turned_the_engines_off(
+    world: World, make_node: Callable[..., Any]
+) -> None:
+    publisher = make_node("rqt").create_publisher(String, "engines", topics.ENGINES.qos)
+    Controller(make_node)
+    with world.page() as page:
+        world.until(lambda: page.shown["engines"]["state"] == topics.ON)
+        world.for_seconds(0.5)
+        publisher.publish(String(data=topics.TURN_OFF))
+        world.until(lambda: page.shown["engines"]["why"] == "turned off by rqt")
 
 
 def test_taken_port_disables_the_page_and_nothing_else(
