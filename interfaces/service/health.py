@@ -11,7 +11,7 @@ import os
 import socket
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from typing import Any, NamedTuple
 
@@ -46,6 +46,8 @@ class HealthReporter:
         self.dropped = 0  # messages since the start
         self._last_output: float | None = None
         self._last_turn_off: float | None = None
+        self.standing: Mapping[str, str] = {}
+        """What each report warns of until it is changed: the reason by subject."""
         self._remarks: dict[str, Counter[str]] = {}  # since the last report: subject, reason, how often
         self._logged: set[str] = set()  # the remarks of the last report
         self._parameters: dict[str, str] = {}
@@ -104,7 +106,7 @@ class HealthReporter:
         remarks, self._remarks = self._remarks, {}
         counts = {
             f"{subject}: {why}": n for subject, reasons in remarks.items() for why, n in reasons.items()
-        }
+        } | {f"{subject}: {why}": 1 for subject, why in self.standing.items()}
         if counts.keys() - self._logged:
             self._node.get_logger().warning("; ".join(sorted(counts)))
         self._logged = set(counts)

@@ -111,6 +111,23 @@ def test_warning_is_logged_when_it_is_new(service: ServiceNode, monkeypatch: pyt
     assert logged == ["l1: early; l1: late", "l1: late; l1: lost", "l1: late"]
 
 
+def test_standing_warning_is_in_each_report(service: ServiceNode, monkeypatch: pytest.MonkeyPatch) -> None:
+    published: list[Any] = []
+    monkeypatch.setattr(service.health._publisher, "publish", published.append)
+    service.health.standing = {"disk": "it is nearly full"}
+    service.remark("l1", "late")
+    for _ in range(2):
+        service.health.report()
+    service.health.standing = {}
+    service.health.report()
+
+    assert [each.status[0].message for each in published] == [
+        "l1: late; disk: it is nearly full",
+        "disk: it is nearly full",
+        "running",
+    ]
+
+
 def test_report_has_host_uptime_and_age_of_the_last_output(
     service: ServiceNode, monkeypatch: pytest.MonkeyPatch
 ) -> None:
