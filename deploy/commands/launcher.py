@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 from deploy.commands.stop import stop
 from deploy.operator.output import say
 from deploy.running import interruption, manifest, messages, rclpy_choice
-from deploy.running.environment import NAMESPACE, set_middleware
+from deploy.running.environment import ADOPTED, NAMESPACE, set_middleware
 from deploy.running.errors import DeploymentError
 from deploy.running.run_directory import RUN
 from deploy.running.supervisord import Program
@@ -32,20 +32,6 @@ LOOK_PERIOD = 0.2  # s between two looks at the states of programs that start
 START_ATTEMPTS = 3  # of a service that dies so slowly that supervisord does not count it as an early death
 RECORDS = "records"  # in the run directory
 LOG_LINES = 15  # of a service that does not start
-# Variables that a command takes over from the running system.
-ADOPTED = (
-    "RUNTIME",
-    "PYTHONPATH",
-    "LD_LIBRARY_PATH",
-    "AMENT_PREFIX_PATH",
-    "ROS_",
-    "RMW_",
-    "CYCLONEDDS_",
-    "FASTRTPS_",
-    "FASTDDS_",
-    NAMESPACE,
-    manifest.VARIABLE,
-)
 LIBRARIES_ARE_KNOWN = "_ROS_WHEELS_BOOTSTRAP_COMPLETE"
 """Environment variable: the wheels of ROS 2 leave the environment of this interpreter as it is."""
 

@@ -7,9 +7,23 @@ import sys
 from collections.abc import Mapping, MutableMapping
 from pathlib import Path
 
-from deploy.running import processes
+from deploy.running import manifest, processes
 
 NAMESPACE = "REACTIVE_ARM_NAMESPACE"  # environment variable: the ROS namespace of an arm
+ADOPTED = (
+    "RUNTIME",
+    "PYTHONPATH",
+    "LD_LIBRARY_PATH",
+    "AMENT_PREFIX_PATH",
+    "ROS_",
+    "RMW_",
+    "CYCLONEDDS_",
+    "FASTRTPS_",
+    "FASTDDS_",
+    NAMESPACE,
+    manifest.VARIABLE,
+)
+"""The beginnings of the variables that belong to an arm: other commands for it take them over."""
 FASTDDS_PROFILES = Path(__file__).resolve().parents[1] / "fastdds.xml"
 
 
