@@ -16,6 +16,7 @@ from deploy.operator.output import say
 from deploy.running import interruption, manifest, messages, rclpy_choice
 from deploy.running.environment import ADOPTED, NAMESPACE, set_middleware
 from deploy.running.errors import DeploymentError
+from deploy.running.machine import LOOPBACK_DOWN, loopback_is_up
 from deploy.running.run_directory import RUN
 from deploy.running.supervisord import Program
 from deploy.running.system import System
@@ -87,6 +88,10 @@ def status(system: System) -> None:
     print(f"{rclpy_choice.words()}, {place(os.environ)}")
     if page := system.page:
         print(page)
+    if not loopback_is_up():  # so no health can be heard, not even that of the sentinel, which tells of it
+        print(f"loopback: {LOOPBACK_DOWN}")
+        print(of_services(programs, {}))
+        return
     with Member() as member, heard_healths(member.node) as health:
         _listen(member, running, health, STATUS_LIMIT)
         print(of_services(programs, health))
@@ -203,9 +208,13 @@ def _show(system: System, member: Member, *, owner: bool = False) -> None:
     parent = os.getppid()
     with Terminal(member.node, system.origin()) as terminal:
         say(HELP)
+        is_connected = True
         while not terminal.has_quit:
             member.spin_some()
             terminal.refresh()
+            if loopback_is_up() != is_connected:
+                is_connected = not is_connected
+                say("loopback: it is up again." if is_connected else f"loopback: {LOOPBACK_DOWN}")
             if owner and os.getppid() != parent:  # make was killed
                 return
             if system.supervisor_has_ended():

@@ -24,6 +24,7 @@ from deploy.operator.page.site import Site
 from deploy.operator.remote import parameter_changes
 from deploy.operator.switch import VIRTUAL_SWITCH, Switch
 from deploy.running import manifest
+from deploy.running.machine import loopback_is_up
 from interfaces import service, topics
 from interfaces.service import ServiceNode, UserError, parameter
 from interfaces.service.epoch import Epoch
@@ -34,6 +35,7 @@ from services import engine_controller, operator_watchdog
 LINGER = 5.0  # s after the last page has left until its topics are given up: a reload is faster
 LINES_PERIOD = 0.5  # s
 TERMINALS_PERIOD = 0.5  # s
+LOOPBACK_PERIOD = 1.0  # s
 BEST_EFFORT = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 UNSEEN = replace(topics.ENGINES_STATE, qos=BEST_EFFORT)
 """The engines' state while no page shows it. To read and acknowledge it ten times a second would cost more
@@ -114,6 +116,7 @@ def wire(node: ServiceNode) -> None:
         switch.holds.map(state.held),
         switch.pressed.map(state.pressed),
         during(is_open, terminal_holds(node)).map(state.held_at_terminal),
+        during(is_open, loopback(node)).map(state.connected),
         turn_offs.map(lambda _: state.turned_off(clock.now())),
         configuration.followers(set_elsewhere, is_open),
         configuration.outcomes(asked),
@@ -163,6 +166,12 @@ def terminal_holds(node: ServiceNode) -> Observable[bool]:
         return any(each.node_name not in services for each in node.get_publishers_info_by_topic(name))
 
     return rx.timer(0.0, TERMINALS_PERIOD, node.scheduler).map(look).distinct_until_changed()
+
+
+def loopback(node: ServiceNode) -> Observable[bool]:
+    """Emit whether the loopback interface is up."""
+    looks = rx.timer(0.0, LOOPBACK_PERIOD, node.scheduler)
+    return looks.map(lambda _: loopback_is_up()).distinct_until_changed()
 
 
 def controllers(node: ServiceNode) -> Callable[[], frozenset[tuple[int, ...]]]:

@@ -1,8 +1,8 @@
 """The sentinel: keeps the services alive where supervisord does not notice that they are not.
 
 User story (ours): as a robot operator, I find a hanging service replaced within five seconds, and a service
-that supervisord has given up started again, without help; and I see on /diagnostics why and how each process
-ended.
+that supervisord has given up started again, without help; I see on /diagnostics why and how each process
+ended; and I am warned while the machine is about to harm the arm (machine.py).
 
 It is a service like the others, and supervised like them. It kills processes that are stopped or report no
 health, kills duplicates of supervised processes, and revives programs that supervisord has given up, with
@@ -25,6 +25,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
 from deploy.running import processes
 from deploy.running.errors import DeploymentError
+from deploy.running.machine import Machine, figures
 from deploy.running.manifest import SENTINEL
 from deploy.running.policy import Action, Observation, Policy, Timeouts
 from deploy.running.probe import Probe
@@ -126,14 +127,16 @@ def wire(node: ServiceNode) -> None:
     parameters = node.declare(Parameters)
     timeouts = Timeouts(parameters.period, parameters.health_timeout, parameters.start_timeout)
     run, supervisord = Path(os.environ[processes.MARK]), Supervisord(os.getppid())
-    probe, policy = Probe(run, supervisord), Policy(timeouts)
+    probe, policy, machine = Probe(run, supervisord), Policy(timeouts), Machine(run, timeouts.period)
     own_name = node.get_fully_qualified_name()
     namespace = node.get_namespace().rstrip("/")
 
     def observe(_: int) -> Observation | None:
+        node.health.standing = machine.warnings(figures(run))
         try:
             return probe.observe()
         except DeploymentError as error:
+            machine.skip()
             node.remark(SENTINEL, str(error))
             return None
 

@@ -19,6 +19,7 @@ from rclpy.time import Time
 
 from deploy.running import processes, sentinel
 from deploy.running.errors import DeploymentError
+from deploy.running.machine import Figures
 from deploy.running.manifest import SENTINEL
 from deploy.running.policy import Action, Observation, Timeouts
 from deploy.running.supervisord import Program, Supervisord
@@ -62,11 +63,28 @@ class Policy:
         return actions
 
 
+class Machine:
+    """Warns of what the test has prepared."""
+
+    def __init__(self) -> None:
+        self.found: dict[str, str] = {}
+        self.skipped = 0
+        self.made_of: tuple[Path, float] | None = None
+
+    def warnings(self, seen: Figures) -> dict[str, str]:
+        assert seen.loopback_is_up
+        return self.found
+
+    def skip(self) -> None:
+        self.skipped += 1
+
+
 class Sentinel(Wired):
-    """A wired sentinel with a probe and a policy of the test."""
+    """A wired sentinel with a probe, a policy and a machine of the test."""
 
     probe: Probe
     policy: Policy
+    machine: Machine
     carried_out: list[tuple[Action, Path, int]]
 
     def states(self) -> list[Any]:
@@ -76,7 +94,7 @@ class Sentinel(Wired):
 
 @pytest.fixture
 def wired(make_node: MakeNode, spin_until: SpinUntil, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Any:
-    probe, policy = Probe(), Policy()
+    probe, policy, machine = Probe(), Policy(), Machine()
     carried_out: list[tuple[Action, Path, int]] = []
 
     def make_policy(timeouts: Timeouts) -> Policy:
@@ -91,7 +109,12 @@ def wired(make_node: MakeNode, spin_until: SpinUntil, monkeypatch: pytest.Monkey
         probe.made_of = (run, supervisord.pid)
         return probe
 
+    def make_machine(run: Path, period: float) -> Machine:
+        machine.made_of = run, period
+        return machine
+
     monkeypatch.setattr(sentinel, "Probe", make_probe)
+    monkeypatch.setattr(sentinel, "Machine", make_machine)
     monkeypatch.setattr(sentinel, "Policy", make_policy)
     monkeypatch.setattr(
         sentinel,
@@ -102,7 +125,7 @@ def wired(make_node: MakeNode, spin_until: SpinUntil, monkeypatch: pytest.Monkey
     def make(**options: Any) -> Sentinel:
         options.setdefault("period", 0.05)
         made = Sentinel(make_node, spin_until, sentinel.wire, inputs=[], outputs=[DIAGNOSTICS], **options)
-        made.probe, made.policy, made.carried_out = probe, policy, carried_out
+        made.probe, made.policy, made.machine, made.carried_out = probe, policy, machine, carried_out
         return made
 
     return make
@@ -201,6 +224,29 @@ def test_states_are_not_repeated_while_observations_fail(
 
     watching.probe.failure = ""
     spin_until(lambda: len(watching.states()) > before)
+
+
+def test_warnings_of_the_machine_stand_in_each_report(
+    wired: Any, spin_until: SpinUntil, tmp_path: Path
+) -> None:
+    watching = wired(period=0.06)
+    assert watching.machine.made_of == (tmp_path, 0.06)
+    watching.machine.found = {"disk": "it is nearly full", "overload": "timers come late"}
+    spin_until(lambda: watching.service.health.standing)
+    expected = "disk: it is nearly full; overload: timers come late"
+    assert watching.remarks() == [expected]
+    assert watching.remarks() == [expected, expected]
+
+    watching.machine.found = {}
+    spin_until(lambda: not watching.service.health.standing)
+    assert watching.remarks() == [expected, expected]
+
+
+def test_a_look_that_waited_for_supervisord_makes_no_overload(wired: Any, spin_until: SpinUntil) -> None:
+    watching = wired()
+    assert watching.machine.skipped == 0
+    watching.probe.failure = "supervisord does not answer"
+    spin_until(lambda: watching.machine.skipped)
 
 
 # Actions

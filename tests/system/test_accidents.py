@@ -6,6 +6,9 @@ import os
 import shlex
 import signal
 
+import pytest
+
+from deploy.running.machine import LOOPBACK_DOWN
 from tests.system.sites import STEADY, Site
 
 
@@ -82,6 +85,27 @@ def test_start_replaces_the_orphans_of_a_killed_supervisord(small_site: Site) ->
     assert small_site.do("start", STEADY)[0] == 0
     assert small_site.members.keys() == {"", *small_site.programs}
     assert set(small_site.members.values()).isdisjoint(orphans.values())
+
+
+def test_a_loopback_that_goes_down_is_shown_by_terminal_and_status(small_site: Site) -> None:
+    launcher = [small_site.python, "-m", "deploy.commands.launcher"]
+    isolated = ["unshare", "--net", "--map-root-user", "sh", "-c", 'ip link set lo up && exec "$@"', "sh"]
+    code, printed = small_site.do_command(*isolated, "true")
+    if code:
+        pytest.skip(f"platform: {printed}")
+    command = small_site.begin_command(*isolated, *launcher, "run", STEADY)
+    command.await_line("Engines are off")
+    target = ["--target", str(small_site.members[""])]
+    inside = ["nsenter", "--user", "--net", "--preserve-credentials", *target]
+    assert small_site.do_command(*inside, "ip", "link", "set", "lo", "down") == (0, "")
+    command.await_line(f"^loopback: {LOOPBACK_DOWN}")
+    code, printed = small_site.do_command(*inside, *launcher, "status")
+    assert (code, f"loopback: {LOOPBACK_DOWN}" in printed.splitlines()) == (0, True)
+    assert all(f"{name} " in printed for name in small_site.programs)
+    assert small_site.do_command(*inside, "ip", "link", "set", "lo", "up") == (0, "")
+    command.await_line("^loopback: it is up again")
+    command.type("quit\n")
+    assert command.wait() == 0
 
 
 def test_the_switch_stays_pressed_by_hand_when_its_process_dies(small_site: Site) -> None:

@@ -189,6 +189,7 @@ class PageState(NamedTuple):
     programs: Mapping[str, Program] = {}
     heard_since: float = -math.inf
     """Since when the programs are heard."""
+    loopback_is_up: bool = True
     lines: Recent = Recent()
     """The lines of the terminal."""
     refusals: Recent = Recent()
@@ -436,6 +437,11 @@ def pressed(pressed: bool) -> Change:
 def held_at_terminal(at_terminal: bool) -> Change:
     """A hand at a terminal begins or ends to send heartbeats."""
     return lambda state: state._replace(hands=state.hands._replace(at_terminal=at_terminal))
+
+
+def connected(loopback_is_up: bool) -> Change:
+    """The loopback interface goes up or down."""
+    return lambda state: state._replace(loopback_is_up=loopback_is_up)
 
 
 def follows_scenario(name: str, follows: bool) -> Change:

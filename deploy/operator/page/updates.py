@@ -7,7 +7,8 @@ from typing import Any
 
 from deploy.operator.page.protocol import LIMITS
 from deploy.operator.page.state import BEAT, PROGRAMS, RENEWED, Clock, PageState, Program
-from deploy.running import sentinel
+from deploy.running import manifest, sentinel
+from deploy.running.machine import LOOPBACK_DOWN
 from interfaces import topics
 from interfaces.topics import OFF, ON
 from services import engine_controller
@@ -28,7 +29,9 @@ def view(state: PageState, page: str, now: float) -> dict[str, Any]:
         "speed": arm.speed,
         **moment(state, page, now),
         "sources": {name: "hand" if name in state.by_hand else "scenario" for name in LIMITS},
-        "processes": [_row(name, state.programs.get(name, Program()), now) for name in PROGRAMS],
+        "processes": [
+            _row(name, state.programs.get(name, Program()), now, state.loopback_is_up) for name in PROGRAMS
+        ],
     }
 
 
@@ -72,7 +75,9 @@ def _why(state: PageState, now: float) -> str:
     return "" if state.engines.state == ON else state.engines.reason(now, state.heard_since)
 
 
-def _row(name: str, program: Program, now: float) -> dict[str, Any]:
+def _row(name: str, program: Program, now: float, loopback_is_up: bool) -> dict[str, Any]:
+    # The health of the sentinel, which tells that the loopback interface is down, cannot be heard then.
+    problem = f"loopback: {LOOPBACK_DOWN}" if name == manifest.SENTINEL and not loopback_is_up else ""
     silence = now - program.heard
     since_output = program.since_output
     if silence > HEALTH_TIMEOUT and since_output is not None:
@@ -83,8 +88,8 @@ def _row(name: str, program: Program, now: float) -> dict[str, Any]:
         "pid": program.pid,
         "restarts": program.restarts,
         "since_output": since_output,
-        "ok": program.ok and silence <= HEALTH_TIMEOUT,
-        "health": _health(program, silence),
+        "ok": program.ok and silence <= HEALTH_TIMEOUT and not problem,
+        "health": problem or _health(program, silence),
     }
 
 

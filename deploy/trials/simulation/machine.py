@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import signal
 import socket
 from collections.abc import Callable, Iterable, Iterator
@@ -15,6 +16,7 @@ from unittest import mock
 from rclpy_simulation import Network, Process, Simulation
 from rclpy_simulation.process import running_process
 
+from deploy.running import machine as running_machine
 from deploy.running import processes
 from deploy.running.errors import DeploymentError
 from deploy.running.processes import MARK
@@ -67,6 +69,11 @@ class Machine:
                 of_system=self._of_system,
                 open_handles=self._open_handles,
                 close=lambda handles: None,
+            ),
+            mock.patch.multiple(
+                running_machine,
+                loopback_is_up=lambda: True,
+                shutil=SimpleNamespace(disk_usage=lambda run: SimpleNamespace(free=math.inf)),
             ),
             mock.patch.multiple(
                 Supervisord,

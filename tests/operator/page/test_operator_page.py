@@ -22,6 +22,7 @@ from deploy.operator.hand import Hand
 from deploy.operator.page.server import UPDATE_PERIOD
 from deploy.operator.page.state import RESTARTED
 from deploy.operator.switch import ECHO
+from deploy.running.machine import LOOPBACK_DOWN
 from deploy.running.run_directory import PAGE_FILE
 from interfaces import topics
 from interfaces.service import ServiceNode
@@ -426,6 +427,23 @@ def test_source_that_is_not_there_is_told(world: World, monkeypatch: pytest.Monk
         world.until(lambda: page.refused)
         assert page.refused[0]["request"] == "set"
         assert "config_l2" in page.refused[0]["why"]
+
+
+def test_loopback_that_goes_down_is_shown(world: World, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(operator_page, "LOOPBACK_PERIOD", 0.05)
+    is_up = True
+    monkeypatch.setattr(operator_page, "loopback_is_up", lambda: is_up)
+    with world.page() as page:
+
+        def health() -> str:
+            rows = {row["name"]: row["health"] for row in page.shown.get("processes", [])}
+            return str(rows.get("sentinel"))
+
+        world.until(lambda: health() == "no health yet")
+        is_up = False
+        world.until(lambda: health() == f"loopback: {LOOPBACK_DOWN}")
+        is_up = True
+        world.until(lambda: health() == "no health yet")
 
 
 def test_processes_are_left_alone_where_none_are_supervised(

@@ -17,6 +17,7 @@ from deploy.operator.page import state
 from deploy.operator.page.history import History
 from deploy.operator.page.state import Arm, Clock, Engines, Operator, PageState, Recent
 from deploy.operator.page.updates import SILENT_CONTROLLER, Updates, lasting, view
+from deploy.running.machine import LOOPBACK_DOWN
 from interfaces import topics
 from interfaces.topics import ALIVE, INCAPACITATED, MISSED, OFF, ON, TURN_OFF
 from reactive_node import stamps
@@ -508,6 +509,14 @@ def test_silent_process_looks_silent(play: Play) -> None:
     silent = row(play.run(212), "kinematics", 214.2)
     assert (silent["state"], silent["ok"]) == ("UNKNOWN", False)
     assert (silent["health"], silent["since_output"]) == ("no health for 4 s", 4)
+
+
+def test_a_loopback_that_is_down_is_the_health_of_the_sentinel() -> None:
+    down = state.connected(False)(PageState())
+    shown = row(down, "sentinel", 200.0)
+    assert (shown["ok"], shown["health"]) == (False, f"loopback: {LOOPBACK_DOWN}")
+    assert row(down, "velocity", 200.0)["health"] == "no health yet"
+    assert row(state.connected(True)(down), "sentinel", 200.0)["health"] == "no health yet"
 
 
 def test_diagnostics_of_others_are_not_shown(play: Play) -> None:
