@@ -29,6 +29,7 @@ export PYTHON SCENARIO PARAMETERS MANIFEST WEB RUNTIME
 # The variables of each command. Others on the command line are refused, except by `make stop`: it must not fail.
 USED_BY_run := SCENARIO PARAMETERS MANIFEST WEB
 USED_BY_start := $(USED_BY_run)
+USED_BY_unit := $(USED_BY_run)
 USED_BY_chaos := MINUTES SEED CHAOS
 USED_BY_simulate := HOURS SEED SCHEDULE SIMULATE
 USED_BY_replay := RECORD REPLAY
@@ -45,13 +46,14 @@ GIVEN := $(foreach name,$(.VARIABLES),$(if $(filter command,$(origin $(name))),$
 $(foreach name,$(filter-out $(USED) $(ENVIRONMENT),$(GIVEN)),$(error make $(GOALS) has no variable $(name); it has $(USED)))
 endif
 
-.PHONY: help setup tables run start stop status logs record terminal chaos simulate replay test mutants check bench new-service
+.PHONY: help setup tables run start unit stop status logs record terminal chaos simulate replay test mutants check bench new-service
 
 help:
 	@echo "make run      start the system, show it in this terminal, stop it with Ctrl-C"
 	@echo "make start    start it in the background          (run, start: SCENARIO=demo, listing_5_9, none or a file)"
 	@echo "                                                  (PARAMETERS=file; WEB=off for no page, or its port;"
 	@echo "                                                  MANIFEST=file with programs of your own)"
+	@echo "make unit     write a systemd unit that starts it at each boot    (the same variables)"
 	@echo "make terminal attach this terminal to it"
 	@echo "make status   its rclpy, page and services: state, pid, uptime, restarts, last output, health"
 	@echo "make logs     follow their logs"
@@ -73,7 +75,7 @@ help:
 setup:
 	@exec $(HOLD) deploy/commands/python.sh deploy.commands.setup "$$PYTHON"
 
-run start: setup
+run start unit: setup
 	@exec $(HOLD) $(PY) -m deploy.commands.launcher $@ "$$SCENARIO" "$$PARAMETERS"
 
 terminal status logs record:

@@ -1,4 +1,4 @@
-"""The commands behind `make run`, `start`, `terminal`, `status`, `logs` and `record`."""
+"""The commands behind `make run`, `start`, `unit`, `terminal`, `status`, `logs` and `record`."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ import signal
 import sys
 import time
 from collections.abc import Iterator, Mapping
-from contextlib import ExitStack, closing, contextmanager, suppress
-from typing import TYPE_CHECKING
+from contextlib import AbstractContextManager, ExitStack, closing, contextmanager, suppress
+from typing import TYPE_CHECKING, NoReturn
 
 from deploy.commands.stop import stop
 from deploy.operator.output import say
@@ -17,7 +17,7 @@ from deploy.running import interruption, manifest, messages, rclpy_choice
 from deploy.running.environment import ADOPTED, NAMESPACE, set_middleware
 from deploy.running.errors import DeploymentError
 from deploy.running.machine import LOOPBACK_DOWN, loopback_is_up
-from deploy.running.run_directory import RUN
+from deploy.running.run_directory import ALL, KEY, LEAD, RUN
 from deploy.running.supervisord import Program
 from deploy.running.system import System
 
@@ -61,6 +61,33 @@ def start(system: System, scenario: str, parameter_file: str) -> None:
     """Start the system in the background; returns when all services are up."""
     with _started(system, scenario, parameter_file):
         print("It runs in the background: make terminal, make status, make logs, make stop.")
+
+
+def unit(scenario: str, parameter_file: str) -> None:
+    """Write the unit with which systemd starts the system."""
+    from deploy.commands import parameters
+    from deploy.commands import unit as writer
+
+    environment = dict(os.environ)
+    with _chosen(scenario):
+        parameters.of_system(scenario, parameter_file)  # reports errors in them now
+    path = writer.write(writer.text(scenario, parameter_file, environment), environment)
+    enable = f"systemctl --user daemon-reload && systemctl --user enable --now {path.stem}"
+    print(f"Wrote {path}. Start it now and at each boot: {enable} && loginctl enable-linger")
+
+
+def become(system: System, scenario: str, parameter_file: str) -> NoReturn:
+    """Become the supervisord of the system: the command of its unit."""
+    from deploy.commands import parameters
+
+    with _chosen(scenario):
+        parameters.check_environment(system)
+        given = parameters.of_system(scenario, parameter_file)
+        given[ALL][KEY]["scenario_epoch"] = time.monotonic() + LEAD
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)  # supervisord would not know of a noted one
+        interruption.check()
+        path = manifest.PATH if manifest.path() == manifest.PATH else system.run / MANIFEST
+        system.become_supervisord(given, ["--nodaemon", "--configuration", str(path)])
 
 
 def attach(system: System) -> None:
@@ -128,6 +155,14 @@ def record(system: System) -> None:
         record.write(system.run / RECORDS, member, system)
 
 
+def _chosen(scenario: str) -> AbstractContextManager[None]:
+    """Choose the manifest of a scenario, with the programs of the user's own file."""
+    from deploy.commands.parameters import NONE
+
+    without = manifest.VIRTUAL_JOINTS if scenario == NONE else ()
+    return manifest.chosen(os.environ.get("MANIFEST", ""), without)
+
+
 @contextmanager
 def _started(system: System, scenario: str, parameter_file: str) -> Iterator[Member]:
     """Start the system and its scenario; stop it when that fails, or the block."""
@@ -135,9 +170,8 @@ def _started(system: System, scenario: str, parameter_file: str) -> Iterator[Mem
     from deploy.commands import parameters
     from deploy.commands.member import Member
 
-    without = manifest.VIRTUAL_JOINTS if scenario == parameters.NONE else ()
     with ExitStack() as stack:
-        stack.enter_context(manifest.chosen(os.environ.get("MANIFEST", ""), without))
+        stack.enter_context(_chosen(scenario))
         parameters.check_environment(system)
         given = parameters.of_system(scenario, parameter_file)
         member = stack.enter_context(Member())
@@ -245,7 +279,7 @@ def main(arguments: list[str]) -> int:
     interruption.install()
     parser = argparse.ArgumentParser(prog="launcher")
     commands = parser.add_subparsers(dest="command", required=True)
-    for name in ("run", "start"):
+    for name in ("run", "start", "unit", "become"):
         command = commands.add_parser(name)
         command.add_argument("scenario")
         command.add_argument("parameter_file", nargs="?", default="")
@@ -261,6 +295,10 @@ def main(arguments: list[str]) -> int:
                 run(system, options.scenario, options.parameter_file)
             case "start":
                 start(system, options.scenario, options.parameter_file)
+            case "unit":
+                unit(options.scenario, options.parameter_file)
+            case "become":
+                become(system, options.scenario, options.parameter_file)
             case "terminal":
                 attach(system)
             case "status":

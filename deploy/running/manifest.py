@@ -22,7 +22,7 @@ from collections.abc import Collection, Iterator
 from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
-from tempfile import NamedTemporaryFile
+from tempfile import mkstemp
 from typing import NamedTuple
 
 from deploy.running.errors import DeploymentError
@@ -86,11 +86,15 @@ def chosen(own: str, without: Collection[str] = ()) -> Iterator[None]:
     if own:
         names += _add(manifest, Path(own))
     manifest[f"group:{GROUP}"]["programs"] = ", ".join(names)
-    with NamedTemporaryFile("w", suffix=".conf", encoding="utf-8") as file:
-        manifest.write(file)
-        file.flush()
-        os.environ[VARIABLE] = file.name
+    handle, name = mkstemp(".conf")
+    os.environ[VARIABLE] = name
+    try:
+        with open(handle, "w", encoding="utf-8") as file:
+            manifest.write(file)
         yield
+    finally:
+        with suppress(FileNotFoundError):  # the system has moved it to its run directory
+            os.unlink(name)
 
 
 def _add(manifest: configparser.RawConfigParser, path: Path) -> list[str]:

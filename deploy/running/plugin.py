@@ -14,18 +14,17 @@ from pathlib import Path
 from deploy.running import manifest, processes
 from deploy.running.errors import DeploymentError
 from deploy.running.extension import make_interface
-from deploy.running.run_directory import scenario_parameters
+from deploy.running.run_directory import LEAD, scenario_parameters
 from deploy.running.system import System
 
 __all__ = ["make_interface"]
 
 SCENARIO = processes.ROOT / "deploy" / "scenarios" / "demo.yaml"  # as `make start`
-LEAD = 10.0  # s until the scenario begins: `make start` waits for the services instead
 
 
 def start_by_hand(arguments: list[str]) -> None:
     """Replace this process by a supervisord with the same arguments that runs the system."""
-    parameters = scenario_parameters(SCENARIO, time.monotonic() + LEAD)
+    parameters = scenario_parameters(SCENARIO, time.monotonic() + LEAD)  # `make start` waits instead
     try:
         System().become_supervisord(parameters, [_absolute(word) for word in arguments])
     except (DeploymentError, OSError) as error:

@@ -28,6 +28,11 @@ class Observation:
     duplicates: frozenset[processes.Process] = frozenset()
     """live processes of programs that supervisord has not started"""
 
+    @property
+    def is_complete(self) -> bool:
+        """Whether every program has a process that has reported its health."""
+        return all((program.name, program.pid) in self.last_health for program in self.programs)
+
 
 class Action(NamedTuple):
     """An action on a program, with its reason."""
@@ -64,6 +69,8 @@ class Policy:
         """the reason of the last action on each program"""
         self.recent_restarts: dict[str, int] = {}
         """restarts of each program within the last minute"""
+        self.hears_itself = True
+        """Whether the sentinel's own reports of health arrive; if not, it cannot judge others"""
         self._timeouts = timeouts or Timeouts()
         # Of each program: pid, time of its first observation, and how long its first health may take.
         self._first_seen: dict[str, tuple[int, float, float]] = {}
@@ -143,7 +150,9 @@ class Policy:
             if silence >= (start if reported is None else self._timeouts.health):
                 silent.append(Action("kill", program.name, pid, f"no health for {silence:.1f} s"))
         self.kill_inhibited_by = ""
-        if itself := [action for action in silent if action.program == SENTINEL]:
+        itself = [action for action in silent if action.program == SENTINEL]
+        self.hears_itself = not itself
+        if itself:
             self.kill_inhibited_by = "the sentinel does not hear itself"
             self._deaf_since = min(self._deaf_since, observation.time)
             # A deaf sentinel is useless; its successor may hear.

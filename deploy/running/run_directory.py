@@ -23,6 +23,7 @@ MANIFEST = "supervisord.conf"  # in the run directory: the manifest of a system,
 ALL, KEY = "/**", "ros__parameters"  # the form of ROS 2's parameter files
 RUN = 20 * "-"  # begins the line between two runs in a log
 NOT_YET = -1.0  # scenario_epoch: the scenario waits until this parameter is set
+LEAD = 10.0  # s until the scenario begins where nothing waits for the services
 
 
 class RunDirectory:

@@ -8,6 +8,9 @@ It is a service like the others, and supervised like them. It kills processes th
 health, kills duplicates of supervised processes, and revives programs that supervisord has given up, with
 growing delay. The sentinel fails passive: where the network or the sentinel itself may have failed, it kills
 no silent service; where supervisord is gone or does not answer, it does nothing at all.
+
+Where systemd has started the arm, the sentinel tells it when all services are up, and each second that it
+observes them and hears itself: systemd restarts an arm whose supervisord hangs.
 """
 
 from __future__ import annotations
@@ -29,6 +32,7 @@ from deploy.running.machine import Machine, figures
 from deploy.running.manifest import SENTINEL
 from deploy.running.policy import Action, Observation, Policy, Timeouts
 from deploy.running.probe import Probe
+from deploy.running.service_manager import ALIVE, READY, notify
 from deploy.running.supervisord import Program, Supervisord
 from interfaces import service
 from interfaces.service import ServiceNode, parameter
@@ -161,10 +165,15 @@ def wire(node: ServiceNode) -> None:
     changed = programs.distinct_until_changed(lambda each: [program._replace(uptime=0.0) for program in each])
     # A failed attempt ends the repetition: old states must not look fresh.
     latest = rx.timer(DISCOVERY, 1.0).with_latest_from(attempts).map(lambda pair: pair[1])
-    repeated = latest.filter(lambda it: it is not None).map(lambda observation: observation.programs)
+    fresh = latest.filter(lambda it: it is not None).share()
+    repeated = fresh.map(lambda observation: observation.programs)
+    ready = observations.filter(lambda observation: observation.is_complete).take(1)
+    alive = fresh.filter(lambda _: policy.hears_itself)
 
     reports.subscribe(probe.hear, scheduler=node.scheduler)
     observations.map(policy.decide).subscribe(act, scheduler=node.scheduler)
+    ready.subscribe(lambda _: notify(READY), scheduler=node.scheduler)
+    alive.subscribe(lambda _: notify(ALIVE), scheduler=node.scheduler)
     node.publish(DIAGNOSTICS, rx.merge(changed, repeated).map(message))
 
 

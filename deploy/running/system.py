@@ -127,7 +127,7 @@ class System(RunDirectory):
         self.write_parameters(parameters)
         self.forget_settings([program.name for program in manifest.programs()])
         if manifest.path() != manifest.PATH:
-            os.environ[manifest.VARIABLE] = shutil.copyfile(manifest.path(), str(self.run / MANIFEST))
+            os.environ[manifest.VARIABLE] = shutil.move(manifest.path(), str(self.run / MANIFEST))
 
     def _end_members(self) -> None:
         """End the live processes without supervisord's help."""

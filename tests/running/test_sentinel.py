@@ -129,6 +129,24 @@ def test_kills_no_silent_service_when_it_does_not_hear_itself() -> None:
     assert not run.policy.kill_inhibited_by
 
 
+def test_tells_whether_it_hears_itself() -> None:
+    run = Run()
+    run.observe(20.0, silent=["kinematics", "velocity"])
+    assert run.policy.hears_itself
+    run.observe(4.0, silent=[SENTINEL])
+    assert not run.policy.hears_itself
+    run.observe(2.0)
+    assert run.policy.hears_itself
+
+
+def test_an_observation_is_complete_when_each_present_process_has_reported() -> None:
+    programs = [program("velocity"), program("kinematics")]
+    reports = {("velocity", PIDS["velocity"]): 1.0, ("kinematics", 999): 1.0}
+    assert not Observation(2.0, programs, reports).is_complete
+    assert Observation(2.0, programs, reports | {("kinematics", PIDS["kinematics"]): 2.0}).is_complete
+    assert not Observation(2.0, [*programs, program(SENTINEL, "BACKOFF")], reports).is_complete
+
+
 def test_ends_itself_when_it_does_not_hear_itself_for_long() -> None:
     run = Run()
     run.observe(20.0)

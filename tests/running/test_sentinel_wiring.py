@@ -9,7 +9,8 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,7 @@ from deploy.running.errors import DeploymentError
 from deploy.running.machine import Figures
 from deploy.running.manifest import SENTINEL
 from deploy.running.policy import Action, Observation, Timeouts
+from deploy.running.service_manager import notify
 from deploy.running.supervisord import Program, Supervisord
 from interfaces.topics import DIAGNOSTICS
 from reactive_node.testing import MakeNode, SpinFor, SpinUntil
@@ -38,6 +40,7 @@ class Probe:
         self.threads: set[int] = set()
         self.made_of: tuple[Path, int] | None = None
         self.heard: dict[str, Any] = {}
+        self.last_health: dict[tuple[str, int], float] = {}
 
     def hear(self, reports: Mapping[str, Any]) -> None:
         self.heard.update(reports)
@@ -47,7 +50,7 @@ class Probe:
         self.threads.add(threading.get_ident())
         if self.failure:
             raise DeploymentError(self.failure)
-        return Observation(0.0, self.programs)
+        return Observation(0.0, self.programs, self.last_health)
 
 
 class Policy:
@@ -57,6 +60,7 @@ class Policy:
         self.recent_restarts: dict[str, int] = {"velocity": 3}
         self.actions: list[Action] = []
         self.timeouts: Timeouts | None = None
+        self.hears_itself = True
 
     def decide(self, observation: Observation) -> list[Action]:
         actions, self.actions = self.actions, []
@@ -247,6 +251,79 @@ def test_a_look_that_waited_for_supervisord_makes_no_overload(wired: Any, spin_u
     assert watching.machine.skipped == 0
     watching.probe.failure = "supervisord does not answer"
     spin_until(lambda: watching.machine.skipped)
+
+
+# systemd
+
+Told = Callable[[], list[str]]
+
+
+@pytest.fixture
+def told(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Told]:
+    """What systemd has been told so far."""
+    heard: list[str] = []
+
+    def listen() -> list[str]:
+        with suppress(BlockingIOError):
+            while True:
+                heard.append(systemd.recv(100).decode())
+        return heard
+
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_NONBLOCK) as systemd:
+        systemd.bind(str(tmp_path / "notify"))
+        monkeypatch.setenv("NOTIFY_SOCKET", str(tmp_path / "notify"))
+        yield listen
+
+
+def test_systemd_is_told_once_that_all_services_are_up(wired: Any, spin_until: SpinUntil, told: Told) -> None:
+    watching = wired()
+    watching.probe.last_health = {("velocity", 400): 0.0}  # of an earlier process
+    spin_until(lambda: told().count("WATCHDOG=1") == 2)
+    assert "READY=1" not in told()
+
+    watching.probe.last_health = {("velocity", VELOCITY.pid): 0.0}
+    spin_until(lambda: "READY=1" in told())
+    spin_until(lambda: told().count("WATCHDOG=1") == 4)
+    assert told().count("READY=1") == 1
+
+
+def test_systemd_is_not_told_that_a_deaf_sentinel_is_alive(
+    wired: Any, spin_until: SpinUntil, spin_for: SpinFor, told: Told
+) -> None:
+    watching = wired()
+    spin_until(lambda: "WATCHDOG=1" in told())
+    watching.policy.hears_itself = False
+    before = len(told())
+    spin_for(1.5)
+    assert len(told()) == before
+
+    watching.policy.hears_itself = True
+    spin_until(lambda: len(told()) > before)
+    watching.probe.failure = "supervisord does not answer"
+    spin_until(watching.remarks)
+    before = len(told())
+    spin_for(1.5)
+    assert len(told()) == before
+
+
+def test_an_abstract_address_of_systemd_is_told_as_well(monkeypatch: pytest.MonkeyPatch) -> None:
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_NONBLOCK) as systemd:
+        systemd.bind("")  # the kernel chooses an abstract address
+        monkeypatch.setenv("NOTIFY_SOCKET", f"@{systemd.getsockname()[1:].decode()}")
+        notify("READY=1")
+        assert systemd.recv(100) == b"READY=1"
+
+
+def test_systemd_that_is_gone_or_full_changes_nothing(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, told: Told
+) -> None:
+    for _ in range(100_000):  # more than fit
+        notify("WATCHDOG=1")
+    monkeypatch.setenv("NOTIFY_SOCKET", str(tmp_path / "gone"))
+    notify("WATCHDOG=1")
+    monkeypatch.delenv("NOTIFY_SOCKET")
+    notify("WATCHDOG=1")
+    assert told()
 
 
 # Actions

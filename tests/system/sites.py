@@ -163,15 +163,19 @@ class Site:
     def begin_command(self, *command: str) -> Command:
         return self._begin(list(command))
 
+    def begin_alone(self, command: list[str], environment: dict[str, str]) -> Command:
+        """Begin any command with nothing but this environment."""
+        begun = Command(command, environment, self.directory)
+        self._commands.callback(begun.close)
+        return begun
+
     def begin_in_terminal(self, *command: str) -> Command:
         """Begin any command in a terminal of its own, which closes when the returned command is killed."""
         spawn = [sys.executable, "-c", "import pty, sys; pty.spawn(sys.argv[1:])"]
         return self._begin([*spawn, *command], TERM="xterm")
 
     def _begin(self, command: list[str], **environment: str) -> Command:
-        begun = Command(command, self.environment | environment, self.directory)
-        self._commands.callback(begun.close)
-        return begun
+        return self.begin_alone(command, self.environment | environment)
 
     def do(self, *arguments: str) -> tuple[int, str]:
         """Do a command of `make`, without make: its exit code and its output."""
