@@ -17,7 +17,7 @@ from deploy.running import interruption, manifest, messages, rclpy_choice
 from deploy.running.environment import ADOPTED, NAMESPACE, set_middleware
 from deploy.running.errors import DeploymentError
 from deploy.running.machine import LOOPBACK_DOWN, loopback_is_up
-from deploy.running.run_directory import ALL, KEY, LEAD, RUN
+from deploy.running.run_directory import ALL, KEY, LEAD, MANIFEST, RUN
 from deploy.running.supervisord import Program
 from deploy.running.system import System
 
