@@ -48,6 +48,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     add = parser.add_argument
     add("--minutes", type=number(0.01, 10_000), default=5.0, help="length of the random faults, default 5")
     add("--seed", help="the same seed gives the same random faults")
+    # What a schedule file does not say: it states faults, and neither the arms nor their network.
     scenarios = f"instead of random faults: {', '.join(NAMED)}"
     add("--scenario", choices=(RANDOM, *NAMED), default=RANDOM, metavar="NAME", help=scenarios)
     add("--arms", type=int, default=1, help="they share the random faults; each gets a whole scenario")
