@@ -78,10 +78,7 @@ def start(module_domain_id: int) -> Iterator[Start]:
     started: list[subprocess.Popen[str]] = []
 
     def start(*arguments: str, **options: Any) -> subprocess.Popen[str]:
-        environment = os.environ | {
-            "ROS_DOMAIN_ID": str(module_domain_id),
-            "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
-        }
+        environment = os.environ | {"ROS_DOMAIN_ID": str(module_domain_id)}
         pipes = {"stdin": subprocess.DEVNULL, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
         command = [sys.executable, "-c", PROGRAM, *arguments]
         process = subprocess.Popen(command, text=True, env=environment, **{**pipes, **options})
