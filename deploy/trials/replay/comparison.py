@@ -17,9 +17,6 @@ from deploy.trials.replay.record import Message
 from interfaces import topics
 from interfaces.topics import Topic
 
-BURST = 0.02
-"""Messages that follow one another faster are a burst, and only its last one is compared [s]: the order in
-which samples of several writers arrive is not recorded."""
 COUNT, FEW = 0.1, 5
 """The numbers of messages may differ by this part, and by this number. So many may be lost in any record."""
 
@@ -39,6 +36,11 @@ class Bounds(NamedTuple):
     """The part that may have no equal message: a busy machine loses samples of readers that keep one."""
     near: float = 0.0
     """The deviation that those may have."""
+    burst: float = 0.02
+    """
+    Messages that follow one another faster are a burst, and only its last one is compared [s]: the order in
+    which samples of several writers arrive is not recorded. It changes no answer of a signal.
+    """
 
     def __str__(self) -> str:
         parts = [f"{self.value:g} {self.unit}".strip()] if self.value else []
@@ -51,9 +53,9 @@ class Bounds(NamedTuple):
 BOUNDS: dict[str, Bounds] = {
     topics.EFFECTOR_POSITION.name: Bounds(1e-9, "m", 0.25, lost=0.05, near=0.2),
     topics.EFFECTOR_SPEED.name: Bounds(1e-9, "m/s", 0.25, lost=0.1, near=math.inf),
-    topics.EFFECTOR_VELOCITY.name: Bounds(1e-9, "m/s", 0.25, lost=0.1, near=math.inf),
-    topics.JOINT_STATES.name: Bounds(1e-9, "rad", 0.25, lost=0.1, near=0.1),
-    topics.TF.name: Bounds(1e-9, "", 0.25, lost=0.1, near=0.1),
+    topics.EFFECTOR_VELOCITY.name: Bounds(1e-9, "m/s", 0.25, lost=0.1, near=math.inf, burst=0.0),
+    topics.JOINT_STATES.name: Bounds(1e-9, "rad", 0.25, lost=0.1, near=0.1, burst=0.0),
+    topics.TF.name: Bounds(1e-9, "", 0.25, lost=0.1, near=0.1, burst=0.0),
     topics.ROBOT_DESCRIPTION.name: Bounds(0.1, "m", 1.25),
     topics.OPERATOR_PRESENCE.name: Bounds(0.25, "s"),
     topics.OPERATOR_ACTIVITY.name: Bounds(),
@@ -116,7 +118,7 @@ def compare(
     )
     counts, far = [], 0
     for items, others, is_recorded in ((one, other, True), (other, one, False)):
-        compared = _compared(items, excused)
+        compared = _compared(items, excused, bounds)
         counts.append(len(compared))
         result.compared += len(compared)
         times = [item.time for item in others]
@@ -136,7 +138,7 @@ def compare(
     return result
 
 
-def _compared(items: Sequence[_Item], excused: Sequence[Interval]) -> list[_Item]:
+def _compared(items: Sequence[_Item], excused: Sequence[Interval], bounds: Bounds) -> list[_Item]:
     """Return the last message of each burst, without the excused ones."""
     remaining = sorted(excused, reverse=True)
     until = 0
@@ -144,7 +146,7 @@ def _compared(items: Sequence[_Item], excused: Sequence[Interval]) -> list[_Item
     for number, item in enumerate(items):
         while remaining and remaining[-1][0] <= item.time:
             until = max(until, remaining.pop()[1])
-        is_last = number + 1 == len(items) or items[number + 1].time - item.time > BURST * SECOND
+        is_last = number + 1 == len(items) or items[number + 1].time - item.time >= bounds.burst * SECOND
         if is_last and item.time > until:
             found.append(item)
     return found

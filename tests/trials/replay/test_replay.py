@@ -18,7 +18,7 @@ from typing import NamedTuple
 import pytest
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from geometry_msgs.msg import TransformStamped
+from geometry_msgs.msg import TransformStamped, Twist, TwistStamped, Vector3
 from mcap_files import FileWriter, McapFile
 from rclpy.serialization import deserialize_message, serialize_message
 from std_msgs.msg import Float64, Header, String
@@ -408,6 +408,25 @@ def test_state_that_changes_later_than_its_bound_differs() -> None:
 def test_state_that_is_repeated_too_seldom_differs() -> None:
     often, seldom = (text(*((n / rate, topics.ON) for n in range(10 * rate))) for rate in (10, 5))
     assert not compare(topics.ENGINES_STATE, often, seldom, []).is_equal
+
+
+def test_answers_of_a_signal_may_come_two_at_a_time() -> None:
+    """They follow the samples of its sources, which arrive seldomer."""
+
+    def velocities(sent: Callable[[int], int], x: Callable[[int], float] = float) -> list[Message]:
+        return [
+            Message(
+                sent(n) * 20_000_000,
+                serialize_message(TwistStamped(twist=Twist(linear=Vector3(x=x(n))))),
+            )
+            for n in range(200)
+        ]
+
+    single = velocities(lambda n: n)
+    assert compare(topics.EFFECTOR_VELOCITY, single, velocities(lambda n: n // 2 * 2), []).is_equal
+    assert not compare(
+        topics.EFFECTOR_VELOCITY, single, velocities(lambda n: n, lambda n: n + 0.5), []
+    ).is_equal
 
 
 def test_presences_of_a_stepped_arm_are_equal_to_replayed_ones() -> None:
