@@ -275,6 +275,28 @@ def test_integral_is_unknown_after_an_unknown_value(scheduler: VirtualTime) -> N
     assert {each.mark for each in found[5:]} == {UNKNOWN}
 
 
+def test_integral_keeps_what_it_needs(scheduler: VirtualTime) -> None:
+    """Its steps are long, and an earlier sum is asked for later."""
+    samples = arriving(scheduler, [Arrival(k * MS, 2.0 * k, 0) for k in range(1500)])
+    integral = linear(samples, lateness=LATENESS, gap=GAP).integral(0.2)
+
+    for time, value, mark in answers(
+        scheduler, lift(lambda *both: both)(integral.delay(0.25), integral), 0.01
+    ):
+        t = time / MS
+        assert (mark == UNKNOWN) == (t < 250)
+        assert mark == UNKNOWN or value == pytest.approx(((t - 250) ** 2 / 1000, t**2 / 1000))
+
+
+def test_integral_begins_with_the_subscription(scheduler: VirtualTime) -> None:
+    integral = constant(1.0).integral(0.1)
+
+    found = answers(scheduler, integral + integral.delay(0.3), 0.1)
+
+    assert [each.mark for each in found[:4]] == [UNKNOWN] * 3 + [CERTAIN]
+    assert found[5].value == pytest.approx(0.5 + 0.2)
+
+
 def test_integral_of_an_integral(scheduler: VirtualTime) -> None:
     twice = constant((2.0, 4.0)).integral(0.01).integral(0.01)
 
@@ -335,7 +357,7 @@ def test_switch_without_a_key_chooses_nothing(scheduler: VirtualTime) -> None:
 
     found = answers(scheduler, switch(hold(scheduler.hot(), lateness=LATENESS), choices))
 
-    assert {each.mark for each in found} == {UNKNOWN}
+    assert {(each.value, each.mark) for each in found} == {(None, UNKNOWN)}
 
 
 @given(keys("x"), arrivals(), arrivals())
