@@ -74,7 +74,7 @@ GUARDS: dict[str, tuple[str, ...]] = {
         f"{_NODE_TESTS}/test_events.py",
         f"{_NODE_TESTS}/test_end.py",
     ),
-    f"{REACTIVE_NODE}/signals/samples.py": (_SAMPLES, _RUNS),
+    f"{REACTIVE_NODE}/signals/samples.py": (_SAMPLES, _OPERATIONS, _RUNS),
     f"{REACTIVE_NODE}/signals/source.py": (_SAMPLES, _OPERATIONS, _RUNS),
     f"{REACTIVE_NODE}/signals/run.py": (_OPERATIONS, _RUNS),
     f"{REACTIVE_NODE}/signals/questions.py": (_OPERATIONS, _RUNS),
