@@ -98,6 +98,13 @@ def test_linear_is_the_line_between_neighbours(samples: list[Arrival], silence: 
         assert (value, mark) == straight(samples, time, silence)
 
 
+def test_movement_of_two_samples_a_gap_apart_goes_on(scheduler: VirtualTime) -> None:
+    samples = arriving(scheduler, [Arrival(0, 0.0, 0), Arrival(GAP_NS, 6.0, 0)])
+    signal = linear(samples, lateness=LATENESS, gap=GAP, silence=Extrapolated(GAP))
+
+    assert answers(scheduler, signal, GAP)[2] == Answer(2 * GAP_NS, 12.0, EXTRAPOLATED)
+
+
 @given(arrivals(), st.data())
 def test_answers_do_not_depend_on_the_order_of_arrival(samples: list[Arrival], data: Any) -> None:
     """Not even their bytes."""
