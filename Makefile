@@ -61,7 +61,7 @@ help:
 	@echo "make stop     stop it"
 	@echo "make chaos    break a system on purpose and check its promises  (MINUTES=5 SEED= CHAOS=--help for more)"
 	@echo "make simulate the same in virtual time, hours in minutes  (HOURS=1 SEED= SCHEDULE=file SIMULATE=--help for more)"
-	@echo "make replay   feed a record through today's services and show what differs  (RECORD= REPLAY=--help for more)"
+	@echo "make replay   feed a record through these services and show what differs  (RECORD= REPLAY=--help for more)"
 	@echo "make test     test the arm                        (TESTS=tests/component for a part, TESTS=deploy/runtime"
 	@echo "                                                  for its rclpy, TESTS=tests/operator/page for its page)"
 	@echo "make mutants  change the safety path in every small way: do the tests notice?  (MODULES= for a part)"
