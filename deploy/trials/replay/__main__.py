@@ -1,4 +1,4 @@
-"""`make replay`: feed a record through today's services in virtual time, and show what they do otherwise.
+"""`make replay`: feed a record through these services in virtual time, and show what differs.
 
 Exit codes: 0 if the replayed output equals the recorded one within the bounds of
 :mod:`deploy.trials.replay.comparison`, 1 if it differs, 2 if nothing can be compared, or the record or the
@@ -56,7 +56,7 @@ def _parse(arguments: Sequence[str]) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         prog="make replay",
         usage='make replay RECORD=FILE [REPLAY="OPTION ..."]',
-        description="Feed a record through today's services in virtual time, and show what differs.",
+        description="Feed a record through these services in virtual time, and show what differs.",
     )
     add = parser.add_argument
     add(
