@@ -57,7 +57,7 @@ def domain_id(domain_id: int, monkeypatch: pytest.MonkeyPatch) -> int:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_collection() -> Generator[None, object, object]:
-    """Collect the tests without garbage collection: it takes a third of the time, in vain."""
+    """Collect the tests without garbage collection: it would take a third of the time."""
     gc.disable()
     try:
         return (yield)

@@ -68,7 +68,7 @@ class Link(ABC):
 
     @abstractmethod
     def wait(self, seconds: float) -> None:
-        """Call back with what arrives, for about so many seconds or until something has arrived."""
+        """Call back with what arrives, until something has arrived, at most for about `seconds`."""
 
     def sent(self) -> int:
         """Return how many items the source has sent by now; 0 if this process cannot know."""

@@ -233,7 +233,7 @@ class _Run:
         return process.pid
 
     def report(self, role: str, event: str, count: int = 1) -> dict[str, Any]:
-        """Wait for so many reports of the processes with a role; return the first."""
+        """Wait for a number of reports of the processes with a role; return the first."""
         deadline = time.monotonic() + _SILENCE
         while True:
             reports = [each for each in self._seen if (each["role"], each["event"]) == (role, event)]

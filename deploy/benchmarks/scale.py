@@ -137,7 +137,7 @@ def tables(results: Mapping[str, Results]) -> str:
 
 
 def fleet(*, shared: bool, sizes: Sequence[int] = SIZES) -> Rows:
-    """Yield the cost of one arm among so many, until the machine is full or an arm does not start."""
+    """Yield the cost of one arm among several, until the machine is full or an arm does not start."""
     temporary = tempfile.TemporaryDirectory(prefix="fleet-", ignore_cleanup_errors=True)
     with temporary as directory, Fleet(Path(directory), shared=shared) as arms:
         starting = 0.0

@@ -62,7 +62,7 @@ def measure() -> Iterator[Row]:
 
 def table(results: Mapping[str, Sequence[str]]) -> str:
     """Return the rows as a table, by what was measured."""
-    head = "| | goal | measured | beside |\n|---|---|---|---|"
+    head = "| | goal | measured | notes |\n|---|---|---|---|"
     return "\n".join([head, *(f"| {' | '.join((name, *row))} |" for name, row in results.items())])
 
 

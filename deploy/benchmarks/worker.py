@@ -77,7 +77,7 @@ class Life:
         self._ended = True
 
     def goes_on(self) -> bool:
-        """Whether nobody has asked for the end, and the parent still lives."""
+        """Whether the parent lives and has not asked for the end."""
         return not self._ended and os.getppid() == self._parent
 
 

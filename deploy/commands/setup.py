@@ -86,7 +86,7 @@ def main() -> int:
 
 
 def check_runtime(environment: Mapping[str, str], ros: str) -> None:
-    """Raise SetupError unless the wanted runtime can be had beside `ros`, the rclpy of a sourced ROS 2."""
+    """Raise SetupError if `ros`, the rclpy of a sourced ROS 2, rules out the wanted runtime."""
     runtime = environment.get(RUNTIME, "")
     if runtime not in ("", "embedded"):
         raise SetupError(f"RUNTIME={runtime}: it is empty for ROS 2's own rclpy, or embedded")

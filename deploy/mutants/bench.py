@@ -20,7 +20,7 @@ from deploy.mutants.mutations import Mutant
 
 MARK = "REACTIVE_ARM_MUTANTS"
 """An environment variable that all processes of a bench inherit."""
-# A mutant may take so many times as long as the original, and so many seconds more.
+# A mutant may take this multiple of the original's time, and some seconds more.
 _PATIENCE, _ALLOWANCE = 5, 10.0
 
 
@@ -81,7 +81,7 @@ class Bench:
 
     def _test(self, tests: Sequence[str], timeout: float) -> int:
         """Return the exit code of pytest; that of a kill after `timeout` [s]."""
-        # The test that killed the mutant before comes first: it often kills the next one as well.
+        # The test that killed the mutant before comes first: it often kills the next one, too.
         options = ["-x", "-q", "--failed-first", "--hypothesis-profile=mutants"]
         assert self._runner.stdin is not None
         print(json.dumps([*options, *tests]), file=self._runner.stdin, flush=True)

@@ -46,7 +46,7 @@ def _arguments(node: cst.Call) -> Iterator[cst.Call]:
 
 
 def _assignment(node: cst.Assign | cst.AnnAssign) -> Iterator[cst.CSTNode]:
-    """Assign None, but not in the place of another false value: hardly any code tells them apart."""
+    """Assign None, but do not replace another false value: hardly any code tells them apart."""
     if node.value is not None and not m.matches(node.value, m.Name("None") | m.Name("False")):
         yield from mutators.operator_assignment(node)
 

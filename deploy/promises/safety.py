@@ -162,7 +162,8 @@ def single_instances(history: History) -> Finding:
             unknown += 1  # the observer may have noted the end too late
         else:
             name, pid = second.value
-            evidence.append(Evidence(second.sent, f"process {pid} is {name} beside process {life.pid}"))
+            together = f"process {pid} runs {name} while process {life.pid} lives"
+            evidence.append(Evidence(second.sent, together))
     for program in {life.program for life in history.lives}:
         lives = sorted(
             (life for life in history.lives if life.program == program), key=lambda life: life.began

@@ -37,7 +37,7 @@ class Epoch:
         start = time.monotonic()
         epoch = node.declare(_Parameters).scenario_epoch
         self.is_past = 0.0 < epoch < start
-        """Whether this process resumes a running scenario, in the place of a process that died."""
+        """Whether this process replaces one that died and resumes its scenario."""
         self._epochs = BehaviorSubject(-1.0)
         node.add_on_set_parameters_callback(self._check)
         node.create_parameter_observable(EPOCH).map(lambda it: it or start).subscribe(self._epochs)

@@ -28,7 +28,7 @@ class Settings:
         """
         Declare the parameter that names the folder, and read what the last process kept.
 
-        :param is_restart: whether this process is in the place of one that died.
+        :param is_restart: whether this process replaces one that died.
         :raises UserError: if the file of the settings has an error.
         """
         self._node = node

@@ -6,10 +6,10 @@ from deploy.benchmarks import signals
 
 
 def test_all_questions_are_answered() -> None:
-    name, goal, measured, beside = signals.mix(30.0)
+    name, goal, measured, notes = signals.mix(30.0)
 
     assert (name, goal, measured) == (signals.MIX, "100 % answered", "100.0%")
-    assert "longest 1" in beside  # 100 ms for late samples, and the next sample
+    assert "longest 1" in notes  # 100 ms for late samples, and the next sample
 
 
 def test_linear_motion_is_exact() -> None:
@@ -17,17 +17,17 @@ def test_linear_motion_is_exact() -> None:
 
 
 def test_disorder_and_replay_change_no_byte() -> None:
-    _, _, measured, beside = signals.hour(60.0)
+    _, _, measured, notes = signals.hour(60.0)
 
     assert measured == "the same"
-    assert beside != "with 0 samples later than their bound, the replay has the bytes of the run"
+    assert notes != "with 0 samples later than their bound, the replay has the bytes of the run"
 
 
 def test_memory_is_measured_over_the_hours() -> None:
-    _, goal, measured, beside = signals.day(hours=2, rate=1.0)
+    _, goal, measured, notes = signals.day(hours=2, rate=1.0)
 
     assert (goal, measured[-3:]) == ("flat", " MB")
-    assert beside.endswith("28,800 samples")
+    assert notes.endswith("28,800 samples")
 
 
 def test_demo_is_as_fast_as_its_scenario_says() -> None:
@@ -39,5 +39,5 @@ def test_demo_is_as_fast_as_its_scenario_says() -> None:
 
 def test_table_has_a_row_for_each_figure() -> None:
     assert signals.table({"a": ["1", "2", "x"], "b": ["3", "4", ""]}) == (
-        "| | goal | measured | beside |\n|---|---|---|---|\n| a | 1 | 2 | x |\n| b | 3 | 4 |  |"
+        "| | goal | measured | notes |\n|---|---|---|---|\n| a | 1 | 2 | x |\n| b | 3 | 4 |  |"
     )

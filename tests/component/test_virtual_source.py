@@ -356,7 +356,7 @@ def test_setting_that_cannot_be_kept_is_reported(
 
 @pytest.fixture
 def restart(make_source: Make, tmp_path: Path, spin_for: SpinFor) -> Callable[[], list[bool]]:
-    """Starts a switch that its scenario presses, in the place of a process that died; what it emits."""
+    """Starts a switch that its scenario presses, as the successor of one that died; what it emits."""
 
     def start() -> list[bool]:
         node = make_source(settings=str(tmp_path / "settings"), scenario_epoch=time.monotonic() - 1.0)

@@ -370,7 +370,7 @@ def test_s5_detects_one_report_of_a_second_instance() -> None:
     history = replace(history, lives=[*history.lives, Life("kinematics", 777, 20.0, 20.3)])
     history = added(history, "/diagnostics", (20.2, ("kinematics", 777)))
     (evidence,) = CHECKERS["S5"](history).evidence
-    assert evidence == (20.2, "process 777 is kinematics beside process 105")
+    assert evidence == (20.2, "process 777 runs kinematics while process 105 lives")
 
 
 def test_s5_is_unknown_if_the_end_of_the_first_may_have_been_noted_late() -> None:

@@ -475,10 +475,10 @@ def test_s5_reports_of_a_second_process() -> None:
     health += [(1.0, (KINEMATICS, 20)), (12.0, (KINEMATICS, 7))]  # a pid that velocity had before
     faults = [overload(5.5, 5.625), overload(9.5, 9.625)]
     found = CHECKERS["S5"](history(health=health, lives=lives, faults=faults))
-    beside = [each for each in found.evidence if "beside" in each.text]
-    assert beside == [
-        Evidence(8.0, "process 10 is velocity beside process 9"),
-        Evidence(12.0, "process 7 is kinematics beside process 20"),
+    together = [each for each in found.evidence if " while " in each.text]
+    assert together == [
+        Evidence(8.0, "process 10 runs velocity while process 9 lives"),
+        Evidence(12.0, "process 7 runs kinematics while process 20 lives"),
     ]
     assert found.unknown == 2
 

@@ -83,7 +83,7 @@ class Recent(NamedTuple):
     """The number of all items."""
 
     def add(self, items: Iterable[Any], most: int) -> Recent:
-        """Return it with more items, of which at most so many are kept."""
+        """Add items; keep only the last `most`."""
         new = tuple(items)
         return Recent((*self.items, *new)[-most:], self.total + len(new))
 

@@ -68,7 +68,7 @@ def _spin_until(node: Node, condition: Callable[[], object]) -> None:
     deadline = time.monotonic() + 20.0
     while not condition():
         if time.monotonic() > deadline:
-            raise TimeoutError(f"{node.get_name()} waits in vain")
+            raise TimeoutError(f"{node.get_name()} has waited too long")
         rclpy.spin_once(node, timeout_sec=0.5)
 
 

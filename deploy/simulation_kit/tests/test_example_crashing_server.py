@@ -30,7 +30,7 @@ def serve() -> None:
 
 
 def ask() -> None:
-    """Call the service until it answers; exit with the number of calls that were in vain."""
+    """Call the service until it answers; exit with the number of failed calls."""
     rclpy.init()
     node = Node("client")
     client = node.create_client(Trigger, "work")

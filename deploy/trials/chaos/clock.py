@@ -1,7 +1,7 @@
 """The time of day of an arm's processes, by libfaketime.
 
 libfaketime is preloaded into each process. Once a second, a process reads from a file by how much its time of
-day is ahead of the machine's. So a step reaches the whole arm within a second, and later processes as well.
+day is ahead of the machine's. So a step reaches the whole arm, and later processes, within a second.
 The machine's own clock and monotonic time stay as they are.
 """
 

@@ -79,7 +79,7 @@ def sources(rate: float) -> dict[str, Any]:
 class Testbed:
     """Arms, and the observer that records them until the end of the `with`."""
 
-    __test__ = False  # pytest shall not collect it
+    __test__ = False  # pytest must not collect it
     lead = 3.0  # s from the start of the first arm to the origin of the scenario
     discovery_range = "LOCALHOST"  # ROS_AUTOMATIC_DISCOVERY_RANGE
 

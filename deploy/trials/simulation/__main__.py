@@ -63,7 +63,7 @@ def _parse(arguments: Sequence[str]) -> argparse.Namespace:
     )
     add("--faults", type=names(FAULT_KINDS), default=tuple(FAULT_KINDS), help=of_kinds)
     add("--schedule", type=Path, metavar="FILE", help="run this schedule instead")
-    minutes = "for so many minutes, inject faults at every message and timer of an operator's day instead"
+    minutes = "for a number of minutes, inject faults at every message and timer of an operator's day instead"
     add("--systematic", type=number(0.01, 100_000), metavar="MINUTES", help=minutes)
     return parser.parse_args(arguments)
 
@@ -116,7 +116,7 @@ def _show(summary: Summary, hours: float, seconds: float, broken: int) -> None:
 
 
 def report(summary: Summary, seconds: float) -> str:
-    """Return what experiments have shown, in so many seconds of this machine."""
+    """Return what experiments have shown in a time of this machine [s]."""
     kinds = ", ".join(f"{kind} {number}" for kind, number in sorted(summary.injected.items()))
     speed = 3600.0 * summary.hours / seconds
     return (

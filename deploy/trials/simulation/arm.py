@@ -86,9 +86,9 @@ class SimulatedArm:
         if not self.supervisor.is_alive:
             for process in self.processes():
                 process.send_signal(signal.SIGTERM)
-            self.simulation.after(SERVICE_GRACE, self._start_anew)
+            self.simulation.after(SERVICE_GRACE, self._start_again)
 
-    def _start_anew(self) -> None:
+    def _start_again(self) -> None:
         if self.supervisor.is_alive:
             return
         for process in self.processes():

@@ -3,7 +3,7 @@
 An attack takes two of the three fail-safes of deploy/SAFETY.md away:
 
 - F1, the operator watchdog: it is killed, stopped or hung during the silence, so it loses its strikes.
-- F2, the engine controller's timeout: a stranger reports the operator's presence. If F3 shall act, the
+- F2, the engine controller's timeout: a stranger reports the operator's presence. If F3 has to act, the
   controller is stopped, hung or slow when F2 has to act.
 - F3, the drive's timeout: the drive keeps the last command.
 

@@ -16,7 +16,7 @@ QUIET = 15.0  # s at the end of an experiment, in which the arm recovers from th
 
 
 def experiments(seed: str, hours: float, every: float, kinds: Sequence[str]) -> list[Experiment]:
-    """Return the experiments of so many hours, with a random fault in each interval of ``every`` [s]."""
+    """Return experiments of some hours, with a random fault in each interval of ``every`` [s]."""
     seconds = 3600.0 * hours
     # A rest of at most QUIET would have no fault, and perhaps no operator: it belongs to the one before.
     number = max(1, math.ceil((seconds - QUIET) / LENGTH))

@@ -171,7 +171,7 @@ def derived(
     """
     Write a record like arm.mcap.
 
-    :param change: returns what is written in the place of a message; ``None`` for nothing.
+    :param change: returns what replaces a message; ``None`` for nothing.
     :param others: topics that are not the arm's, and when a message of them was received [ns of the record].
     """
     with McapFile(RECORD) as record:

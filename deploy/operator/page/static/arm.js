@@ -171,10 +171,10 @@ export class Arm {
  * @param {[number, number]} elbow in units of the drawing
  */
 export function labelPlaces(one, theta2, elbow) {
-  // Beside the elbow, where no link is.
+  // Next to the elbow, where no link is.
   const free = one + (wrap(theta2) - Math.PI) / 2 + (wrap(theta2) > 0 ? 0 : Math.PI);
   const two = [elbow[0] + 26 * Math.cos(free), elbow[1] - 13 * Math.sin(free)];
-  // Beside the x axis, where link one is not, and where its arc begins; further out where the other label is.
+  // Next to the x axis, where link one is not, and where its arc begins; further out where the other label is.
   const side = Math.sin(one) < 0 ? -1 : 1;
   const y = side < 0 ? -7 : 9;
   const isTaken = Math.abs(two[0] - 38) < LABEL.width && Math.abs(two[1] - y) < LABEL.height;

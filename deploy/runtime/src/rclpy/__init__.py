@@ -155,7 +155,7 @@ def _with_executor(node: Node, executor: Executor | None, work: Callable[[Execut
 
 
 def spin_once(node: Node, *, executor: Executor | None = None, timeout_sec: float | None = None) -> None:
-    """Run one callback of ``node``; wait for it at most ``timeout_sec`` (``None``: for ever)."""
+    """Run one callback of ``node``; wait for it at most ``timeout_sec`` (``None``: no limit)."""
     _with_executor(node, executor, lambda chosen: chosen.spin_once(timeout_sec))
 
 

@@ -1,7 +1,7 @@
 """Tells when the time of day is set, by the kernel's ``timerfd`` (man timerfd_create).
 
 DDS waits until a time of day. When that is set back, a wait goes on for as long as the step, so executors
-have to wait anew.
+have to wait again.
 """
 
 from __future__ import annotations

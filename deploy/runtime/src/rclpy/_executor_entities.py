@@ -54,7 +54,7 @@ class ExecutorEntities:
         self._guard = _dds.GuardCondition()
         self._rclpy_waitset = _dds.WaitSet()
         self._rclpy_waitset.attach(self._guard.handle, WAKE)
-        # Closed with the executor, also if it is garbage-collected without a shutdown.
+        # Closed with the executor, even if that is garbage-collected without a shutdown.
         self._rclpy_dds: list[_dds.WaitSet | _dds.GuardCondition] = [self._rclpy_waitset, self._guard]
         self._rclpy_close_dds = weakref.finalize(self, _close, self._rclpy_dds)
         self._rclpy_close_dds.atexit = False  # at exit, DDS closes everything itself
@@ -70,7 +70,7 @@ class ExecutorEntities:
         self._rclpy_guards: list[Any] = []
         self._rclpy_watch: WaitableWatch | None = None  # if nodes have waitables of users
         self._rclpy_attached: dict[int, tuple[Entity, int]] = {}  # token -> entity, DDS handle
-        self._rclpy_blocked: dict[int, tuple[Entity, int]] = {}  # likewise, while the callback group is busy
+        self._rclpy_blocked: dict[int, tuple[Entity, int]] = {}  # the same, while the callback group is busy
         self._rclpy_reserved: set[Any] = set()  # entities of tasks that have not begun
         self._rclpy_tokens: dict[int, int] = {}  # DDS handle -> token
         self._rclpy_last_token = WAKE

@@ -232,7 +232,7 @@ class Graph(GraphQueries):
         """
         Wait until ``condition`` is true; check it whenever the graph changes.
 
-        :param timeout: [s]; ``None`` or negative: for ever.
+        :param timeout: [s]; ``None`` or negative: no limit.
         :param alive: called at least ten times a second; the wait ends when it returns False.
         :return: whether the condition became true.
         """

@@ -118,7 +118,7 @@ class Client(ServiceSide):
 
     def wait_for_service(self, timeout_sec: float | None = None) -> bool:
         """
-        Wait for a server, at most ``timeout_sec`` (``None``: for ever); return whether there is one.
+        Wait for a server, at most ``timeout_sec`` (``None``: no limit); return whether there is one.
 
         :raises RCLError: if the context is shut down, so that a loop around this call ends.
         """

@@ -171,7 +171,7 @@ class Executor(ExecutorOffers, AbstractContextManager["Executor"]):
 
     def spin_once(self, timeout_sec: float | None = None) -> None:
         """
-        Run one callback; wait for it at most ``timeout_sec`` (``None`` or negative: for ever).
+        Run one callback; wait for it at most ``timeout_sec`` (``None`` or negative: no limit).
 
         Custom executors implement this with :meth:`wait_for_ready_callbacks`.
         """
@@ -401,7 +401,7 @@ class _BuiltInExecutor(Executor):
             self._rclpy_spin(None, None)
 
     def spin_once(self, timeout_sec: float | None = None) -> None:
-        """Run one callback; wait for it at most ``timeout_sec`` (``None`` or negative: for ever)."""
+        """Run one callback; wait for it at most ``timeout_sec`` (``None`` or negative: no limit)."""
         self._rclpy_spin(_deadline(timeout_sec), None, once=True)
 
     def spin_once_until_future_complete(

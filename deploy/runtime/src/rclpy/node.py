@@ -206,7 +206,7 @@ class Node(NodeParameters, NodeGraph):
 
     @property
     def executor(self) -> Executor | None:
-        """The existing executor to which the node was added last, also by ``rclpy.spin_once()``."""
+        """The last living executor that got the node, perhaps by ``rclpy.spin_once()``."""
         return None if self._rclpy_executor is None else self._rclpy_executor()
 
     @executor.setter

@@ -78,7 +78,7 @@ class AsyncParameterClient:
 
     def wait_for_services(self, timeout_sec: float | None = None) -> bool:
         """
-        Wait for all services, at most `timeout_sec` seconds; `None`: for ever.
+        Wait for all services, at most `timeout_sec` seconds; `None`: no limit.
 
         :returns: whether they are available.
         """

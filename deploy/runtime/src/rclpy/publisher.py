@@ -79,6 +79,6 @@ class Publisher(Owner):
         self.handle.assert_liveliness()
 
     def wait_for_all_acked(self, timeout: Duration = Duration(seconds=-1)) -> bool:  # noqa: B008
-        """Wait until reliable subscriptions have acknowledged all; ``timeout`` negative: for ever."""
+        """Wait until reliable subscriptions have acknowledged all; ``timeout`` negative: no limit."""
         nanoseconds = timeout.nanoseconds
         return self.handle.wait_for_acks(nanoseconds if nanoseconds >= 0 else 2**63 - 1)

@@ -216,7 +216,7 @@ class Rate:
         """
         Sleep until the next tick, or not at all if a tick came since the last sleep.
 
-        :raises ROSInterruptException: if the context is shut down, also during the sleep.
+        :raises ROSInterruptException: if the context is shut down before or during the sleep.
         :raises RuntimeError: if the rate was destroyed before; its destruction during the sleep just ends it.
         """
         with self._rclpy_ticks:

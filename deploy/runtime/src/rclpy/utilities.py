@@ -48,7 +48,7 @@ def try_shutdown(*, context: Context | None = None) -> None:
     """
     Shut down ``context`` (by default the default one) unless it is already shut down.
 
-    The next default context is a new one, also after a shutdown by a signal.
+    The next default context is a new one, even after a shutdown by a signal.
     """
     (get_default_context(shutting_down=True) if context is None else context).try_shutdown()
 
@@ -64,7 +64,7 @@ def get_available_rmw_implementations() -> set[str]:
 
 
 def timeout_sec_to_nsec(timeout_sec: float | None) -> int:
-    """Convert a timeout [s] (``None`` or negative: for ever) to nanoseconds (-1: for ever)."""
+    """Convert a timeout [s] (``None`` or negative: no limit) to nanoseconds (-1: no limit)."""
     if timeout_sec is None or timeout_sec < 0:
         return -1
     return int(float(timeout_sec) * S_TO_NS)

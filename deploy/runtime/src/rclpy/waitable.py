@@ -1,4 +1,4 @@
-"""Waitables: what an executor waits for beside subscriptions, timers, services and guard conditions."""
+"""Waitables: what an executor waits for, besides subscriptions, timers, services and guard conditions."""
 
 from __future__ import annotations
 

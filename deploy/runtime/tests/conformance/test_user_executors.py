@@ -132,7 +132,7 @@ def test_a_callback_whose_group_is_busy_keeps_its_message(user_executor: Executo
     publish(1.0)
     running()
     with suppress(TimeoutException):
-        while True:  # the callback begins in vain, or is not offered
+        while True:  # the callback begins without work, or is not offered
             user_executor.wait_for_ready_callbacks(0.05)[0]()
     assert received == []
     future.set_result(None)

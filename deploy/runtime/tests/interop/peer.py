@@ -82,7 +82,7 @@ class Peer:
         return lambda event: policies.append(QoSPolicyKind(event.last_policy_kind).name)
 
     def incompatible(self, topic: str) -> list[str]:
-        """Return the policies because of which an endpoint of the topic has not matched another."""
+        """Return the policies that kept an endpoint of the topic from matching another."""
         return self._incompatible[topic]
 
     def received(self, topic: str) -> list[str]:

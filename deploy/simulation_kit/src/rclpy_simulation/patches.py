@@ -1,6 +1,6 @@
 """What a simulated program sees of time, threads, signals and its process.
 
-While a simulation runs, these functions stand in the place of those of the standard library. Code outside of
+While a simulation runs, these functions replace those of the standard library. Code outside of
 simulated programs gets the real ones through them.
 """
 
@@ -82,7 +82,7 @@ def _of_day(convert: Callable[..., Any]) -> Callable[..., Any]:
 
 
 class _Waiter:
-    """Stands in the place of the lock for which a thread waits in ``Condition.wait``."""
+    """Replaces the lock that a thread waits for in ``Condition.wait``."""
 
     def __init__(self) -> None:
         self.thread = running()

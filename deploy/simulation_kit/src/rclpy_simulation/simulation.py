@@ -77,7 +77,7 @@ class Simulation:
         Prepare a simulation at time 0.
 
         :param network: how the network behaves.
-        :param variables: module variables that each process shall have for itself, besides those of rclpy.
+        :param variables: module variables that each process has for itself, besides those of rclpy.
         """
         self.network = network or Network()
         self.seed = seed

@@ -256,7 +256,7 @@ class ReactiveNode(Node):
         A call begins with its subscription, waits for a server if there is none, and never blocks.
         Disposing abandons it. It completes when the node ends.
 
-        :param timeout: if no response arrives within so many seconds, the observable ends in a TimeoutError.
+        :param timeout: if no response arrives within this time [s], the observable ends in a TimeoutError.
         :param options: further arguments of :meth:`rclpy.node.Node.create_client`.
         """
         client = self.create_client(srv_type, srv_name, **options)
@@ -379,7 +379,7 @@ class ReactiveNode(Node):
             node.serve_recipe(lambda requests: requests.map(lambda r: (r, answer(r))), SetBool, "switch")
 
         It must answer each request once, with the request itself, not a copy. A request without an answer is
-        kept, and its client waits in vain; others do not. An error of the recipe, its completion, an answer
+        kept, and its client gets no answer. An error of the recipe, its completion, an answer
         to a request that does not wait, and a response of another type are raised out of the spinning of
         this node. Then the service ends as well, so clients see that there is no server.
 

@@ -38,7 +38,7 @@ class Unattended(CallbackGroup):
 
 
 def keep_last(qos_profile: QoSProfile | int, count: int) -> QoSProfile:
-    """Return a QoS whose reader keeps so many messages."""
+    """Return a QoS whose reader keeps that many messages."""
     qos = QoSProfile(depth=qos_profile) if isinstance(qos_profile, int) else copy.copy(qos_profile)
     qos.history = HistoryPolicy.KEEP_LAST
     qos.depth = count

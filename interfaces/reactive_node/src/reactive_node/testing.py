@@ -174,7 +174,7 @@ def spin_until(executor: Executor) -> SpinUntil:
 
 @pytest.fixture
 def spin_for(executor: Executor) -> SpinFor:
-    """Spins the test's executor for so many seconds, to show that something does not happen."""
+    """Spins the test's executor for some seconds, to show that something does not happen."""
 
     def spin(seconds: float) -> None:
         deadline = time.monotonic() + seconds

@@ -83,7 +83,7 @@ def undisturbed(test: Callable[..., None]) -> Callable[..., None]:
             except Exception:
                 if not hand.stalled:
                     raise
-            hand.begin_anew()
+            hand.start_over()
         pytest.skip(f"platform: the machine stood still in each of {ATTEMPTS} attempts")
 
     return attempts

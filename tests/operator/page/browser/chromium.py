@@ -145,7 +145,7 @@ class HandOnPage:
         self.page.goto(url)
         self.await_live()
 
-    def begin_anew(self) -> None:
+    def start_over(self) -> None:
         for key in (" ", "Enter"):
             self.page.keyboard.up(key)
         self.up()

@@ -234,9 +234,9 @@ class HandAtDesktop(HandOnPage):
         """:param page: a browser on the desktop."""
         self.desktop = desktop
         self.page = page
-        self.begin_anew()
+        self.start_over()
 
-    def begin_anew(self) -> None:
+    def start_over(self) -> None:
         self.desktop.lift_all()
         self.page.reload()
         self.page.wait_for_selector("html[data-connection=live]")

@@ -29,7 +29,7 @@ def shared(arm: Arm) -> Iterator[HandAtDesktop]:
 
 @pytest.fixture
 def hand(shared: HandAtDesktop) -> HandAtDesktop:
-    shared.begin_anew()
+    shared.start_over()
     return shared
 
 

@@ -258,7 +258,7 @@ class ActionClient(ActionWaitable):
 
     def wait_for_server(self, timeout_sec: float | None = None) -> bool:
         """
-        Wait for a server, at most ``timeout_sec`` (``None``: for ever); return whether there is one.
+        Wait for a server, at most ``timeout_sec`` (``None``: no limit); return whether there is one.
 
         :raises RCLError: if the context is shut down.
         """

@@ -17,7 +17,7 @@ def get_action_client_names_and_types_by_node(
     node: Node, remote_node_name: str, remote_node_namespace: str
 ) -> NamesAndTypes:
     """
-    Return the actions of which a node has clients, with their types.
+    Return the actions that a node has clients for, with their types.
 
     :param node: the node that asks.
     :raises NodeNameNonExistentError: if the other node is unknown.
@@ -29,7 +29,7 @@ def get_action_server_names_and_types_by_node(
     node: Node, remote_node_name: str, remote_node_namespace: str
 ) -> NamesAndTypes:
     """
-    Return the actions of which a node has servers, with their types.
+    Return the actions that a node serves, with their types.
 
     :param node: the node that asks.
     :raises NodeNameNonExistentError: if the other node is unknown.
