@@ -14,8 +14,6 @@ _REMEMBERED_WRITERS = 1000
 
 
 class BadInput:
-    """The malformed samples of one reader."""
-
     def __init__(self, logger: RcutilsLogger, name: str) -> None:
         self._logger = logger
         self._name = name

@@ -82,7 +82,6 @@ class ExecutorEntities:
         self._rclpy_tasks_were_first = False
 
     def get_nodes(self) -> list[Node]:
-        """Return the nodes of this executor."""
         with self._nodes_lock:
             return list(self._nodes)
 

@@ -67,7 +67,6 @@ class Graph(GraphQueries):
         self._listener.start()
 
     def close(self) -> None:
-        """Leave the domain."""
         self._closing.set()
         with self._lock:  # held by the listening thread while it works
             for own in self._own.values():
@@ -178,7 +177,6 @@ class Graph(GraphQueries):
         self._change(node, add)
 
     def destroy(self, node: Node, *endpoints: Writer | Reader) -> None:
-        """Close readers and writers of ``node``."""
         gone = {endpoint.gid for endpoint in endpoints}
 
         def remove(own: _OwnNode) -> None:

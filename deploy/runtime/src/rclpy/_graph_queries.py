@@ -26,7 +26,6 @@ class GraphQueries:
         raise NotImplementedError
 
     def node_names(self) -> list[tuple[str, str, str]]:
-        """Return name, namespace and enclave of every node."""
         enclaves = self._discovered().participants()
         return [
             (node.name, node.namespace, user_data_value(enclaves.get(gid, ""), "enclave") or "/")
@@ -68,12 +67,10 @@ class GraphQueries:
         return [endpoint for endpoint in endpoints if endpoint.gid in gids]
 
     def publishers_of_node(self, name: str, namespace: str, no_demangle: bool) -> NamesAndTypes:
-        """Return the topics that a node publishes."""
         writers = self._of_node(name, namespace, "writers", self._discovered().writers())
         return _collect_topics(writers, no_demangle)
 
     def subscriptions_of_node(self, name: str, namespace: str, no_demangle: bool) -> NamesAndTypes:
-        """Return the topics that a node subscribes to."""
         readers = self._of_node(name, namespace, "readers", self._discovered().readers())
         return _collect_topics(readers, no_demangle)
 
@@ -96,11 +93,9 @@ class GraphQueries:
         return self._with_owners([r for r in self._discovered().readers() if r.topic == dds_topic])
 
     def count_writers(self, dds_topic: str) -> int:
-        """Return the number of writers on a topic."""
         return sum(writer.topic == dds_topic for writer in self._discovered().writers())
 
     def count_readers(self, dds_topic: str) -> int:
-        """Return the number of readers on a topic."""
         return sum(reader.topic == dds_topic for reader in self._discovered().readers())
 
 

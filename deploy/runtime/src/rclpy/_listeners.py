@@ -21,7 +21,6 @@ class Listeners(Generic[Listener]):
         self._listeners: WeakValueDictionary[int, Listener] = WeakValueDictionary()
 
     def add(self, listener: Listener) -> None:
-        """Add an object."""
         self._listeners[id(listener)] = listener
 
     def discard(self, listener: Listener) -> None:

@@ -15,8 +15,6 @@ _MANY = 100
 
 
 class Peers:
-    """The latest announcements of the other participants."""
-
     def __init__(self, reader: Reader) -> None:
         self._reader = reader
         self._announced: dict[bytes, Sample] = {}  # by a participant's GUID; decoded on the first query

@@ -72,7 +72,6 @@ class WaitableEntity:
 
     @property
     def callback_group(self) -> CallbackGroup | None:
-        """The callback group of the waitable."""
         return self.waitable.callback_group
 
     def _rclpy_take(self) -> tuple[Any]:
@@ -110,7 +109,6 @@ class WaitableWatch:
         self.entities: list[WaitableEntity] = []
 
     def update(self, waitables: Iterable[Waitable]) -> None:
-        """Change the waitables."""
         known = {id(entity.waitable): entity for entity in self.entities}
         self.entities = [
             known.get(id(waitable)) or WaitableEntity(waitable, self._executor) for waitable in waitables

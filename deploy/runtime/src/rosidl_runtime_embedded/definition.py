@@ -60,12 +60,10 @@ class FieldType(NamedTuple):
 
     @property
     def is_message(self) -> bool:
-        """Whether the base type is another message."""
         return "/" in self.base
 
     @property
     def is_plural(self) -> bool:
-        """Whether it is an array or a sequence."""
         return self.is_sequence or self.array_size > 0
 
     def __str__(self) -> str:
@@ -84,8 +82,6 @@ class FieldType(NamedTuple):
 
 
 class Field(NamedTuple):
-    """A member of a message."""
-
     name: str
     type: FieldType
     default: Literal | tuple[Literal, ...] | None = None
@@ -93,16 +89,12 @@ class Field(NamedTuple):
 
 
 class Constant(NamedTuple):
-    """A named value of a message type."""
-
     name: str
     type: str
     value: Literal
 
 
 class MessageDefinition(NamedTuple):
-    """A message type."""
-
     name: str
     """Full name, for example ``std_msgs/msg/Header``."""
     fields: tuple[Field, ...]
@@ -115,8 +107,6 @@ class MessageDefinition(NamedTuple):
 
 
 class ServiceDefinition(NamedTuple):
-    """A service type."""
-
     name: str
     """Full name, for example ``std_srvs/srv/Trigger``."""
     request: MessageDefinition
@@ -164,7 +154,6 @@ class ActionDefinition(NamedTuple):
 
     @property
     def feedback_message(self) -> MessageDefinition:
-        """The feedback with the UUID of its goal."""
         feedback = Field("feedback", FieldType(self.feedback.name))
         return MessageDefinition(f"{self.name}_FeedbackMessage", (_GOAL_ID, feedback))
 

@@ -88,7 +88,6 @@ def definition_source(name: str) -> tuple[str, str]:
 
 
 def is_defined(name: str) -> bool:
-    """Whether ``<package>/<kind>/<Name>`` has a definition file."""
     return _file(name) is not None
 
 

@@ -27,8 +27,6 @@ SIZES = {base: Struct(f"={code}").size for base, code in CODES.items()}
 
 
 class Item(NamedTuple):
-    """A value of fixed size in a run."""
-
     format: str
     """Its ``struct`` format."""
     size: int

@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 
 
 def slot_type(type_: FieldType) -> AbstractType:
-    """The type of a field."""
     element = _element(type_)
     if type_.array_size:
         return Array(element, type_.array_size)

@@ -169,7 +169,6 @@ def write_stubs(package: str, output: Path) -> bool:
 
 
 def main() -> None:
-    """Run the command line."""
     parser = argparse.ArgumentParser(description="Write type stubs of message packages.")
     parser.add_argument("packages", nargs="*", metavar="package", help="default: all of this distribution")
     parser.add_argument("--output", type=Path, required=True, help="root directory of the stubs")

@@ -13,7 +13,6 @@ if TYPE_CHECKING:
 
 
 def type_description(name: str) -> Message:
-    """``type_description_interfaces/msg/TypeDescription`` of an interface by its full name."""
     description, referenced = describe(name)
     return _to_message(
         "TypeDescription", {"type_description": description, "referenced_type_descriptions": referenced}

@@ -10,8 +10,6 @@ from rclpy_simulation.endpoints import Endpoint, Reader, Writer
 
 
 class Discovery:
-    """The DDS entities that a participant has discovered."""
-
     def __init__(
         self, participants: Callable[[], dict[bytes, str]], endpoints: Callable[[], Iterable[Endpoint]]
     ) -> None:
@@ -29,7 +27,6 @@ class Discovery:
         self._readers: list[EndpointInfo] = []
 
     def note(self) -> None:
-        """Note that there are changes."""
         self._writers = None
         self._news.set()
 
@@ -51,11 +48,9 @@ class Discovery:
         self._news.clear()
 
     def writers(self) -> list[EndpointInfo]:
-        """Return every writer."""
         return self._all()[0]
 
     def readers(self) -> list[EndpointInfo]:
-        """Return every reader."""
         return self._all()[1]
 
     def _all(self) -> tuple[list[EndpointInfo], list[EndpointInfo]]:

@@ -40,8 +40,6 @@ class Owner(Place, Protocol):
 
 
 class Endpoint(Handle):
-    """A simulated writer or reader."""
-
     matched_status = ""
     incompatible_status = ""
 
@@ -90,7 +88,6 @@ class Endpoint(Handle):
         )
 
     def unmatch(self, other: Endpoint) -> None:
-        """Forget an endpoint that is gone."""
         if self._disconnect(other):
             self.statuses.change(
                 self.matched_status, current_count=-1, last_instance_handle=other.instance_handle
@@ -115,7 +112,6 @@ class Endpoint(Handle):
         raise NotImplementedError
 
     def close(self) -> None:
-        """Close the endpoint."""
         if not self.is_closed:
             self.is_closed = True
             self.handle.close()
@@ -123,8 +119,6 @@ class Endpoint(Handle):
 
 
 class Writer(Endpoint):
-    """A simulated writer of CDR."""
-
     matched_status = "publication_matched"
     incompatible_status = "offered_incompatible_qos"
 
@@ -172,7 +166,6 @@ class Writer(Endpoint):
             link.send(sample)
 
     def link_to(self, reader: Reader) -> Link:
-        """Return the link to a reader."""
         link = self._links.get(reader)
         if link is None:
             place = self.participant
@@ -192,11 +185,9 @@ class Writer(Endpoint):
         return self._matched.pop(other, None) is not None
 
     def matched(self) -> int:
-        """Return the number of matched readers."""
         return len(self._matched)
 
     def matched_user_data(self) -> list[str]:
-        """Return the USER_DATA of every matched reader."""
         return [reader.user_data for reader in self._matched]
 
     def links_to(self, participant: Place) -> list[Link]:
@@ -250,8 +241,6 @@ class Writer(Endpoint):
 
 
 class Reader(Endpoint):
-    """A simulated reader of CDR."""
-
     matched_status = "subscription_matched"
     incompatible_status = "requested_incompatible_qos"
     take_message = entities.Reader.take_message
@@ -316,18 +305,15 @@ class Reader(Endpoint):
                 yield link
 
     def close(self) -> None:
-        """Close the reader."""
         self.condition.close()
         super().close()
         for writer in self._writers:
             writer.unlink(self)
 
     def matched(self) -> int:
-        """Return the number of matched writers."""
         return len(self._writers)
 
     def matched_user_data(self) -> list[str]:
-        """Return the USER_DATA of every matched writer."""
         return [writer.user_data for writer in self._writers]
 
     def user_data_of(self, publication_handle: int) -> str | None:

@@ -16,15 +16,11 @@ _STOPPED_QUEUE = 256  # samples of a best-effort writer that the kernel of a sto
 
 
 class Place(Protocol):
-    """A participant, as links see it."""
-
     process: Process
     host: Host
 
 
 class End(Protocol):
-    """A writer or reader, as links see it."""
-
     is_reliable: bool
 
     @property
@@ -32,8 +28,6 @@ class End(Protocol):
 
 
 class Sender(End, Protocol):
-    """A writer, as links see it."""
-
     topic: str
     instance_handle: int
     depth: int | None
@@ -45,8 +39,6 @@ class Sender(End, Protocol):
 
 
 class Receiver(End, Protocol):
-    """A reader, as links see it."""
-
     is_closed: bool
 
     def receive(self, sample: Sample, lifespan: int) -> None: ...
@@ -94,7 +86,6 @@ class Link:
         self._stopped: deque[Sample] | None = None  # since the reader's process has stopped
 
     def send(self, sample: Sample) -> None:
-        """Transport a sample."""
         kernel, network = self.kernel, self.network
         if self.reader.is_closed:
             self._is_unanswered = True
@@ -176,7 +167,6 @@ class Link:
     # What the reader knows of the writer
 
     def connect_reader(self) -> None:
-        """Note that the reader has discovered the writer."""
         self.reader_knows = True
         self.is_alive = self.writer.is_alive or not self.is_local
         if self._has_lease and self.writer.is_manual:
@@ -188,7 +178,6 @@ class Link:
             self._deliver(sample)
 
     def disconnect_reader(self) -> None:
-        """Note that the reader has forgotten the writer."""
         self.reader_knows = False
         if self._lease is not None:
             self._lease.stop()
@@ -219,7 +208,6 @@ class Link:
         return self.writer.lease if self._has_lease and not self.writer.is_manual else None
 
     def set_alive(self, is_alive: bool) -> None:
-        """Note whether the writer is alive."""
         if self.reader_knows and self.is_alive != is_alive:
             self.is_alive = is_alive
             self.reader.note_liveliness(self.writer, is_alive)

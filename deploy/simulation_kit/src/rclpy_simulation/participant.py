@@ -74,7 +74,6 @@ class Participant:
         self._announce()
 
     def remove(self, endpoint: Endpoint) -> None:
-        """Remove an endpoint that was closed."""
         if self.endpoints.pop(endpoint.gid, None) is not None:
             local = self._local[endpoint.topic]
             local.remove(endpoint)
@@ -102,7 +101,6 @@ class Participant:
             self.learn(other, tuple(other.endpoints.values()), other.version)
 
     def learn(self, other: Participant, endpoints: tuple[Endpoint, ...], version: int) -> None:
-        """Note the present endpoints of another participant."""
         known = self.known.get(other)
         if known is None or self._known_versions.get(other, -1) > version:
             return
@@ -119,7 +117,6 @@ class Participant:
         self._note_news()
 
     def forget(self, other: Participant) -> None:
-        """Note that another participant is gone."""
         for endpoint in self.known.pop(other, {}).values():
             self._forget_endpoint(endpoint)
         self._known_versions.pop(other, None)
@@ -146,7 +143,6 @@ class Participant:
                 yield from endpoint.links_from(other)
 
     def create_discovery(self) -> Discovery:
-        """Return the entities that this participant discovers."""
         if self._discovery is None:
             self._discovery = Discovery(self._participants, self._everyone)
         return self._discovery
@@ -165,7 +161,6 @@ class Participant:
     # Its end
 
     def close(self) -> None:
-        """Leave the domain and notify the others."""
         if not self.has_left:
             self._leave()
             self.domains.leave(self)
@@ -185,12 +180,10 @@ class Participant:
         self._remote.clear()
 
     def fall_silent(self) -> None:
-        """Note that the process is stopped."""
         self.silent_since = self.kernel.now
         self.domains.fall_silent(self)
 
     def speak_again(self) -> None:
-        """Note that the process runs again."""
         self.silent_since = None
         self.domains.speak_again(self)
 

@@ -103,7 +103,6 @@ class Thread:
             waiter.wake()
 
     def wake(self) -> None:
-        """End the present wait of this thread."""
         if self._waits and not self._is_due and not self.done:
             self._is_due = True
             kernel = self.process.kernel

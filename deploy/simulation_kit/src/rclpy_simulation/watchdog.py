@@ -39,7 +39,6 @@ class Watchdog:
             kernel.after(self._period, self._check)
 
     def stop(self) -> None:
-        """Do not ring any more."""
         self._is_stopped = True
 
     def _check(self) -> None:

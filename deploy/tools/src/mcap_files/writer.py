@@ -53,7 +53,6 @@ class FileWriter(Writer):
 
     @property
     def is_open(self) -> bool:
-        """Whether the file takes more messages."""
         return self._stream.is_open
 
     def close(self) -> None:

@@ -22,8 +22,6 @@ _PRESETS: dict[str, dict[str, Any]] = {
 
 
 class BagWriter:
-    """A bag that is being recorded."""
-
     def __init__(self, directory: Path, preset: str, custom_data: dict[str, str]) -> None:
         """Create the directory and its file. Raises OSError."""
         directory.mkdir(parents=True)

@@ -19,8 +19,6 @@ _Verb = TypeVar("_Verb", bound=Callable[..., Any])
 
 
 class FiniteFloat(click.FloatRange):
-    """A number that is neither infinite nor NaN."""
-
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Return the number; fail with one line."""
         number = super().convert(value, param, ctx)
@@ -37,7 +35,6 @@ NON_NEGATIVE_INT = click.IntRange(min=0)
 
 
 def direct_options(verb: _Verb) -> _Verb:
-    """Add the options ``spin_time`` and ``use_sim_time``."""
     verb = click.option(
         "--spin-time",
         type=FINITE_FLOAT,
@@ -71,8 +68,6 @@ def node_options(verb: _Verb) -> _Verb:
 
 
 def qos_options(action: str, default: str) -> Callable[[_Verb], _Verb]:
-    """Add the options of `qos_profile`."""
-
     def decorate(verb: _Verb) -> _Verb:
         from rclpy import qos
 
@@ -146,8 +141,6 @@ class ManyValues(click.Option):
 
 
 class VerbWithManyValues(click.Command):
-    """A verb with options of the kind `ManyValues`."""
-
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Repeat such an option before each of its values, as click expects it."""
         many = {name for param in self.params if isinstance(param, ManyValues) for name in param.opts}

@@ -32,7 +32,6 @@ class Topic:
     encoding: str = "cdr"
 
     def is_service_event(self) -> bool:
-        """Whether it records the calls of a service."""
         return "/srv/" in self.type and self.type.endswith("_Event") and self.name.endswith("/_service_event")
 
 
@@ -53,11 +52,9 @@ class Metadata:
 
     @property
     def count(self) -> int:
-        """The number of messages."""
         return sum(topic.count for topic in self.topics)
 
     def paths(self) -> list[Path]:
-        """Return the files of the bag."""
         return [self.directory / file for file in self.files]
 
 
@@ -184,7 +181,6 @@ def _of_files(directory: Path, paths: list[Path]) -> Metadata:
 
 
 def qos_to_yaml(profiles: list[QoSProfile]) -> str:
-    """Return profiles as a channel's metadata has them."""
     return yaml.safe_dump([_qos_to_dict(profile) for profile in profiles], sort_keys=False)
 
 

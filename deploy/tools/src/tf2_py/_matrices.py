@@ -36,7 +36,6 @@ def matrix_of(translation: Vector, rotation: Quaternion) -> Matrix:
 
 
 def inverse(matrix: Matrix) -> Matrix:
-    """Return the inverse of a rigid transform."""
     inverted = np.eye(4)
     inverted[:3, :3] = matrix[:3, :3].T
     inverted[:3, 3] = -matrix[:3, :3].T @ matrix[:3, 3]
@@ -44,7 +43,6 @@ def inverse(matrix: Matrix) -> Matrix:
 
 
 def translation_of(matrix: Matrix) -> Vector:
-    """Return the translation of a transform."""
     x, y, z = matrix[:3, 3].tolist()
     return x, y, z
 

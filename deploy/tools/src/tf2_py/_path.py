@@ -33,7 +33,6 @@ class Path(NamedTuple):
 
     @property
     def frames(self) -> list[str]:
-        """All frames from the source to the target."""
         return [*self.from_source, self.common, *reversed(self.from_target)]
 
     @property

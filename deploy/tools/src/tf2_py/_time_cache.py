@@ -100,7 +100,6 @@ class TimeCache:
         return True
 
     def clear(self) -> None:
-        """Remove all samples."""
         self._stamps.clear()
         self._samples.clear()
 
@@ -144,8 +143,6 @@ class TimeCache:
 
 
 class StaticCache:
-    """A transform that holds at all times."""
-
     latest = oldest = 0
 
     def __init__(self) -> None:
@@ -163,5 +160,4 @@ class StaticCache:
         """Keep the transform: a static transform does not become outdated."""
 
     def at(self, stamp: int) -> Sample | None:
-        """Return the transform."""
         return self._sample

@@ -21,8 +21,6 @@ _RECENT = 16  # messages that a second reader may deliver again
 
 
 class MessageReader(SharedReader):
-    """Turns messages into items for all observers."""
-
     def __init__(
         self,
         node: Node,

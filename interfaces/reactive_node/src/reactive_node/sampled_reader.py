@@ -26,11 +26,9 @@ class Unattended(CallbackGroup):
     """Keeps its entities out of the wait set of an executor."""
 
     def can_execute(self, entity: Any) -> bool:
-        """Return False."""
         return False
 
     def beginning_execution(self, entity: Any) -> bool:
-        """Return False."""
         return False
 
     def ending_execution(self, entity: Any) -> None:
@@ -108,8 +106,6 @@ def sampled_messages(
 
 
 class SampledReader(SharedReader):
-    """Reads a topic at ticks for all observers."""
-
     def __init__(
         self,
         node: Node,

@@ -56,5 +56,4 @@ class Requests:
             executor.wake()
 
     def close(self) -> None:
-        """Answer no request any more."""
         self._closed = True

@@ -91,8 +91,6 @@ class _BuiltinReader:
 
 
 class Discovery:
-    """The DDS entities that a participant has discovered."""
-
     def __init__(self, participant: int) -> None:
         self._participants = _BuiltinReader(
             participant, BUILTIN_PARTICIPANTS, BuiltinParticipant, _participant
@@ -107,7 +105,6 @@ class Discovery:
 
     @property
     def gone(self) -> list[int]:
-        """The DDS conditions that are true until :meth:`forget_gone`."""
         return [self._participants.gone, self._writers.gone, self._readers.gone]
 
     def forget_gone(self) -> None:
@@ -123,15 +120,12 @@ class Discovery:
         self.readers()
 
     def participants(self) -> dict[bytes, str]:
-        """Return the GUID and USER_DATA of every participant."""
         return dict(self._participants.alive())
 
     def writers(self) -> list[Endpoint]:
-        """Return every writer."""
         return self._writers.alive()
 
     def readers(self) -> list[Endpoint]:
-        """Return every reader."""
         return self._readers.alive()
 
 

@@ -113,7 +113,6 @@ class Participant:
         self.subscriber = checked(blocking.dds_create_subscriber(self.handle, None, None), "subscriber")
 
     def create_discovery(self) -> Discovery:
-        """Return the entities that this participant discovers."""
         return Discovery(self.handle)
 
     def close(self) -> None:
@@ -219,8 +218,6 @@ class _Endpoint(Handle):
 
 
 class Writer(_Endpoint):
-    """A DDS writer of CDR."""
-
     def __init__(self, handle: int) -> None:
         super().__init__(handle)
         sertype = Pointer()
@@ -263,11 +260,9 @@ class Writer(_Endpoint):
             checked(result, "cannot write")
 
     def matched(self) -> int:
-        """Return the number of matched readers."""
         return max(0, int(quick.dds_get_matched_subscriptions(self.handle, None, 0)))
 
     def matched_user_data(self) -> list[str]:
-        """Return the USER_DATA of every matched reader."""
         handles = _matched_handles(self.handle, "dds_get_matched_subscriptions")
         found = (_user_data(self.handle, "dds_get_matched_subscription_data", other) for other in handles)
         return [data for data in found if data is not None]
@@ -347,11 +342,9 @@ class Reader(_Endpoint):
         return message, sample.info()
 
     def matched(self) -> int:
-        """Return the number of matched writers."""
         return max(0, int(quick.dds_get_matched_publications(self.handle, None, 0)))
 
     def matched_user_data(self) -> list[str]:
-        """Return the USER_DATA of every matched writer."""
         handles = _matched_handles(self.handle, "dds_get_matched_publications")
         return [data for other in handles if (data := self.user_data_of(other)) is not None]
 
@@ -360,7 +353,6 @@ class Reader(_Endpoint):
         return _user_data(self.handle, "dds_get_matched_publication_data", publication_handle)
 
     def close(self) -> None:
-        """Close the reader and its condition."""
         blocking.dds_delete(self.handle)
 
 
@@ -379,7 +371,6 @@ class GuardCondition:
         blocking.dds_take_guardcondition(self.handle, ct.byref(ct.c_bool()))
 
     def close(self) -> None:
-        """Close the condition."""
         blocking.dds_delete(self.handle)
 
 

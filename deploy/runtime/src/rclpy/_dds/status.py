@@ -65,7 +65,6 @@ def watch(handle: int, names: list[str]) -> None:
 
 
 def watch_also(handle: int, name: str) -> None:
-    """Watch a further status."""
     mask = ct.c_uint32()
     blocking.dds_get_status_mask(handle, ct.byref(mask))
     blocking.dds_set_status_mask(handle, mask.value | STATUSES[name][0])

@@ -31,7 +31,6 @@ class Endpoints:
         self.created: list[Publisher | Subscription | Client | Service] = []
 
     def client(self, srv_type: Any, name: str, profile: QoSProfile, kind: type[Client] = Client) -> Client:
-        """Create a client of the action's service ``name``."""
         name = self._prefix + name
         endpoint = self._node._rclpy_service_endpoint(srv_type, name, profile, is_server=False)
         client = kind(self._node.context, endpoint, srv_type, name, profile, self._group)
@@ -39,7 +38,6 @@ class Endpoints:
         return client
 
     def service(self, srv_type: Any, name: str, profile: QoSProfile) -> Service:
-        """Create the action's service ``name``."""
         name = self._prefix + name
         endpoint = self._node._rclpy_service_endpoint(srv_type, name, profile, is_server=True)
         service = Service(endpoint, srv_type, name, _never_called, self._group, profile)
@@ -47,7 +45,6 @@ class Endpoints:
         return service
 
     def subscription(self, msg_type: Any, name: str, profile: QoSProfile) -> Subscription:
-        """Create a subscription to the action's topic ``name``."""
         silent = SubscriptionEventCallbacks(use_default_callbacks=False)
         subscription = self._node._rclpy_make_subscription(
             msg_type, self._prefix + name, _never_called, profile, self._group, silent
@@ -56,19 +53,16 @@ class Endpoints:
         return subscription
 
     def publisher(self, msg_type: Any, name: str, profile: QoSProfile) -> Publisher:
-        """Create a publisher of the action's topic ``name``."""
         publisher = self._node._rclpy_create_own_publisher(msg_type, self._prefix + name, profile)
         self.created.append(publisher)
         return publisher
 
     def handles(self) -> tuple[int, ...]:
-        """The DDS conditions that an executor waits for."""
         return tuple(
             handle for endpoint in self.created for handle in getattr(endpoint, "_rclpy_handles", ())
         )
 
     def destroy(self) -> None:
-        """Destroy the endpoints."""
         with self._node._rclpy_graph.one_announcement():
             for endpoint in self.created:
                 endpoint.destroy()
@@ -131,7 +125,6 @@ class ActionWaitable(Waitable):
         ]
 
     def is_ready(self, wait_set: Any) -> bool:
-        """Return whether anything has arrived, after a wait."""
         return any(wait_set.is_ready(kind, index) for kind, index in self._rclpy_in_wait_set)
 
     def _rclpy_take(self) -> dict[str, Any] | None:

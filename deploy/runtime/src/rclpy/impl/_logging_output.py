@@ -135,7 +135,6 @@ def shutdown() -> None:
 
 
 def enable_console(enabled: bool) -> None:
-    """Switch the console on or off (`--disable-stdout-logs`)."""
     global _console_enabled
     _console_enabled = enabled
 
@@ -172,7 +171,6 @@ def share_rosout_publisher(parent: str, child: str) -> Callable[[LogRecord], Non
 
 
 def unshare_rosout_publisher(child: str, publish: Callable[[LogRecord], None]) -> None:
-    """Undo one call of `share_rosout_publisher`."""
     with _rosout_lock:
         publishers = _rosout.get(child, [])
         if publish in publishers:
