@@ -30,8 +30,6 @@ Point = tuple[float, float]
 
 
 class Picture:
-    """A diagram over time."""
-
     def __init__(self, times: Point, values: Point) -> None:
         """Show these ranges [s, any unit]."""
         self._times, self._values = times, values
@@ -47,27 +45,22 @@ class Picture:
         )
 
     def title(self, text: str, kind: str) -> None:
-        """Explain a color."""
         self._parts.append(f'<text class="{kind}" x="{MARGIN + 200 * self._titles}" y="16">{text}</text>')
         self._titles += 1
 
     def curve(self, points: Iterable[Point], kind: str) -> None:
-        """Draw a line through points."""
         places = " ".join(f"{x:g},{y:g}" for x, y in map(self.at, points))
         self._parts.append(f'<polyline class="{kind}" style="fill:none" points="{places}"/>')
 
     def dots(self, points: Iterable[Point], kind: str, radius: float = 3.0) -> None:
-        """Draw single points."""
         places = map(self.at, points)
         self._parts += [f'<circle class="{kind}" cx="{x:g}" cy="{y:g}" r="{radius:g}"/>' for x, y in places]
 
     def across(self, one: Point, other: Point) -> None:
-        """Draw a thin line."""
         (x1, y1), (x2, y2) = self.at(one), self.at(other)
         self._parts.append(f'<line x1="{x1:g}" y1="{y1:g}" x2="{x2:g}" y2="{y2:g}" stroke-dasharray="3 3"/>')
 
     def save(self, path: Path) -> None:
-        """Write the file."""
         axis = f'<line x1="{MARGIN}" y1="{HEIGHT - MARGIN}" x2="{WIDTH - MARGIN}" y2="{HEIGHT - MARGIN}"/>'
         begin, end = self._times
         ends = [

@@ -52,7 +52,6 @@ class NodeGraph(NodeNames):
         return self._rclpy_usable_graph().topic_names_and_types(no_demangle)
 
     def get_service_names_and_types(self) -> NamesAndTypes:
-        """Return every service with its types."""
         return self._rclpy_usable_graph().service_names_and_types()
 
     def get_publisher_names_and_types_by_node(

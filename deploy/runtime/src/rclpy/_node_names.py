@@ -31,7 +31,6 @@ class NodeNames:
 
     @property
     def context(self) -> Context:
-        """The context of the node."""
         return self._context
 
     @property
@@ -56,15 +55,12 @@ class NodeNames:
             raise RCLError(f"cannot use node {self._rclpy_fully_qualified_name}: the context was shut down")
 
     def get_name(self) -> str:
-        """Return the node's name."""
         return self._rclpy_name
 
     def get_namespace(self) -> str:
-        """Return the node's namespace."""
         return self._rclpy_namespace
 
     def get_fully_qualified_name(self) -> str:
-        """Return the node's namespace and name."""
         return self._rclpy_fully_qualified_name
 
     def resolve_topic_name(self, topic: str, *, only_expand: bool = False) -> str:

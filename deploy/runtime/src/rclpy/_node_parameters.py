@@ -157,7 +157,6 @@ class NodeParameters(NodeNames):
     # Reading
 
     def has_parameter(self, name: str) -> bool:
-        """Return whether a parameter is declared."""
         return name in self._parameters
 
     def get_parameter_types(self, names: list[str]) -> list[Parameter.Type]:

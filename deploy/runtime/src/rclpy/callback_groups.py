@@ -25,11 +25,9 @@ class CallbackGroup:
         self.entities.add(weakref.ref(entity, self.entities.discard))
 
     def has_entity(self, entity: Any) -> bool:
-        """Return whether `entity` is a member."""
         return weakref.ref(entity) in self.entities
 
     def can_execute(self, entity: Any) -> bool:
-        """Return whether `entity` could run now."""
         raise NotImplementedError
 
     def beginning_execution(self, entity: Any) -> bool:
@@ -79,7 +77,6 @@ class MutuallyExclusiveCallbackGroup(CallbackGroup):
         return True
 
     def ending_execution(self, entity: Any) -> None:
-        """Allow the next callback to run."""
         assert self._active_entity is entity, "ending_execution() of an entity that is not being executed"
         self._active_entity = None
         self._rclpy_permission.append(None)

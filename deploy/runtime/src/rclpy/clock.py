@@ -80,15 +80,12 @@ class JumpThreshold:
 
 
 class TimeJump:
-    """A time jump that occurred."""
-
     def __init__(self, clock_change: ClockChange, delta: Duration) -> None:
         self._clock_change = clock_change
         self._delta = delta
 
     @property
     def clock_change(self) -> ClockChange:
-        """How the source of time changed."""
         return self._clock_change
 
     @property
@@ -126,7 +123,6 @@ class JumpHandle:
         )
 
     def unregister(self) -> None:
-        """Remove the callbacks."""
         if self._clock is not None:
             self._clock.handle.remove_clock_callback(self)
             self._clock = None
@@ -264,7 +260,6 @@ class Clock:
         return f"Clock(clock_type={self._rclpy_clock_type.name})"
 
     def now(self) -> Time:
-        """Return the current time."""
         return self._rclpy_source.get_now()
 
     def create_jump_callback(
@@ -350,7 +345,6 @@ class ROSClock(Clock):
 
     @property
     def ros_time_is_active(self) -> bool:
-        """Whether the time is simulated."""
         return self._rclpy_source.get_ros_time_override_is_enabled()
 
     def _set_ros_time_is_active(self, enabled: bool) -> None:

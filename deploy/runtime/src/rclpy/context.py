@@ -35,8 +35,6 @@ def _leave_domains() -> None:
 
 
 class ContextHandle(Handle):
-    """A handle for a context."""
-
     def __init__(self, context: Context) -> None:
         self._rclpy_context = context
 
@@ -45,7 +43,6 @@ class ContextHandle(Handle):
         return self._rclpy_context.ok()
 
     def get_domain_id(self) -> int:
-        """Return the DDS domain."""
         return self._rclpy_context.get_domain_id()
 
     def shutdown(self) -> None:

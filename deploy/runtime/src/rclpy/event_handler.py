@@ -18,8 +18,6 @@ from rclpy.waitable import NumberOfEntities, Waitable
 
 
 class QoSPublisherEventType(IntEnum):
-    """The events of a publisher."""
-
     RCL_PUBLISHER_OFFERED_DEADLINE_MISSED = 0
     RCL_PUBLISHER_LIVELINESS_LOST = 1
     RCL_PUBLISHER_OFFERED_INCOMPATIBLE_QOS = 2
@@ -28,8 +26,6 @@ class QoSPublisherEventType(IntEnum):
 
 
 class QoSSubscriptionEventType(IntEnum):
-    """The events of a subscription."""
-
     RCL_SUBSCRIPTION_REQUESTED_DEADLINE_MISSED = 0
     RCL_SUBSCRIPTION_LIVELINESS_CHANGED = 1
     RCL_SUBSCRIPTION_REQUESTED_INCOMPATIBLE_QOS = 2
@@ -176,7 +172,6 @@ class EventHandler(Waitable):
         self._rclpy_index = 0
 
     def destroy(self) -> None:
-        """Stop calling back."""
         self._rclpy_destroyed = True
 
     def get_num_entities(self) -> NumberOfEntities:
@@ -239,8 +234,6 @@ def _warn_of_incompatible_qos(logger_name: str, text: str) -> Callable[[Any], No
 
 
 class SubscriptionEventCallbacks:
-    """The event callbacks of a subscription."""
-
     def __init__(
         self,
         *,
@@ -264,7 +257,6 @@ class SubscriptionEventCallbacks:
     def create_event_handlers(
         self, callback_group: CallbackGroup, subscription: Reader, topic_name: str
     ) -> list[EventHandler]:
-        """Create the handlers of a subscription."""
         incompatible_qos = self.incompatible_qos
         if incompatible_qos is None and self.use_default_callbacks:
             text = (
@@ -288,8 +280,6 @@ class SubscriptionEventCallbacks:
 
 
 class PublisherEventCallbacks:
-    """The event callbacks of a publisher."""
-
     def __init__(
         self,
         *,
@@ -311,7 +301,6 @@ class PublisherEventCallbacks:
     def create_event_handlers(
         self, callback_group: CallbackGroup, publisher: Writer, topic_name: str
     ) -> list[EventHandler]:
-        """Create the handlers of a publisher."""
         incompatible_qos = self.incompatible_qos
         if incompatible_qos is None and self.use_default_callbacks:
             text = (

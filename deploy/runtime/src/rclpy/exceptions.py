@@ -63,8 +63,6 @@ class NameValidationException(Exception):
 
 
 class InvalidNamespaceException(NameValidationException):
-    """Raised when a namespace is invalid."""
-
     def __init__(self, name: str, error_msg: str, invalid_index: int) -> None:
         super().__init__("namespace", name, error_msg, invalid_index)
 

@@ -46,8 +46,6 @@ class ShutdownException(Exception):
 
 
 class ExternalShutdownException(Exception):
-    """Context has been shutdown."""
-
     def __init__(self, *args: object) -> None:
         super().__init__(*(args or ("the context was shut down by a signal or another thread",)))
 
@@ -114,7 +112,6 @@ class Executor(ExecutorOffers, AbstractContextManager["Executor"]):
 
     @property
     def context(self) -> Context:
-        """The context of the executor."""
         return self._context
 
     # Nodes

@@ -199,7 +199,6 @@ class Node(NodeParameters, NodeGraph):
         return self._clock
 
     def get_logger(self) -> RcutilsLogger:
-        """Return the node's logger."""
         return self._logger
 
     # Execution
@@ -249,32 +248,26 @@ class Node(NodeParameters, NodeGraph):
 
     @property
     def publishers(self) -> Iterator[Publisher]:
-        """The node's publishers."""
         yield from list(self._publishers)
 
     @property
     def subscriptions(self) -> Iterator[Subscription]:
-        """The node's subscriptions."""
         yield from list(self._subscriptions)
 
     @property
     def clients(self) -> Iterator[Client]:
-        """The node's clients."""
         yield from list(self._clients)
 
     @property
     def services(self) -> Iterator[Service]:
-        """The node's services."""
         yield from list(self._services)
 
     @property
     def timers(self) -> Iterator[Timer]:
-        """The node's timers."""
         yield from list(self._timers)
 
     @property
     def guards(self) -> Iterator[GuardCondition]:
-        """The node's guard conditions."""
         yield from list(self._guards)
 
     @property

@@ -89,7 +89,6 @@ class Parameter:
 
     @classmethod
     def from_parameter_msg(cls, param_msg: ParameterMsg) -> Parameter:
-        """Convert from an `rcl_interfaces/msg/Parameter`."""
         type_ = Parameter.Type(param_msg.value.type)
         value = None if type_ is Parameter.Type.NOT_SET else getattr(param_msg.value, _field(type_))
         return cls(param_msg.name, type_, value)
@@ -113,12 +112,10 @@ class Parameter:
 
     @property
     def name(self) -> str:
-        """The name, with dots between namespaces."""
         return self._name
 
     @property
     def type_(self) -> Parameter.Type:
-        """The type of the value."""
         return self._type_
 
     @property
@@ -127,14 +124,12 @@ class Parameter:
         return self._value
 
     def get_parameter_value(self) -> ParameterValue:
-        """Convert the value to a message."""
         message = ParameterValue(type=self._type_.value)
         if self._type_ is not Parameter.Type.NOT_SET:
             setattr(message, _field(self._type_), self._value)
         return message
 
     def to_parameter_msg(self) -> ParameterMsg:
-        """Convert to an `rcl_interfaces/msg/Parameter`."""
         return ParameterMsg(name=self._name, value=self.get_parameter_value())
 
 

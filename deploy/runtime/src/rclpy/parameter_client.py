@@ -73,7 +73,6 @@ class AsyncParameterClient:
         ]
 
     def services_are_ready(self) -> bool:
-        """Return whether all services are available."""
         return all(client.service_is_ready() for client in self._rclpy_clients())
 
     def wait_for_services(self, timeout_sec: float | None = None) -> bool:
@@ -100,7 +99,6 @@ class AsyncParameterClient:
         return _call(self._list_parameter_client, request, callback)
 
     def get_parameters(self, names: list[str], callback: Callable[[Future], Any] | None = None) -> Future:
-        """Request values."""
         return _call(self._get_parameter_client, GetParameters.Request(names=names), callback)
 
     def set_parameters(
@@ -115,13 +113,11 @@ class AsyncParameterClient:
     def describe_parameters(
         self, names: list[str], callback: Callable[[Future], Any] | None = None
     ) -> Future:
-        """Request descriptors."""
         return _call(self._describe_parameters_client, DescribeParameters.Request(names=names), callback)
 
     def get_parameter_types(
         self, names: list[str], callback: Callable[[Future], Any] | None = None
     ) -> Future:
-        """Request types."""
         return _call(self._get_parameter_types_client, GetParameterTypes.Request(names=names), callback)
 
     def set_parameters_atomically(

@@ -29,8 +29,6 @@ class ParameterCallbackHandle:
 
 
 class ParameterEventCallbackHandle:
-    """A callback for all events."""
-
     def __init__(self, callback: Callable[[ParameterEvent], None]) -> None:
         self.callback = callback
         self.mutex = RLock()
@@ -45,8 +43,6 @@ class ParameterEventHandler:
     """
 
     class Callbacks:
-        """The callbacks of a handler."""
-
         def __init__(self) -> None:
             self.parameter_callbacks: dict[tuple[str, str], list[ParameterCallbackHandle]] = {}
             self.event_callbacks: list[ParameterEventCallbackHandle] = []
@@ -95,7 +91,6 @@ class ParameterEventHandler:
         def add_parameter_event_callback(
             self, callback: Callable[[ParameterEvent], None]
         ) -> ParameterEventCallbackHandle:
-            """Add a callback for all events."""
             handle = ParameterEventCallbackHandle(callback)
             with self.mutex:
                 self.event_callbacks.insert(0, handle)
@@ -137,7 +132,6 @@ class ParameterEventHandler:
         )
 
     def destroy(self) -> None:
-        """End the subscription."""
         self.node.destroy_subscription(self.parameter_event_subscription)
 
     @staticmethod

@@ -71,7 +71,6 @@ class Publisher(Owner):
             raise TypeError(f"Expected {expected} on {self._rclpy_name}, got {type(msg).__name__}: {msg!r}")
 
     def get_subscription_count(self) -> int:
-        """Return the number of matched subscriptions."""
         return self.handle.matched()
 
     def assert_liveliness(self) -> None:

@@ -64,7 +64,6 @@ class QoSOverridingOptions:
 
     @property
     def policy_kinds(self) -> Iterable[QoSPolicyKind]:
-        """The selected policies."""
         return self._policy_kinds
 
     @property

@@ -28,8 +28,6 @@ if TYPE_CHECKING:
 
 
 class SignalHandlerOptions(IntEnum):
-    """The signals that rclpy handles."""
-
     NO = 0
     SIGINT = 1
     SIGTERM = 2

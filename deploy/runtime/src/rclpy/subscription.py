@@ -20,8 +20,6 @@ class Subscription(Owner):
     """Calls back with each message of a topic. Created by :meth:`rclpy.node.Node.create_subscription`."""
 
     class CallbackType(Enum):
-        """The arguments of the callback."""
-
         MessageOnly = 0
         WithMessageInfo = 1
 
@@ -72,7 +70,6 @@ class Subscription(Owner):
         self._rclpy_takes_info = self._callback_type is Subscription.CallbackType.WithMessageInfo
 
     def get_publisher_count(self) -> int:
-        """Return the number of matched publishers."""
         return self.handle.matched()
 
     # The interface that executors use for every entity.

@@ -58,7 +58,6 @@ class Future:
         self._rclpy_complete()
 
     def cancelled(self) -> bool:
-        """Return whether the future was cancelled."""
         return self._rclpy_cancelled
 
     def done(self) -> bool:
@@ -85,7 +84,6 @@ class Future:
         return self._exception
 
     def set_result(self, result: Any) -> None:
-        """Complete the future with a result."""
         with self._lock:
             self._result = result
             self._rclpy_done = True

@@ -81,7 +81,6 @@ class Time:
 
     @property
     def clock_type(self) -> ClockType:
-        """The type of the clock."""
         return self._rclpy_clock_type
 
     def __repr__(self) -> str:

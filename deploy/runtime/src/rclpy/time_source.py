@@ -82,7 +82,6 @@ class TimeSource:
         node._post_set_parameters_callbacks.insert(0, self._rclpy_follow)
 
     def detach_node(self) -> None:
-        """Stop following the node's parameter."""
         node = self._get_node()
         self._rclpy_unsubscribe()
         if node is not None:

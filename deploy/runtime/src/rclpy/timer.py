@@ -25,7 +25,6 @@ class TimerHandle(EntityHandle["Timer"]):
     """A timer for a waitable that waits for it."""
 
     def is_timer_ready(self) -> bool:
-        """Whether the next call is due."""
         return self._rclpy_entity.is_ready()
 
     def call_timer(self) -> None:
@@ -99,7 +98,6 @@ class Timer:
 
     @property
     def clock(self) -> Clock:
-        """The clock of the timer."""
         return self._clock
 
     @property
@@ -112,14 +110,12 @@ class Timer:
         self._rclpy_usable()._rclpy_period = int(value)
 
     def is_ready(self) -> bool:
-        """Whether the next call is due."""
         return (
             not self._rclpy_usable()._rclpy_canceled
             and self._rclpy_source.nanoseconds() >= self._rclpy_next_call
         )
 
     def is_canceled(self) -> bool:
-        """Whether it is canceled."""
         return self._rclpy_usable()._rclpy_canceled
 
     def cancel(self) -> None:

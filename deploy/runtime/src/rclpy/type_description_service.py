@@ -44,7 +44,6 @@ class TypeDescriptionService:
             )
 
     def destroy(self) -> None:
-        """Destroy the service."""
         if self._rclpy_service is not None:
             self._rclpy_node._rclpy_destroy_service(self._rclpy_service)
             self._rclpy_service = None

@@ -21,7 +21,6 @@ class TypeHash:
 
     @property
     def version(self) -> int:
-        """The version of the RIHS standard."""
         return self._version
 
     @version.setter
@@ -31,7 +30,6 @@ class TypeHash:
 
     @property
     def value(self) -> bytes:
-        """The bytes of the hash."""
         return self._value
 
     @value.setter

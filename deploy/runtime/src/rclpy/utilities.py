@@ -59,7 +59,6 @@ def get_rmw_implementation_identifier() -> str:
 
 
 def get_available_rmw_implementations() -> set[str]:
-    """Return the available middlewares."""
     return {get_rmw_implementation_identifier()}
 
 

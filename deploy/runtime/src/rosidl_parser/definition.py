@@ -28,15 +28,11 @@ class NamespacedType(AbstractNestableType):
     name: str
 
     def namespaced_name(self) -> tuple[str, ...]:
-        """Namespaces and name."""
         return (*self.namespaces, self.name)
 
 
 class AbstractGenericString(AbstractNestableType):
-    """A string."""
-
     def has_maximum_size(self) -> bool:
-        """Whether the length is bounded."""
         return hasattr(self, "maximum_size")
 
 
@@ -74,8 +70,6 @@ class UnboundedWString(AbstractWString):
 
 @dataclass
 class AbstractNestedType(AbstractType):
-    """Elements of one type."""
-
     value_type: AbstractNestableType
 
     def has_maximum_size(self) -> bool:
@@ -85,8 +79,6 @@ class AbstractNestedType(AbstractType):
 
 @dataclass
 class Array(AbstractNestedType):
-    """A fixed number of elements."""
-
     size: int
 
 

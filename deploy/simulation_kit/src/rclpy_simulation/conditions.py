@@ -17,14 +17,12 @@ class Condition:
         self.wait_sets: list[WaitSet] = []
 
     def set(self) -> None:
-        """Trigger the condition."""
         if not self.is_triggered:
             self.is_triggered = True
             for wait_set in self.wait_sets:
                 wait_set.note(self)
 
     def clear(self) -> None:
-        """End the trigger."""
         if self.is_triggered:
             self.is_triggered = False
             for wait_set in self.wait_sets:
@@ -37,8 +35,6 @@ class Condition:
 
 
 class GuardCondition:
-    """A condition that a program triggers."""
-
     def __init__(self) -> None:
         self.handle = Condition()
 
@@ -47,11 +43,9 @@ class GuardCondition:
         self.handle.set()
 
     def take(self) -> None:
-        """Reset the condition."""
         self.handle.clear()
 
     def close(self) -> None:
-        """Close the condition."""
         self.handle.close()
 
 
@@ -73,13 +67,11 @@ class WaitSet:
         return True
 
     def detach(self, handle: Condition) -> None:
-        """Remove a condition."""
         if self._tokens.pop(handle, None) is not None:
             self._triggered.pop(handle, None)
             handle.wait_sets.remove(self)
 
     def note(self, handle: Condition) -> None:
-        """Note whether a condition is triggered."""
         if handle.is_triggered:
             self._triggered[handle] = self._tokens[handle]
             if self._waiting is not None:

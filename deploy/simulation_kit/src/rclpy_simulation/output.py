@@ -26,10 +26,8 @@ class Output(io.TextIOBase):
         return len(text)
 
     def end(self) -> None:
-        """Ignore all later text."""
         self._has_ended = True
 
     @property
     def text(self) -> str:
-        """What the process has written."""
         return "".join(self._parts)

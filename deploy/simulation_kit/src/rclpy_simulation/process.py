@@ -111,7 +111,6 @@ class Process:
 
     @property
     def ended(self) -> bool:
-        """Whether the process has ended."""
         return self.exit_code is not None
 
     @property
@@ -122,7 +121,6 @@ class Process:
     # Its life
 
     def begin(self) -> None:
-        """Run ``main``."""
         if not self.ended:
             self.start_thread(self._run, self.face)
 
@@ -219,7 +217,6 @@ class Process:
         self._at_end.append(action)
 
     def abandon(self) -> None:
-        """Forget the actions of :meth:`at_end`."""
         self._at_end.clear()
 
     # What happens to it

@@ -116,7 +116,6 @@ class Simulation:
         return (self._kernel.now - BOOT) / SECOND
 
     def run(self, seconds: float) -> None:
-        """Let time pass."""
         self._kernel.run_until(self._kernel.now + int(seconds * SECOND))
 
     def run_until(self, condition: Callable[[], object], seconds: float = 60.0) -> None:
@@ -135,7 +134,6 @@ class Simulation:
         self._kernel.schedule(BOOT + int(time * SECOND), lambda: self._kernel.run_outside(action))
 
     def after(self, seconds: float, action: Callable[[], Any]) -> None:
-        """Run an action after a delay."""
         self._kernel.after(int(seconds * SECOND), lambda: self._kernel.run_outside(action))
 
     @property
@@ -201,7 +199,6 @@ class Simulation:
 
     @property
     def processes(self) -> list[Process]:
-        """The live processes."""
         return list(self._processes.alive.values())
 
     @property

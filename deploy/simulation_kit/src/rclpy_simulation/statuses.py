@@ -29,8 +29,6 @@ does so only for samples that a reader rejects because of another order of desti
 
 
 class Statuses:
-    """The communication statuses of an endpoint."""
-
     def __init__(self) -> None:
         self.handle = Condition()
         self._values: dict[str, dict[str, int]] = {}
@@ -43,7 +41,6 @@ class Statuses:
         self._update()
 
     def watch_also(self, name: str) -> None:
-        """Watch a further status."""
         self._watched.add(name)
         self._update()
 

@@ -16,7 +16,6 @@ _MARKER = "simulation(seed=0, network=None): the seed and the network of the fix
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Register the marker."""
     config.addinivalue_line("markers", _MARKER)
 
 

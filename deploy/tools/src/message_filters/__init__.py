@@ -31,7 +31,6 @@ class SimpleFilter:
         return connection
 
     def signalMessage(self, *msg: Any) -> None:
-        """Output messages."""
         for callback, args in self.callbacks.values():
             callback(*msg, *args)
 
@@ -52,7 +51,6 @@ class Subscriber(SimpleFilter):
         self.sub = self.node.create_subscription(*args[1:], self.callback, **kwargs)
 
     def callback(self, msg: Any) -> None:
-        """Output a message."""
         self.signalMessage(msg)
 
     def getTopic(self) -> str:
@@ -83,11 +81,9 @@ class Cache(SimpleFilter):
         self.allow_headerless = allow_headerless
 
     def connectInput(self, f: SimpleFilter) -> None:
-        """Take the messages of a filter."""
         self.incoming_connection = f.registerCallback(self.add)
 
     def add(self, msg: Any) -> None:
-        """Take a message."""
         stamp = _stamp(msg, self.allow_headerless, "message_filters_cache")
         if stamp is None:
             return
@@ -138,7 +134,6 @@ class TimeSynchronizer(SimpleFilter):
         self.lock = threading.RLock()
 
     def connectInput(self, fs: Sequence[SimpleFilter]) -> None:
-        """Take the messages of these filters."""
         self.queues: list[dict[int, Any]] = [{} for _ in fs]  # by stamp [ns]
         self.input_connections = [
             f.registerCallback(self.add, queue, index)
@@ -146,7 +141,6 @@ class TimeSynchronizer(SimpleFilter):
         ]
 
     def add(self, msg: Any, my_queue: dict[int, Any], my_queue_index: int | None = None) -> None:
-        """Take a message of an input."""
         with self.lock:
             self._message_filters_enqueue(msg, Time.from_msg(msg.header.stamp).nanoseconds, my_queue)
             for stamp in sorted(set.intersection(*map(set, self.queues))):

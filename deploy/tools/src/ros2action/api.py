@@ -39,5 +39,4 @@ def get_action_clients_and_servers(*, node: Node, action_name: str) -> tuple[_No
 
 
 def get_action_names(*, node: Node) -> list[str]:
-    """Return the names of these actions."""
     return [name for name, _ in get_action_names_and_types(node=node)]

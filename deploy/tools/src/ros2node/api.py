@@ -52,7 +52,6 @@ def get_subscriber_info(
 def get_service_server_info(
     *, node: Node, remote_node_name: str, include_hidden: bool = False
 ) -> list[TopicInfo]:
-    """Return the services of a node."""
     return _info(node.get_service_names_and_types_by_node, remote_node_name, include_hidden)
 
 

@@ -10,15 +10,12 @@ from ament_index_python import PackageNotFoundError, get_package_prefix, get_pac
 
 
 class PackageNotFound(Exception):
-    """There is no such package."""
-
     def __init__(self, package_name: str) -> None:
         super().__init__(f"Package '{package_name}' not found")
         self.package_name = package_name
 
 
 def get_package_names() -> Iterable[str]:
-    """Return the names of all packages."""
     return get_packages_with_prefixes().keys()
 
 

@@ -19,7 +19,6 @@ def get_service_names_and_types(
 
 
 def get_service_names(*, node: Node, include_hidden_services: bool = False) -> list[str]:
-    """Return the names of these services."""
     services = get_service_names_and_types(node=node, include_hidden_services=include_hidden_services)
     return [name for name, _ in services]
 

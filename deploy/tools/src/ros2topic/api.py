@@ -23,7 +23,6 @@ def get_topic_names_and_types(
 
 
 def get_topic_names(*, node: Node, include_hidden_topics: bool = False) -> list[str]:
-    """Return the names of these topics."""
     topics = get_topic_names_and_types(node=node, include_hidden_topics=include_hidden_topics)
     return [name for name, _ in topics]
 

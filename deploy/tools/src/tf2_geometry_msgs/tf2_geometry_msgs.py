@@ -51,7 +51,6 @@ def transform_covariance(cov_in: ArrayLike, transform: TransformStamped) -> NDAr
 
 
 def do_transform_point(point: PointStamped, transform: TransformStamped) -> PointStamped:
-    """Return a point in another frame."""
     (row,) = _points([point.point], transform)
     return PointStamped(header=transform.header, point=Point(x=row[0], y=row[1], z=row[2]))
 
@@ -97,7 +96,6 @@ def do_transform_pose_with_covariance_stamped(
 
 
 def do_transform_polygon_stamped(polygon: PolygonStamped, transform: TransformStamped) -> PolygonStamped:
-    """Return a polygon in another frame."""
     points = [Point32(x=x, y=y, z=z) for x, y, z in _points(polygon.polygon.points, transform)]
     return PolygonStamped(header=transform.header, polygon=Polygon(points=points))
 

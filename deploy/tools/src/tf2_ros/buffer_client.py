@@ -109,7 +109,6 @@ class BufferClient(BufferInterface):
     def can_transform(
         self, target_frame: str, source_frame: str, time: Time | TimeMsg, timeout: Duration = NO_WAIT
     ) -> bool:
-        """Return whether :meth:`lookup_transform` has a result."""
         try:
             self.lookup_transform(target_frame, source_frame, time, timeout)
         except TransformException:
@@ -125,7 +124,6 @@ class BufferClient(BufferInterface):
         fixed_frame: str,
         timeout: Duration = NO_WAIT,
     ) -> bool:
-        """Return whether :meth:`lookup_transform_full` has a result."""
         try:
             self.lookup_transform_full(
                 target_frame, target_time, source_frame, source_time, fixed_frame, timeout
@@ -135,7 +133,6 @@ class BufferClient(BufferInterface):
         return True
 
     def destroy(self) -> None:
-        """Destroy the action client."""
         self.action_client.destroy()
 
     def _tf2_ask(self, goal: Any) -> TransformStamped:

@@ -103,7 +103,6 @@ class BufferInterface:
     def can_transform(
         self, target_frame: str, source_frame: str, time: Time | TimeMsg, timeout: Duration = NO_WAIT
     ) -> Any:
-        """Return whether :meth:`lookup_transform` has a result."""
         raise NotImplementedException
 
     def can_transform_full(
@@ -115,7 +114,6 @@ class BufferInterface:
         fixed_frame: str,
         timeout: Duration = NO_WAIT,
     ) -> Any:
-        """Return whether :meth:`lookup_transform_full` has a result."""
         raise NotImplementedException
 
 
@@ -131,7 +129,6 @@ class TransformRegistration:
     _tf2_functions: ClassVar[dict[type, _DoTransform]] = {}
 
     def print_me(self) -> None:
-        """Print the registered types."""
         print(self._tf2_functions)
 
     def add(self, key: type, callback: _DoTransform) -> None:

@@ -11,14 +11,11 @@ from tf2_msgs.msg import TFMessage
 
 
 class TransformBroadcaster:
-    """Publishes transforms on ``/tf``."""
-
     def __init__(self, node: Node, qos: QoSProfile | int | None = None) -> None:
         """Create the publisher, by default a reliable one that keeps the last 100 messages."""
         self.pub_tf = node.create_publisher(TFMessage, "/tf", QoSProfile(depth=100) if qos is None else qos)
 
     def sendTransform(self, transform: TransformStamped | Iterable[TransformStamped]) -> None:
-        """Publish one transform or several."""
         self.pub_tf.publish(TFMessage(transforms=as_list(transform)))
 
 

@@ -62,17 +62,14 @@ class TransformListener:
             self.unregister()
 
     def unregister(self) -> None:
-        """Unsubscribe."""
         self.node.destroy_subscription(self.tf_sub)
         self.node.destroy_subscription(self.tf_static_sub)
 
     def callback(self, data: TFMessage) -> None:
-        """Put transforms into the buffer."""
         for transform in data.transforms:
             self.buffer.set_transform(transform, _AUTHORITY)
 
     def static_callback(self, data: TFMessage) -> None:
-        """Put static transforms into the buffer."""
         for transform in data.transforms:
             self.buffer.set_transform_static(transform, _AUTHORITY)
 

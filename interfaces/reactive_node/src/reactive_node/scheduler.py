@@ -86,7 +86,6 @@ class NodeScheduler(PeriodicScheduler):
 
     @property
     def now(self) -> datetime:
-        """The present time of this scheduler."""
         return stamps.from_nanoseconds(self._read())
 
     def time_of_stamps(self) -> int:

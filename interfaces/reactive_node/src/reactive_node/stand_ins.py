@@ -37,7 +37,6 @@ class Turn:
         """Keep it: between two turns, there is one to end as well."""
 
     def end(self) -> None:
-        """End the turn, on any thread."""
         self._end(self)
 
 

@@ -46,7 +46,6 @@ class ClientGoalHandle:
 
     @property
     def goal_id(self) -> UUID:
-        """The UUID of the goal."""
         return self._goal_id
 
     @property
@@ -56,7 +55,6 @@ class ClientGoalHandle:
 
     @property
     def accepted(self) -> bool:
-        """Whether the server accepted the goal."""
         return bool(self._goal_response.accepted)
 
     @property
@@ -112,8 +110,6 @@ class _ResultCalls(_Calls):
 
 
 class ActionClient(ActionWaitable):
-    """Sends goals to an action server."""
-
     def __init__(
         self,
         node: Node,

@@ -34,8 +34,6 @@ if TYPE_CHECKING:
 
 
 class GoalResponse(Enum):
-    """The answers to a goal."""
-
     REJECT = 1
     ACCEPT = 2
 
@@ -104,12 +102,10 @@ class ServerGoalHandle:
 
     @property
     def goal_id(self) -> UUID:
-        """The UUID of the goal."""
         return self._goal_info.goal_id
 
     @property
     def is_active(self) -> bool:
-        """Whether the goal has not ended."""
         return self.status in _ACTIVE
 
     @property
@@ -199,8 +195,6 @@ def default_cancel_callback(cancel_request: Any) -> CancelResponse:
 
 
 class ActionServer(ActionWaitable):
-    """Accepts and executes goals."""
-
     def __init__(
         self,
         node: Node,
@@ -287,7 +281,6 @@ class ActionServer(ActionWaitable):
 
     @property
     def action_type(self) -> Any:
-        """The type of the action."""
         return self._action_type
 
     # Goals

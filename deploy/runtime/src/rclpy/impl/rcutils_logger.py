@@ -207,15 +207,12 @@ class RcutilsLogger:
         return True
 
     def debug(self, message: str, **kwargs: Any) -> bool:
-        """Log with severity DEBUG, see `log`."""
         return self.log(message, LoggingSeverity.DEBUG, **kwargs)
 
     def info(self, message: str, **kwargs: Any) -> bool:
-        """Log with severity INFO, see `log`."""
         return self.log(message, LoggingSeverity.INFO, **kwargs)
 
     def warning(self, message: str, **kwargs: Any) -> bool:
-        """Log with severity WARN, see `log`."""
         return self.log(message, LoggingSeverity.WARN, **kwargs)
 
     def warn(self, message: str, **kwargs: Any) -> bool:
@@ -223,9 +220,7 @@ class RcutilsLogger:
         return self.warning(message, **kwargs)
 
     def error(self, message: str, **kwargs: Any) -> bool:
-        """Log with severity ERROR, see `log`."""
         return self.log(message, LoggingSeverity.ERROR, **kwargs)
 
     def fatal(self, message: str, **kwargs: Any) -> bool:
-        """Log with severity FATAL, see `log`."""
         return self.log(message, LoggingSeverity.FATAL, **kwargs)

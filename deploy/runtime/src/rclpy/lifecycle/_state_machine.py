@@ -27,8 +27,6 @@ class TransitionCallbackReturn(Enum):
 
 
 class TransitionDescription(NamedTuple):
-    """A transition."""
-
     id: int
     label: str
     start: int
@@ -113,12 +111,10 @@ class LifecycleStateMachine:
 
     @property
     def current_state(self) -> tuple[int, str]:
-        """Identifier and label of the state."""
         return self._state, STATES[self._state]
 
     @property
     def available_transitions(self) -> list[TransitionDescription]:
-        """The transitions from the state."""
         return [transition for transition in TRANSITIONS if transition.start == self._state]
 
     def get_transition_by_label(self, label: str) -> int:

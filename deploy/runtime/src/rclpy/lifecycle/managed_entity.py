@@ -16,23 +16,18 @@ class ManagedEntity:
     """Takes part in transitions; by default, every transition succeeds. ``state`` is the previous state."""
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Handle the request to configure."""
         return TransitionCallbackReturn.SUCCESS
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Handle the request to clean up."""
         return TransitionCallbackReturn.SUCCESS
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Handle the request to shut down."""
         return TransitionCallbackReturn.SUCCESS
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Handle the request to activate."""
         return TransitionCallbackReturn.SUCCESS
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Handle the request to deactivate."""
         return TransitionCallbackReturn.SUCCESS
 
     def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -41,24 +36,19 @@ class ManagedEntity:
 
 
 class SimpleManagedEntity(ManagedEntity):
-    """Knows whether it is activated."""
-
     def __init__(self) -> None:
         self._enabled = False
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Activate."""
         self._enabled = True
         return TransitionCallbackReturn.SUCCESS
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Deactivate."""
         self._enabled = False
         return TransitionCallbackReturn.SUCCESS
 
     @property
     def is_activated(self) -> bool:
-        """Whether it is activated."""
         return self._enabled
 
     @staticmethod

@@ -30,8 +30,6 @@ _SHUTDOWNS = {
 
 
 class LifecycleState(NamedTuple):
-    """A state of a lifecycle node."""
-
     label: str
     state_id: int
 
@@ -248,8 +246,6 @@ def _messages(
 
 
 class LifecycleNode(LifecycleNodeMixin, Node):
-    """A node with a lifecycle."""
-
     def __init__(self, node_name: str, *, enable_communication_interface: bool = True, **kwargs: Any) -> None:
         """
         Create a lifecycle node.

@@ -27,11 +27,9 @@ class Command(click.Group):
         self._verbs = verbs
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        """Return the names of the verbs."""
         return sorted(self._verbs)
 
     def get_command(self, ctx: click.Context, name: str) -> click.Command | None:
-        """Import and return a verb."""
         if name not in self._verbs:
             return None
         module, _, function = self._verbs[name].partition(":")
