@@ -11,6 +11,8 @@ import pytest
 
 pytest.importorskip("tf2_msgs.msg", reason="platform: no tf2_msgs here, as with ROS 2's wheels")
 
+from deploy.tools.tests.transforms import transform
+
 from geometry_msgs.msg import PointStamped, TransformStamped
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
@@ -37,16 +39,6 @@ from tf2_ros import (
 )
 
 SpinUntil = Callable[..., None]
-
-
-def transform(parent: str, child: str, seconds: int = 1, x: float = 0.0) -> TransformStamped:
-    message = TransformStamped()
-    message.header.frame_id = parent
-    message.header.stamp.sec = seconds
-    message.child_frame_id = child
-    message.transform.translation.x = x
-    message.transform.rotation.w = 1.0
-    return message
 
 
 @pytest.fixture
@@ -83,8 +75,8 @@ def test_a_lookup_waits_for_the_transform(buffer: Buffer, later: Callable[..., N
 
 
 def test_a_full_lookup_waits_for_the_transform(buffer: Buffer, later: Callable[..., None]) -> None:
-    buffer.set_transform(transform("map", "robot", 1, 1.0), "test")
-    later(buffer.set_transform, transform("map", "robot", 3, 5.0), "test")
+    buffer.set_transform(transform("map", "robot", 1.0, 1), "test")
+    later(buffer.set_transform, transform("map", "robot", 5.0, 3), "test")
     found = buffer.lookup_transform_full(
         "robot", Time(seconds=3), "robot", Time(seconds=1), "map", Duration(seconds=10)
     )
@@ -131,9 +123,9 @@ def test_a_future_gets_the_transform_when_it_arrives(buffer: Buffer) -> None:
     future = buffer.wait_for_transform_async("map", "tool", Time(seconds=2))
     full = buffer.wait_for_transform_full_async("map", Time(seconds=2), "tool", Time(seconds=2), "base")
     buffer.set_transform_static(transform("map", "base", x=1.0), "test")
-    buffer.set_transform(transform("base", "tool", 1), "test")
+    buffer.set_transform(transform("base", "tool"), "test")
     assert not future.done()
-    buffer.set_transform(transform("base", "tool", 3, x=4.0), "test")
+    buffer.set_transform(transform("base", "tool", 4.0, 3), "test")
     assert future.done()
     assert full.done()
     assert future.result().transform.translation.x == 3.0
@@ -212,7 +204,7 @@ def marker(x: float, frame: str, seconds: int) -> Marker:
 def test_an_object_of_a_registered_type_is_transformed(buffer: Buffer) -> None:
     TransformRegistration().add(Marker, move)
     for second, x in ((1, 10.0), (3, 30.0)):
-        buffer.set_transform(transform("map", "robot", second, x), "test")
+        buffer.set_transform(transform("map", "robot", x, second), "test")
     moved = buffer.transform(marker(0.5, "robot", 2), "map")
     assert (moved.x, moved.header.frame_id, moved.header.stamp.sec) == (20.5, "map", 2)
     moved = buffer.transform_full(marker(0.5, "robot", 1), "robot", Time(seconds=3), "map")

@@ -8,7 +8,8 @@ import pytest
 
 pytest.importorskip("tf2_msgs.msg", reason="platform: no tf2_msgs here, as with ROS 2's wheels")
 
-from geometry_msgs.msg import TransformStamped
+from deploy.tools.tests.transforms import transform
+
 from rclpy.action import ActionServer
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.context import Context
@@ -35,16 +36,6 @@ from tf2_ros import (
 
 MakeNode = Callable[..., Node]
 SpinUntil = Callable[..., None]
-
-
-def transform(parent: str, child: str, x: float = 0.0, seconds: int = 1) -> TransformStamped:
-    message = TransformStamped()
-    message.header.frame_id = parent
-    message.header.stamp.sec = seconds
-    message.child_frame_id = child
-    message.transform.translation.x = x
-    message.transform.rotation.w = 1.0
-    return message
 
 
 def x_of(buffer: Buffer, target: str, source: str) -> float:

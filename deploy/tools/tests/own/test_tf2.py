@@ -11,8 +11,10 @@ import pytest
 
 pytest.importorskip("tf2_msgs.msg", reason="platform: no tf2_msgs here, as with ROS 2's wheels")
 
+from deploy.tools.tests.transforms import transform
+
 import tf2_geometry_msgs
-from geometry_msgs.msg import TransformStamped, Vector3, Vector3Stamped
+from geometry_msgs.msg import Vector3, Vector3Stamped
 from rclpy.duration import Duration, Infinite
 from rclpy.node import Node
 from rclpy.time import Time
@@ -23,19 +25,10 @@ pytestmark = pytest.mark.own
 SpinUntil = Callable[..., None]
 
 
-def transform(child: str, x: float = 0.0) -> TransformStamped:
-    message = TransformStamped()
-    message.header.frame_id = "map"
-    message.header.stamp.sec = 1
-    message.child_frame_id = child
-    message.transform.translation.x = x
-    return message
-
-
 def test_a_chain_has_all_frames_from_the_source_to_the_target() -> None:
     buffer = Buffer()
     for child in ("left", "right"):
-        buffer.set_transform_static(transform(child), "test")
+        buffer.set_transform_static(transform("map", child), "test")
     chain = functools.partial(buffer._chain, target_time=Time(), source_time=Time())
     assert chain(target_frame="left", source_frame="right", fixed_frame="map") == ["right", "map", "left"]
     assert chain(target_frame="map", source_frame="right", fixed_frame="map") == ["right", "map"]
@@ -44,19 +37,25 @@ def test_a_chain_has_all_frames_from_the_source_to_the_target() -> None:
 
 def test_a_new_static_transform_replaces_the_old_one(make_node: Callable[..., Node]) -> None:
     broadcaster = StaticTransformBroadcaster(make_node())
-    message = transform("camera", 1.0)
+    message = transform("map", "camera", 1.0)
     broadcaster.sendTransform(message)
     message.child_frame_id = "lidar"  # the same message for another transform
     broadcaster.sendTransform(message)
-    assert broadcaster.net_message.transforms == [transform("camera", 1.0), transform("lidar", 1.0)]
-    broadcaster.sendTransform(transform("camera", 2.0))
-    assert broadcaster.net_message.transforms == [transform("camera", 2.0), transform("lidar", 1.0)]
+    assert broadcaster.net_message.transforms == [
+        transform("map", "camera", 1.0),
+        transform("map", "lidar", 1.0),
+    ]
+    broadcaster.sendTransform(transform("map", "camera", 2.0))
+    assert broadcaster.net_message.transforms == [
+        transform("map", "camera", 2.0),
+        transform("map", "lidar", 1.0),
+    ]
 
 
 def test_transforming_a_vector_leaves_the_transform_as_it_is() -> None:
-    by = transform("robot", 3.0)
+    by = transform("map", "robot", 3.0)
     tf2_geometry_msgs.do_transform_vector3(Vector3Stamped(vector=Vector3(x=1.0)), by)
-    assert by == transform("robot", 3.0)
+    assert by == transform("map", "robot", 3.0)
 
 
 def test_a_cancelled_future_stays_cancelled() -> None:
@@ -64,7 +63,7 @@ def test_a_cancelled_future_stays_cancelled() -> None:
     cancelled = buffer.wait_for_transform_async("map", "robot", Time())
     cancelled.cancel()
     future = buffer.wait_for_transform_async("map", "robot", Time())
-    buffer.set_transform(transform("robot"), "test")
+    buffer.set_transform(transform("map", "robot"), "test")
     assert cancelled.cancelled()
     assert future.done()
 
@@ -82,7 +81,7 @@ def test_a_wait_without_end_ends_with_the_transform() -> None:
     waiting.daemon = True
     waiting.start()
     assert asked.wait(10)
-    buffer.set_transform(transform("robot"), "test")
+    buffer.set_transform(transform("map", "robot"), "test")
     waiting.join(10)
     assert not waiting.is_alive()
 
@@ -100,7 +99,7 @@ def test_a_listener_may_spin_its_node_itself(
     listener = TransformListener(buffer, make_node("listener"), spin_thread=True)
     broadcaster = TransformBroadcaster(node)
     spin_until(lambda: broadcaster.pub_tf.get_subscription_count() == 1)
-    broadcaster.sendTransform(transform("robot", 1.0))
+    broadcaster.sendTransform(transform("map", "robot", 1.0))
     assert buffer.can_transform("map", "robot", Time(), Duration(seconds=10))
     listener.executor.shutdown()
     listener.dedicated_listener_thread.join(10)
