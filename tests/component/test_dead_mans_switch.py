@@ -113,9 +113,7 @@ def test_person_who_takes_the_switch_ends_the_commands_of_the_scenario(
     assert commands_of(switch) == [TURN_OFF]
 
 
-def test_person_who_turns_the_engines_off_ends_the_repetition_of_the_scenario(
-    play: Play, spin_for: SpinFor
-) -> None:
+def test_turn_off_by_a_person_ends_the_repetition_of_the_scenario(play: Play, spin_for: SpinFor) -> None:
     switch = play("[{at: 0.0, command: turn_on}]")
     assert commands_of(switch) == [TURN_ON]
 

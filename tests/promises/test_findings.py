@@ -195,7 +195,7 @@ def test_s2_overload_just_before_makes_the_outcome_unknown() -> None:
     )
 
 
-def test_s2_counts_kills_while_the_engines_are_on_and_the_operator_is_present() -> None:
+def test_s2_counts_kills_while_engines_are_on_and_the_operator_is_present() -> None:
     lives = [
         Life(CONTROLLER, 1, 0.0, 9.875),
         Life(CONTROLLER, 2, 9.875, 20.0),

@@ -370,7 +370,7 @@ def test_thousand_disposals_on_other_threads_under_traffic_are_safe(
 # Errors
 
 
-def test_observable_can_be_subscribed_after_its_reader_could_not_be_created(
+def test_observable_can_be_subscribed_after_its_reader_failed(
     node: ReactiveNode, talker: Talker, spin_until: SpinUntil, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     received: list[str] = []

@@ -50,7 +50,7 @@ def test_kill_each_kills_every_program_twenty_times() -> None:
     assert {program: killed.count(program) for program in PROGRAMS} == dict.fromkeys(PROGRAMS, 20)
 
 
-def test_a_brief_run_kills_every_program_three_times_while_the_operator_is_awake() -> None:
+def test_brief_run_kills_every_program_three_times_before_the_sleep() -> None:
     killed = [each.target for each in schedule.briefly() if each.at % schedule.DAY < schedule.AWAKE]
     assert {program: killed.count(program) for program in PROGRAMS} == dict.fromkeys(PROGRAMS, 3)
 

@@ -100,7 +100,7 @@ def test_localhost_without_loopback_is_an_error(interfaces: list[tuple[str, int]
         domain.configuration({RANGE: "LOCALHOST"})
 
 
-def test_localhost_without_loopback_but_with_peers_leaves_choice_to_cyclone(
+def test_localhost_without_loopback_leaves_the_choice_to_cyclone(
     interfaces: list[tuple[str, int]],
 ) -> None:
     interfaces[:] = [("eth0", UP)]
