@@ -32,13 +32,13 @@ class Job:
     topic: str
     """Where the source publishes."""
     size: int
-    """Of an item [octets]."""
+    """The size of an item [octets]."""
     rate: float
-    """Of the source [Hz]; 0 is as fast as it can."""
+    """The rate of the source [Hz]; 0: as fast as it can."""
     warm_up: float
     """From the first item until the measurement [s]."""
     seconds: float
-    """Of the measurement."""
+    """The time of the measurement."""
     directory: str
     """For sockets, and for names that no other measurement has."""
 

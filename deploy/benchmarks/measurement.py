@@ -46,13 +46,13 @@ class Scenario:
     name: str
     """`pipeline`, `flood`, `start`, `subscribers`, `image`, `chain` (angle to speed) or `watchdog`."""
     size: int
-    """Of an item [octets]."""
+    """The size of an item [octets]."""
     rate: float
-    """Of the source [Hz]; 0 is as fast as it can."""
+    """The rate of the source [Hz]; 0: as fast as it can."""
     warm_up: float = 0.5
     """From the first item until the measurement [s]; connections and caches have settled by then."""
     seconds: float = 1.5
-    """Of the measurement."""
+    """The time of the measurement."""
 
     @property
     def key(self) -> str:

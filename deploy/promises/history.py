@@ -52,8 +52,8 @@ def _output(program: str) -> topics.Topic | None:
 
 
 OUTPUTS = {program: topic for program in PROGRAMS if (topic := _output(program))}
-"""The topic that shows whether a program works: the first one that names it as its first publisher. Of the
-other programs, the health shows it."""
+"""The topic that shows whether a program works: the first one that names it as its first publisher. The
+health shows it for the other programs."""
 
 
 def _dependents(program: str) -> tuple[str, ...]:
@@ -105,7 +105,7 @@ class InjectedFault(NamedTuple):
     pid: int = 0
     """The process that was hit; 0 if the target is not a program, or had no process."""
     ahead: float = 0.0
-    """By how much the arm's time of day is ahead of the machine's from then on [s]."""
+    """The lead of the arm's time of day over the machine's after the fault [s]."""
 
 
 @dataclass(frozen=True)

@@ -23,4 +23,4 @@ DURATIONS = {
     "L1": Durations("Silence after SIGKILL [s]", (MEDIAN, SLOWEST)),
     "L4": Durations("Silence after a hang [s]", (HUNG,)),
 }
-"""Those of the promises about durations."""
+"""The durations of the promises about time."""

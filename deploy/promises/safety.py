@@ -288,7 +288,7 @@ def _overlapping(
     """
     Yield two processes that live together for longer than one of them may need to start.
 
-    After each overload of the machine, it may need as long again. One that reports has started anyway.
+    After each overload of the machine, it may need as long again. A process that reports has started.
     """
     overloads = sorted(effect.end for effect in found if effect.why == OVERLOADED)
     for one, two in itertools.combinations(lives, 2):

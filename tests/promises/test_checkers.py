@@ -409,7 +409,7 @@ def test_l1_detects_silence_for_good_after_any_fault() -> None:
     for topic in history.streams:
         history = silent(history, topic, 20.0, END)
     finding = CHECKERS["L1"](faulty(history, InjectedFault("kill_supervisor", ALL, 20.0, 21.0)))
-    # Of the silent sources follows the silence of the programs that wait for them.
+    # Programs that wait for silent sources are silent, too.
     waiting = {*NEEDED_AT_START, *(each for program in NEEDED_AT_START for each in DEPENDENTS[program])}
     assert len(finding.evidence) == len(set(PROGRAMS) - waiting)
 

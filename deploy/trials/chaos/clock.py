@@ -30,7 +30,7 @@ class Clock:
     def __init__(self, path: Path) -> None:
         """:param path: of the file that the arm's processes read."""
         self.ahead = 0.0
-        """By how much it is ahead of the machine's time of day [s]."""
+        """Its lead over the machine's time of day [s]."""
         self._path = path
         self._random = random.Random(1)
 

@@ -38,7 +38,7 @@ class Outcome(NamedTuple):
     messages: dict[str, list[Message]]
     """By topic name of the contract, in the order of sending."""
     comparisons: list[Comparison]
-    """Of the topics that were recorded."""
+    """One for each topic that was recorded."""
     failures: list[tuple[int, str]]
     """When a service ended by itself [ns since 1970], and why."""
 

@@ -92,7 +92,7 @@ def test_each_refusal_concerns_one_sample(scheduler: VirtualTime) -> None:
 
 
 def test_integral_forgets_and_is_exact(scheduler: VirtualTime, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Its signal forgets the values between two questions that are far apart."""
+    """An integral forgets the values between two questions that are far apart."""
     kept: list[int] = []
     forget = Integral.forget
 

@@ -288,7 +288,7 @@ def test_the_shortest_lateness_is_a_nanosecond(scheduler: VirtualTime) -> None:
 
 
 def test_sample_on_its_bound_is_too_late(scheduler: VirtualTime) -> None:
-    """Its time was settled before."""
+    """The value at that time is settled already."""
     refused: list[Refused] = []
     samples = [Arrival(0, 1.0, 0), Arrival(200 * MS, 9.0, 100 * MS), Arrival(250 * MS, 3.0, 0)]
     signal = hold(arriving(scheduler, samples), lateness=LATENESS, refused=refused.append)

@@ -87,14 +87,14 @@ class Process:
         """``None`` while it is alive, the negative signal number if a signal has killed it."""
         self.participants: list[Member] = []
         self.handlers: dict[int, Any] = {}
-        """Its signal handlers."""
+        """The signal handlers by signal."""
         self.exit_functions: list[Callable[[], Any]] = []
         self.interrupts: deque[Callable[[], Any]] = deque()
         """Actions that wait for the main thread."""
         self.face = threading.Thread(name="MainThread", daemon=False)
         """The main thread, as its program sees it."""
         self.saved: list[Any] = []
-        """Its variables, while those of another process are in place."""
+        """The module variables of the process while another one runs."""
         self.is_stopped = False
         """Whether SIGSTOP has suspended it."""
         self.is_hung = False
