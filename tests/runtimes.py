@@ -7,7 +7,7 @@ import importlib.util
 EMBEDDED_ONLY = (
     "deploy/runtime/tests/interop",
     "deploy/runtime/tests/runtime",
-    "deploy/simulation_kit/tests",
+    "deploy/simulation_kit",
     "tests/mutants",
     "tests/trials/replay",
     "tests/trials/simulation",

@@ -47,7 +47,9 @@ def python(rclpy: str) -> str:
 
 def environment(rclpy: str) -> dict[str, str]:
     # A wheel starts its interpreter again with the libraries of its own environment, but only once.
-    not_inherited = ("LD_LIBRARY_PATH", "_ROS_WHEELS_BOOTSTRAP_COMPLETE")
+    not_inherited = ["LD_LIBRARY_PATH", "_ROS_WHEELS_BOOTSTRAP_COMPLETE"]
+    if rclpy == "kilted":  # Fast DDS 3 has other names of settings
+        not_inherited.append("FASTRTPS_DEFAULT_PROFILES_FILE")
     inherited = {name: value for name, value in os.environ.items() if name not in not_inherited}
     return inherited | {"RUNTIME": "embedded" if rclpy == "embedded" else ""}
 

@@ -35,6 +35,9 @@ def test_topics_connect_kilted_with_other_nodes(other_rclpy: str, peer_on: PeerO
         assert reader("received", topic) == [message]
         wait_until(lambda: len(node("endpoints", topic)) == len(reader("endpoints", topic)) == 2)  # noqa: B023
         assert without_nodes(reader("endpoints", topic)) == without_nodes(node("endpoints", topic))
+        # What a node publishes is announced apart from its endpoints.
+        wait_until(lambda: node.full_name in reader("nodes"))  # noqa: B023
+        wait_until(lambda: topic in reader("interface", node.name, node.namespace)["publishers"])  # noqa: B023
         interface = reader("interface", node.name, node.namespace)
         assert interface["publishers"][topic] == [POSITION]
 
