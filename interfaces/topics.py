@@ -216,7 +216,7 @@ DRIVEN_TIME = Topic(
     _qos(1, lifespan=DRIVE_TIMEOUT),
     "s",
     ("drive",),
-    ("config_theta1", "config_theta2", "terminal"),
+    ("config_theta1", "config_theta2", *OPERATOR_NODES),
     "for how long the drive has moved the joints; only in a scenario with a drive, by which they then move",
     _not_a_length,
 )
