@@ -73,7 +73,7 @@ window.tell = (type) => dispatchEvent(Object.assign(new Event(type), { gamepad: 
 DECIDED = "#hold[data-state=held], #hold[data-state=other_page], #hold-why:not(:empty)"
 """What the page has when a press has led to a hold or to a refusal."""
 
-STALLS = ("too busy", "word from the server", "too slow", "too late")
+STALLS = ("too busy", "word from the server", "too slow", "no beat came", " ms late")
 """Reasons for a release that a machine gives which stands still for 250 ms: no behaviour of the page."""
 
 
