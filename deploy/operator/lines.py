@@ -113,7 +113,7 @@ def line_batches(
 def measurements(seen: Seen) -> Observable[Line]:
     configuration = rx.combine_latest(*(seen(topic) for topic in topics.CONFIGURATION.values())).map(_joined)
     drive = seen(topics.DRIVEN_TIME).take(1).map(lambda _: True)
-    is_driven = drive.timeout(DISCOVERY, drive.start_with(False)).start_with(True)
+    is_driven = drive.timeout(DISCOVERY, drive.start_with(False))
     data = unrepeated(configuration, is_driven, lambda it: it)
     positions = unrepeated(seen(topics.EFFECTOR_POSITION), is_driven, lambda it: (it.x, it.y))
     return rx.merge(
@@ -179,13 +179,18 @@ def unrepeated(
     """
     Emit only changes if a drive moves the joints: a joint that stands publishes its angle again and again.
 
-    Without a drive, all are emitted: Listing 5.9 shows values that are published twice.
+    Without a drive, all are emitted: Listing 5.9 shows values that are published twice. Until it is known,
+    there may be one.
     """
+
+    def step(state: tuple[Any, bool], event: Any) -> tuple[Any, bool]:
+        return (None, event) if isinstance(event, bool) else (event, state[1])
 
     def is_repeated(before: tuple[Any, bool], now: tuple[Any, bool]) -> bool:
         return now[1] and key(before[0].value) == key(now[0].value)
 
-    return items.with_latest_from(is_driven).distinct_until_changed(comparer=is_repeated).map(_first)
+    states = rx.merge(is_driven, items).scan(step, (None, True)).filter(lambda state: state[0] is not None)
+    return states.distinct_until_changed(comparer=is_repeated).map(_first)
 
 
 def senders(seen: Seen, namespace: str) -> Observable[Line]:

@@ -13,7 +13,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from reactivex import Observable
 from reactivex.testing import ReactiveTest, TestScheduler
 
-from deploy.operator.lines import Allowance, Kind, Line, line_batches
+from deploy.operator.lines import Allowance, Kind, Line, line_batches, unrepeated
 from deploy.running import sentinel
 from deploy.running.supervisord import Program
 from interfaces import topics
@@ -107,6 +107,12 @@ def test_positions_of_an_arm_with_a_drive_are_shown_when_they_change(
     places = {0.2: (2.0, 3.0), 0.4: (2.0, 3.0), 2: (2.0, 3.0), 3: (2.0, 3.5)}
     positions = [(at, Position(int(at * 1e9), *place)) for at, place in places.items()]
     assert times(play(drive + [(at, topics.EFFECTOR_POSITION, it) for at, it in positions])) == shown
+
+
+def test_value_that_comes_before_a_drive_is_known_is_shown() -> None:
+    found: list[Any] = []
+    unrepeated(rx.of(Timestamp(1.0, ORIGIN)), rx.never(), float).subscribe(found.append)
+    assert [each.value for each in found] == [1.0]
 
 
 def test_lines_of_a_batch_are_in_the_order_of_their_source_times(play: Play) -> None:
