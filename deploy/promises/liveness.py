@@ -9,7 +9,6 @@ from collections.abc import Iterator, Sequence
 
 from deploy.promises.effects import (
     BEFORE,
-    CUT_OFF,
     FLOWING,
     KILLING,
     LASTING,
@@ -34,7 +33,6 @@ from deploy.promises.history import (
     History,
     InjectedFault,
     between,
-    last_sent,
 )
 from deploy.promises.limits import GAP, GONE, HUNG, MEDIAN, SLOWEST
 from deploy.promises.positions import PublishedValues, may_lack_values
@@ -145,7 +143,7 @@ def right_after_restart(history: History) -> Finding:
             continue
         positions = between(history.stream(topics.EFFECTOR_POSITION), begin, begin + 1.0)
         right = bool(positions) and published.explain(positions[-1], within=SETTLED)
-        if positions and not right and _is_undecided(history, found, positions[-1].sent):
+        if positions and not right and may_lack_values(history, found, positions[-1].sent):
             unknown += 1
             continue
         cases += bool(positions)
@@ -154,16 +152,6 @@ def right_after_restart(history: History) -> Finding:
             evidence.append(Evidence(positions[-1].sent, text))
     measured = f"right after {cases - len(evidence)} of {count(cases, 'return')}"
     return Finding("L3", cases, measured, evidence, unknown)
-
-
-def _is_undecided(history: History, found: Sequence[Effect], time: float) -> bool:
-    """Return whether the observer and kinematics may have received different values before a time."""
-    newest = {source: last_sent(history.output(source), time) for source in SOURCES}
-    return may_lack_values(found, time) or not all(
-        undisturbed(found, source, value.sent, value.sent, CUT_OFF)
-        for source, value in newest.items()
-        if value
-    )
 
 
 def hung_is_replaced(history: History) -> Finding:

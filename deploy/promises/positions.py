@@ -5,10 +5,18 @@ from __future__ import annotations
 import itertools
 import math
 from bisect import bisect_left, bisect_right
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
-from deploy.promises.effects import DISCOVERY, LONGEST_PAUSE, MISSED, UNDISCOVERED, Effect, undisturbed
-from deploy.promises.history import SOURCES, History, Sample
+from deploy.promises.effects import (
+    CUT_OFF,
+    DISCOVERY,
+    LONGEST_PAUSE,
+    MISSED,
+    UNDISCOVERED,
+    Effect,
+    undisturbed,
+)
+from deploy.promises.history import SOURCES, History, Sample, last_sent
 from interfaces import topics
 
 ROUNDING = 1e-8  # m
@@ -46,10 +54,17 @@ class PublishedValues:
         return [s.value for s in reversed(stream[max(0, oldest - 1) : newest])]
 
 
-def may_lack_values(found: Iterable[Effect], time: float) -> bool:
+def may_lack_values(history: History, found: Sequence[Effect], time: float) -> bool:
     """Return whether the record may lack values that kinematics had received before a time."""
-    begin = time - DISCOVERY
-    return not all(undisturbed(found, each, begin, time, *MISSED, UNDISCOVERED) for each in SOURCES)
+    for source in SOURCES:
+        newest = last_sent(history.output(source), time)
+        seen = newest.sent if newest else -math.inf
+        # What a source sends while it is killed may reach kinematics only.
+        if not undisturbed(found, source, time - DISCOVERY, time, *MISSED, UNDISCOVERED) or not undisturbed(
+            found, source, seen, time, CUT_OFF
+        ):
+            return True
+    return False
 
 
 def _any_fits(candidates: list[list[float]], x: float, y: float) -> bool:

@@ -145,7 +145,7 @@ def valid_speeds_and_positions(history: History) -> Finding:
     for position in positions:
         if published.explain(position, within=LONGEST_PAUSE):
             continue
-        if may_lack_values(found, position.sent):
+        if may_lack_values(history, found, position.sent):
             unknown += 1
         else:
             evidence.append(Evidence(position.sent, f"no published values give {position.value}"))

@@ -316,6 +316,14 @@ def test_s4_is_unknown_if_a_value_may_have_been_missed() -> None:
     assert finding.unknown >= 1
 
 
+@pytest.mark.parametrize(
+    ("at", "expected"), [(28.97, VIOLATED), (29.01, HOLDS), (29.1, HOLDS), (30.7, VIOLATED)]
+)
+def test_s4_is_unknown_until_a_killed_source_sends_again(at: float, expected: str) -> None:
+    history = replace(killed(good(), "config_l1", 29.0, 0.5), lives=good().lives)
+    assert verdict("S4", added(history, "effector/position", (at, (1.0, 9.0)))) == expected
+
+
 def test_s4_is_unknown_on_a_lossy_network() -> None:
     history = added(good(), "effector/position", (30.0, (1.0, 9.0)))
     finding = CHECKERS["S4"](faulty(history, InjectedFault("loss", NO_TARGET, 0.0, END)))

@@ -698,12 +698,12 @@ def positions(*wrong: float) -> list[tuple[float, tuple[float, float]]]:
 def test_l3_judges_the_last_position_of_a_second() -> None:
     found = CHECKERS["L3"](
         history(
-            **LINKS,
+            **LINKS | {"l1": [(0.0, 1.0), (34.5, 1.0)]},
             positions=positions(6.0, 14.0, 22.0),
             speeds=back((20.0, 0.5)),
             faults=[
-                *kill("config_l1", 1.0, 2.0),  # without output after, or before
                 *kill(KINEMATICS, 4.0, 12.0, 20.0, 28.0),
+                *kill("config_l1", 35.0, 36.0),  # without output after, or before
                 *kill("velocity", 20.0),
                 overload(5.875, 5.9375),
                 overload(21.875, 21.9375),
@@ -725,10 +725,11 @@ def test_l3_judges_the_last_position_of_a_second() -> None:
         ("config_l1", 4.49, 4.5, 1),
         ("config_l1", 4.51, 4.5, 1),
         ("config_l1", 4.475, 4.5, 0),
-        ("config_l1", 4.525, 4.5, 0),
+        ("config_l1", 4.525, 4.5, 1),  # the record may lack one
         ("config_l1", 4.5, 5.0, 0),  # a newer value has come since
         ("config_l1", 4.5, 6.5, 1),  # after the position
-        ("config_l2", 4.5, 4.5, 0),
+        ("config_l2", 4.5, 4.5, 1),
+        ("velocity", 4.5, 4.5, 0),
     ],
 )
 def test_l3_value_that_a_fault_cuts_off_while_it_is_sent_is_unknown(
