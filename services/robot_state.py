@@ -41,10 +41,11 @@ def configurations(states: Iterable[Signal[float]], rate: float = 30.0) -> Obser
     """
     Emit the configuration at one common time, ``rate`` times a second, from l1, l2, theta1 and theta2.
 
-    A held value counts, too: a dead source does not hide the arm.
+    A held value counts, too: a dead source does not hide the arm. The stream is steady: a burst every 100 ms,
+    as the slowest source sends, would make a pause of a busy machine so much longer.
     """
     configuration = lift(Configuration)(*states)
-    return configuration.sample(1 / rate).filter(lambda answer: answer.mark != UNKNOWN)
+    return configuration.sample(1 / rate, steady=True).filter(lambda answer: answer.mark != UNKNOWN)
 
 
 def lengths(l1: Observable[float], l2: Observable[float]) -> Observable[tuple[float, float]]:

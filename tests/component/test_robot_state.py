@@ -30,7 +30,7 @@ from interfaces.robot_model import (
     urdf,
 )
 from interfaces.service import ServiceNode
-from interfaces.service.states import state
+from interfaces.service.states import GAP, LATENESS, state
 from interfaces.topics import CONFIGURATION, CONTRACT, JOINT_STATES, ROBOT_DESCRIPTION, TF
 from reactive_node.signals import Signal
 from reactive_node.stamps import stamped
@@ -81,6 +81,23 @@ def test_resting_configuration_is_repeated_at_the_rate(scheduler: VirtualTime, l
     times = [it.time for _, it in recording.items]
     assert {later - time for time, later in itertools.pairwise(times)} == {NS // 100}
     assert 2.0 - times[-1] / NS < 0.17  # lateness, gap and period
+
+
+@pytest.mark.parametrize("pause", [0.0, 0.15, 0.5])
+def test_stream_is_steady_whenever_the_sources_send(scheduler: VirtualTime, pause: float) -> None:
+    """Otherwise, a pause of a busy machine would add to that between two bursts of answers."""
+
+    def source(number: int, period: float) -> Signal[float]:
+        times = [0.01 * number + period * k + (pause if period * k > 1.0 else 0) for k in range(50)]
+        samples = scheduler.hot(*((t + 0.001, stamped(t, round(t * NS))) for t in times))
+        return state(samples, scheduler.hot((0.0, stamped(True, 0))))
+
+    states = [source(number, period) for number, period in enumerate((0.1, 0.1, 0.04, 0.04), 1)]
+
+    found = scheduler.record(configurations(states), until=2.5).items
+
+    assert [at - it.time / NS for at, it in found] == pytest.approx([LATENESS + GAP] * len(found), abs=1e-5)
+    assert {later.time - it.time for (_, it), (_, later) in itertools.pairwise(found)} == {NS // 30}
 
 
 def test_lengths_are_emitted_on_change_at_most_once_a_second(scheduler: VirtualTime) -> None:

@@ -250,6 +250,17 @@ def test_it_completes_when_all_samples_have_come(scheduler: VirtualTime) -> None
     assert len(messages) == 7
 
 
+def test_steady_answers_come_when_they_are_known_at_the_latest(scheduler: VirtualTime) -> None:
+    samples = arriving(scheduler, [Arrival(k * 80 * MS, 1.0, 0) for k in range(10)])
+    signal = lift(lambda *parts: parts)(linear(samples, lateness=LATENESS, gap=GAP), constant(1.0))
+
+    recording = scheduler.record(signal.delay(-0.01).sample(0.03, steady=True), until=1.5)
+
+    waited = [at - answer.time / SECOND for at, answer in recording.items]
+    assert waited == pytest.approx([LATENESS + GAP + 0.01] * 44, abs=1e-6)
+    assert {answer.is_certain for _, answer in recording.items if answer.time < 710 * MS} == {True}
+
+
 def test_event_is_answered_at_the_very_time_when_it_is_known(scheduler: VirtualTime) -> None:
     events = arriving(scheduler, [Arrival(100 * MS, "a", 0)])
     signal = hold(scheduler.hot(), lateness=LATENESS)

@@ -84,6 +84,10 @@ class Run:
         if isinstance(memory, Source):
             self._sources.append(memory)
 
+    def longest_wait(self) -> int:
+        """Return how long it takes at most until the value at a time is known [ns]."""
+        return max((source.wait + source.high for source in self._sources), default=0)
+
     def start(self, questions: Questions) -> abc.DisposableBase:
         """Begin to receive samples and to answer."""
         self._questions = questions
@@ -128,7 +132,7 @@ class Run:
         time = self._questions.next()
         if time is None:
             return
-        due = time + max((source.wait + source.high for source in self._sources), default=0)
+        due = time + self.longest_wait()
         if self._armed_for is not None and self._armed_for <= due:
             return  # it looks early, and then is armed again
         self._armed_for = due

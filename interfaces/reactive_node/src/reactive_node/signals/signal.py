@@ -40,14 +40,21 @@ class Signal(Generic[T]):
 
     # Questions
 
-    def sample(self, period: float) -> Observable[Answer[T]]:
+    def sample(self, period: float, *, steady: bool = False) -> Observable[Answer[T]]:
         """
         Emit the values at all multiples of a period [s]: ``[(t, s(t)) for t = k · period]``.
 
         The first one follows the subscription. Answers come in the order of time, as soon as they are known.
+
+        :param steady: whether each one comes when it is known at the latest, so that they come at the rate,
+            and not in bursts with the samples.
         """
         every = nanoseconds("the period", period)
-        return Observable(evaluation(self, lambda run, node: Grid(run, node, every, run.observer.on_next)))
+
+        def ask(run: Run, node: Node) -> Grid:
+            return Grid(run, node, every, run.observer.on_next, steady=steady)
+
+        return Observable(evaluation(self, ask))
 
     def snapshot(
         self,
