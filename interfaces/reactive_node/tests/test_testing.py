@@ -18,9 +18,8 @@ def test_environment_selects_domain_on_this_machine(
     monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest
 ) -> None:
     monkeypatch.delenv("ROS_AUTOMATIC_DISCOVERY_RANGE")
-    monkeypatch.delenv(
-        "FASTRTPS_DEFAULT_PROFILES_FILE", raising=False
-    )  # conftest.py replaces the range by a profile
+    for profiles in ("FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE"):
+        monkeypatch.delenv(profiles, raising=False)  # conftest.py replaces the range by a profile
 
     domain_id = request.getfixturevalue("domain_id")
 
