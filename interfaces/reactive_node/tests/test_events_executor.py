@@ -106,11 +106,13 @@ def test_spin_of_rclpys_own_is_a_busy_loop(domain_id: int) -> None:
     assert process.stdout.readline().strip() == "spins"
     clock = ~process.pid << 3 | 2  # of its processor time: clock_getcpuclockid(3)
     enough, deadline = time.clock_gettime(clock) + 0.5, time.monotonic() + 10.0
-    while time.clock_gettime(clock) < enough:
-        assert time.monotonic() < deadline, "it does not wait busily any more"
-        time.sleep(0.05)
-    process.kill()
-    process.communicate(timeout=10.0)
+    try:
+        while time.clock_gettime(clock) < enough:
+            assert time.monotonic() < deadline, "it does not wait busily any more"
+            time.sleep(0.05)
+    finally:
+        process.kill()
+        process.communicate(timeout=10.0)
 
 
 def test_spin_once_without_limit_waits_for_a_callback(make_node: MakeNode, executor: Executor) -> None:
