@@ -7,7 +7,7 @@ import sys
 from collections.abc import Mapping, MutableMapping
 from pathlib import Path
 
-from deploy.running import manifest, processes
+from deploy.running import manifest, processes, rclpy_choice
 
 NAMESPACE = "REACTIVE_ARM_NAMESPACE"  # environment variable: the ROS namespace of an arm
 ADOPTED = (
@@ -25,14 +25,39 @@ ADOPTED = (
 )
 """The beginnings of the variables that belong to an arm: other commands for it take them over."""
 FASTDDS_PROFILES = Path(__file__).resolve().parents[1] / "fastdds.xml"
+CYCLONEDDS = "CYCLONEDDS_URI"
+RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
+# Processes of one tag find each other by multicast, so they need neither questions to each port nor a port of
+# their own, of which a domain has a hundred.
+_BY_MULTICAST = (
+    '<General><Interfaces><NetworkInterface name="lo" multicast="true" allow_multicast="spdp"/></Interfaces>'
+    "<AllowMulticast>spdp</AllowMulticast></General>"
+)
+_WITHOUT_INDEX = (
+    "<ParticipantIndex>none</ParticipantIndex><MaxAutoParticipantIndex>0</MaxAutoParticipantIndex>"
+)
 
 
 def set_middleware(environment: MutableMapping[str, str]) -> None:
     """Set what the nodes of an arm need from the middleware, where the user has not set it."""
-    environment.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    environment.setdefault(RANGE, "LOCALHOST")
     environment.setdefault("FASTRTPS_DEFAULT_PROFILES_FILE", str(FASTDDS_PROFILES))
     # In LOCALHOST, rmw_fastrtps_cpp always adds shared memory; there, the profile keeps messages out of it.
     environment.setdefault("FASTDDS_BUILTIN_TRANSPORTS", "UDPv4")
+    if environment.get(rclpy_choice.RUNTIME) and namespace_of(environment) != "/":
+        environment.setdefault(CYCLONEDDS, tagged(environment))
+
+
+def tagged(environment: Mapping[str, str]) -> str:
+    """
+    Return the settings of Cyclone DDS with which an arm meets no process of another arm in its domain.
+
+    In a domain of many processes, each answers all others, and a busy machine repeats what is not answered.
+    """
+    alone = environment.get(RANGE) == "LOCALHOST" and not environment.get("ROS_STATIC_PEERS")
+    general, index = (_BY_MULTICAST, _WITHOUT_INDEX) if alone else ("", "")
+    discovery = f"<Discovery>{index}<Tag>{namespace_of(environment)}</Tag></Discovery>"
+    return f"<CycloneDDS><Domain>{general}{discovery}</Domain></CycloneDDS>"
 
 
 def namespace_of(environment: Mapping[str, str]) -> str:

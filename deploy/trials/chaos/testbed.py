@@ -121,7 +121,7 @@ class Testbed:
             for arm in self.arms:
                 arm.domain = stack.enter_context(reserved_domain())
                 stack.callback(arm.system.stop)  # after the end of the record, which shows no stopping arm
-            environment = {"ROS_AUTOMATIC_DISCOVERY_RANGE": self.discovery_range, **_packet_loss(self._loss)}
+            environment = {"ROS_AUTOMATIC_DISCOVERY_RANGE": self.discovery_range, **_cyclone(self._loss)}
             lines = self._start_observer(stack, environment)
             parameters = self._parameters()
             path = [str(INJECTED), *filter(None, [os.environ.get("PYTHONPATH")])]
@@ -256,10 +256,10 @@ def _no_message(topic_names: Sequence[str], arms: int) -> str:
     return f"No message on {shown}{others} within {START_TIMEOUT:.0f} s{advice}"
 
 
-def _packet_loss(percent: float) -> dict[str, str]:
-    if not percent:
-        return {}
-    return _configured(f"<Internal><Test><XmitLossiness>{10 * percent:.0f}</XmitLossiness></Test></Internal>")
+def _cyclone(loss: float) -> dict[str, str]:
+    """Return Cyclone's settings: without a tag of the arm, which its domain of its own makes needless."""
+    lossiness = f"<Internal><Test><XmitLossiness>{10 * loss:.0f}</XmitLossiness></Test></Internal>"
+    return _configured(lossiness if loss else "")
 
 
 def _configured(setting: str) -> dict[str, str]:
