@@ -17,6 +17,7 @@ REPLAY ?=
 MODULES ?=
 BENCH ?=
 NAME ?=
+ARMS ?=
 SHELL := /bin/sh
 MAKEFLAGS += --no-print-directory
 PY := deploy/commands/venv.sh
@@ -30,6 +31,7 @@ export PYTHON SCENARIO PARAMETERS MANIFEST WEB RUNTIME
 USED_BY_run := SCENARIO PARAMETERS MANIFEST WEB
 USED_BY_start := $(USED_BY_run)
 USED_BY_unit := $(USED_BY_run)
+USED_BY_fleet := ARMS
 USED_BY_chaos := MINUTES SEED CHAOS
 USED_BY_simulate := HOURS SEED SCHEDULE SIMULATE
 USED_BY_replay := RECORD REPLAY
@@ -46,7 +48,7 @@ GIVEN := $(foreach name,$(.VARIABLES),$(if $(filter command,$(origin $(name))),$
 $(foreach name,$(filter-out $(USED) $(ENVIRONMENT),$(GIVEN)),$(error make $(GOALS) has no variable $(name); it has $(USED)))
 endif
 
-.PHONY: help setup tables run start unit stop status logs record terminal chaos simulate replay test mutants check bench new-service
+.PHONY: help setup tables run start unit stop status logs record terminal fleet chaos simulate replay test mutants check bench new-service
 
 help:
 	@echo "make run      start the system, show it in this terminal, stop it with Ctrl-C"
@@ -58,6 +60,7 @@ help:
 	@echo "make status   its rclpy, page and services: state, pid, uptime, restarts, last output, health"
 	@echo "make logs     follow their logs"
 	@echo "make record   record its messages until Ctrl-C     (MCAP for Foxglove and ros2 bag, in .run/records)"
+	@echo "make fleet    watch all arms of this host, one line each  (ARMS=\"/arm1 /arm2=5\" for those of other hosts)"
 	@echo "make stop     stop it"
 	@echo "make chaos    break a system on purpose and check its promises  (MINUTES=5 SEED= CHAOS=--help for more)"
 	@echo "make simulate the same in virtual time, hours in minutes  (HOURS=1 SEED= SCHEDULE=file SIMULATE=--help for more)"
@@ -81,6 +84,10 @@ run start unit: setup
 terminal status logs record:
 	@test -e $(STAMP) || { echo ".venv is not set up: make setup (make stop works without it)" >&2; exit 1; }
 	@exec $(HOLD) $(PY) -m deploy.commands.launcher $@
+
+fleet:
+	@test -e $(STAMP) || { echo ".venv is not set up: make setup" >&2; exit 1; }
+	@RUNTIME=embedded exec $(HOLD) $(PY) -m deploy.commands.fleet $(ARMS)
 
 stop:
 	@exec $(HOLD) deploy/commands/python.sh deploy.commands.stop "$$PYTHON"

@@ -8,6 +8,7 @@ EMBEDDED_ONLY = (
     "deploy/runtime/tests/interop",
     "deploy/runtime/tests/runtime",
     "deploy/simulation_kit",
+    "tests/commands/test_fleet.py",
     "tests/mutants",
     "tests/trials/replay",
     "tests/trials/simulation",

@@ -179,6 +179,8 @@ class Health(NamedTuple):
     """Age of the service's last output [s]; ``None`` before the first."""
     since_turn_off: float | None = None
     """Age of its last ``turn_off`` [s]; ``None`` before the first."""
+    host: str = ""
+    """The name of its host."""
 
 
 @contextmanager
@@ -218,6 +220,7 @@ def _health(status: DiagnosticStatus, values: dict[str, str]) -> Health:
         reason=status.message,
         since_output=_age(values, _SINCE_OUTPUT),
         since_turn_off=_age(values, _SINCE_TURN_OFF),
+        host=status.hardware_id,
     )
 
 

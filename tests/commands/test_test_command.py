@@ -13,6 +13,7 @@ from deploy.commands import test as command
 
 HERE = command.Part("", "", ["tests/system", "-x"])
 """Tests for one rclpy."""
+EMBEDDED = "tests/commands/test_fleet.py tests/mutants tests/trials/replay tests/trials/simulation"
 IGNORED = "--ignore=tests/mutants"
 ONE = "tests/trials/simulation/test_experiment.py::test"
 
@@ -65,8 +66,8 @@ def arguments(words: str) -> dict[str, str]:
     [
         ("tests/system -x", "-x tests/system", None),
         ("tests/trials/simulation -x", None, "-x tests/trials/simulation"),
-        ("tests -x", "-x tests", "-x tests/mutants tests/trials/replay tests/trials/simulation"),
-        (f"tests {IGNORED}", f"{IGNORED} tests", f"{IGNORED} tests/trials/replay tests/trials/simulation"),
+        ("tests -x", "-x tests", f"-x {EMBEDDED}"),
+        (f"tests {IGNORED}", f"{IGNORED} tests", f"{IGNORED} {EMBEDDED.replace('tests/mutants ', '')}"),
         (f"{ONE} tests/page", "tests/page", ONE),
     ],
 )

@@ -310,8 +310,12 @@ def test_a_second_arm_runs_in_a_namespace_of_the_same_domain(module_site: Site, 
         services = status(second, until=lambda row: row[-1] == "ok")
         assert services.keys() == second.programs
         assert {row[-1] for row in services.values()} == {"ok"}
+        fleet = second.begin_command("env", "RUNTIME=embedded", second.python, "-m", "deploy.commands.fleet")
+        for name, engines in ((module_site.namespace or "/", r"\w+"), ("/second", "off")):
+            fleet.await_line(rf"^{name} +{second.domain} +\S+ +\S+ +{engines} +{len(services)} ok +10\.5 s$")
         command.type("quit\n")
         assert command.wait() == 0
+        fleet.await_line(r"^/second .* silent +silent ")
     assert module_site.members == first
 
 

@@ -1,0 +1,204 @@
+"""`make fleet`: one process watches many arms, and shows a line for each.
+
+It shows the arms of this host that run now, and those that the user names for other hosts: `/arm1` in the
+ROS domain of this shell, `/arm1=5` in domain 5. It runs on the embedded rclpy, which sees arms of both.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import time
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from typing import Any, NamedTuple
+
+import rclpy
+import reactivex as rx
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.signals import SignalHandlerOptions
+from reactivex import Observable
+
+from deploy.operator.fleet import HEADER, Arm, Seen, fleet, row, watched
+from deploy.operator.output import say
+from deploy.running import interruption, processes
+from deploy.running.columns import table
+from deploy.running.environment import CYCLONEDDS, NAMESPACE, namespace_of, set_middleware, tagged
+from deploy.running.errors import DeploymentError
+from interfaces.topics import DIAGNOSTICS, ENGINES_STATE, Topic
+from reactive_node import ReactiveNode
+
+PERIOD = 1.0  # s between two looks at the engines, and between two tables
+FIRST = 2.5  # s until the first table: each service reports its health once a second
+BEST_EFFORT = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+DDS = ("ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_STATIC_PEERS", "ROS_LOCALHOST_ONLY", CYCLONEDDS)
+"""The variables by which this process meets the nodes of an arm."""
+
+
+class Domain(NamedTuple):
+    """A ROS domain, as the nodes of some arms join it."""
+
+    number: int
+    variables: tuple[tuple[str, str], ...]
+    """Those of :data:`DDS`."""
+
+
+class Place(NamedTuple):
+    """Where an arm is heard."""
+
+    namespace: str
+    domain: Domain
+
+
+def place(environment: Mapping[str, str]) -> Place:
+    """Return the place of the arm with this environment."""
+    variables = tuple((name, environment[name]) for name in DDS if environment.get(name))
+    return Place(namespace_of(environment), Domain(int(environment.get("ROS_DOMAIN_ID") or 0), variables))
+
+
+def places(named: Iterable[str]) -> set[Place]:
+    """
+    Return where the arms of this host are heard, and those that the user names.
+
+    :raises DeploymentError: if a name is no namespace with a domain.
+    """
+    here = {place(environment) for environment in processes.systems().values()}
+    return here.union(*map(_places_of, named))
+
+
+def _places_of(name: str) -> list[Place]:
+    """Return where an arm of another host may be heard: on the embedded rclpy it has a tag, else none."""
+    namespace, _, domain = name.partition("=")
+    domain = domain or os.environ.get("ROS_DOMAIN_ID") or "0"
+    if not namespace.startswith("/") or not domain.isdecimal():
+        raise DeploymentError(f"ARMS: {name} is no arm such as /arm1, or /arm1=5 in ROS domain 5")
+    environment = {**os.environ, NAMESPACE: namespace, "ROS_DOMAIN_ID": domain}
+    tags = ["", tagged(environment)] if namespace != "/" else [""]
+    return [place(environment | {CYCLONEDDS: tag}) for tag in tags]
+
+
+@contextmanager
+def _joined(domain: Domain, number: int) -> Iterator[ReactiveNode]:
+    """
+    Join a domain.
+
+    :param number: of the domain within this process: arms of several tags share a ROS domain.
+    """
+    outside = f"<Discovery><ExternalDomainId>{domain.number}</ExternalDomainId></Discovery>"
+    settings = dict.fromkeys(DDS, "") | dict(domain.variables)
+    uri = [settings[CYCLONEDDS], f"<CycloneDDS><Domain>{outside}</Domain></CycloneDDS>"]
+    settings[CYCLONEDDS] = ",".join(filter(None, uri))
+    before = dict(os.environ)
+    os.environ |= settings
+    context = Context()
+    try:
+        rclpy.init(args=[], context=context, domain_id=number, signal_handler_options=SignalHandlerOptions.NO)
+        node = ReactiveNode(f"fleet_{os.getpid()}", context=context)
+    except RuntimeError as error:
+        raise DeploymentError(f"Cannot join ROS domain {domain.number}: {error}") from None
+    finally:
+        os.environ.clear()
+        os.environ |= before
+    try:
+        yield node
+    finally:
+        node.destroy_node()
+        rclpy.try_shutdown(context=context)
+
+
+def _observe(node: ReactiveNode, topic: Topic, name: str) -> Observable[Any]:
+    def value(message: Any) -> Any:
+        return topic.value(message)
+
+    if topic is ENGINES_STATE:  # ten a second are too many to be read
+        return node.create_sampled_observable(topic.type, name, PERIOD, BEST_EFFORT, item=value)
+    return node.create_observable(topic.type, name, topic.qos, item=value)
+
+
+def _seen(namespace: str, nodes: Iterable[ReactiveNode], health: Mapping[ReactiveNode, Any]) -> Seen:
+    """Give the topics of an arm as these nodes hear them; all arms of a domain share its /diagnostics."""
+
+    def seen(topic: Topic) -> Observable[Any]:
+        name = topic.full_name(namespace)
+        return rx.merge(
+            *(health[node] if topic is DIAGNOSTICS else _observe(node, topic, name) for node in nodes)
+        )
+
+    return seen
+
+
+def watch(found: Collection[Place], more: Callable[[], bool]) -> None:
+    """Show the arms until there are more of them, or the user ends it."""
+    arms = {(namespace, domain.number): Arm(namespace, domain.number) for namespace, domain in sorted(found)}
+
+    def note(arm: Arm) -> None:
+        arms[arm.name, arm.domain] = arm
+
+    with ExitStack() as stack:
+        domains = enumerate(sorted({domain for _, domain in found}))
+        nodes = {domain: stack.enter_context(_joined(domain, number)) for number, domain in domains}
+        health = {node: _observe(node, DIAGNOSTICS, DIAGNOSTICS.name) for node in nodes.values()}
+
+        def arm_of(key: tuple[str, int]) -> Observable[Arm]:
+            heard_by = [nodes[domain] for name, domain in found if (name, domain.number) == key]
+            return watched(arms[key], _seen(key[0], heard_by, health), time.monotonic)
+
+        first, *_ = nodes.values()
+        executor = stack.enter_context(SingleThreadedExecutor(context=first.context))
+        for node in nodes.values():
+            executor.add_node(node)
+        stack.enter_context(fleet(map(arm_of, [*arms])).subscribe(note, scheduler=first.scheduler))
+        due, shown = time.monotonic() + FIRST, ""
+        while not more():
+            while (now := time.monotonic()) < due:
+                interruption.check()
+                executor.spin_once(timeout_sec=min(due - now, 0.1))
+            due = now + PERIOD
+            lines = table([HEADER, *(row(arm, now) for arm in arms.values())])
+            if lines != shown:
+                say(("\n" if shown else "") + lines)
+                shown = lines
+
+
+def run(named: Sequence[str]) -> None:
+    """
+    Watch the arms until the user ends it; an arm that has ended stays in the table.
+
+    :raises DeploymentError: for a wrong name, or if there is no arm.
+    """
+    found: set[Place] = set()
+
+    def more() -> bool:
+        return not found >= places(named)
+
+    while more():
+        found |= places(named)
+        watch(found, more)
+    raise DeploymentError("No arm runs on this host. ARMS=/arm1 names an arm of another host.")
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Watch the fleet; return the exit code."""
+    interruption.install()
+    parser = argparse.ArgumentParser(prog="make fleet", description=__doc__)
+    parser.add_argument("arms", nargs="*", metavar="ARM", help="an arm of another host: /arm1, or /arm1=5")
+    named = parser.parse_args(arguments).arms
+    set_middleware(os.environ)
+    try:
+        run(named)
+    except interruption.Interrupted:
+        return 0
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
+    except DeploymentError as error:
+        print(error, file=sys.stderr)
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,133 @@
+"""The fleet: what an operator of many arms has to know of each.
+
+User story (ours): as the operator of many arms, I see at a glance which of them needs me.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
+from typing import Any, NamedTuple
+
+import reactivex as rx
+from reactivex import Observable
+
+from deploy.running.sentinel import reported
+from interfaces.service.health import Health, healths, reported_parameters
+from interfaces.topics import ALIVE, DIAGNOSTICS, ENGINES_STATE, OPERATOR_ACTIVITY, Topic
+from services import engine_controller
+
+HEADER = ("ARM", "DOMAIN", "HOST", "OPERATOR", "ENGINES", "HEALTH", "BOUND")
+SILENT, UNKNOWN = "silent", "-"
+LONGEST_SILENCE = (
+    2.7  # s between two states of the engines, two conclusions `alive`, or two reports of health
+)
+DRIVE = 0.5  # s from the presence timeout until the drive has stopped the engines at the latest (S1)
+
+Seen = Callable[[Topic], Observable[Any]]
+"""Gives the values of a topic of an arm."""
+Clock = Callable[[], float]
+"""The monotonic clock [s]."""
+
+
+class Told(NamedTuple):
+    """A value, and when it came [s, monotonic clock]."""
+
+    value: str = ""
+    at: float = -math.inf
+
+
+class Arm(NamedTuple):
+    """An arm as its topics show it."""
+
+    name: str
+    domain: int
+    engines: Told = Told()
+    operator: Told = Told()
+    healths: Mapping[str, Health] = {}
+    """The latest report of each program."""
+    states: Mapping[str, str] = {}
+    """The state of each process, as the sentinel sees it."""
+    presence_timeout: float = engine_controller.DEFAULTS.presence_timeout
+
+
+Change = Callable[[Arm], Arm]
+
+
+def fleet(arms: Iterable[Observable[Arm]]) -> Observable[Arm]:
+    """Emit each arm when something of it has changed."""
+    return rx.merge(*arms)
+
+
+def watched(arm: Arm, seen: Seen, clock: Clock) -> Observable[Arm]:
+    """Emit an arm as it is after each of its messages."""
+
+    def engines(state: str) -> Change:
+        return lambda arm: arm._replace(engines=Told(state, clock()))
+
+    def operator(activity: str) -> Change:
+        return lambda arm: arm._replace(operator=Told(activity, clock()))
+
+    changes = rx.merge(
+        seen(ENGINES_STATE).map(engines),
+        seen(OPERATOR_ACTIVITY).map(operator),
+        seen(DIAGNOSTICS).map(_health),
+    )
+    return changes.scan(lambda arm, change: change(arm), arm)
+
+
+def _health(message: Any) -> Change:
+    def change(arm: Arm) -> Arm:
+        namespace = arm.name.rstrip("/")
+        states = {program.name: program.state for program in reported(message, namespace)}
+        timeout = arm.presence_timeout
+        for status in message.status:
+            if status.name == f"{namespace}/engine_controller":
+                default = engine_controller.DEFAULTS.presence_timeout
+                with suppress(ValueError):  # not a report of ours
+                    timeout = reported_parameters(status).get("presence_timeout", default)
+        return arm._replace(
+            healths={**arm.healths, **healths(message, namespace)},
+            states={**arm.states, **states},
+            presence_timeout=timeout,
+        )
+
+    return change
+
+
+def row(arm: Arm, now: float) -> tuple[str, ...]:
+    """
+    Return the cells of an arm; what is old is not shown as fresh.
+
+    :param now: on the monotonic clock [s].
+    """
+    engines = arm.engines.value if now - arm.engines.at < LONGEST_SILENCE else SILENT
+    operator = arm.operator.value
+    if operator == ALIVE and now - arm.operator.at >= LONGEST_SILENCE:
+        operator = ""
+    hosts = {health.host for health in arm.healths.values()}
+    return (
+        arm.name,
+        str(arm.domain),
+        ", ".join(sorted(hosts)) or UNKNOWN,
+        operator or UNKNOWN,
+        engines,
+        _in_words(arm, now),
+        f"{arm.presence_timeout + DRIVE:g} s" if arm.healths else UNKNOWN,
+    )
+
+
+def _in_words(arm: Arm, now: float) -> str:
+    """Return the health of an arm: how many programs are well, or the first problem."""
+    silent = {name for name, health in arm.healths.items() if now - health.heard >= LONGEST_SILENCE}
+    if len(silent) == len(arm.healths):
+        return SILENT
+    problems = {name: health.reason for name, health in arm.healths.items() if not health.ok}
+    problems |= dict.fromkeys(silent, SILENT)
+    problems |= {name: state for name, state in arm.states.items() if state not in ("STARTING", "RUNNING")}
+    if not problems:
+        return f"{len(arm.healths)} ok"
+    first = min(problems)
+    more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
+    return f"{first}: {problems[first]}{more}"

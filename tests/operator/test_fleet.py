@@ -1,0 +1,130 @@
+"""The lines of the fleet: one for each arm."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from reactivex import Observable
+from reactivex.testing import ReactiveTest, TestScheduler
+
+from deploy.operator.fleet import Arm, Told, fleet, row, watched
+from deploy.running import sentinel
+from deploy.running.supervisord import Program
+from interfaces.service.health import Health
+from interfaces.topics import ALIVE, DIAGNOSTICS, ENGINES_STATE, MISSED, OFF, ON, OPERATOR_ACTIVITY, Topic
+
+Script = list[tuple[float, Topic, Any]]
+"""When a message arrives [s], on which topic, and its value."""
+
+
+def health(program: str, *, ok: bool = True, **values: str) -> DiagnosticArray:
+    given = {"pid": "7", "published": "1", **values}
+    status = DiagnosticStatus(
+        name=program,
+        level=DiagnosticStatus.OK if ok else DiagnosticStatus.WARN,
+        message="running" if ok else "too old",
+        hardware_id="robot1",
+        values=[KeyValue(key=key, value=value) for key, value in given.items()],
+    )
+    return DiagnosticArray(status=[status])
+
+
+def arms(scripts: dict[str, Script]) -> list[tuple[float, Arm]]:
+    """Return the arms of a fleet after each of their messages."""
+    scheduler = TestScheduler()
+
+    def of(name: str) -> Observable[Arm]:
+        def seen(topic: Topic) -> Observable[Any]:
+            items = [ReactiveTest.on_next(at, value) for at, on, value in scripts[name] if on is topic]
+            return scheduler.create_hot_observable(items)
+
+        return watched(Arm(name, 0), seen, lambda: scheduler.clock)
+
+    results = scheduler.start(
+        lambda: fleet(of(name) for name in scripts), created=0.01, subscribed=0.02, disposed=60.0
+    )
+    return [(message.time, message.value.value) for message in results.messages]
+
+
+def last(script: Script, name: str = "/arm1") -> Arm:
+    return arms({name: script})[-1][1]
+
+
+def test_each_message_of_each_arm_is_its_news() -> None:
+    news = arms(
+        {
+            "/arm1": [(1.0, ENGINES_STATE, OFF), (3.0, OPERATOR_ACTIVITY, ALIVE)],
+            "/arm2": [(2.0, ENGINES_STATE, ON)],
+        }
+    )
+    assert [(at, arm.name, arm.engines.value, arm.operator.value) for at, arm in news] == [
+        (1.0, "/arm1", OFF, ""),
+        (2.0, "/arm2", ON, ""),
+        (3.0, "/arm1", OFF, ALIVE),
+    ]
+
+
+def test_arm_that_is_well_is_one_line() -> None:
+    script: Script = [
+        (1.0, ENGINES_STATE, ON),
+        (1.0, OPERATOR_ACTIVITY, ALIVE),
+        (1.1, DIAGNOSTICS, health("/arm1/velocity")),
+        (1.2, DIAGNOSTICS, health("/arm1/engine_controller")),
+        (1.3, DIAGNOSTICS, health("/arm2/velocity", ok=False)),
+    ]
+    arm = last(script)
+    heard = max(health.heard for health in arm.healths.values())
+    fresh = arm._replace(engines=Told(ON, heard), operator=Told(ALIVE, heard))
+    assert row(fresh, heard) == ("/arm1", "0", "robot1", ALIVE, ON, "2 ok", "10.5 s")
+
+
+def test_bound_follows_from_the_presence_timeout_of_the_arm() -> None:
+    report = health("/arm1/engine_controller", **{"parameter presence_timeout": "4.5"})
+    arm = last([(1.0, DIAGNOSTICS, report)])
+    assert row(arm, 0.0)[-1] == "5 s"
+
+
+def well(heard: float, **problems: str) -> Arm:
+    """Return an arm of three programs, some of which report a problem."""
+    reports = {
+        name: Health(heard, 7, name not in problems, problems.get(name, "running"), None)
+        for name in ("drive", "kinematics", "velocity")
+    }
+    return Arm("/", 0, Told(ON, heard), Told(ALIVE, heard), reports)
+
+
+@pytest.mark.parametrize(
+    ("problems", "words"),
+    [
+        ({}, "3 ok"),
+        ({"kinematics": "l1: -1 is negative"}, "kinematics: l1: -1 is negative"),
+        ({"velocity": "slow", "drive": "full"}, "drive: full (and 1 more)"),
+    ],
+)
+def test_first_problem_of_an_arm_is_shown(problems: dict[str, str], words: str) -> None:
+    assert row(well(10.0, **problems), 11.0)[5] == words
+
+
+def test_process_that_does_not_run_is_a_problem() -> None:
+    program = Program("drive", "FATAL", 0, 0.0, 3, "exit code 1", "")
+    states = DiagnosticArray(status=sentinel.states([program], {}, {}, "/arm1/sentinel"))
+    arm = last([(1.0, DIAGNOSTICS, health("/arm1/velocity")), (1.1, DIAGNOSTICS, states)])
+    assert row(arm, arm.healths["velocity"].heard)[5] == "drive: FATAL"
+
+
+@pytest.mark.parametrize(("operator", "shown"), [(ALIVE, "-"), (MISSED, MISSED)])
+def test_arm_that_falls_silent_shows_nothing_as_fresh(operator: str, shown: str) -> None:
+    arm = well(10.0)._replace(operator=Told(operator, 10.0))
+    assert row(arm, 12.8)[3:6] == (shown, "silent", "silent")
+
+
+def test_service_that_falls_silent_is_a_problem() -> None:
+    arm = well(10.0)
+    old = arm.healths["drive"]._replace(heard=8.0)
+    assert row(arm._replace(healths={**arm.healths, "drive": old}), 11.0)[5] == "drive: silent"
+
+
+def test_arm_that_was_never_heard_is_silent() -> None:
+    assert row(Arm("/arm3", 5), 100.0) == ("/arm3", "5", "-", "-", "silent", "silent", "-")
