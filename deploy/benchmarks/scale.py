@@ -35,6 +35,7 @@ FULL = 0.9  # of all cores: further arms would only take time from each other
 SETTLE = 5.0  # s after a start
 SECONDS = 20.0  # s of a measurement
 LAUNCH = [sys.executable, "-m", "deploy.commands.launcher", "start"]
+RESTART = [sys.executable, "-m", "deploy.benchmarks.restart"]
 RATE = 100.0  # Hz of the topic with many subscribers
 _LOOK = 0.1  # s between two looks for an interruption
 
@@ -45,6 +46,8 @@ _ARM = {
     "cpu": "CPU of an arm [% of a core]",
     "megabytes": "proportional set size of an arm [MB]",
     "packets": "packets of an arm [1/s]",
+    "last_start": "start of the last arm [s]",
+    "restart": "a killed service is heard again after [s]",
 }
 _ITEM = {"publisher_us": "CPU of the publisher [µs/item]", "subscriber_us": "CPU of a subscriber [µs/item]"}
 HEADINGS = {OWN_DOMAINS: _ARM, ONE_DOMAIN: _ARM, SUBSCRIBERS: _ITEM}
@@ -106,6 +109,19 @@ class Fleet:
             raise MeasurementFailed(f"arm {len(self.arms) + 1} does not start: {words[0]}")
         self.arms.append(arm)
 
+    def restart(self) -> float:
+        """
+        Kill a service of the last arm, and return how long it takes until the next one is heard [s].
+
+        :raises MeasurementFailed: if it is not heard.
+        """
+        environment = self.arms[-1].environment()
+        done = subprocess.run(RESTART, cwd=ROOT, env=environment, capture_output=True, text=True, check=False)
+        if done.returncode:
+            reason = done.stderr.strip().rpartition("\n")[2]
+            raise MeasurementFailed(f"the restart of a service of arm {len(self.arms)}: {reason}")
+        return float(done.stdout)
+
     def cost(self, seconds: float = SECONDS) -> dict[str, float]:
         """Return what one arm costs: percent of a core, MB of proportional set size, packets per second."""
         before, packets = Cost.now(self.arms), _packets()
@@ -140,15 +156,16 @@ def fleet(*, shared: bool, sizes: Sequence[int] = SIZES) -> Rows:
     """Yield the cost of one arm among several, until the machine is full or an arm does not start."""
     temporary = tempfile.TemporaryDirectory(prefix="fleet-", ignore_cleanup_errors=True)
     with temporary as directory, Fleet(Path(directory), shared=shared) as arms:
-        starting = 0.0
+        starting = last = 0.0
         for size in sizes:
-            began = time.monotonic()
             while len(arms.arms) < size:
+                began = time.monotonic()
                 arms.start()
-            starting += time.monotonic() - began
+                last = time.monotonic() - began
+                starting += last
             _wait(SETTLE)
             figures = arms.cost()
-            yield str(size), {"started": starting, **figures}
+            yield str(size), {"started": starting, **figures, "last_start": last, "restart": arms.restart()}
             if figures["cpu"] * size > FULL * 100 * len(os.sched_getaffinity(0)):
                 raise MeasurementFailed(f"the machine is full with {size} arms")
 

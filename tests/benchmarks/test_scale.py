@@ -29,10 +29,10 @@ def test_fleet_of_two_has_a_cost_and_leaves_nothing(tmp_path: Path) -> None:
             "/arm2",
         }
         domains = {arm.system.environment()["ROS_DOMAIN_ID"] for arm in fleet.arms}
-        figures = fleet.cost(1.0)
+        figures = fleet.cost(1.0) | {"restart": fleet.restart()}
         assert all(arm.system.members() for arm in fleet.arms)
     assert len(domains) == 2
-    assert figures.keys() == scale.HEADINGS[scale.OWN_DOMAINS].keys() - {"started"}
+    assert figures.keys() == scale.HEADINGS[scale.OWN_DOMAINS].keys() - {"started", "last_start"}
     assert all(value > 0 for value in figures.values())
     assert [arm.system.members() for arm in fleet.arms] == [[], []]
 
@@ -71,6 +71,7 @@ def test_fleet_grows_until_the_machine_is_full(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr(scale.os, "sched_getaffinity", lambda _: {0, 1})
     monkeypatch.setattr(scale.Fleet, "start", lambda self: self.arms.append(None))
     monkeypatch.setattr(scale.Fleet, "cost", lambda self: {"cpu": 20.0})
+    monkeypatch.setattr(scale.Fleet, "restart", lambda self: 0.5)
     rows = scale.fleet(shared=False, sizes=(1, 5, 10, 20))
     numbers: list[str] = []
     with pytest.raises(MeasurementFailed, match="full with 10 arms"):
