@@ -22,7 +22,11 @@ from reactive_node.stamps import stamped
 LATENESS = 0.05  # s that a message may take
 GAP = 0.1
 """The longest time [s] between two samples of a movement: configuration publishers send 25 in a second."""
-DEPTH = 10  # samples that may wait while the process is not scheduled: each of them counts
+DEPTH = 100
+"""
+Samples that may wait while the process is not scheduled: those of 4 s. DDS does not report one that is lost,
+so a replay would hear it.
+"""
 LIFE_PERIOD = 0.5  # s between two looks for the publishers
 
 

@@ -29,14 +29,14 @@ theta2: {center: 0.8, amplitude: 0.5, period: 10.0, rest: 2.0}
 """
 
 
-@pytest.fixture(scope="module")
-def record(tmp_path_factory: pytest.TempPathFactory) -> Record:
-    """A minute of movements; one message in fifty is later than the signals wait."""
+@pytest.fixture(scope="module", params=["late", "later"])
+def record(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Record:
+    """A minute of movements; one message in fifty is later than the signals wait, some by half a second."""
     scenario = tmp_path_factory.mktemp("replay") / "scenario.yaml"
     scenario.write_text(SCENARIO)
     messages: defaultdict[str, list[Message]] = defaultdict(list)
     network = Network(latency=Delay(0.005, 0.08), discovery=Delay(0.01, 0.01), matching=Delay(0.002, 0.002))
-    with simulated_services("late", network) as simulation:
+    with simulated_services(request.param, network) as simulation:
         begin = simulation.host(ROBOT).time_of_day(0)
         for name in CONFIGURATION:
             arguments = [name, "--ros-args", "-p", f"scenario:={scenario}"]
