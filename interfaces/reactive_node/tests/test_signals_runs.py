@@ -179,6 +179,25 @@ def test_samples_of_a_future_that_was_set_back_are_forgotten() -> None:
     assert found[-1].time == 10_900 * MS
 
 
+@pytest.mark.parametrize("delay", [0.05, 0.15])
+def test_state_that_was_not_settled_survives_a_set_clock(delay: float) -> None:
+    """It does not come again."""
+    clock = _Clock()
+    state = Subject[Any]()
+    found: list[Any] = []
+    signal = lift(lambda *parts: parts)(
+        hold(state, lateness=LATENESS), linear(state, lateness=LATENESS, gap=GAP, silence=Unchanged())
+    )
+    signal.sample(0.1).subscribe(found.append, scheduler=clock)
+    state.on_next(stamped("old", 0))
+    clock.time = 10.0
+    state.on_next(stamped("new", round((clock.time - delay) * SECOND)))
+    for clock.time in (5.0, 6.0):
+        state.on_next(stamped("older", -1))
+
+    assert found[-1] == Answer(5800 * MS, ("new", "new"))
+
+
 def test_events_of_a_future_that_was_set_back_are_forgotten() -> None:
     clock = _Clock()
     samples, events = Subject[Any](), Subject[Any]()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import Any
 
 import pytest
@@ -279,6 +280,107 @@ def test_late_value_of_a_state_counts_if_it_is_the_newest(scheduler: VirtualTime
     assert refused == [Refused(20 * MS, 9.0, "it is 0.400 s late", taken)]
     assert {each.value for each in found if each.time <= 320 * MS} == {1.0}
     assert {each.value for each in found if each.time > 320 * MS} == {9.0 if is_state else 1.0}
+
+
+@given(arrivals(st.none(), most=400))
+def test_late_value_of_a_state_bends_no_line(samples: list[Arrival]) -> None:
+    """A certain value is on the line of the movement, or that of a state that rests."""
+    scheduler = VirtualTime()
+    moving = [each._replace(value=float(each.time)) for each in samples]
+    signal = linear(arriving(scheduler, moving), lateness=LATENESS, gap=GAP, silence=Unchanged())
+
+    measured = {each.value for each in moving}
+    for time, value, mark in answers(scheduler, signal, 0.01, until=2.5):
+        assert mark != CERTAIN or value in measured or value == pytest.approx(time)
+
+
+@given(arrivals(most=900))
+def test_resting_state_has_its_newest_value_however_late_it_came(samples: list[Arrival]) -> None:
+    for make in (
+        lambda it: hold(it, lateness=LATENESS),
+        lambda it: linear(it, lateness=LATENESS, gap=GAP, silence=Unchanged()),
+    ):
+        scheduler = VirtualTime()
+        (*_, last) = answers(scheduler, make(arriving(scheduler, samples)), until=3.0)
+
+        assert last.value == (samples[-1].value if samples else None)
+
+
+@pytest.mark.parametrize(
+    ("pause", "late", "after_late"),
+    [(140, [(5, None), (6, None)], []), (320, [(5, 300), *((k, None) for k in range(6, 16))], [16, 17, 18])],
+)
+def test_late_values_in_a_movement_bend_no_line(
+    scheduler: VirtualTime, pause: int, late: list[tuple[int, int | None]], after_late: list[int]
+) -> None:
+    """From 80 ms on, the network pauses; then all samples come together."""
+    refused: list[Refused] = []
+    ramp = [
+        Arrival(k * 20 * MS, float(k), max(0, 80 + pause - 20 * k) * MS if k > 4 else 0) for k in range(40)
+    ]
+    signal = linear(
+        arriving(scheduler, ramp), lateness=LATENESS, gap=GAP, silence=Unchanged(), refused=refused.append
+    )
+
+    found = [each for each in answers(scheduler, signal, 0.01) if each.time <= 780 * MS]
+
+    assert [(each.value, each.taken) for each in refused] == [
+        *((float(k), None if taken is None else taken * MS + 1) for k, taken in late),
+        *((float(k), None) for k in after_late),
+    ]
+    certain = [each for each in found if each.is_certain]
+    assert all(each.value == each.time / (20 * MS) or 140 * MS <= each.time <= 240 * MS for each in certain)
+    assert max(b.time - a.time for a, b in pairwise(certain)) <= (10 if pause < 200 else 140) * MS
+
+
+@pytest.mark.parametrize(
+    ("following", "taken"),
+    [
+        ([], [120 * MS + 1]),
+        ([Arrival(120 * MS, 5.0, 0)], [None]),
+        ([Arrival(120 * MS + 1, 5.0, 0)], [120 * MS + 1, 240 * MS + 2]),
+        ([Arrival(180 * MS + 1, 5.0, 0)], [120 * MS + 1, 240 * MS + 2]),
+        ([Arrival(180 * MS + 2, 5.0, 0)], [120 * MS + 1]),
+        ([Arrival(180 * MS, 5.0, 0), Arrival(240 * MS + 1, 6.0, 0)], [120 * MS + 1, None]),
+    ],
+)
+def test_late_value_of_a_state_counts_two_gaps_after_the_sample_before(
+    scheduler: VirtualTime, following: list[Arrival], taken: list[int | None]
+) -> None:
+    """If none follows by then. No line leads to it or from it: what follows within a gap is as late."""
+    refused: list[Refused] = []
+    samples = [Arrival(0, 1.0, 0), Arrival(20 * MS, 9.0, 100 * MS), *following]
+    signal = linear(
+        arriving(scheduler, samples), lateness=LATENESS, gap=GAP, silence=Unchanged(), refused=refused.append
+    )
+
+    found = answers(scheduler, signal, 0.001)
+
+    reasons = ["it is 0.100 s late", "it comes right after a late one"]
+    assert refused == [
+        Refused(sample.time, sample.value, reason, at)
+        for sample, reason, at in zip(samples[1:], reasons, taken, strict=False)
+    ]
+    counted = dict(zip((each.value for each in samples[1:]), taken, strict=False))
+    straight_through = [
+        sample._replace(time=at)
+        for sample in samples
+        if (at := counted.get(sample.value, sample.time)) is not None
+    ]
+    for time, value, mark in found:
+        assert (value, mark) == straight(straight_through, time, Unchanged())
+        assert mark == HELD or value in {each.value for each in samples}
+
+
+def test_the_newest_of_several_late_values_counts(scheduler: VirtualTime) -> None:
+    refused: list[Refused] = []
+    late = [Arrival(k * MS, float(k), (400 - k) * MS) for k in range(3)]
+    signal = hold(arriving(scheduler, late), lateness=LATENESS, refused=refused.append)
+
+    found = answers(scheduler, signal, 0.1)
+
+    assert [each.taken for each in refused] == [300 * MS + k for k in (1, 2, 3)]
+    assert [each.value for each in found[3:5]] == [None, 2.0]
 
 
 def test_the_shortest_lateness_is_a_nanosecond(scheduler: VirtualTime) -> None:

@@ -133,7 +133,8 @@ def interpolate(
     :param samples: values with the times of their measurement, in any order. Of two with one time, the first
         that arrives counts.
     :param lateness: how long after its time a sample may arrive [s]. A later one is refused; but if it is
-        the newest of all and silence means :class:`Unchanged`, its value counts from ``lateness`` ago on.
+        the newest of all and silence means :class:`Unchanged`, its value counts as soon as no other sample
+        has come for two gaps. One that comes within a gap after that is as late.
     :param gap: the longest time between two samples of one movement [s].
     :param refused: called with each sample that was outside of these bounds.
     """
@@ -166,18 +167,16 @@ class _Held(Source):
         run.add(self)
 
     def take(self, time: int, value: Any) -> None:
-        if self._times and time == self._times[-1]:
-            self.refuse(time, value, "another sample has the same time")
+        if self._times and time <= self._times[-1]:
+            self.refuse(Refused(time, value, "another sample has the same time"))
         else:
             self._times.append(time)
             self._values.append(value)
 
-    def take_late(self, time: int, value: Any) -> int | None:
-        if self.waiting or (self._times and time <= self._times[-1]):
-            return None
-        taken = self.settled + 1
-        self.take(taken, value)
-        return taken
+    def take_late(self, late: Refused) -> None:
+        taken = max([self.settled, *self._times[-1:]]) + 1
+        self.take(taken, late.value)
+        self.refuse(late._replace(taken=taken))
 
     def forget(self, time: int) -> None:
         unused = bisect_right(self._times, time) - 2  # one for `a`, one before it for an extrapolation
@@ -188,9 +187,10 @@ class _Held(Source):
     def restart(self, now: int) -> None:
         super().restart(now)
         self._times.clear()
-        if self._values:  # a state does not come again
-            self._values = self._values[-1:]
+        self._values.clear()
+        if self.newest is not None:  # a state does not come again
             self._times.append(self.settled)
+            self._values.append(self.newest.value)
 
     def at(self, time: int) -> tuple[Any, int]:
         index = bisect_right(self._times, time) - 1
@@ -212,12 +212,46 @@ class _Interpolated(_Held):
         self._between = between
         self._gap = gap
         self._silence = silence
+        self._late: Refused | None = None
+        """The newest sample, which came too late, until it is known that the state rests."""
+        self._shifted: int | None = None
+        """The time from which the last late value counts [ns]."""
         self.wait += self._gap
 
-    def take_late(self, time: int, value: Any) -> int | None:
-        return super().take_late(time, value) if isinstance(self._silence, Unchanged) else None
+    def take(self, time: int, value: Any) -> None:
+        self._drop_late()
+        if self._shifted is not None and time <= self._shifted + self._gap:
+            self.take_late(Refused(time, value, "it comes right after a late one"))
+        else:
+            super().take(time, value)
+
+    def take_late(self, late: Refused) -> None:
+        self._drop_late()
+        if isinstance(self._silence, Unchanged):
+            self._late = late
+        else:
+            self.refuse(late)
+
+    def settle(self, now: int) -> None:
+        settled = self.settled
+        super().settle(now)
+        if self._late is not None:
+            rest = max([settled, *(last + 2 * self._gap for last in self._times[-1:])])
+            if self.settled >= rest:
+                self._shifted = rest + 1
+                super().take(self._shifted, self._late.value)
+                self.refuse(self._late._replace(taken=self._shifted))
+                self._late = None
+
+    def _drop_late(self) -> None:
+        """Drop the late value: there is a newer one."""
+        if self._late is not None:
+            self.refuse(self._late)
+            self._late = None
 
     def restart(self, now: int) -> None:
+        self._drop_late()
+        self._shifted = None
         super().restart(now)
         if not isinstance(self._silence, Unchanged):
             self._times.clear()

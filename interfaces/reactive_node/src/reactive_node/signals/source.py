@@ -68,6 +68,8 @@ class Source(Memory):
         self.wait = self.lateness
         """How long it takes at most until a value is known [ns]."""
         self.waiting: list[tuple[int, int, Any]] = []
+        self.newest: Timestamp[Any] | None = None
+        """The sample with the latest time, late or not, of those that were not ahead of the clock."""
         self._arrivals = 0
         self._now, self._advance, self._refused = now, advance, refused
 
@@ -77,12 +79,18 @@ class Source(Memory):
         now = self._now()
         self.settle(now)
         self._arrivals += 1
-        if time <= self.settled:
-            self.refuse(time, value, f"it is {(now - time) / SECOND:.3f} s late", self.take_late(time, value))
-        elif time > now + self.lateness:
-            self.refuse(time, value, f"it is {(time - now) / SECOND:.3f} s ahead of the clock")
+        if time > now + self.lateness:
+            self.refuse(Refused(time, value, f"it is {(time - now) / SECOND:.3f} s ahead of the clock"))
         else:
-            heapq.heappush(self.waiting, (time, self._arrivals, value))
+            is_newest = self.newest is None or time > self.newest.nanoseconds
+            if is_newest:
+                self.newest = sample
+            if time > self.settled:
+                heapq.heappush(self.waiting, (time, self._arrivals, value))
+            else:
+                reason = f"it is {(now - time) / SECOND:.3f} s late"
+                late = Refused(time, value, reason, is_first=self._arrivals == 1)
+                (self.take_late if is_newest else self.refuse)(late)
         self._advance()
 
     def complete(self) -> None:
@@ -99,23 +107,25 @@ class Source(Memory):
                 time, _, value = heapq.heappop(self.waiting)
                 self.take(time, value)
 
-    def refuse(self, time: int, value: Any, reason: str, taken: int | None = None) -> None:
+    def refuse(self, sample: Refused) -> None:
         """Report a sample."""
         if self._refused is not None:
-            self._refused(Refused(time, value, reason, taken, is_first=self._arrivals == 1))
+            self._refused(sample)
 
     def restart(self, now: int) -> None:
         """Begin at an earlier time [ns]: the clock was set back."""
         self.settled = now - self.lateness
+        if self.newest is not None:
+            self.newest = self.newest._replace(nanoseconds=min(self.newest.nanoseconds, self.settled))
         self.waiting.clear()
 
     def take(self, time: int, value: Any) -> None:
         """Take the next sample in the order of time."""
         raise NotImplementedError
 
-    def take_late(self, time: int, value: Any) -> int | None:
-        """Take a sample that is too late, if it still tells something: return from when on [ns]."""
-        return None
+    def take_late(self, late: Refused) -> None:
+        """Report the newest sample of all, which is too late; its value may count from another time on."""
+        self.refuse(late)
 
     def horizon(self) -> int:
         """Return the time up to which values are known [ns]."""
