@@ -167,9 +167,10 @@ def test_each_parameter_is_set_or_refused_with_a_reason(
 def test_parameters_are_set_together_or_not_at_all(
     server: Node, client: AsyncParameterClient, result: Result
 ) -> None:
-    good, bad = Parameter("joint.count", value=7), Parameter("speed", value=-1.0)
-    refused = result(client.set_parameters_atomically([good, bad])).result
-    assert not refused.successful
+    good = Parameter("joint.count", value=7)
+    for bad in (Parameter("missing", value=1), Parameter("speed", value=-1.0)):
+        refused = result(client.set_parameters_atomically([good, bad])).result
+        assert not refused.successful
     assert "speed" in refused.reason
     assert server.get_parameter("joint.count").value == 3
     both = [good, Parameter("speed", value=1.0)]

@@ -25,7 +25,6 @@ from rclpy.qos import (
     QoSProfile,
     ReliabilityPolicy,
 )
-from rclpy.waitable import NumberOfEntities
 from std_msgs.msg import Bool, Float64
 
 # rclpy 7.1.3 itself uses the class that it deprecates.
@@ -209,9 +208,3 @@ def test_the_deprecated_module_qos_event_works_and_warns() -> None:
     with pytest.warns(UserWarning, match="deprecated"):
         qos_event = importlib.import_module("rclpy.qos_event")
     assert qos_event.SubscriptionEventCallbacks is SubscriptionEventCallbacks
-
-
-def test_numbers_of_entities_add_up() -> None:
-    total = NumberOfEntities(1, 2, 3) + NumberOfEntities(num_events=1)
-    assert (total.num_subscriptions, total.num_guard_conditions, total.num_timers) == (1, 2, 3)
-    assert repr(total) == "<NumberOfEntities(1, 2, 3, 0, 0, 1)>"

@@ -84,19 +84,6 @@ def test_all_services_must_be_available(node: Node) -> None:
     assert not client.wait_for_services(timeout_sec=0.0)
 
 
-def test_requests_carry_the_arguments_of_the_call(node: Node) -> None:
-    client = client_of(node)
-    assert client.get_parameters(["a"]).result().names == ["a"]
-    assert client.describe_parameters(["a"]).result().names == ["a"]
-    assert client.get_parameter_types(["a"]).result().names == ["a"]
-    request = client.list_parameters().result()
-    assert (request.prefixes, request.depth) == ([], 0)
-    request = client.list_parameters(["p"], 2).result()
-    assert (request.prefixes, request.depth) == (["p"], 2)
-    for name in ("get_parameters", "describe_parameters", "get_parameter_types", "list_parameters"):
-        assert node.clients[f"other/{name}"].requests
-
-
 def test_parameters_are_set_as_values_or_messages(node: Node) -> None:
     client = client_of(node)
     parameter = Parameter("a", value=1)
@@ -109,11 +96,6 @@ def test_parameters_are_set_as_values_or_messages(node: Node) -> None:
     assert len(node.clients["other/set_parameters_atomically"].requests) == 1
 
 
-def test_deleting_sets_parameters_to_not_set(node: Node) -> None:
-    request = client_of(node).delete_parameters(["a", "b"]).result()
-    assert [(p.name, p.value.type) for p in request.parameters] == [("a", 0), ("b", 0)]
-
-
 def test_a_file_is_loaded_parameter_by_parameter_or_atomically(node: Node, tmp_path: Path) -> None:
     path = tmp_path / "parameters.yaml"
     path.write_text("/other: {ros__parameters: {a: 1, b: {c: x}}}\n/**: {ros__parameters: {d: 2.5}}")
@@ -123,17 +105,6 @@ def test_a_file_is_loaded_parameter_by_parameter_or_atomically(node: Node, tmp_p
     request = client.load_parameter_file_atomically(str(path), use_wildcard=True).result()
     assert [parameter.name for parameter in request.parameters] == ["d", "a", "b.c"]
     assert len(node.clients["other/set_parameters_atomically"].requests) == 1
-
-
-def test_a_callback_gets_the_future_of_its_call(node: Node) -> None:
-    done: list[Future] = []
-    future = client_of(node).get_parameters(["a"], callback=done.append)
-    assert done == [future]
-
-
-def test_the_client_subscribes_to_the_events_of_all_nodes(node: Node) -> None:
-    assert client_of(node).on_parameter_event(print) is not None
-    assert node.subscriptions == [("/parameter_events", print)]
 
 
 # The event handler
@@ -149,20 +120,6 @@ def event(node_name: str = "/ns/other", **values: int) -> ParameterEvent:
 
 def handler_of(node: Node) -> ParameterEventHandler:
     return ParameterEventHandler(node)  # type: ignore[arg-type]
-
-
-@pytest.mark.parametrize(
-    ("given", "resolved"), [("", "/ns/me"), ("other", "/ns/other"), ("/far/other", "/far/other")]
-)
-def test_a_callback_gets_only_its_parameter_of_its_node(node: Node, given: str, resolved: str) -> None:
-    handler, values = handler_of(node), []
-    handler.add_parameter_callback("a", given, lambda message: values.append(message.value.integer_value))
-    send = node.subscriptions[0][1]
-    send(event(resolved, a=1))
-    send(event(resolved, b=2, a=3))
-    send(event(resolved, b=4))
-    send(event("/ns/stranger", a=5))
-    assert values == [1, 3]
 
 
 def test_a_node_in_the_root_namespace_resolves_node_names_there() -> None:

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 import threading
 from collections.abc import Callable
 from typing import Any
@@ -272,38 +269,6 @@ def test_a_blocking_call_ends_with_the_context(context: Context, node: Node) -> 
     client = ActionClient(node, Fibonacci, "fibonacci")
     threading.Timer(0.1, context.shutdown).start()
     assert client.send_goal(Fibonacci.Goal()) is None
-
-
-PROGRAM = """
-import sys
-import rclpy
-from rclpy.node import Node
-assert not [name for name in sys.modules if name.startswith(("rclpy.action", "action_msgs"))]
-from example_interfaces.action import Fibonacci
-from rclpy._dds.library import blocking
-from rclpy.action import ActionClient, ActionServer
-from rclpy.action._endpoints import uuid_bytes
-rclpy.init()
-node = Node("node")
-def execute(goal_handle):
-    goal_handle.succeed()
-    return Fibonacci.Result()
-server = ActionServer(node, Fibonacci, "fibonacci", execute)
-client = ActionClient(node, Fibonacci, "fibonacci")
-assert client.wait_for_server(timeout_sec=10)
-future = client.send_goal_async(Fibonacci.Goal())
-rclpy.spin_until_future_complete(node, future, timeout_sec=10)
-future = future.result().get_result_async()
-rclpy.spin_until_future_complete(node, future, timeout_sec=10)
-print(future.result().status, "numpy" in sys.modules)
-rclpy.shutdown()
-"""
-
-
-def test_programs_without_actions_import_none_and_those_with_them_no_numpy(domain_id: int) -> None:
-    command = [sys.executable, "-c", PROGRAM]
-    environment = os.environ | {"ROS_DOMAIN_ID": str(domain_id)}
-    assert subprocess.check_output(command, env=environment, text=True, timeout=60) == "4 False\n"
 
 
 def test_a_destroyed_node_takes_its_goals_along(

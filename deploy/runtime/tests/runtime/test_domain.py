@@ -294,11 +294,3 @@ def test_security_is_refused_in_one_line(
 def test_security_is_off_unless_true(value: str) -> None:
     environment = {"ROS_SECURITY_ENABLE": value, "ROS_SECURITY_STRATEGY": "Enforce"}
     assert domain.configuration(environment) == domain.configuration({})
-
-
-def test_context_forgets_callbacks_of_lost_objects(context: Context) -> None:
-    class Listener:
-        def hear(self) -> None: ...
-
-    context.on_shutdown(Listener().hear)
-    assert context._callbacks == []

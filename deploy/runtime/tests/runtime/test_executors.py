@@ -173,43 +173,6 @@ def test_spinning_once_again_runs_the_next_task_without_waiting(executor: Single
         assert order == [*range(number + 1)]
 
 
-def test_a_thousand_entities_under_traffic_leave_nothing_behind(
-    context: Context, executor: SingleThreadedExecutor, node: Node
-) -> None:
-    publisher = node.create_publisher(Float64, "x", 10)
-    spinning = threading.Thread(target=executor.spin)
-    spinning.start()
-    before = threading.active_count()
-    failures: list[BaseException] = []
-
-    def churn() -> None:
-        try:
-            for _ in range(125):
-                subscription = node.create_subscription(Float64, "x", lambda message: None, 10)
-                timer = node.create_timer(0.001, lambda: None)
-                publisher.publish(Float64())
-                extra = node.create_publisher(Float64, "y", 10)
-                node.destroy_timer(timer)
-                node.destroy_subscription(subscription)
-                node.destroy_publisher(extra)
-        except BaseException as error:
-            failures.append(error)
-
-    threads = [threading.Thread(target=churn) for _ in range(8)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    executor.shutdown()
-    spinning.join(10)
-    assert not failures
-    assert list(node.subscriptions) == []
-    assert list(node.timers) == []
-    assert node.count_subscribers("x") == 0
-    assert node.count_publishers("y") == 0
-    assert threading.active_count() <= before
-
-
 @pytest.mark.parametrize(("break_", "waits", "looks"), [(10**12, 1, 6), (-1, 5, 5)])
 def test_a_reader_is_asked_again_only_in_a_flood(
     executor: SingleThreadedExecutor,

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from collections.abc import Callable
 from typing import Any
 
@@ -56,8 +54,3 @@ def test_an_error_in_a_callback_is_logged(context: Context, capfd: pytest.Captur
     node.trigger_configure()
     assert "ZeroDivisionError: planted" in capfd.readouterr().err
     node.destroy_node()
-
-
-def test_programs_without_lifecycle_nodes_import_none() -> None:
-    code = "import sys, rclpy.node; print([name for name in sys.modules if 'lifecycle' in name])"
-    assert subprocess.check_output([sys.executable, "-c", code], text=True, timeout=60) == "[]\n"

@@ -15,7 +15,6 @@ from rcl_interfaces.srv import (
     GetLoggerLevels,
     GetParameters,
     GetParameterTypes,
-    ListParameters,
     SetLoggerLevels,
     SetParameters,
     SetParametersAtomically,
@@ -66,14 +65,6 @@ def node() -> Node:
     return node
 
 
-def integer(name: str, value: int) -> ParameterMsg:
-    return ParameterMsg(name=name, value=ParameterValue(type=2, integer_value=value))
-
-
-def double(name: str, value: float) -> ParameterMsg:
-    return ParameterMsg(name=name, value=ParameterValue(type=3, double_value=value))
-
-
 def test_the_six_services_queue_a_thousand_requests(node: Node) -> None:
     assert sorted(node.services) == [
         "node/describe_parameters",
@@ -118,33 +109,6 @@ def test_descriptors_are_returned_all_or_none(node: Node) -> None:
     descriptors = node.call(DescribeParameters, "describe_parameters", names=["value"]).descriptors
     assert [(d.name, d.type, d.description) for d in descriptors] == [("value", 3, "a length [m]")]
     assert node.call(DescribeParameters, "describe_parameters", names=["value", "x"]).descriptors == []
-
-
-def test_names_are_listed(node: Node) -> None:
-    result = node.call(ListParameters, "list_parameters").result
-    assert (result.names, result.prefixes) == (["value", "arm.name", "unset"], ["arm"])
-    result = node.call(ListParameters, "list_parameters", prefixes=["arm"], depth=1).result
-    assert result.names == ["arm.name"]
-
-
-def test_each_parameter_is_set_or_refused_with_a_reason(node: Node) -> None:
-    parameters = [double("value", 2.5), integer("value", 1), integer("missing", 1)]
-    results = node.call(SetParameters, "set_parameters", parameters=parameters).results
-    assert [result.successful for result in results] == [True, False, False]
-    assert "Wrong parameter type" in results[1].reason
-    assert "undeclared parameter(s): ['missing']" in results[2].reason
-    assert node.get_parameter("value").value == 2.5
-
-
-def test_parameters_are_set_atomically(node: Node) -> None:
-    def set_all(*parameters: ParameterMsg) -> Any:
-        name = "set_parameters_atomically"
-        return node.call(SetParametersAtomically, name, parameters=list(parameters)).result
-
-    assert not set_all(double("value", 2.5), integer("missing", 1)).successful
-    assert node.get_parameter("value").value == 1.5
-    assert set_all(double("value", 2.5), integer("unset", 1)).successful
-    assert node.get_parameter("unset").value == 1
 
 
 def test_a_parameter_with_an_unknown_type_is_refused(node: Node) -> None:

@@ -8,7 +8,10 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -46,6 +49,17 @@ asyncio.run(handle())
 """
 
 
+@contextmanager
+def running(code: str, *arguments: str, **options: Any) -> Iterator[Any]:
+    command = [sys.executable, "-c", code, *arguments]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    with subprocess.Popen(command, text=True, **pipes, **options) as process:
+        try:
+            yield process
+        finally:
+            process.kill()
+
+
 def is_asleep(pid: int) -> bool:
     return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] == "S"
 
@@ -62,27 +76,14 @@ def is_asleep(pid: int) -> bool:
 def test_a_signal_ends_spinning_and_shuts_the_context_down(
     number: signal.Signals, before: str, domain_id: int
 ) -> None:
-    environment = {**os.environ, "ROS_DOMAIN_ID": str(domain_id)}
-    with subprocess.Popen(
-        [sys.executable, "-c", SPIN.format(before)],
-        env=environment,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
-    ) as process:
-        assert process.stdout is not None
-        assert process.stderr is not None
-        try:
-            assert process.stdout.readline() == "spinning\n"
-            while not is_asleep(process.pid):  # in DDS, whose wait no signal interrupts
-                time.sleep(0.001)
-            process.send_signal(number)
-            assert process.wait(10) == 0
-            assert process.stdout.read() == "False\n"
-            assert process.stderr.read() == ""
-        finally:
-            process.kill()
+    with running(SPIN.format(before)) as process:
+        assert process.stdout.readline() == "spinning\n"
+        while not is_asleep(process.pid):  # in DDS, whose wait no signal interrupts
+            time.sleep(0.001)
+        process.send_signal(number)
+        assert process.wait(10) == 0
+        assert process.stdout.read() == "False\n"
+        assert process.stderr.read() == ""
 
 
 def test_shutdown_on_another_thread_restores_the_signal_handlers(domain_id: int) -> None:
@@ -99,12 +100,7 @@ signal.raise_signal(signal.SIGTERM)
 print("survived")
 """
     done = subprocess.run(
-        [sys.executable, "-c", code],
-        env={**os.environ, "ROS_DOMAIN_ID": str(domain_id)},
-        capture_output=True,
-        text=True,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
-        check=False,
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False
     )
     assert (done.stdout, done.stderr) == ("interrupted\n", "")
     assert done.returncode == -signal.SIGTERM
@@ -134,16 +130,10 @@ libc.pthread_mutex_lock(mutex)  # forever
 def test_a_signal_ends_a_spinning_thread_while_the_main_thread_blocks(
     number: signal.Signals, domain_id: int
 ) -> None:
-    with subprocess.Popen(
-        [sys.executable, "-c", BLOCKED_MAIN_THREAD], stdout=subprocess.PIPE, text=True
-    ) as process:
-        try:
-            assert process.stdout is not None
-            assert process.stdout.readline() == "spinning\n"
-            process.send_signal(number)
-            assert process.stdout.readline() == "ended\n"
-        finally:
-            process.kill()
+    with running(BLOCKED_MAIN_THREAD) as process:
+        assert process.stdout.readline() == "spinning\n"
+        process.send_signal(number)
+        assert process.stdout.readline() == "ended\n"
 
 
 SPIN_AND_INIT_AGAIN = f"""
@@ -158,17 +148,11 @@ print(rclpy.ok(), flush=True)
 
 
 def test_a_handled_signal_does_not_end_the_next_context(domain_id: int) -> None:
-    with subprocess.Popen(
-        [sys.executable, "-c", SPIN_AND_INIT_AGAIN], stdout=subprocess.PIPE, text=True
-    ) as process:
-        try:
-            assert process.stdout is not None
-            assert process.stdout.readline() == "spinning\n"
-            process.send_signal(signal.SIGINT)
-            assert process.stdout.readline() == "False\n"
-            assert process.stdout.readline() == "True\n"
-        finally:
-            process.kill()
+    with running(SPIN_AND_INIT_AGAIN) as process:
+        assert process.stdout.readline() == "spinning\n"
+        process.send_signal(signal.SIGINT)
+        assert process.stdout.readline() == "False\n"
+        assert process.stdout.readline() == "True\n"
 
 
 # DDS waits until a time of day: a wait that has begun before a step back by an hour takes an hour longer.
@@ -203,25 +187,15 @@ rclpy.spin(node)
 
 def test_a_timer_fires_in_time_although_the_clock_is_set_back(domain_id: int) -> None:
     reading, writing = os.pipe()
-    with subprocess.Popen(
-        [sys.executable, "-c", STEP_BACK, str(reading)],
-        env={**os.environ, "ROS_DOMAIN_ID": str(domain_id)},
-        pass_fds=[reading],
-        stdout=subprocess.PIPE,
-        text=True,
-    ) as process:
-        assert process.stdout is not None
-        try:
-            assert process.stdout.readline() == "waits\n"
-            while not is_asleep(process.pid):
-                time.sleep(0.001)
-            os.write(writing, b"step")
-            assert process.wait(10) == 0
-            assert process.stdout.read().endswith("fired\n")
-        finally:
-            process.kill()
-            os.close(reading)
-            os.close(writing)
+    with running(STEP_BACK, str(reading), pass_fds=[reading]) as process:
+        os.close(reading)
+        assert process.stdout.readline() == "waits\n"
+        while not is_asleep(process.pid):
+            time.sleep(0.001)
+        os.write(writing, b"step")
+        assert process.wait(10) == 0
+        assert process.stdout.read().endswith("fired\n")
+    os.close(writing)
 
 
 def test_the_kernel_watches_the_clock_and_reports_nothing_without_a_step() -> None:
@@ -249,13 +223,7 @@ print(ended.wait(10), other.ok())
 
 
 def test_a_signal_shuts_down_each_context_however_it_was_initialized(domain_id: int) -> None:
-    environment = {**os.environ, "ROS_DOMAIN_ID": str(domain_id)}
     ended = subprocess.run(
-        [sys.executable, "-c", TWO_CONTEXTS],
-        env=environment,
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
+        [sys.executable, "-c", TWO_CONTEXTS], capture_output=True, text=True, timeout=60, check=False
     )
     assert (ended.stdout, ended.stderr) == ("True False\n", "")

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 from collections.abc import Callable
 from typing import Any
 
@@ -139,22 +136,3 @@ def test_a_waitable_may_consist_of_an_action_client(
     for one in (server, client):
         node.remove_waitable(one)
         one.destroy()
-
-
-PROGRAM = """
-import sys
-import rclpy
-from rclpy.node import Node
-rclpy.init()
-node = Node("node")
-node.create_timer(0.0, lambda: None)
-rclpy.spin_once(node, timeout_sec=10)
-print("rclpy._wait_set" in sys.modules)
-rclpy.shutdown()
-"""
-
-
-def test_programs_without_waitables_do_not_load_wait_sets(domain_id: int) -> None:
-    environment = os.environ | {"ROS_DOMAIN_ID": str(domain_id)}
-    command = [sys.executable, "-c", PROGRAM]
-    assert subprocess.check_output(command, env=environment, text=True, timeout=60) == "False\n"
