@@ -97,11 +97,7 @@ WATCHDOG_SCENARIOS = tuple(Scenario(WATCHDOG, 1, rate, warm_up=2.0, seconds=3.0)
 
 
 def measure(alternative: Alternative, scenario: Scenario) -> dict[str, float]:
-    """
-    Return the figures of a scenario, named with its key.
-
-    :raises MeasurementFailed: if the processes end early or stay silent.
-    """
+    """Return the figures by name, with the scenario's key. Raises MeasurementFailed without figures."""
     if scenario.name == WATCHDOG:
         return _measure_watchdog(alternative, scenario)
     roles = (SINK, *scenario.middle, SOURCE)
@@ -135,11 +131,7 @@ def _measure_watchdog(alternative: Alternative, scenario: Scenario) -> dict[str,
 
 
 def measure_subscribers(alternative: Alternative, scenario: Scenario, count: int) -> dict[str, float]:
-    """
-    Return the processor time that an item costs its publisher and each of ``count`` subscribers [µs].
-
-    :raises MeasurementFailed: if the processes end early or stay silent.
-    """
+    """Return an item's processor time in its publisher and each subscriber [µs]. Raises MeasurementFailed."""
     with _run(alternative, (*[SINK] * count, SOURCE), scenario) as run:
         run.start()
         _, (publisher, subscriber) = _cost(run, [run.pids[SOURCE], run.pids[SINK]], scenario.seconds)

@@ -74,11 +74,7 @@ class Fleet:
         self._stack.close()
 
     def start(self) -> None:
-        """
-        Start one more arm, and wait until all its services are up.
-
-        :raises MeasurementFailed: if it does not start.
-        """
+        """Start one more arm, and wait for its services. Raises MeasurementFailed if it does not start."""
         name = f"arm{len(self.arms) + 1}"
         arm = RealArm(f"/{name}", System(self._directory / name))
         if not self.domain or not self._shared:

@@ -20,12 +20,7 @@ def get_packages_with_prefixes() -> dict[str, str]:
 
 
 def get_package_prefix(package_name: str) -> str:
-    """
-    Return the prefix into which a package is installed.
-
-    :raises PackageNotFoundError: if no prefix has it.
-    :raises ValueError: if the name is not that of a package (REP 127).
-    """
+    """Return a package's prefix. Raises PackageNotFoundError, or ValueError for a bad name (REP 127)."""
     if not re.fullmatch("[a-zA-Z0-9][a-zA-Z0-9_-]+", package_name, re.ASCII):
         raise ValueError(f"'{package_name}' is not a valid package name")
     prefix = has_resource("packages", package_name)

@@ -70,11 +70,7 @@ class RosArguments:
     remaining: list[str] = field(default_factory=list)
 
     def before(self, fallback: RosArguments) -> RosArguments:
-        """
-        Return these arguments of one node, completed by those of its process (`fallback`).
-
-        Remaps and parameters of the node win. All other arguments are those of the process.
-        """
+        """Return a node's arguments: its remaps and parameters come first, the rest is its process'."""
         return replace(
             fallback, remaps=self.remaps + fallback.remaps, parameters=fallback.parameters + self.parameters
         )

@@ -14,12 +14,7 @@ class Checked(Generic[T]):
     def __init__(
         self, kind: type[T], doc: str, also: type | None = None, make: Callable[[Any], T] | None = None
     ) -> None:
-        """
-        Create the attribute.
-
-        :param also: another type whose values can be assigned.
-        :param make: makes the value from one of the other type; by default, ``kind`` does.
-        """
+        """Create the attribute; ``make``, by default ``kind``, converts values of the type ``also``."""
         self._kind, self._also, self.__doc__ = kind, also, doc
         self._make: Callable[[Any], T] = make or kind
 

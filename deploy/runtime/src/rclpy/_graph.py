@@ -101,11 +101,7 @@ class Graph(GraphQueries):
                 self._writer.write(encode(self.participant.gid, list(self._own.values())))
 
     def add_node(self, node: Node, dropped: Callable[[], None]) -> None:
-        """
-        Announce a node of this process until it is removed or garbage-collected.
-
-        :param dropped: called on the graph's thread after a garbage collection and the closing of endpoints.
-        """
+        """Announce a node until it is removed, or dropped: then the graph's thread calls ``dropped``."""
         with self._lock:
             self._own[weakref.ref(node, self._drop)] = _OwnNode(node, dropped)
         self._announce()

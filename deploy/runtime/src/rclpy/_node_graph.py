@@ -36,11 +36,9 @@ class NodeGraph(NodeNames):
         return [name for name, _, _ in self._rclpy_usable_graph().node_names()]
 
     def get_fully_qualified_node_names(self) -> list[str]:
-        """Return the names of all nodes, with their namespaces."""
         return _full_names(self._rclpy_usable_graph())
 
     def get_node_names_and_namespaces(self) -> list[tuple[str, str]]:
-        """Return name and namespace of every node."""
         return [(name, namespace) for name, namespace, _ in self._rclpy_usable_graph().node_names()]
 
     def get_node_names_and_namespaces_with_enclaves(self) -> list[tuple[str, str, str]]:
@@ -79,15 +77,12 @@ class NodeGraph(NodeNames):
         return self._rclpy_usable_graph().count_writers(self._rclpy_counted_topic(topic_name))
 
     def count_subscribers(self, topic_name: str) -> int:
-        """Return the number of subscriptions to a topic; its name is not remapped."""
         return self._rclpy_usable_graph().count_readers(self._rclpy_counted_topic(topic_name))
 
     def count_services(self, service_name: str) -> int:
-        """Return the number of servers of a service; its name is not remapped."""
         return self._rclpy_usable_graph().count_readers(self._rclpy_counted_requests(service_name))
 
     def count_clients(self, service_name: str) -> int:
-        """Return the number of clients of a service; its name is not remapped."""
         return self._rclpy_usable_graph().count_writers(self._rclpy_counted_requests(service_name))
 
     def get_publishers_info_by_topic(

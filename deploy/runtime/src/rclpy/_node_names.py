@@ -44,12 +44,7 @@ class NodeNames:
             raise InvalidHandle(f"cannot use node {self._rclpy_fully_qualified_name}: it was destroyed")
 
     def _rclpy_check_usable(self) -> None:
-        """
-        Check that the node can be used in its domain.
-
-        :raises InvalidHandle: if the node was destroyed.
-        :raises RCLError: if the context was shut down.
-        """
+        """Raise InvalidHandle if the node was destroyed, RCLError if its context was shut down."""
         self._rclpy_check_exists()
         if not self._context.ok():
             raise RCLError(f"cannot use node {self._rclpy_fully_qualified_name}: the context was shut down")
@@ -64,19 +59,11 @@ class NodeNames:
         return self._rclpy_fully_qualified_name
 
     def resolve_topic_name(self, topic: str, *, only_expand: bool = False) -> str:
-        """
-        Return the fully qualified name of a topic, remapped unless ``only_expand``.
-
-        :raises RCLError: if the name is invalid.
-        """
+        """Return a topic's full name, remapped unless ``only_expand``. Raises RCLError if it is invalid."""
         return self._rclpy_resolve(topic, only_expand, is_service=False)
 
     def resolve_service_name(self, service: str, *, only_expand: bool = False) -> str:
-        """
-        Return the fully qualified name of a service, remapped unless ``only_expand``.
-
-        :raises RCLError: if the name is invalid.
-        """
+        """Return a service's full name, remapped unless ``only_expand``. Raises RCLError if it is invalid."""
         return self._rclpy_resolve(service, only_expand, is_service=True)
 
     def _rclpy_resolve(self, name: str, only_expand: bool, *, is_service: bool) -> str:

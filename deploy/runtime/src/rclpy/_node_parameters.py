@@ -49,12 +49,7 @@ class NodeParameters(NodeNames):
     _clock: Clock
 
     def _rclpy_init_parameters(self, overrides: dict[str, Parameter], *, allow_undeclared: bool) -> None:
-        """
-        Initialize the node without parameters.
-
-        :param overrides: values that replace those given at declaration.
-        :param allow_undeclared: whether undeclared parameters can be set, and read as not set.
-        """
+        """Begin without parameters; ``overrides`` replace the values that declarations give."""
         self._parameters: dict[str, Parameter] = {}
         self._descriptors: dict[str, ParameterDescriptor] = {}
         self._parameter_overrides = overrides
@@ -160,11 +155,7 @@ class NodeParameters(NodeNames):
         return name in self._parameters
 
     def get_parameter_types(self, names: list[str]) -> list[Parameter.Type]:
-        """
-        Return the types of parameters; see `get_parameter_type`.
-
-        :raises TypeError: if a name is not a string.
-        """
+        """Return types, see `get_parameter_type`. Raises TypeError if a name is not a string."""
         _check_names(names)
         return [self.get_parameter_type(name) for name in names]
 
@@ -181,11 +172,7 @@ class NodeParameters(NodeNames):
         raise ParameterNotDeclaredException(name)
 
     def get_parameters(self, names: list[str]) -> list[Parameter]:
-        """
-        Return parameters; see `get_parameter`.
-
-        :raises TypeError: if a name is not a string.
-        """
+        """Return parameters, see `get_parameter`. Raises TypeError if a name is not a string."""
         _check_names(names)
         return [self.get_parameter(name) for name in names]
 
@@ -213,11 +200,7 @@ class NodeParameters(NodeNames):
         return parameter
 
     def get_parameters_by_prefix(self, prefix: str) -> dict[str, Parameter]:
-        """
-        Return the parameters below `prefix`, by their names without it; all if `prefix` is empty.
-
-        rclpy also returns `Parameter`s, although its annotation says values.
-        """
+        """Return the `Parameter`s below `prefix`, by their names without it; all if `prefix` is empty."""
         start = f"{prefix}{PARAMETER_SEPARATOR_STRING}" if prefix else ""
         return {
             name.removeprefix(start): parameter

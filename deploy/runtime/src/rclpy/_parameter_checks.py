@@ -9,11 +9,7 @@ from rclpy.parameter import Parameter
 
 
 def objection(parameter: Parameter, descriptor: ParameterDescriptor, rel_tol: float) -> str:
-    """
-    Return why the descriptor's type or range forbids the parameter's value; '' if it allows it.
-
-    :param rel_tol: relative tolerance with which a double must meet a bound or step.
-    """
+    """Return why type or range forbid a value, '' if they allow it; `rel_tol` is a double's tolerance."""
     if parameter.type_ is Parameter.Type.NOT_SET:
         return ""
     if not descriptor.dynamic_typing and parameter.type_.value != descriptor.type:

@@ -31,11 +31,7 @@ class ParameterFileError(ValueError):
 
 
 def read_parameter_file(path: str) -> ParametersOfNodes:
-    """
-    Read a parameter file.
-
-    :raises ParameterFileError: if the file cannot be read or is invalid.
-    """
+    """Read a parameter file. Raises ParameterFileError if it cannot be read or is invalid."""
     try:
         with open(path, encoding="utf-8") as file:
             document = yaml.compose(file, Loader=_Loader)
@@ -60,11 +56,7 @@ def read_parameter_file(path: str) -> ParametersOfNodes:
 
 
 def parse_yaml_value(text: str) -> Any:
-    """
-    Convert a scalar or a list of scalars.
-
-    :raises ValueError: if the text is not YAML, or something else in YAML.
-    """
+    """Convert a scalar or a list of scalars. Raises ValueError if the text is something else, or not YAML."""
     try:
         return _value(yaml.compose(text, Loader=_Loader))
     except yaml.YAMLError as error:
@@ -153,11 +145,7 @@ def _check_node_name(key_node: yaml.Node, name: str) -> None:
 
 
 def _value(node: yaml.Node | None) -> Any:
-    """
-    Convert a scalar or a list of scalars. An empty list has no type: it is `None`, as in ROS 2.
-
-    :raises ValueError: for other nodes, an empty scalar, or a list of mixed types.
-    """
+    """Convert a scalar or a list of one type; an empty list is `None`, as in ROS 2. Raises ValueError."""
     if isinstance(node, yaml.ScalarNode) and not _is_empty(node):
         return _scalar(node)
     if not isinstance(node, yaml.SequenceNode):

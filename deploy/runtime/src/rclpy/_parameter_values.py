@@ -12,11 +12,7 @@ _NOT_PLAIN = re.compile(r"""[\[\]{}'"!&*|>#%@`:,?\\\s]|^-$|^---|^\.\.\.""")
 
 
 def parse_value(text: str) -> Any:
-    """
-    Convert the value of `-p name:=value`.
-
-    :raises ValueError: if it is empty, invalid YAML, or neither a scalar nor a list of scalars of one type.
-    """
+    """Convert the value of `-p name:=value`. Raises ValueError if no parameter can have it."""
     # The usual case, a plain scalar, needs no YAML parser, which takes time to import.
     if not _NOT_PLAIN.search(text):
         return plain_scalar(text)

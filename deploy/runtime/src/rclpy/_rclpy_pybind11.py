@@ -36,11 +36,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    """
-    Return what few programs need: enumerations, and guard conditions for waitables.
-
-    :raises NotImplementedError: for all other names of the extension.
-    """
+    """Return enumerations, and guard conditions for waitables. Raises NotImplementedError for all others."""
     if name.startswith("__"):
         raise AttributeError(name)
     if name == "GuardCondition":

@@ -10,11 +10,7 @@ from typing import Any
 
 
 class CallbackGroup:
-    """
-    Base of the callback groups, which decide when the callbacks of their entities may run.
-
-    An entity is a subscription, timer, service, client, guard condition or waitable.
-    """
+    """Base of the callback groups, which decide when the callbacks of their entities may run."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -43,11 +39,9 @@ class ReentrantCallbackGroup(CallbackGroup):
     """Lets all callbacks run in parallel, even a callback with itself."""
 
     def can_execute(self, entity: Any) -> bool:
-        """Return `True`: `entity` may always run."""
         return True
 
     def beginning_execution(self, entity: Any) -> bool:
-        """Return `True`: `entity` may always run."""
         return True
 
     def ending_execution(self, entity: Any) -> None:
@@ -64,7 +58,6 @@ class MutuallyExclusiveCallbackGroup(CallbackGroup):
         self._rclpy_permission = [None]
 
     def can_execute(self, entity: Any) -> bool:
-        """Return whether no callback of the group is running."""
         return bool(self._rclpy_permission)
 
     def beginning_execution(self, entity: Any) -> bool:

@@ -107,21 +107,13 @@ class Client(ServiceSide):
                     del self._pending_requests[number]
 
     def service_is_ready(self) -> bool:
-        """
-        Whether a server is matched in both directions, and none on another DDS.
-
-        :raises RCLError: after the shutdown.
-        """
+        """Whether a server is matched both ways, none on another DDS. Raises RCLError after the shutdown."""
         if not self.context.ok():
             raise RCLError(f"cannot look for a server of {self._rclpy_name}: the context was shut down")
         return server_is_matched(self.handle, self._rclpy_replies)
 
     def wait_for_service(self, timeout_sec: float | None = None) -> bool:
-        """
-        Wait for a server, at most ``timeout_sec`` (``None``: no limit); return whether there is one.
-
-        :raises RCLError: if the context is shut down, so that a loop around this call ends.
-        """
+        """Return whether a server comes within ``timeout_sec`` (``None``: no limit). RCLError at shutdown."""
         timeout = None if timeout_sec is None else max(0.0, timeout_sec)
         graph = self._rclpy_node._rclpy_graph
         return graph.wait_for(self.service_is_ready, timeout, self.context.ok) or self.service_is_ready()

@@ -351,11 +351,7 @@ class ROSClock(Clock):
         self._rclpy_source.set_ros_time_override_is_enabled(enabled)
 
     def set_ros_time_override(self, time: Time) -> None:
-        """
-        Set the simulated time.
-
-        :raises TypeError: if ``time`` is not a :class:`~rclpy.time.Time`.
-        """
+        """Set the simulated time. Raises TypeError if ``time`` is not a :class:`~rclpy.time.Time`."""
         if not isinstance(time, Time):
             raise TypeError("Time must be specified as rclpy.time.Time")
         self._rclpy_source.set_ros_time_override(time)

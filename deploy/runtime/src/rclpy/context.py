@@ -143,11 +143,7 @@ class Context(AbstractContextManager["Context"]):
             self._callbacks.remove(reference)
 
     def shutdown(self) -> None:
-        """
-        Shut down: all waiting calls end, and new ones are not possible.
-
-        :raises RCLError: if the context is not initialized or already shut down.
-        """
+        """Shut down: waiting calls end, new ones are not possible. Raises RCLError if it does not run."""
         if not self._rclpy_end():
             if self._rclpy_initialized:
                 raise RCLError("failed to shutdown: rcl_shutdown already called on the given context")

@@ -29,11 +29,7 @@ class Duration:
     __hash__ = None  # type: ignore[assignment]
 
     def __init__(self, *, seconds: int | float = 0, nanoseconds: int = 0):
-        """
-        Create a duration from the sum of `seconds` and `nanoseconds`, without fractions of a nanosecond.
-
-        :raises OverflowError: if the sum does not fit into 64 bits.
-        """
+        """Create `seconds` plus `nanoseconds`, in whole nanoseconds. Raises OverflowError beyond 64 bits."""
         total = int(seconds * S_TO_NS) + int(nanoseconds)
         if not _MIN <= total <= _MAX:
             raise OverflowError("Total nanoseconds value is too large to store in C duration.")
@@ -71,11 +67,7 @@ class Duration:
 
     @classmethod
     def from_msg(cls, msg: builtin_interfaces.msg.Duration) -> Duration:
-        """
-        Convert from a message.
-
-        :raises TypeError: if `msg` is not a `builtin_interfaces.msg.Duration`.
-        """
+        """Convert from a message. Raises TypeError if `msg` is not a `builtin_interfaces.msg.Duration`."""
         if not isinstance(msg, builtin_interfaces.msg.Duration):
             raise TypeError("Must pass a builtin_interfaces.msg.Duration object")
         return cls(seconds=msg.sec, nanoseconds=msg.nanosec)

@@ -175,7 +175,6 @@ class EventHandler(Waitable):
         self._rclpy_destroyed = True
 
     def get_num_entities(self) -> NumberOfEntities:
-        """Return one event."""
         return NumberOfEntities(num_events=1)
 
     def add_to_wait_set(self, wait_set: Any) -> None:
@@ -290,7 +289,6 @@ class PublisherEventCallbacks:
         matched: Callable[[QoSPublisherMatchedInfo], None] | None = None,
         use_default_callbacks: bool = True,
     ) -> None:
-        """Choose the callbacks; by default, incompatible QoS is logged as a warning."""
         self.deadline = deadline
         self.liveliness = liveliness
         self.incompatible_qos = incompatible_qos

@@ -341,11 +341,7 @@ class Executor(ExecutorOffers, AbstractContextManager["Executor"]):
         return self._rclpy_spinning_thread is None
 
     def shutdown(self, timeout_sec: float | None = None) -> bool:
-        """
-        Stop, and wait until callbacks on other threads have ended.
-
-        :return: whether they ended within ``timeout_sec`` (``None``: no limit).
-        """
+        """Stop; return whether callbacks on other threads end within ``timeout_sec`` (``None``: no limit)."""
         if not self._is_shutdown:
             self._is_shutdown = self._rclpy_changed = True
             self._guard.trigger()
@@ -398,18 +394,15 @@ class _BuiltInExecutor(Executor):
             self._rclpy_spin(None, None)
 
     def spin_once(self, timeout_sec: float | None = None) -> None:
-        """Run one callback; wait for it at most ``timeout_sec`` (``None`` or negative: no limit)."""
         self._rclpy_spin(_deadline(timeout_sec), None, once=True)
 
     def spin_once_until_future_complete(
         self, future: Future, timeout_sec: float | TimeoutObject | None = None
     ) -> None:
-        """Run one callback, unless ``future`` is done before one is ready."""
         future._rclpy_call_when_complete(self.wake)
         self._rclpy_spin(_deadline(timeout_sec), future._rclpy_is_over, once=True)
 
     def spin_until_future_complete(self, future: Future, timeout_sec: float | None = None) -> None:
-        """Run callbacks until ``future`` is done or cancelled, at most for ``timeout_sec``."""
         if self._rclpy_overrides("spin_once_until_future_complete", "wait_for_ready_callbacks"):
             super().spin_until_future_complete(future, timeout_sec)
             return
@@ -498,11 +491,7 @@ class MultiThreadedExecutor(_BuiltInExecutor):
     _rclpy_spin_ends = _BuiltInExecutor._rclpy_spin_ends | {ExternalShutdownException}  # as in rclpy
 
     def __init__(self, num_threads: int | None = None, *, context: Context | None = None) -> None:
-        """
-        Create an executor with ``num_threads`` threads, by default one per processor and at least two.
-
-        :raises ValueError: if ``num_threads`` is less than one.
-        """
+        """Create ``num_threads`` threads, by default one per processor, at least two. Raises ValueError."""
         if num_threads is not None and num_threads < 1:
             raise ValueError("a MultiThreadedExecutor needs at least one thread")
         from concurrent.futures import ThreadPoolExecutor  # here: it takes long to import

@@ -32,22 +32,14 @@ _root_logger = RcutilsLogger()
 
 
 def get_logger(name: str) -> RcutilsLogger:
-    """
-    Return a logger with that name.
-
-    :raises ValueError: if `name` is empty.
-    """
+    """Return a logger with that name. Raises ValueError if `name` is empty."""
     if not name:
         raise ValueError("Logger name must not be empty.")
     return _root_logger.get_child(name)
 
 
 def initialize() -> None:
-    """
-    Configure logging from the environment, unless it is already configured.
-
-    :raises RuntimeError: if an environment variable has an invalid value.
-    """
+    """Configure logging from the environment, once. Raises RuntimeError if a variable is invalid."""
     _logging_output.initialize()
 
 
@@ -64,12 +56,7 @@ def clear_config() -> None:
 
 
 def set_logger_level(name: str, level: int | LoggingSeverity, detailed_error: bool = False) -> None:
-    """
-    Set the level of the logger `name`; '' sets the default of all loggers.
-
-    :param detailed_error: has no effect: the only error always names its reason.
-    :raises ValueError: if `level` is not a severity.
-    """
+    """Set a logger's level, or with '' the default. Raises ValueError, with its reason in any case."""
     _logging_levels.set_level(name, LoggingSeverity(level))
 
 
@@ -84,11 +71,7 @@ def get_logger_level(name: str) -> LoggingSeverity:
 
 
 def get_logging_severity_from_string(log_severity: str) -> LoggingSeverity:
-    """
-    Return the severity with that name, in upper or lower case.
-
-    :raises RuntimeError: if there is none.
-    """
+    """Return the severity with that name, in upper or lower case. Raises RuntimeError if there is none."""
     try:
         return LoggingSeverity[log_severity.upper()]
     except KeyError:
@@ -104,11 +87,7 @@ def get_logging_directory() -> Path:
 
 
 def _apply_arguments(arguments: RosArguments) -> None:
-    """
-    Configure logging from the environment and the command line of a process.
-
-    :raises RuntimeError: if an environment variable has an invalid value.
-    """
+    """Configure logging from environment and command line. Raises RuntimeError if a variable is invalid."""
     initialize()
     _logging_output.enable_console(arguments.stdout_logs)
     if arguments.log_level is not None:

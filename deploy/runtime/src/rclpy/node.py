@@ -462,11 +462,7 @@ class Node(NodeParameters, NodeGraph):
         qos_profile: QoSProfile = qos_profile_services_default,
         callback_group: CallbackGroup | None = None,
     ) -> Client:
-        """
-        Create a client of a service.
-
-        :raises InvalidServiceNameException: if the service's name is invalid.
-        """
+        """Create a client of a service. Raises InvalidServiceNameException if its name is invalid."""
         group = callback_group or self._default_callback_group
         endpoint = self._rclpy_service_endpoint(srv_type, srv_name, qos_profile, is_server=False)
         client = Client(self._context, endpoint, srv_type, srv_name, qos_profile, group)
@@ -541,12 +537,7 @@ class Node(NodeParameters, NodeGraph):
         return guard
 
     def create_rate(self, frequency: float, clock: Clock | None = None) -> Rate:
-        """
-        Create a rate: a thread that does not spin the node can sleep until its next tick.
-
-        :param frequency: ticks per second; positive.
-        :raises ValueError: if the frequency is not positive.
-        """
+        """Create a rate [Hz], for threads that do not spin the node. Raises ValueError if not positive."""
         if frequency <= 0:
             raise ValueError("frequency must be > 0")
         # A separate group: callbacks of the node must not delay the rate.
@@ -577,23 +568,18 @@ class Node(NodeParameters, NodeGraph):
         return self._rclpy_destroy(self._publishers, publisher)
 
     def destroy_subscription(self, subscription: Subscription) -> bool:
-        """Destroy a subscription; return ``False`` if the node does not have it."""
         return self._rclpy_destroy(self._subscriptions, subscription)
 
     def destroy_client(self, client: Client) -> bool:
-        """Destroy a client; return ``False`` if the node does not have it."""
         return self._rclpy_destroy(self._clients, client)
 
     def destroy_service(self, service: Service) -> bool:
-        """Destroy a service; return ``False`` if the node does not have it."""
         return self._rclpy_destroy(self._services, service)
 
     def destroy_timer(self, timer: Timer) -> bool:
-        """Destroy a timer; return ``False`` if the node does not have it."""
         return self._rclpy_destroy(self._timers, timer)
 
     def destroy_guard_condition(self, guard: GuardCondition) -> bool:
-        """Destroy a guard condition; return ``False`` if the node does not have it."""
         return self._rclpy_destroy(self._guards, guard)
 
     def destroy_rate(self, rate: Rate) -> bool:

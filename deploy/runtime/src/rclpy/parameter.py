@@ -56,11 +56,7 @@ class Parameter:
 
         @classmethod
         def from_parameter_value(cls, parameter_value: Any) -> Parameter.Type:
-            """
-            Return the type of a value; that of an empty list is a byte array.
-
-            :raises TypeError: if no parameter can have this value.
-            """
+            """Return the type of a value; of an empty list, a byte array. Raises TypeError if it has none."""
             if parameter_value is None:
                 return cls.NOT_SET
             for scalar, type_ in _SCALARS.items():
@@ -156,11 +152,7 @@ def _field(type_: Any) -> str:
 
 
 def get_parameter_value(string_value: str) -> ParameterValue:
-    """
-    Convert a text to a value of the type that it has in YAML, or else to a string.
-
-    A list of mixed types, a mapping and an empty text become strings.
-    """
+    """Convert a text to the value that it has in YAML; what no parameter can have becomes a string."""
     import yaml
 
     try:
@@ -184,11 +176,7 @@ def _from_yaml(value: Any, text: str) -> ParameterValue:
 
 
 def parameter_value_to_python(parameter_value: ParameterValue) -> Any:
-    """
-    Return the value in a message: arrays as lists, `None` if it is not set.
-
-    :raises RuntimeError: if the type in the message is unknown.
-    """
+    """Return a message's value: arrays as lists, `None` if not set. Raises RuntimeError for other types."""
     try:
         type_ = Parameter.Type(parameter_value.type)
     except ValueError:

@@ -30,11 +30,7 @@ if TYPE_CHECKING:
 
 
 class AsyncParameterClient:
-    """
-    Calls the parameter services of another node. All calls return futures of the responses.
-
-    If a `callback` is given, it becomes a done callback of the future.
-    """
+    """Calls the parameter services of another node; `callback` is a done callback of the returned future."""
 
     def __init__(
         self,
@@ -76,11 +72,7 @@ class AsyncParameterClient:
         return all(client.service_is_ready() for client in self._rclpy_clients())
 
     def wait_for_services(self, timeout_sec: float | None = None) -> bool:
-        """
-        Wait for all services, at most `timeout_sec` seconds; `None`: no limit.
-
-        :returns: whether they are available.
-        """
+        """Return whether all services are available within `timeout_sec` seconds (`None`: no limit)."""
         deadline = None if timeout_sec is None else time.monotonic() + timeout_sec
         for client in self._rclpy_clients():
             remaining = None if deadline is None else deadline - time.monotonic()
@@ -139,11 +131,7 @@ class AsyncParameterClient:
         use_wildcard: bool = False,
         callback: Callable[[Future], Any] | None = None,
     ) -> Future:
-        """
-        Set the parameters in a YAML file one by one; see `parameter_dict_from_yaml_file`.
-
-        :raises RuntimeError: if it is not a parameter file.
-        """
+        """Set the parameters of a YAML file one by one. Raises RuntimeError if it is not a parameter file."""
         parameters = parameter_dict_from_yaml_file(parameter_file, use_wildcard)
         return self.set_parameters(list(parameters.values()), callback)
 
@@ -153,11 +141,7 @@ class AsyncParameterClient:
         use_wildcard: bool = False,
         callback: Callable[[Future], Any] | None = None,
     ) -> Future:
-        """
-        Set all parameters in a YAML file or none; see `parameter_dict_from_yaml_file`.
-
-        :raises RuntimeError: if it is not a parameter file.
-        """
+        """Set all parameters of a YAML file or none. Raises RuntimeError if it is not a parameter file."""
         parameters = parameter_dict_from_yaml_file(parameter_file, use_wildcard)
         return self.set_parameters_atomically(list(parameters.values()), callback)
 

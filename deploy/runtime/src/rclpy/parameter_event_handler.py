@@ -74,11 +74,7 @@ class ParameterEventHandler:
             return handle
 
         def remove_parameter_callback(self, handle: ParameterCallbackHandle) -> None:
-            """
-            Undo `add_parameter_callback`.
-
-            :raises RuntimeError: if it was not added.
-            """
+            """Undo `add_parameter_callback`. Raises RuntimeError if it was not added."""
             key = (handle.parameter_name, handle.node_name)
             with self.mutex:
                 handles = self.parameter_callbacks.get(key, [])
@@ -97,11 +93,7 @@ class ParameterEventHandler:
             return handle
 
         def remove_parameter_event_callback(self, handle: ParameterEventCallbackHandle) -> None:
-            """
-            Undo `add_parameter_event_callback`.
-
-            :raises RuntimeError: if it was not added.
-            """
+            """Undo `add_parameter_event_callback`. Raises RuntimeError if it was not added."""
             with self.mutex:
                 if handle not in self.event_callbacks:
                     raise RuntimeError("Callback doesn't exist")
@@ -160,11 +152,7 @@ class ParameterEventHandler:
         return self._callbacks.add_parameter_callback(parameter_name, self._resolve_path(node_name), callback)
 
     def remove_parameter_callback(self, handle: ParameterCallbackHandle) -> None:
-        """
-        Undo `add_parameter_callback`.
-
-        :raises RuntimeError: if it was not added.
-        """
+        """Undo `add_parameter_callback`. Raises RuntimeError if it was not added."""
         self._callbacks.remove_parameter_callback(handle)
 
     def add_parameter_event_callback(
@@ -174,11 +162,7 @@ class ParameterEventHandler:
         return self._callbacks.add_parameter_event_callback(callback)
 
     def remove_parameter_event_callback(self, handle: ParameterEventCallbackHandle) -> None:
-        """
-        Undo `add_parameter_event_callback`.
-
-        :raises RuntimeError: if it was not added.
-        """
+        """Undo `add_parameter_event_callback`. Raises RuntimeError if it was not added."""
         self._callbacks.remove_parameter_event_callback(handle)
 
     def _resolve_path(self, node_path: str | None = None) -> str:

@@ -52,16 +52,11 @@ class QoSPolicyEnum(IntEnum):
 
     @classmethod
     def get_from_short_key(cls, name: str) -> int:
-        """
-        Return the number of the member with that name, in upper or lower case.
-
-        :raises KeyError: if there is none.
-        """
+        """Return the member's number by name, in upper or lower case. Raises KeyError if there is none."""
         return cls[name.upper()].value
 
     @property
     def short_key(self) -> str:
-        """The lower-case name of this member."""
         return self.name.lower()
 
 
@@ -231,11 +226,7 @@ class QoSProfile:
         self._depth = value
 
     def get_c_qos_profile(self) -> NoReturn:
-        """
-        Not supported: there is no C layer.
-
-        :raises NotImplementedError: always.
-        """
+        """Raise NotImplementedError: there is no C layer."""
         raise NotImplementedError("QoSProfile.get_c_qos_profile: this runtime has no rmw_qos_profile_t")
 
     def __eq__(self, other: object) -> bool:
@@ -314,16 +305,11 @@ class QoSPresetProfiles(Enum):
 
     @classmethod
     def short_keys(cls) -> list[str]:
-        """Return the lower-case names of all presets."""
         return [name.lower() for name in cls.__members__]
 
     @classmethod
     def get_from_short_key(cls, name: str) -> QoSProfile:
-        """
-        Return the preset with that name, in upper or lower case.
-
-        :raises KeyError: if there is none.
-        """
+        """Return the preset with that name, in upper or lower case. Raises KeyError if there is none."""
         return cls[name.upper()].value
 
 

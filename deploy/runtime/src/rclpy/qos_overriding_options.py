@@ -52,12 +52,7 @@ class QoSOverridingOptions:
         callback: QosCallbackType | None = None,
         entity_id: str | None = None,
     ) -> None:
-        """
-        Select the policies.
-
-        :param callback: returns whether the profile is valid with all overrides.
-        :param entity_id: distinguishes the entity from others of its kind on the same topic.
-        """
+        """Select policies; ``callback`` judges the profile, ``entity_id`` tells entities of a topic apart."""
         self._policy_kinds = policy_kinds
         self._callback = callback
         self._entity_id = entity_id

@@ -49,11 +49,7 @@ class Service(ServiceSide):
         return self._rclpy_requests
 
     def send_response(self, response: Any, header: RequestId) -> None:
-        """
-        Answer the request that ``header`` identifies.
-
-        :raises TypeError: if ``response`` is not of the service's response type.
-        """
+        """Answer the request of ``header``. Raises TypeError if ``response`` is of another type."""
         if not isinstance(response, self.srv_type.Response):
             expected = self.srv_type.Response._TYPE_NAME
             raise TypeError(f"{self._rclpy_name} must answer with {expected}, not {response!r}")

@@ -15,11 +15,7 @@ if TYPE_CHECKING:
 
 
 class Future:
-    """
-    A future result or exception. Coroutine callbacks can await it.
-
-    All methods may be called from any thread.
-    """
+    """A future result or exception, for any thread. Coroutine callbacks can await it."""
 
     def __init__(self, *, executor: Executor | None = None) -> None:
         """Create a future. Its done callbacks run on `executor`, or without one on the completing thread."""
@@ -47,11 +43,7 @@ class Future:
         return self.result()
 
     def cancel(self) -> None:
-        """
-        Cancel the future unless it is done: done callbacks run, and awaiting it results in `None`.
-
-        `done()` stays `False`, as in rclpy.
-        """
+        """Cancel unless done: callbacks run, awaiting gives `None`, `done()` stays `False`, as in rclpy."""
         with self._lock:
             if not self._rclpy_done:
                 self._rclpy_cancelled = True
@@ -68,11 +60,7 @@ class Future:
         return self._rclpy_done or self._rclpy_cancelled
 
     def result(self) -> Any:
-        """
-        Return the result, or `None` before there is one.
-
-        :raises Exception: the exception, if there is one instead of a result.
-        """
+        """Return the result, or `None` before there is one. Raises the exception if there is one instead."""
         if self._exception is not None:
             self._exception_fetched = True
             raise self._exception
@@ -170,11 +158,7 @@ _running = _Running()
 
 
 class Task(Future):
-    """
-    A function or coroutine that an executor runs, and the future of its result.
-
-    Only executors create tasks: see `Executor.create_task`.
-    """
+    """A function or coroutine that an executor runs (`Executor.create_task`), and its future."""
 
     def __init__(
         self,

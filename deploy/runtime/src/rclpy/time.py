@@ -25,11 +25,7 @@ class TimeHandle(Protocol):
 
 @total_ordering
 class Time:
-    """
-    A point in time: nanoseconds since the epoch of a clock, and the type of the clock.
-
-    Only times of the same clock type can be compared and subtracted.
-    """
+    """Nanoseconds since the epoch of a clock. Only times of one clock type can be compared and subtracted."""
 
     __slots__ = ("__weakref__", "_rclpy_clock_type", "_rclpy_nanoseconds")
 
@@ -147,11 +143,7 @@ class Time:
 
     @classmethod
     def from_msg(cls, msg: builtin_interfaces.msg.Time, clock_type: ClockType = ClockType.ROS_TIME) -> Time:
-        """
-        Convert from a message.
-
-        :raises TypeError: if `msg` is not a `builtin_interfaces.msg.Time`.
-        """
+        """Convert from a message. Raises TypeError if `msg` is not a `builtin_interfaces.msg.Time`."""
         if not isinstance(msg, builtin_interfaces.msg.Time):
             raise TypeError("Must pass a builtin_interfaces.msg.Time object")
         return cls(seconds=msg.sec, nanoseconds=msg.nanosec, clock_type=clock_type)

@@ -56,11 +56,7 @@ class TimeSource:
             self._rclpy_unsubscribe()
 
     def attach_node(self, node: Node) -> None:
-        """
-        Follow the parameter `use_sim_time` of `node`; declare it if necessary.
-
-        :raises TypeError: if `node` is not a node.
-        """
+        """Follow `use_sim_time` of `node`; declare it if necessary. Raises TypeError if it is no node."""
         from rclpy.node import Node
 
         if not isinstance(node, Node):
@@ -90,11 +86,7 @@ class TimeSource:
         self._node_weak_ref = None
 
     def attach_clock(self, clock: ROSClock) -> None:
-        """
-        Attach a clock.
-
-        :raises ValueError: if it is not a clock of ROS time.
-        """
+        """Attach a clock. Raises ValueError if it is not a clock of ROS time."""
         if not isinstance(clock, ROSClock):
             raise ValueError("Only clocks with type ROS_TIME can be attached.")
         clock.set_ros_time_override(self._last_time_set)
@@ -102,11 +94,7 @@ class TimeSource:
         self._associated_clocks[clock] = None
 
     def clock_callback(self, msg: rosgraph_msgs.msg.Clock) -> None:
-        """
-        Set all clocks to the simulator's time.
-
-        :raises ValueError: if it is negative.
-        """
+        """Set all clocks to the simulator's time. Raises ValueError if it is negative."""
         if self._rclpy_timeout is not None:
             self._rclpy_end_timeout()
         time = Time.from_msg(msg.clock)

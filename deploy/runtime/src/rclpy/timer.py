@@ -45,12 +45,7 @@ class Timer:
         context: Context | None = None,
         autostart: bool = True,
     ) -> None:
-        """
-        Create a timer; usually, :meth:`rclpy.node.Node.create_timer` does.
-
-        :param timer_period_ns: period [ns], not negative.
-        :param autostart: whether it starts now, or with :meth:`reset`.
-        """
+        """Create a timer with a period [ns]; usually, :meth:`rclpy.node.Node.create_timer` does."""
         if timer_period_ns < 0:
             raise RCLError("failed to create timer: timer period must be non-negative")
         self.callback = callback

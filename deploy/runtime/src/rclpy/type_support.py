@@ -6,11 +6,7 @@ from typing import Any
 
 
 def check_for_type_support(msg_or_srv_type: Any) -> None:
-    """
-    Check that a class is a message, service or action type of this runtime.
-
-    :raises AttributeError: if it is not.
-    """
+    """Raise AttributeError if a class is not a message, service or action type of this runtime."""
     if not hasattr(msg_or_srv_type, "_TYPE_NAME"):
         if hasattr(msg_or_srv_type.__class__, "_TYPE_SUPPORT"):
             raise AttributeError(
@@ -21,12 +17,7 @@ def check_for_type_support(msg_or_srv_type: Any) -> None:
 
 
 def check_is_valid_msg_type(msg_type: Any) -> None:
-    """
-    Check that a class is a message type.
-
-    :raises AttributeError: if it is neither a message nor a service type.
-    :raises RuntimeError: if it is a service type.
-    """
+    """Raise RuntimeError for another type of ROS than a message, AttributeError for other classes."""
     check_for_type_support(msg_type)
     if not hasattr(msg_type, "_serialize"):
         raise RuntimeError(
@@ -35,12 +26,7 @@ def check_is_valid_msg_type(msg_type: Any) -> None:
 
 
 def check_is_valid_srv_type(srv_type: Any) -> None:
-    """
-    Check that a class is a service type.
-
-    :raises AttributeError: if it is neither a message nor a service type.
-    :raises RuntimeError: if it is a message type.
-    """
+    """Raise RuntimeError for another type of ROS than a service, AttributeError for other classes."""
     check_for_type_support(srv_type)
     if not hasattr(srv_type, "Request"):
         raise RuntimeError(

@@ -14,11 +14,7 @@ g_context_lock = threading.Lock()
 
 
 def get_default_context(*, shutting_down: bool = False) -> Context:
-    """
-    Return the default context; create it if necessary.
-
-    :param shutting_down: whether the caller shuts it down: the next call creates a new one.
-    """
+    """Return the default context; after a call with ``shutting_down``, the next one creates a new one."""
     global g_default_context
     with g_context_lock:
         if g_default_context is None:

@@ -12,11 +12,7 @@ _MAX_LENGTH = 255 - 8
 
 
 def validate_full_topic_name(name: str, *, is_service: bool = False) -> Literal[True]:
-    """
-    Check that `name` is a valid fully qualified topic (or service) name.
-
-    :raises InvalidTopicNameException: if it is not (`InvalidServiceNameException` if `is_service`).
-    """
+    """Check a full name. Raises InvalidTopicNameException, for a service InvalidServiceNameException."""
     if problem := _problem(name, "topic name", _MAX_LENGTH):
         error = InvalidServiceNameException if is_service else InvalidTopicNameException
         raise error(name, *problem)
@@ -24,7 +20,6 @@ def validate_full_topic_name(name: str, *, is_service: bool = False) -> Literal[
 
 
 def _problem(name: str, what: str, max_length: int) -> tuple[str, int] | None:
-    """Return problem and index of an invalid fully qualified `name`, `None` for a valid one."""
     if not name:
         return f"{what} must not be empty", 0
     if name[0] != "/":

@@ -12,20 +12,13 @@ _MAX_LENGTH = validate_full_topic_name._MAX_LENGTH - 2
 
 
 def validate_namespace(namespace: str) -> Literal[True]:
-    """
-    Check that `namespace` is valid: absolute, with or without tokens.
-
-    The constructor of `Node` also accepts '' and relative namespaces, and makes them absolute first.
-
-    :raises InvalidNamespaceException: if it is invalid; the message marks the place.
-    """
+    """Check an absolute namespace. Raises InvalidNamespaceException, whose message marks the place."""
     if problem := _problem(namespace):
         raise InvalidNamespaceException(namespace, *problem)
     return True
 
 
 def _problem(namespace: str) -> tuple[str, int] | None:
-    """Return problem and index of an invalid `namespace`, `None` for a valid one."""
     if namespace == "/":
         return None
     if namespace.endswith("/"):

@@ -11,18 +11,13 @@ _MAX_LENGTH = 255
 
 
 def validate_node_name(node_name: str) -> Literal[True]:
-    """
-    Check that `node_name` consists of letters, digits and underscores and does not start with a digit.
-
-    :raises InvalidNodeNameException: if it does not; the message marks the place.
-    """
+    """Check for letters, digits, underscores, and no digit first. Raises InvalidNodeNameException."""
     if problem := _problem(node_name):
         raise InvalidNodeNameException(node_name, *problem)
     return True
 
 
 def _problem(name: str) -> tuple[str, int] | None:
-    """Return problem and index of an invalid `name`, `None` for a valid one."""
     if not name:
         return "node name must not be empty", 0
     if stray := re.search(r"[^0-9A-Za-z_]", name):

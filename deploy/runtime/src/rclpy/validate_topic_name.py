@@ -11,11 +11,7 @@ TOPIC_SEPARATOR_STRING = "/"
 
 
 def validate_topic_name(name: str, *, is_service: bool = False) -> Literal[True]:
-    """
-    Check that `name` is a valid topic (or service) name before expansion.
-
-    :raises InvalidTopicNameException: if it is not (`InvalidServiceNameException` if `is_service`).
-    """
+    """Check an unexpanded name; raises InvalidTopicNameException, or InvalidServiceNameException."""
     if problem := _problem(name):
         error = InvalidServiceNameException if is_service else InvalidTopicNameException
         raise error(name, *problem)
@@ -23,7 +19,6 @@ def validate_topic_name(name: str, *, is_service: bool = False) -> Literal[True]
 
 
 def _problem(name: str) -> tuple[str, int] | None:
-    """Return problem and index of an invalid `name`, `None` for a valid one."""
     if not name:
         return "topic name must not be empty string", 0
     if name[0] in "0123456789":

@@ -73,17 +73,14 @@ class Waitable:
         raise NotImplementedError("Must be implemented by subclass")
 
     def take_data(self) -> Any:
-        """Return what :meth:`execute` needs; implemented by subclasses."""
         raise NotImplementedError("Must be implemented by subclass")
 
     async def execute(self, taken_data: Any) -> None:
-        """Do the work; implemented by subclasses."""
         raise NotImplementedError("Must be implemented by subclass")
 
     def get_num_entities(self) -> NumberOfEntities:
-        """Return the numbers of entities that are added to wait sets; implemented by subclasses."""
+        """Return how many entities :meth:`add_to_wait_set` adds."""
         raise NotImplementedError("Must be implemented by subclass")
 
     def add_to_wait_set(self, wait_set: Any) -> None:
-        """Add entities to a wait set; implemented by subclasses."""
         raise NotImplementedError("Must be implemented by subclass")

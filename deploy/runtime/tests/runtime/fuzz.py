@@ -149,11 +149,7 @@ COUNTS = [struct.pack("<I", count) for count in (0, 1, 2, 3, 255, 65536, 0x7FFFF
 
 
 def feed(name: str, inputs: int, seed: str) -> tuple[int, int]:
-    """
-    Return how many damaged inputs a decoder reads and refuses.
-
-    :raises AssertionError: if the decoder does anything else; its message has the input.
-    """
+    """Return how many damaged inputs a decoder reads and refuses. Raises AssertionError with any other."""
     read, samples, check = decoder(name)
     chance = random.Random(f"{name} {seed}")
     accepted = 0

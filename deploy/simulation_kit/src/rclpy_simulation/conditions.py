@@ -39,7 +39,6 @@ class GuardCondition:
         self.handle = Condition()
 
     def trigger(self) -> None:
-        """Trigger the condition: waits on it end."""
         self.handle.set()
 
     def take(self) -> None:

@@ -139,7 +139,6 @@ class Writer(Endpoint):
             self._watchdogs.append(self._lease)
 
     def write(self, data: bytes | Pieces) -> None:
-        """Write CDR with its encapsulation header. Raises InvalidHandle if the writer is closed."""
         data = bytes(data)
         participant = self.participant
         if self.is_closed:
@@ -195,7 +194,6 @@ class Writer(Endpoint):
         return [link for reader, link in self._matched.items() if reader.participant is participant]
 
     def wait_for_acks(self, timeout: int) -> bool:
-        """Wait at most ``timeout`` [ns] until all reliable readers have acknowledged all samples."""
         thread = running()
         deadline = self.participant.kernel.now + timeout
         while any(link.is_unacknowledged for link in self._matched.values()):
@@ -205,7 +203,6 @@ class Writer(Endpoint):
         return True
 
     def assert_liveliness(self) -> None:
-        """Assert that the application of this writer is alive (liveliness MANUAL_BY_TOPIC)."""
         if self._lease is not None:
             self._lease.renew()
             self._revive()
@@ -263,7 +260,6 @@ class Reader(Endpoint):
             self.condition.set()
 
     def take(self, lend: bool = False) -> Sample | None:
-        """Return the next message, ``None`` if there is none."""
         now = self.participant.kernel.now
         while self._queue:
             expiry, sample = self._queue.popleft()
@@ -317,7 +313,6 @@ class Reader(Endpoint):
         return [writer.user_data for writer in self._writers]
 
     def user_data_of(self, publication_handle: int) -> str | None:
-        """Return the USER_DATA of a matched writer, ``None`` if it is no longer matched."""
         return next((w.user_data for w in self._writers if w.instance_handle == publication_handle), None)
 
 

@@ -20,11 +20,7 @@ class Kernel:
     """Runs events in the order of virtual time, and switches between programs."""
 
     def __init__(self, seed: int | str, state: list[State]) -> None:
-        """
-        Begin at :data:`BOOT`.
-
-        :param state: the variables that each process has for itself.
-        """
+        """Begin at :data:`BOOT`; ``state`` has the variables that each process has for itself."""
         self.now = BOOT
         """Monotonic time [ns]."""
         self.random = random.Random(seed)

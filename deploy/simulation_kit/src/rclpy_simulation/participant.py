@@ -51,13 +51,11 @@ class Participant:
         return self.gid[:12] + next(self._gids).to_bytes(3, "big") + bytes([kind])
 
     def create_writer(self, topic: str, type_name: str, profile: QoSProfile, user_data: str) -> Writer:
-        """Create a writer on the DDS topic ``topic`` of DDS type ``type_name``."""
         writer = Writer(self, topic, type_name, profile, user_data)
         self._add(writer)
         return writer
 
     def create_reader(self, topic: str, type_name: str, profile: QoSProfile, user_data: str) -> Reader:
-        """Create a reader on the DDS topic ``topic`` of DDS type ``type_name``."""
         reader = Reader(self, topic, type_name, profile, user_data)
         self._add(reader)
         return reader

@@ -44,11 +44,7 @@ class Processes:
     """The processes of a simulation."""
 
     def __init__(self, kernel: Kernel, at_exit: Callable[[], Any]) -> None:
-        """
-        Begin without a process.
-
-        :param at_exit: runs in a process that ends in order.
-        """
+        """Begin without a process; ``at_exit`` runs in a process that ends in order."""
         self.kernel = kernel
         self.at_exit = at_exit
         self.listeners: list[Callable[[Process], Any]] = []

@@ -119,11 +119,7 @@ class Simulation:
         self._kernel.run_until(self._kernel.now + int(seconds * SECOND))
 
     def run_until(self, condition: Callable[[], object], seconds: float = 60.0) -> None:
-        """
-        Let time pass until a condition is true.
-
-        :raises TimeoutError: if it is not true within ``seconds``.
-        """
+        """Let time pass until a condition is true. Raises TimeoutError if it is not within ``seconds``."""
         if not condition() and not self._kernel.run_until(
             self._kernel.now + int(seconds * SECOND), condition
         ):

@@ -57,7 +57,6 @@ class Statuses:
         self._update()
 
     def changed(self, name: str) -> dict[str, int] | None:
-        """Return the fields of a status if it has changed since the last call."""
         if name not in self._changed:
             return None
         del self._changed[name]

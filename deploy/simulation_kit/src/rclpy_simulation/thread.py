@@ -61,11 +61,7 @@ class Thread:
     """
 
     def __init__(self, process: Owner, work: Callable[[], Any], face: threading.Thread) -> None:
-        """
-        Prepare a thread.
-
-        :param face: what ``threading.current_thread`` returns in it.
-        """
+        """Prepare a thread; ``face`` is what ``threading.current_thread`` returns in it."""
         self.process = process
         self.face = face
         self.ident = _FIRST_IDENT + process.kernel.next_number()

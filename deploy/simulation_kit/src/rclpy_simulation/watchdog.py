@@ -17,12 +17,7 @@ class Watchdog:
     __slots__ = ("_is_running", "_is_stopped", "_period", "_process", "_ring", "_since")
 
     def __init__(self, process: Process, period: int, ring: Callable[[int], bool]) -> None:
-        """
-        Create a watchdog that does not run yet.
-
-        :param period: [ns].
-        :param ring: is called with the number of periods that have passed; returns whether to watch on.
-        """
+        """Begin with a period [ns]; ``ring`` gets the number of periods, and returns whether to go on."""
         self._process = process
         self._period = period
         self._ring = ring

@@ -35,12 +35,7 @@ class McapFile:
     """
 
     def __init__(self, path: Path) -> None:
-        """
-        Read what the file contains.
-
-        :raises UnreadableError: if it is damaged or no MCAP file.
-        :raises OSError: if it cannot be opened.
-        """
+        """Read the contents. Raises UnreadableError if it is damaged or no MCAP file, and OSError."""
         self.path = path
         self.schemas: dict[int, Schema] = {}
         self.channels: dict[int, Channel] = {}

@@ -56,11 +56,7 @@ class FileWriter(Writer):
         return self._stream.is_open
 
     def close(self) -> None:
-        """
-        Complete the file; without effect after a failure or another call.
-
-        :raises OSError: if the disk does not take it.
-        """
+        """Complete the file; without effect after a failure or another call. Raises OSError."""
         if self.is_open:
             self.finish()  # type: ignore[no-untyped-call]
             self.save()
@@ -68,11 +64,7 @@ class FileWriter(Writer):
 
 
 class _Stream:
-    """
-    Writes whole records to a file, or nothing of them.
-
-    The MCAP writer passes whole records only.
-    """
+    """Writes the whole records that the MCAP writer passes, or nothing of them."""
 
     def __init__(self, path: Path) -> None:
         self._path = path

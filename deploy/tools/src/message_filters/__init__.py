@@ -39,11 +39,7 @@ class Subscriber(SimpleFilter):
     """Outputs the messages of a topic. Other attributes are those of its subscription, ``sub``."""
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
-        """
-        Subscribe: ``Subscriber(node, msg_type, topic, **options)``.
-
-        The options are those of ``Node.create_subscription``; ``qos_profile`` is 10 by default.
-        """
+        """Subscribe: ``Subscriber(node, msg_type, topic, **options)``, with ``qos_profile`` 10 by default."""
         super().__init__()
         self.node: Node = args[0]
         self.topic: str = args[2]

@@ -19,11 +19,7 @@ def get_action_names_and_types(*, node: Node) -> list[tuple[str, list[str]]]:
 
 
 def get_action_clients_and_servers(*, node: Node, action_name: str) -> tuple[_NodesAndTypes, _NodesAndTypes]:
-    """
-    Return the nodes that have a client of an action, and those that have a server, each with its types.
-
-    :raises RuntimeError: if the name is invalid.
-    """
+    """Return the nodes with a client and with a server of an action. Raises RuntimeError if invalid."""
     full_name = graph.full_topic_name(node, action_name)
     clients: _NodesAndTypes = []
     servers: _NodesAndTypes = []

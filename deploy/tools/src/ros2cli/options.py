@@ -187,12 +187,7 @@ def parsed_yaml(text: str) -> Any:
 
 
 def fill(message: Any, values: str, **options: Any) -> list[Callable[[Any], None]]:
-    """
-    Set the fields of a message from YAML, and check their values.
-
-    :param options: those of `set_message_fields`, whose result is returned.
-    :raises ClickException: if a value does not fit its field.
-    """
+    """Set a message from YAML as `set_message_fields` does. Raises ClickException if a value does not fit."""
     from rosidl_runtime_py import set_message_fields
 
     try:

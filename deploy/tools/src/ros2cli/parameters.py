@@ -28,11 +28,7 @@ def full_name(node_name: str) -> str:
 def client(
     node_name: str, *, include_hidden_nodes: bool, timeout: float, spin_time: float, use_sim_time: bool
 ) -> Iterator[AsyncParameterClient]:
-    """
-    A client for the parameters of a node, which is looked for `timeout` [s], and at least `spin_time` [s].
-
-    :raises ClickException: if there is no such node, or it has no parameter services.
-    """
+    """A client of a node, looked for `timeout` [s], and at least `spin_time`. Raises ClickException."""
     name = full_name(node_name)
     with graph.node(use_sim_time=use_sim_time) as node:
 

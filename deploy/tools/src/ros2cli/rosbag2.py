@@ -108,11 +108,7 @@ def write(metadata: Metadata) -> None:
 
 
 def read(path: Path) -> Metadata:
-    """
-    Read the metadata of a bag, or of a single MCAP file.
-
-    :raises ClickException: if it is no bag, damaged, or not in MCAP.
-    """
+    """Read the metadata of a bag, or of a single MCAP file. Raises ClickException if it is neither."""
     if path.is_file():
         return _of_files(path.parent, [path])
     if not (path / METADATA_FILE).exists() and (files := sorted(path.glob("*.mcap*"))):
@@ -209,11 +205,7 @@ def qos_from_yaml(profiles: str | list[dict[str, Any]] | None) -> list[QoSProfil
 
 
 def qos_from_dict(policies: dict[str, Any]) -> QoSProfile:
-    """
-    Return the profile with these policies, as in a file for ``--qos-profile-overrides-path``.
-
-    :raises ValueError: for an unknown policy or value.
-    """
+    """Return the profile with these policies of a file. Raises ValueError for an unknown policy or value."""
     from rclpy import qos
     from rclpy.duration import Duration
 

@@ -24,11 +24,7 @@ def get_service_names(*, node: Node, include_hidden_services: bool = False) -> l
 
 
 def get_service_class(node: Node, service_name: str, include_hidden_services: bool) -> Any:
-    """
-    Return the class of a service.
-
-    :raises RuntimeError: if there is no such service, or its type is unknown or not the only one.
-    """
+    """Return the class of a service. Raises RuntimeError if its type is unknown or not the only one."""
     services = get_service_names_and_types(node=node, include_hidden_services=include_hidden_services)
     types = dict(services).get(service_name)
     if types is None:

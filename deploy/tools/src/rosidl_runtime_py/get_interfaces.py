@@ -28,12 +28,7 @@ def get_interface_packages() -> dict[str, str]:
 
 
 def get_interfaces(package_names: Collection[str] = ()) -> dict[str, list[str]]:
-    """
-    Return the interfaces of packages, such as ``msg/String``, by their package.
-
-    :param package_names: the packages; all packages if it is empty.
-    :raises LookupError: if a package is unknown.
-    """
+    """Return the interfaces (``msg/String``) of these packages, or of all. Raises LookupError."""
     return _interfaces(package_names, KINDS)
 
 
@@ -88,12 +83,7 @@ def _names(package: Path, kind: str) -> set[str]:
 
 
 def get_interface_path(interface_name: str) -> str:
-    """
-    Return the file that defines an interface, such as ``std_msgs/msg/String``.
-
-    :raises ValueError: if the name is malformed.
-    :raises LookupError: if the package or the interface is unknown.
-    """
+    """Return an interface's file. Raises ValueError for a malformed name, LookupError for an unknown one."""
     parts = interface_name.split("/")
     if len(parts) < 2:
         raise ValueError(f"Invalid name '{interface_name}'. Expected at least two parts separated by '/'")

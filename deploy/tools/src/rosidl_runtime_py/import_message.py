@@ -9,12 +9,7 @@ from rosidl_parser.definition import NamespacedType
 
 
 def import_message_from_namespaced_type(message_type: NamespacedType) -> Any:
-    """
-    Import the class of a message, service or action.
-
-    :raises ModuleNotFoundError: if its package is unknown.
-    :raises AttributeError: if its package does not define it.
-    """
+    """Import the class of an interface. Raises ModuleNotFoundError, or AttributeError within its package."""
     module = importlib.import_module(".".join(message_type.namespaces))
     if message_type.name.endswith("_FeedbackMessage"):  # generated for each action, within its class
         action = getattr(module, message_type.name.removesuffix("_FeedbackMessage"))

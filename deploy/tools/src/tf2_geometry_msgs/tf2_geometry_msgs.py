@@ -40,11 +40,7 @@ def from_msg_msg(msg: _T) -> _T:
 
 
 def transform_covariance(cov_in: ArrayLike, transform: TransformStamped) -> NDArray[np.float64]:
-    """
-    Return the covariance matrix of a pose in another frame.
-
-    :param cov_in: row by row, of x, y, z and the rotations about the fixed axes x, y, z: 36 numbers.
-    """
+    """Return the covariance of a pose in another frame: 6 × 6, of x, y, z and rotations about fixed axes."""
     rotation = np.kron(np.eye(2), _matrix(transform.transform)[:3, :3])
     covariance: Matrix = np.asarray(cov_in, float).reshape(6, 6)
     return np.ravel(rotation @ covariance @ rotation.T)

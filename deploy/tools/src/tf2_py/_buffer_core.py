@@ -33,13 +33,7 @@ class BufferCore:
     """
 
     def __init__(self, cache_time: TimeLike | None = None) -> None:
-        """
-        Create an empty buffer.
-
-        :param cache_time: how long transforms are kept, counted from the latest one of the same frame; 10 s
-            by default.
-        :raises TypeError: if it is not a duration.
-        """
+        """Create a buffer; transforms are kept for ``cache_time``, by default 10 s. Raises TypeError."""
         self._tf2_cache_time = (
             _DEFAULT_CACHE_TIME if cache_time is None else nanoseconds(cache_time, "duration")
         )

@@ -84,11 +84,7 @@ class Buffer(BufferCore, BufferInterface):
     def lookup_transform(
         self, target_frame: str, source_frame: str, time: Time | TimeMsg, timeout: Duration = NO_WAIT
     ) -> TransformStamped:
-        """
-        Return the transform from ``source_frame`` to ``target_frame``, see ``BufferCore``.
-
-        :param timeout: how long to wait until it is known; another thread must spin meanwhile.
-        """
+        """Return the transform, see ``BufferCore``; wait up to ``timeout`` while another thread spins."""
         self.can_transform(target_frame, source_frame, time, timeout)
         return self.lookup_transform_core(target_frame, source_frame, time)
 
@@ -108,12 +104,7 @@ class Buffer(BufferCore, BufferInterface):
         fixed_frame: str,
         timeout: Duration = NO_WAIT,
     ) -> TransformStamped:
-        """
-        Return the transform from the source at one time to the target at another one.
-
-        :param fixed_frame: a frame that does not move in between.
-        :param timeout: how long to wait until it is known; another thread must spin meanwhile.
-        """
+        """Return the transform between two times, see ``BufferCore``; wait as in :meth:`lookup_transform`."""
         arguments = target_frame, target_time, source_frame, source_time, fixed_frame
         self.can_transform_full(*arguments, timeout)
         return self.lookup_transform_full_core(*arguments)
@@ -139,11 +130,7 @@ class Buffer(BufferCore, BufferInterface):
         timeout: Duration = NO_WAIT,
         return_debug_tuple: bool = False,
     ) -> Any:
-        """
-        Return whether the transform is known, after waiting for it up to ``timeout``.
-
-        :param return_debug_tuple: whether to return also the reason if it is not.
-        """
+        """Return whether it is known within ``timeout``; ``return_debug_tuple`` adds the reason if not."""
         result = self._tf2_wait(lambda: self.can_transform_core(target_frame, source_frame, time), timeout)
         return result if return_debug_tuple else result[0]
 

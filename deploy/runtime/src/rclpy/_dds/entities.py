@@ -229,11 +229,7 @@ class Writer(_Endpoint):
         self.instance_handle = instance.value
 
     def write(self, data: bytes | Pieces) -> None:
-        """
-        Write CDR with its encapsulation header. May block if the writer is reliable.
-
-        :raises InvalidHandle: if another thread closes the writer during the call.
-        """
+        """Write CDR with its header; may block if reliable. Raises InvalidHandle if closed meanwhile."""
         if len(data) & 3:  # RTPS pads to four octets; Cyclone would pad with uninitialized memory
             data += bytes(-len(data) & 3)  # type: ignore[operator]
         octets = len(data)

@@ -63,11 +63,7 @@ class ClientGoalHandle:
         return self._status
 
     def cancel_goal(self) -> Any:
-        """
-        Ask the server to cancel the goal, and wait for its ``action_msgs/srv/CancelGoal`` response.
-
-        Another thread must spin the node, so do not call this in a callback.
-        """
+        """Wait for the ``action_msgs/srv/CancelGoal`` response; not in a callback, see `get_result`."""
         return self._action_client._cancel_goal(self)
 
     def cancel_goal_async(self) -> Future:
@@ -75,11 +71,7 @@ class ClientGoalHandle:
         return self._action_client._cancel_goal_async(self)
 
     def get_result(self) -> Any:
-        """
-        Wait for the response with ``status`` and ``result`` of the goal.
-
-        Another thread must spin the node, so do not call this in a callback.
-        """
+        """Wait for ``status`` and ``result``; not in a callback: another thread must spin the node."""
         return self._action_client._get_result(self)
 
     def get_result_async(self) -> Future:
@@ -168,14 +160,7 @@ class ActionClient(ActionWaitable):
     # Sending
 
     def send_goal(self, goal: Any, **kwargs: Any) -> Any:
-        """
-        Send a goal, and wait for the response with its ``status`` and ``result``.
-
-        Another thread must spin the node, so do not call this in a callback. The keyword arguments are those
-        of :meth:`send_goal_async`.
-
-        :raises TypeError: if ``goal`` is not of the action's goal type.
-        """
+        """Send a goal and wait for its result as :meth:`ClientGoalHandle.get_result` does."""
         goal_handle = self._rclpy_wait_for(self.send_goal_async(goal, **kwargs))
         return None if goal_handle is None else self._get_result(goal_handle)
 
@@ -253,11 +238,7 @@ class ActionClient(ActionWaitable):
         )
 
     def wait_for_server(self, timeout_sec: float | None = None) -> bool:
-        """
-        Wait for a server, at most ``timeout_sec`` (``None``: no limit); return whether there is one.
-
-        :raises RCLError: if the context is shut down.
-        """
+        """Return whether a server comes within ``timeout_sec`` (``None``: no limit). RCLError at shutdown."""
         timeout = None if timeout_sec is None else max(0.0, timeout_sec)
         graph, context = self._node._rclpy_graph, self._node.context
         return graph.wait_for(self.server_is_ready, timeout, context.ok) or self.server_is_ready()

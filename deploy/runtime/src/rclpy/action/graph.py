@@ -16,24 +16,14 @@ NamesAndTypes = list[tuple[str, list[str]]]
 def get_action_client_names_and_types_by_node(
     node: Node, remote_node_name: str, remote_node_namespace: str
 ) -> NamesAndTypes:
-    """
-    Return the actions that a node has clients for, with their types.
-
-    :param node: the node that asks.
-    :raises NodeNameNonExistentError: if the other node is unknown.
-    """
+    """Ask ``node`` which actions another one calls, and their types. Raises NodeNameNonExistentError."""
     return _actions(node.get_subscriber_names_and_types_by_node(remote_node_name, remote_node_namespace))
 
 
 def get_action_server_names_and_types_by_node(
     node: Node, remote_node_name: str, remote_node_namespace: str
 ) -> NamesAndTypes:
-    """
-    Return the actions that a node serves, with their types.
-
-    :param node: the node that asks.
-    :raises NodeNameNonExistentError: if the other node is unknown.
-    """
+    """Ask ``node`` which actions another one serves, and their types. Raises NodeNameNonExistentError."""
     return _actions(node.get_publisher_names_and_types_by_node(remote_node_name, remote_node_namespace))
 
 

@@ -137,22 +137,14 @@ class ServerGoalHandle:
                 self._action_server.notify_goal_done()
 
     def execute(self, execute_callback: Callable[[ServerGoalHandle], Any] | None = None) -> None:
-        """
-        Run the execute callback on the node's executor.
-
-        :param execute_callback: runs instead of the server's callback.
-        """
+        """Run ``execute_callback``, by default that of the server, on the node's executor."""
         # A goal may be cancelled before its execution. The callback finds out through is_cancel_requested.
         if not self.is_cancel_requested:
             self._update_state(GoalEvent.EXECUTE)
         self._action_server.notify_execute(self, execute_callback)
 
     def publish_feedback(self, feedback: Any) -> None:
-        """
-        Publish feedback on the goal.
-
-        :raises TypeError: if ``feedback`` is not of the action's feedback type.
-        """
+        """Publish feedback on the goal. Raises TypeError if it is not of the action's feedback type."""
         action_type = self._action_server.action_type
         if not isinstance(feedback, action_type.Feedback):
             raise TypeError(f"Expected {action_type.Feedback._TYPE_NAME}, got {feedback!r}")
@@ -474,11 +466,7 @@ class ActionServer(ActionWaitable):
         self._cancel_callback = cancel_callback or default_cancel_callback
 
     def register_execute_callback(self, execute_callback: Callable[[ServerGoalHandle], Any]) -> None:
-        """
-        Replace the callback that executes goals.
-
-        :raises TypeError: if it is not callable.
-        """
+        """Replace the callback that executes goals. Raises TypeError if it is not callable."""
         if not callable(execute_callback):
             raise TypeError("Failed to register goal execution callback: not callable")
         self._execute_callback = execute_callback

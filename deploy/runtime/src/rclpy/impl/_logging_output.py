@@ -67,11 +67,7 @@ def _compile(output_format: str) -> list[str | Callable[[LogRecord], str]]:
 
 
 def _switch(variable: str) -> bool | None:
-    """
-    Read an environment variable that is 0, 1 or empty.
-
-    :raises RuntimeError: if it has another value.
-    """
+    """Read an environment variable that is 0, 1 or empty. Raises RuntimeError for another value."""
     value = os.environ.get(variable, "")
     if value not in ("", "0", "1"):
         raise RuntimeError(f"unexpected value [{value}] specified for {variable}. Valid values are 0 or 1.")
@@ -118,11 +114,7 @@ _publishing = threading.local()
 
 
 def initialize() -> None:
-    """
-    Read the environment variables, unless they were read before.
-
-    :raises RuntimeError: if a variable has an invalid value.
-    """
+    """Read the environment variables, once. Raises RuntimeError if one has an invalid value."""
     global _console
     if _console is None:
         _console = _Console()
@@ -140,11 +132,7 @@ def enable_console(enabled: bool) -> None:
 
 
 def add_rosout_publisher(logger_name: str, publish: Callable[[LogRecord], None]) -> None:
-    """
-    Publish each message of the logger `logger_name`, and of its future children, with `publish`.
-
-    `publish` is called on the thread that logs.
-    """
+    """Publish the messages of a logger and its future children with `publish`, on the thread that logs."""
     with _rosout_lock:
         _rosout.setdefault(logger_name, []).append(publish)
 

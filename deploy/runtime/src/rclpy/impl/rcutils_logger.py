@@ -25,22 +25,14 @@ def _find_caller(frame: FrameType) -> FrameType:
 
 
 class _Filters:
-    """
-    The filters of a logging call in the source, and their state.
-
-    The filters apply in this order: throttle, skip first, once.
-    """
+    """The filters of a logging call in the source, in this order: throttle, skip first, once."""
 
     __slots__ = ("_last", "_logged", "_skipped", "name", "options", "severity")
 
     OPTIONS = ("throttle_duration_sec", "throttle_time_source_type", "skip_first", "once")
 
     def __init__(self, severity: LoggingSeverity, name: str, options: dict[str, Any]) -> None:
-        """
-        Create the filters of a call from its keyword `options`.
-
-        :raises ValueError: if the time source is not a clock.
-        """
+        """Read the keyword `options` of a call. Raises ValueError if the time source is not a clock."""
         self.severity = severity
         self.name = name
         self.options = options
@@ -53,11 +45,7 @@ class _Filters:
             raise ValueError(f'Received throttle_time_source_type of "{clock}" is not a clock instance')
 
     def check_unchanged(self, severity: LoggingSeverity, name: str, options: dict[str, Any]) -> None:
-        """
-        Check that the call has the same arguments as before.
-
-        :raises ValueError: if it does not.
-        """
+        """Check that the call has the same arguments as before. Raises ValueError if it does not."""
         if severity != self.severity:
             raise ValueError("Logger severity cannot be changed between calls.")
         if name != self.name:
@@ -97,11 +85,7 @@ def _requested(options: dict[str, Any]) -> set[str]:
 
 
 def _check_options(options: dict[str, Any]) -> None:
-    """
-    Check the keyword arguments of a logging call.
-
-    :raises TypeError: if an argument is unknown, or a required one is missing.
-    """
+    """Check a call's keywords. Raises TypeError if one is unknown or a required one is missing."""
     for option in options:
         if option not in _Filters.OPTIONS:
             raise TypeError(
@@ -134,11 +118,7 @@ class RcutilsLogger:
             _logging_output.unshare_rosout_publisher(self.name, self._rclpy_shared_publisher)
 
     def get_child(self, name: str) -> RcutilsLogger:
-        """
-        Return the logger `name` below this one.
-
-        :raises ValueError: if `name` is empty.
-        """
+        """Return the logger `name` below this one. Raises ValueError if `name` is empty."""
         if not name:
             raise ValueError("Child logger name must not be empty.")
         if not self.name:
@@ -148,11 +128,7 @@ class RcutilsLogger:
         return child
 
     def set_level(self, level: int | LoggingSeverity) -> None:
-        """
-        Set the level below which messages are not logged; UNSET: the level of the parent.
-
-        :raises ValueError: if `level` is not a severity.
-        """
+        """Set the lowest level to log; UNSET: that of the parent. Raises ValueError if it is no severity."""
         _logging_levels.set_level(self.name, LoggingSeverity(level))
 
     def get_effective_level(self) -> LoggingSeverity:
@@ -160,11 +136,7 @@ class RcutilsLogger:
         return LoggingSeverity(_logging_levels.effective_level(self.name))
 
     def is_enabled_for(self, severity: int | LoggingSeverity) -> bool:
-        """
-        Return whether messages of `severity` are logged.
-
-        :raises ValueError: if `severity` is not a severity.
-        """
+        """Return whether messages of `severity` are logged. Raises ValueError if it is no severity."""
         return LoggingSeverity(severity) >= _logging_levels.effective_level(self.name)
 
     def log(self, message: str, severity: int | LoggingSeverity, **kwargs: Any) -> bool:

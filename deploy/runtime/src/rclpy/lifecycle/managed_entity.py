@@ -55,11 +55,7 @@ class SimpleManagedEntity(ManagedEntity):
     def when_enabled(
         wrapped: Callable[..., None] | None = None, *, when_not_enabled: Callable[[], Any] | None = None
     ) -> Callable[..., Any]:
-        """
-        Decorate a method of a subclass: calls have an effect only while the entity is activated.
-
-        :param when_not_enabled: called instead of the method otherwise.
-        """
+        """Decorate a method: it runs while the entity is activated, otherwise ``when_not_enabled`` does."""
 
         def decorator(method: Callable[..., None]) -> Callable[..., None]:
             @wraps(method)

@@ -94,22 +94,18 @@ class LifecycleNodeMixin(ManagedEntity):
         return self.__change_state(Transition.TRANSITION_CONFIGURE)
 
     def trigger_cleanup(self) -> TransitionCallbackReturn:
-        """Clean up; return the result of the callback. Raises RCLError if the state does not allow it."""
         return self.__change_state(Transition.TRANSITION_CLEANUP)
 
     def trigger_shutdown(self) -> TransitionCallbackReturn:
-        """Shut down; return the result of the callback. Raises RCLError if the state does not allow it."""
         transition = _SHUTDOWNS.get(self._state_machine.current_state[1])
         if transition is None:
             raise RCLError("Shutdown transition not possible")
         return self.__change_state(transition)
 
     def trigger_activate(self) -> TransitionCallbackReturn:
-        """Activate; return the result of the callback. Raises RCLError if the state does not allow it."""
         return self.__change_state(Transition.TRANSITION_ACTIVATE)
 
     def trigger_deactivate(self) -> TransitionCallbackReturn:
-        """Deactivate; return the result of the callback. Raises RCLError if the state does not allow it."""
         return self.__change_state(Transition.TRANSITION_DEACTIVATE)
 
     def __change_state(self, transition_id: int) -> TransitionCallbackReturn:
@@ -141,11 +137,7 @@ class LifecycleNodeMixin(ManagedEntity):
     # Managed entities
 
     def add_managed_entity(self, entity: ManagedEntity) -> None:
-        """
-        Let an entity take part in transitions.
-
-        :raises TypeError: if it is not a ManagedEntity.
-        """
+        """Let an entity take part in transitions. Raises TypeError if it is not a ManagedEntity."""
         if not isinstance(entity, ManagedEntity):
             raise TypeError("Expected a rclpy.lifecycle.ManagedEntity instance.")
         self._managed_entities[entity] = None
@@ -181,19 +173,15 @@ class LifecycleNodeMixin(ManagedEntity):
         return self.__forward("on_configure", state)
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Clean up all managed entities; subclasses that override this call it."""
         return self.__forward("on_cleanup", state)
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Shut down all managed entities; subclasses that override this call it."""
         return self.__forward("on_shutdown", state)
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Activate all managed entities; subclasses that override this call it."""
         return self.__forward("on_activate", state)
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Deactivate all managed entities; subclasses that override this call it."""
         return self.__forward("on_deactivate", state)
 
     def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -247,11 +235,6 @@ def _messages(
 
 class LifecycleNode(LifecycleNodeMixin, Node):
     def __init__(self, node_name: str, *, enable_communication_interface: bool = True, **kwargs: Any) -> None:
-        """
-        Create a lifecycle node.
-
-        :param enable_communication_interface: whether other nodes may ask for transitions.
-        :param kwargs: the other arguments of :class:`rclpy.node.Node`.
-        """
+        """Create a lifecycle node; ``kwargs`` are the other arguments of :class:`rclpy.node.Node`."""
         Node.__init__(self, node_name, **kwargs)
         LifecycleNodeMixin.__init__(self, enable_communication_interface=enable_communication_interface)

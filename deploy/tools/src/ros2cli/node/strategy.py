@@ -13,11 +13,7 @@ if TYPE_CHECKING:
 
 
 class NodeStrategy:
-    """
-    A context manager that gives a node with all its methods; there is no daemon.
-
-    :param args: what :func:`add_arguments` has added.
-    """
+    """A context manager that gives a node; there is no daemon. ``args``: see :func:`add_arguments`."""
 
     def __init__(self, args: Any) -> None:
         spin_time = getattr(args, "spin_time", None)
