@@ -139,28 +139,6 @@ def test_equal_profiles_are_compatible() -> None:
             {"liveliness_lease_duration": Duration(seconds=1)},
             "ERROR: Subscription liveliness lease duration is less than publisher;",
         ),
-    ],
-)
-def test_requesting_more_than_offered_is_incompatible(
-    publisher: dict[str, object], subscription: dict[str, object], reason: str
-) -> None:
-    result = qos_check_compatible(profile(**publisher), profile(**subscription))
-    assert result == (QoSCompatibility.ERROR, reason)
-
-
-def test_requesting_less_than_offered_is_compatible() -> None:
-    publisher = profile(
-        durability=DurabilityPolicy.TRANSIENT_LOCAL,
-        deadline=Duration(seconds=1),
-        liveliness=LivelinessPolicy.MANUAL_BY_TOPIC,
-    )
-    subscription = profile(reliability=ReliabilityPolicy.BEST_EFFORT, deadline=Duration(seconds=2))
-    assert qos_check_compatible(publisher, subscription)[0] == QoSCompatibility.OK
-
-
-@pytest.mark.parametrize(
-    ("publisher", "subscription", "reason"),
-    [
         (
             {"reliability": ReliabilityPolicy.SYSTEM_DEFAULT},
             {"reliability": ReliabilityPolicy.UNKNOWN},
@@ -178,11 +156,21 @@ def test_requesting_less_than_offered_is_compatible() -> None:
         ),
     ],
 )
-def test_policies_left_to_the_middleware_may_be_incompatible(
+def test_what_is_or_may_be_requested_in_vain_is_reported(
     publisher: dict[str, object], subscription: dict[str, object], reason: str
 ) -> None:
     result = qos_check_compatible(profile(**publisher), profile(**subscription))
-    assert result == (QoSCompatibility.WARNING, reason)
+    assert result == (getattr(QoSCompatibility, reason.partition(":")[0]), reason)
+
+
+def test_requesting_less_than_offered_is_compatible() -> None:
+    publisher = profile(
+        durability=DurabilityPolicy.TRANSIENT_LOCAL,
+        deadline=Duration(seconds=1),
+        liveliness=LivelinessPolicy.MANUAL_BY_TOPIC,
+    )
+    subscription = profile(reliability=ReliabilityPolicy.BEST_EFFORT, deadline=Duration(seconds=2))
+    assert qos_check_compatible(publisher, subscription)[0] == QoSCompatibility.OK
 
 
 def test_every_incompatible_policy_is_reported() -> None:
