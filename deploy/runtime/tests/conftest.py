@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 from deploy.runtime.tests.host import ADDRESS, Host
+from deploy.runtime.tests.nodes import MakeNode
 
 from geometry_msgs.msg import PointStamped
 from rclpy.clock import ROSClock
@@ -51,14 +52,14 @@ def make_node(context: Context) -> Iterator[Callable[..., Node]]:
 
 
 @pytest.fixture
-def node(make_node: Callable[..., Node], executor: SingleThreadedExecutor) -> Node:
+def node(make_node: MakeNode, executor: SingleThreadedExecutor) -> Node:
     node = make_node()
     executor.add_node(node)
     return node
 
 
 @pytest.fixture
-def facts_node(make_node: Callable[..., Node]) -> Node:
+def facts_node(make_node: MakeNode) -> Node:
     """A node like the one that facts/discovery.txt was recorded from."""
     node = make_node("facts", namespace="/arm1")
     node.declare_parameter("value", 2.0)

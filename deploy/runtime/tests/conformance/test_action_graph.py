@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import suppress
 
 import pytest
 from deploy.runtime.tests.conformance.fibonacci import PACKAGE, Fibonacci
+from deploy.runtime.tests.nodes import MakeNode, SpinUntil
 
 from rclpy.action import (
     ActionClient,
@@ -22,9 +23,6 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import Float64
 from type_description_interfaces.srv import GetTypeDescription
-
-MakeNode = Callable[..., Node]
-SpinUntil = Callable[..., None]
 
 FIBONACCI = f"{PACKAGE}/action/Fibonacci"
 # The hash of this type in ROS 2.

@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 from deploy.runtime.tests.conformance.fibonacci import Fibonacci
+from deploy.runtime.tests.nodes import MakeNode, SpinUntil
 
 from action_msgs.msg import GoalInfo, GoalStatus, GoalStatusArray
 from action_msgs.srv import CancelGoal
@@ -24,8 +25,6 @@ from rclpy.qos import qos_profile_action_status_default
 from rclpy.task import Future
 from unique_identifier_msgs.msg import UUID
 
-MakeNode = Callable[..., Node]
-SpinUntil = Callable[..., None]
 MakeServer = Callable[..., ActionServer]
 Response = Any
 

@@ -5,6 +5,7 @@ from typing import Any
 
 import pytest
 from deploy.runtime.tests.conformance.middleware import announced_history
+from deploy.runtime.tests.nodes import SpinUntil
 
 from rclpy.duration import Duration, Infinite
 from rclpy.impl.implementation_singleton import rclpy_implementation
@@ -20,7 +21,6 @@ from rclpy.qos import (
 from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 
-SpinUntil = Callable[..., None]
 Create = Callable[..., QoSProfile]
 
 BEST_EFFORT, RELIABLE = ReliabilityPolicy.BEST_EFFORT, ReliabilityPolicy.RELIABLE

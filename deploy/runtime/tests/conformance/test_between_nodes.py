@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 from deploy.runtime.tests.conformance.middleware import announced_history
+from deploy.runtime.tests.nodes import MakeNode, SpinUntil
 
 from rcl_interfaces.msg import (
     FloatingPointRange,
@@ -35,8 +36,6 @@ from rclpy.task import Future
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 from std_msgs.msg import Float64
 
-MakeNode = Callable[..., Node]
-SpinUntil = Callable[..., None]
 Result = Callable[[Future], Any]
 
 

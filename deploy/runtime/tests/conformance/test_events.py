@@ -1,10 +1,10 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable
 from typing import Any
 
 import pytest
+from deploy.runtime.tests.nodes import SpinUntil
 
 from rclpy.context import Context
 from rclpy.duration import Duration
@@ -29,8 +29,6 @@ from std_msgs.msg import Bool, Float64
 
 # rclpy 7.1.3 itself uses the class that it deprecates.
 pytestmark = pytest.mark.filterwarnings("ignore:QoSEventHandler is deprecated")
-
-SpinUntil = Callable[..., None]
 
 
 def ignore(message: Float64) -> None:

@@ -6,6 +6,7 @@ import weakref
 from collections.abc import Callable, Iterator
 
 import pytest
+from deploy.runtime.tests.nodes import MakeNode, SpinUntil, subscribe
 
 import rclpy
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
@@ -24,17 +25,13 @@ from rclpy.task import Future
 from rclpy.utilities import get_default_context
 from std_msgs.msg import Float64
 
-MakeNode = Callable[..., Node]
-SpinUntil = Callable[..., None]
 STEADY = Clock(clock_type=ClockType.STEADY_TIME)
 
 
 def test_messages_arrive_within_one_process(spin_until: SpinUntil, node: Node) -> None:
-    received: list[float] = []
-    publisher = node.create_publisher(Float64, "x", 10)
-    node.create_subscription(Float64, "x", lambda message: received.append(message.data), 10)
+    received, publish = subscribe(node)
     for number in range(5):
-        publisher.publish(Float64(data=float(number)))
+        publish(float(number))
     spin_until(lambda: len(received) == 5)
     assert received == [0.0, 1.0, 2.0, 3.0, 4.0]
 
@@ -432,11 +429,9 @@ def test_unread_messages_of_a_removed_node_wait_for_its_return(
     make_node: MakeNode, context: Context, executor: SingleThreadedExecutor, spin_until: SpinUntil
 ) -> None:
     node = make_node()
-    received: list[float] = []
-    node.create_subscription(Float64, "x", lambda message: received.append(message.data), 10)
-    publisher = node.create_publisher(Float64, "x", 10)
+    received, publish = subscribe(node)
     for number in range(3):
-        publisher.publish(Float64(data=float(number)))
+        publish(float(number))
     executor.add_node(node)
     spin_until(lambda: received)
     executor.remove_node(node)

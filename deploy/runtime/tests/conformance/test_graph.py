@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 from deploy.runtime.tests.conformance.middleware import announced_history
+from deploy.runtime.tests.nodes import MakeNode, SpinUntil
 
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
@@ -21,8 +21,6 @@ from rclpy.qos import (
 from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 
-MakeNode = Callable[..., Node]
-SpinUntil = Callable[..., None]
 FACTS = Path(__file__).parents[1] / "facts"
 
 

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
+from deploy.runtime.tests.nodes import MakeNode, SpinUntil
 
 from rclpy.context import Context
 from rclpy.exceptions import (
@@ -21,8 +22,6 @@ from rclpy.serialization import deserialize_message
 from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 
-MakeNode = Callable[..., Node]
-SpinUntil = Callable[..., None]
 RCLError = rclpy_implementation.RCLError
 
 
@@ -173,7 +172,7 @@ def test_a_subscription_can_be_polled(
     assert deserialize_message(data, Float64) == Float64(data=2.0)
 
 
-def test_each_entity_knows_the_logger_of_its_node(make_node: Callable[..., Node]) -> None:
+def test_each_entity_knows_the_logger_of_its_node(make_node: MakeNode) -> None:
     node = make_node("talker", namespace="/arm1")
     entities = [
         node.create_publisher(Float64, "x", 1),

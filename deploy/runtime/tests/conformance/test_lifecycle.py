@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
+from deploy.runtime.tests.nodes import SpinUntil
 
 import rclpy.lifecycle
 from lifecycle_msgs.msg import State, Transition, TransitionEvent
@@ -26,7 +27,6 @@ from rclpy.lifecycle import (
 from rclpy.node import Node
 from std_msgs.msg import Float64
 
-SpinUntil = Callable[..., None]
 Call = Callable[..., Any]
 SUCCESS, FAILURE, ERROR = (
     TransitionCallbackReturn.SUCCESS,

@@ -7,6 +7,7 @@ from contextlib import ExitStack
 from typing import Any
 
 import pytest
+from deploy.runtime.tests.nodes import SpinUntil
 
 from builtin_interfaces.msg import Time
 from rclpy.context import Context
@@ -81,7 +82,7 @@ class OfFourArguments(Node):
 
 
 def test_create_subscription_may_know_only_four_parameters(
-    make: Make, executor: SingleThreadedExecutor, spin_until: Callable[..., None]
+    make: Make, executor: SingleThreadedExecutor, spin_until: SpinUntil
 ) -> None:
     node = make(OfFourArguments, parameter_overrides=[SIMULATED])
     assert node.subscribed == [(Clock, "/clock")]

@@ -5,12 +5,12 @@ from __future__ import annotations
 import json
 import threading
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from deploy.runtime.tests.nodes import MakeNode, SpinUntil
 
 from rcl_interfaces.msg import ParameterValue
 from rclpy.context import Context
@@ -22,8 +22,6 @@ from rclpy.qos import QoSProfile
 from rclpy.serialization import deserialize_message, serialize_message
 from std_msgs.msg import Float64, Int32, String
 
-MakeNode = Callable[..., Node]
-SpinUntil = Callable[..., None]
 GOLDEN = json.loads((Path(__file__).parents[1] / "facts" / "cdr_golden.json").read_text())
 
 

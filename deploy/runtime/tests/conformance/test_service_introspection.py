@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import pytest
+from deploy.runtime.tests.nodes import MakeNode, SpinUntil
 
 from rclpy.client import Client
 from rclpy.exceptions import InvalidHandle
@@ -18,7 +18,6 @@ from rclpy.time import Time
 from service_msgs.msg import ServiceEventInfo
 from std_srvs.srv import SetBool
 
-SpinUntil = Callable[..., None]
 OFF = ServiceIntrospectionState.OFF
 METADATA = ServiceIntrospectionState.METADATA
 CONTENTS = ServiceIntrospectionState.CONTENTS
@@ -55,7 +54,7 @@ class Introspected:
 
 @pytest.fixture
 def introspected(
-    make_node: Callable[..., Node], executor: SingleThreadedExecutor, spin_until: SpinUntil
+    make_node: MakeNode, executor: SingleThreadedExecutor, spin_until: SpinUntil
 ) -> Introspected:
     node = make_node()
     executor.add_node(node)

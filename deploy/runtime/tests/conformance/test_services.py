@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
 
 import pytest
+from deploy.runtime.tests.nodes import MakeNode, SpinUntil
 
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.context import Context
@@ -15,9 +15,6 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.task import Future
 from std_srvs.srv import SetBool, Trigger
-
-MakeNode = Callable[..., Node]
-SpinUntil = Callable[..., None]
 
 
 def answer(request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:

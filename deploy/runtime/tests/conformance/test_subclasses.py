@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
 from typing import Any
 
 import pytest
+from deploy.runtime.tests.nodes import SpinUntil
 
 from rclpy.context import Context
 from rclpy.exceptions import InvalidHandle
@@ -46,7 +46,7 @@ class Busy(Node):
 
 @pytest.mark.parametrize("first", [True, False])
 def test_a_subclass_may_use_any_private_name(
-    context: Context, executor: SingleThreadedExecutor, spin_until: Callable[..., None], first: bool
+    context: Context, executor: SingleThreadedExecutor, spin_until: SpinUntil, first: bool
 ) -> None:
     node = Busy(context, first=first)
     executor.add_node(node)

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import pytest
+from deploy.runtime.tests.nodes import MakeNode, SpinUntil
 
 import rclpy.logging
 from builtin_interfaces.msg import Time as TimeMsg
@@ -63,7 +63,7 @@ def test_only_clocks_of_ros_time_can_be_attached() -> None:
         TimeSource(node="node")  # type: ignore[arg-type]
 
 
-def test_a_node_follows_its_parameter_use_sim_time(make_node: Callable[..., Node]) -> None:
+def test_a_node_follows_its_parameter_use_sim_time(make_node: MakeNode) -> None:
     node = make_node()
     assert node.get_parameter("use_sim_time").value is False
     assert set_use_sim_time(node, True).successful
@@ -75,19 +75,19 @@ def test_a_node_follows_its_parameter_use_sim_time(make_node: Callable[..., Node
     assert clock_topics(node) == []
 
 
-def test_a_node_may_start_in_simulated_time(make_node: Callable[..., Node]) -> None:
+def test_a_node_may_start_in_simulated_time(make_node: MakeNode) -> None:
     node = make_node(parameter_overrides=[Parameter("use_sim_time", value=True)])
     assert node.get_clock().now().nanoseconds == 0
 
 
-def test_use_sim_time_must_be_a_bool(make_node: Callable[..., Node]) -> None:
+def test_use_sim_time_must_be_a_bool(make_node: MakeNode) -> None:
     node = make_node(allow_undeclared_parameters=True)
     assert not set_use_sim_time(node, "yes").successful
     assert node.get_parameter("use_sim_time").value is False
 
 
 def test_simulated_time_follows_the_clock_topic(
-    make_node: Callable[..., Node], executor: SingleThreadedExecutor, spin_until: Callable[..., None]
+    make_node: MakeNode, executor: SingleThreadedExecutor, spin_until: SpinUntil
 ) -> None:
     node, simulator = make_node(), make_node("simulator")
     executor.add_node(node)
@@ -102,7 +102,7 @@ def test_simulated_time_follows_the_clock_topic(
         spin_until(lambda: at(seconds))  # noqa: B023
 
 
-def test_wait_for_message_needs_no_executor(make_node: Callable[..., Node]) -> None:
+def test_wait_for_message_needs_no_executor(make_node: MakeNode) -> None:
     publisher = make_node("talker").create_publisher(String, "chatter", LATCHED)
     publisher.publish(String(data="hello"))
     node = make_node()
@@ -111,14 +111,14 @@ def test_wait_for_message_needs_no_executor(make_node: Callable[..., Node]) -> N
     assert list(node.subscriptions) == []
 
 
-def test_wait_for_message_ends_with_its_timeout(make_node: Callable[..., Node]) -> None:
+def test_wait_for_message_ends_with_its_timeout(make_node: MakeNode) -> None:
     node = make_node()
     assert wait_for_message(String, node, "silence", time_to_wait=0.01) == (False, None)
     assert list(node.subscriptions) == []
 
 
 def test_a_callback_of_the_node_may_call_wait_for_message(
-    make_node: Callable[..., Node], executor: SingleThreadedExecutor, spin_until: Callable[..., None]
+    make_node: MakeNode, executor: SingleThreadedExecutor, spin_until: SpinUntil
 ) -> None:
     make_node("talker").create_publisher(String, "chatter", LATCHED).publish(String(data="hello"))
     node = make_node()

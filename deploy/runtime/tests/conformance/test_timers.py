@@ -1,9 +1,9 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
 
 import pytest
+from deploy.runtime.tests.nodes import MakeNode
 
 from rclpy.clock import Clock, ClockType, JumpThreshold, ROSClock, TimeJump
 from rclpy.context import Context
@@ -13,9 +13,6 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.time import Time
 from rclpy.time_source import TimeSource
-
-MakeNode = Callable[..., Node]
-SpinUntil = Callable[..., None]
 
 
 def ros_time(nanoseconds: int) -> Time:

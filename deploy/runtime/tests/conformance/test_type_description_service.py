@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
+from deploy.runtime.tests.nodes import MakeNode, SpinUntil
 
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -13,8 +14,6 @@ from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 from type_description_interfaces.srv import GetTypeDescription
 
-MakeNode = Callable[..., Node]
-SpinUntil = Callable[..., None]
 Ask = Callable[..., Any]
 
 # The hashes of these types in ROS 2.

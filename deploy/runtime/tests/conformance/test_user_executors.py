@@ -8,6 +8,7 @@ from contextlib import suppress
 from typing import Any
 
 import pytest
+from deploy.runtime.tests.nodes import MakeNode, subscribe
 
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
 from rclpy.context import Context
@@ -20,9 +21,6 @@ from rclpy.executors import (
 )
 from rclpy.node import Node
 from rclpy.task import Future, Task
-from std_msgs.msg import Float64
-
-MakeNode = Callable[..., Node]
 
 
 @pytest.fixture
@@ -30,14 +28,6 @@ def node(make_node: MakeNode, user_executor: Executor) -> Node:
     node = make_node()
     user_executor.add_node(node)
     return node
-
-
-def subscribe(node: Node, topic: str, **options: Any) -> tuple[list[float], Callable[[float], None]]:
-    """Subscribe to a topic of the node's own; return what is received, and a function that publishes."""
-    received: list[float] = []
-    node.create_subscription(Float64, topic, lambda message: received.append(message.data), 10, **options)
-    publisher = node.create_publisher(Float64, topic, 10)
-    return received, lambda value: publisher.publish(Float64(data=value))
 
 
 def run_all(executor: Executor, until: Callable[[], object]) -> None:
@@ -86,7 +76,7 @@ def test_a_callback_that_goes_on_has_its_entity_and_node_again(user_executor: Ex
 
 
 def test_a_callback_that_was_not_run_is_returned_again(user_executor: Executor, node: Node) -> None:
-    received, publish = subscribe(node, "x")
+    received, publish = subscribe(node)
     publish(5.0)
     postponed = user_executor.wait_for_ready_callbacks(10)
     assert user_executor.wait_for_ready_callbacks(10) == postponed
@@ -111,7 +101,7 @@ def test_a_callback_that_was_not_run_delays_no_other(user_executor: Executor, no
 
 
 def test_an_entity_cannot_execute_between_its_return_and_its_run(user_executor: Executor, node: Node) -> None:
-    _, publish = subscribe(node, "x", callback_group=ReentrantCallbackGroup())
+    _, publish = subscribe(node, callback_group=ReentrantCallbackGroup())
     publish(1.0)
     task, entity, _ = user_executor.wait_for_ready_callbacks(10)
     assert not user_executor.can_execute(entity)
@@ -127,7 +117,7 @@ def test_a_callback_whose_group_is_busy_keeps_its_message(user_executor: Executo
         await future
 
     timer = node.create_timer(0.0, callback, group)
-    received, publish = subscribe(node, "x", callback_group=group)
+    received, publish = subscribe(node, callback_group=group)
     running = user_executor.wait_for_ready_callbacks(10)[0]
     publish(1.0)
     running()
@@ -141,7 +131,7 @@ def test_a_callback_whose_group_is_busy_keeps_its_message(user_executor: Executo
 
 
 def test_a_pool_of_a_user_gets_every_message_once(user_executor: Executor, node: Node) -> None:
-    received, publish = subscribe(node, "x", callback_group=ReentrantCallbackGroup())
+    received, publish = subscribe(node, callback_group=ReentrantCallbackGroup())
     submitted: set[Task] = set()
     with ThreadPoolExecutor(4) as pool:
         for batch in range(10):
@@ -229,7 +219,7 @@ def test_what_a_user_has_begun_is_ended_by_other_spinning(
 
     waiting = executor.create_task(wait)
     executor.wait_for_ready_callbacks(10)[0]()
-    received, publish = subscribe(node, "x")
+    received, publish = subscribe(node)
     publish(1.0)
     while not executor.wait_for_ready_callbacks(10)[1]:
         pass  # postponed

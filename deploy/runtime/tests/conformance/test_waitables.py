@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import pytest
+from deploy.runtime.tests.nodes import MakeNode, SpinUntil
 
 from rclpy.callback_groups import CallbackGroup, MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
 from rclpy.clock import Clock
@@ -22,9 +23,6 @@ from rclpy.task import Future
 from rclpy.timer import Timer
 from rclpy.waitable import NumberOfEntities, Waitable
 from std_msgs.msg import Float64
-
-MakeNode = Callable[..., Node]
-SpinUntil = Callable[..., None]
 
 
 class Bell(Waitable):

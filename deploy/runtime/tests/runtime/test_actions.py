@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
 from typing import Any
 
 import pytest
+from deploy.runtime.tests.nodes import MakeNode, SpinUntil
 
 from action_msgs.msg import GoalStatus
 from example_interfaces.action import Fibonacci
@@ -20,9 +20,6 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.time import Time
-
-MakeNode = Callable[..., Node]
-SpinUntil = Callable[..., None]
 
 
 def succeed(goal_handle: ServerGoalHandle) -> Fibonacci.Result:
@@ -55,7 +52,6 @@ def test_two_processes_share_an_action(
         spin_until(lambda: len(heard) == 5)
     server.destroy()
     there.destroy_node()
-    client.destroy()
 
 
 def test_feedback_that_arrived_before_the_result_is_not_lost(
@@ -83,12 +79,10 @@ def test_feedback_that_arrived_before_the_result_is_not_lost(
         spin_until(lambda: blocking.dds_triggered(client._rclpy_result_calls._rclpy_handles[0]))
         other_executor.spin_until_future_complete(future, 10)
     assert heard == [0, 1, 2, 3, 4]
-    client.destroy()
-    server.destroy()
 
 
 def test_the_endpoints_of_an_action_carry_type_hashes(node: Node, spin_until: SpinUntil) -> None:
-    server = ActionServer(node, Fibonacci, "fibonacci", succeed)
+    ActionServer(node, Fibonacci, "fibonacci", succeed)
     spin_until(lambda: node.count_services("fibonacci/_action/get_result"))
     topics = {
         "rt/fibonacci/_action/feedback": ("Fibonacci_FeedbackMessage_", Fibonacci.Impl.FeedbackMessage),
@@ -106,7 +100,6 @@ def test_the_endpoints_of_an_action_carry_type_hashes(node: Node, spin_until: Sp
         assert announced[topic] == [f"example_interfaces::action::dds_::{dds_name}"]
         (info,) = node.get_publishers_info_by_topic(topic, no_mangle=True)
         assert str(info.topic_type_hash) == cls._TYPE_HASH
-    server.destroy()
 
 
 def test_a_malformed_goal_is_dropped(node: Node, spin_until: SpinUntil) -> None:
@@ -118,14 +111,13 @@ def test_a_malformed_goal_is_dropped(node: Node, spin_until: SpinUntil) -> None:
     spin_until(future.done)
     assert future.result().accepted
     assert server._rclpy_goal_service._rclpy_bad_input.count == 1
-    client.destroy()
-    server.destroy()
 
 
 def test_a_second_server_of_an_action_is_reported(
     node: Node, spin_until: SpinUntil, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    servers = [ActionServer(node, Fibonacci, "fibonacci", succeed) for _ in range(2)]
+    for _ in range(2):
+        ActionServer(node, Fibonacci, "fibonacci", succeed)
     client = ActionClient(node, Fibonacci, "fibonacci")
     spin_until(lambda: client._rclpy_goal_calls.handle.matched() == 2)
     client.send_goal_async(Fibonacci.Goal())
@@ -138,8 +130,6 @@ def test_a_second_server_of_an_action_is_reported(
         return text in log
 
     spin_until(reported)
-    for one in (*servers, client):
-        one.destroy()
 
 
 @pytest.mark.parametrize(
@@ -156,7 +146,7 @@ def test_a_wrong_result_is_reported_and_answered(
         goal_handle.succeed()
         return result
 
-    server = ActionServer(node, Fibonacci, "fibonacci", execute)
+    ActionServer(node, Fibonacci, "fibonacci", execute)
     client = ActionClient(node, Fibonacci, "fibonacci")
     assert client.wait_for_server(timeout_sec=10)
     sent = client.send_goal_async(Fibonacci.Goal())
@@ -166,8 +156,6 @@ def test_a_wrong_result_is_reported_and_answered(
     assert future.result().status == GoalStatus.STATUS_SUCCEEDED
     assert list(future.result().result.sequence) == []
     assert reason in capfd.readouterr().err
-    client.destroy()
-    server.destroy()
 
 
 def test_a_result_is_kept_from_the_end_of_its_goal_in_the_nodes_time(
@@ -203,8 +191,6 @@ def test_a_result_is_kept_from_the_end_of_its_goal_in_the_nodes_time(
     executor.wake()
     spin_until(lambda: not server._goal_handles)
     assert goals[0].status == GoalStatus.STATUS_UNKNOWN
-    client.destroy()
-    server.destroy()
 
 
 def test_the_type_of_a_service_or_message_is_no_action(node: Node) -> None:
@@ -224,7 +210,7 @@ def test_a_failed_creation_leaves_no_endpoints(node: Node, spin_until: SpinUntil
 
 
 def test_a_finished_goal_is_forgotten_by_its_client(node: Node, spin_until: SpinUntil) -> None:
-    server = ActionServer(node, Fibonacci, "fibonacci", succeed)
+    ActionServer(node, Fibonacci, "fibonacci", succeed)
     client = ActionClient(node, Fibonacci, "fibonacci")
     assert client.wait_for_server(timeout_sec=10)
     sent = client.send_goal_async(Fibonacci.Goal(), lambda _: None)
@@ -232,8 +218,6 @@ def test_a_finished_goal_is_forgotten_by_its_client(node: Node, spin_until: Spin
     result = sent.result().get_result_async()
     spin_until(lambda: result.done() and sent.result().status == GoalStatus.STATUS_SUCCEEDED)
     assert (client._rclpy_goal_ids, client._goal_handles, client._feedback_callbacks) == ({}, {}, {})
-    client.destroy()
-    server.destroy()
 
 
 def test_a_destroyed_server_starts_no_execution(
@@ -254,7 +238,6 @@ def test_a_destroyed_server_starts_no_execution(
     assert task.cancelled()
     executor.spin_once(0.0)
     assert (executed, server._rclpy_executions) == ([], set())
-    client.destroy()
 
 
 def test_a_cancelled_send_is_forgotten(node: Node) -> None:
@@ -284,4 +267,3 @@ def test_a_destroyed_node_takes_its_goals_along(
     spin_until(lambda: accepted)
     there.destroy_node()
     spin_until(lambda: not client.server_is_ready())
-    client.destroy()

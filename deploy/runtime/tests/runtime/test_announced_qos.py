@@ -13,10 +13,10 @@ from cyclonedds.builtin import (
     BuiltinTopicDcpsSubscription,
 )
 from cyclonedds.domain import DomainParticipant
+from deploy.runtime.tests.nodes import SpinUntil
 
 from rclpy.node import Node
 
-SpinUntil = Callable[..., None]
 RECORD = (Path(__file__).parents[1] / "facts" / "discovery.txt").read_text()
 KINDS = {"PUB": BuiltinTopicDcpsPublication, "SUB": BuiltinTopicDcpsSubscription}
 

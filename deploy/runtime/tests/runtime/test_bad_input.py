@@ -6,11 +6,11 @@ import random
 import struct
 import time
 import tracemalloc
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
+from deploy.runtime.tests.nodes import MakeNode, SpinUntil
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.srv import SetParameters
@@ -24,9 +24,6 @@ from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import Float64, Float64MultiArray, String
 from std_srvs.srv import SetBool
-
-MakeNode = Callable[..., Node]
-SpinUntil = Callable[..., None]
 
 HEADER = b"\0\1\0\0"
 QUEUE = QoSProfile(depth=1000)

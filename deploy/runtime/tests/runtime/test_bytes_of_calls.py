@@ -7,9 +7,9 @@ USER_DATA pairs a reader with its writer.
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable
 
 import pytest
+from deploy.runtime.tests.nodes import SpinUntil
 
 from action_msgs.msg import GoalStatus
 from example_interfaces.action import Fibonacci
@@ -20,8 +20,6 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_srvs.srv import SetBool
 from unique_identifier_msgs.msg import UUID
-
-SpinUntil = Callable[[Callable[[], object]], None]
 
 SET_BOOL = "std_srvs::srv::dds_::SetBool"
 FIBONACCI = "example_interfaces::action::dds_::Fibonacci_"

@@ -6,17 +6,15 @@ import os
 import socket
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from deploy.runtime.tests.nodes import MakeNode
 
 from rclpy._dds import Participant, domain
 from rclpy.context import Context
 from rclpy.exceptions import RCLError
-from rclpy.node import Node
 
-MakeNode = Callable[..., Node]
 RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
 UP, LOOPBACK = 0x1, 0x8  # flags of network interfaces
 

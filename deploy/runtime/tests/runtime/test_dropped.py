@@ -10,6 +10,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
+from deploy.runtime.tests.nodes import MakeNode
 
 import rclpy
 from example_interfaces.action import Fibonacci
@@ -23,8 +24,6 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
-
-MakeNode = Callable[..., Node]
 
 
 class FullNode(Node):

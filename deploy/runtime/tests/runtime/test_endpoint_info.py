@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import pytest
+from deploy.runtime.tests.nodes import MakeNode
 
-from rclpy.node import Node
 from rclpy.serialization import deserialize_message
 from rclpy.type_hash import TypeHash
 from std_msgs.msg import String
@@ -34,7 +32,7 @@ def test_a_service_type_cannot_be_deserialized() -> None:
         deserialize_message(b"", Trigger)
 
 
-def test_changed_profile_of_an_endpoint_changes_no_other(make_node: Callable[..., Node]) -> None:
+def test_changed_profile_of_an_endpoint_changes_no_other(make_node: MakeNode) -> None:
     node = make_node("talker")
     for topic in ("first", "second"):
         node.create_publisher(String, topic, 10)

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
+from deploy.runtime.tests.nodes import MakeNode, SpinUntil
 
 import rclpy
 from rclpy import _executor_entities
@@ -18,9 +19,6 @@ from rclpy.executors import Executor, MultiThreadedExecutor, SingleThreadedExecu
 from rclpy.node import Node
 from rclpy.task import Future, Task
 from std_msgs.msg import Float64
-
-MakeNode = Callable[..., Node]
-SpinUntil = Callable[..., None]
 
 
 def test_a_callback_taken_before_the_shutdown_still_runs(make_node: MakeNode, context: Context) -> None:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
+from deploy.runtime.tests.nodes import MakeNode
 
 from rclpy.action import ActionClient, ActionServer
 from rclpy.node import Node
@@ -42,7 +43,7 @@ USES: dict[str, Callable[[Node], Any]] = {
 
 
 @pytest.mark.parametrize("use", USES)
-def test_a_class_of_the_other_runtime_is_named(make_node: Callable[..., Node], use: str) -> None:
+def test_a_class_of_the_other_runtime_is_named(make_node: MakeNode, use: str) -> None:
     with pytest.raises(AttributeError, match=REASON) as error:
         USES[use](make_node())
     assert "\n" not in str(error.value)

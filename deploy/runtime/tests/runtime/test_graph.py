@@ -2,9 +2,9 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable
 from pathlib import Path
 
+from deploy.runtime.tests.nodes import MakeNode
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -12,7 +12,6 @@ from rclpy._dds.discovery import Discovery
 from rclpy._discovery_info import NodeEntities, decode, encode
 from rclpy.node import Node
 
-MakeNode = Callable[..., Node]
 FACTS = Path(__file__).parents[1] / "facts"
 
 

@@ -6,12 +6,11 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
+from deploy.runtime.tests.nodes import MakeNode
 
 from rclpy.exceptions import InvalidHandle, RCLError
 from rclpy.node import Node
 from std_srvs.srv import Trigger
-
-MakeNode = Callable[..., Node]
 
 
 @pytest.mark.parametrize(

@@ -15,6 +15,7 @@ from threading import Barrier
 from typing import Any
 
 import pytest
+from deploy.runtime.tests.nodes import MakeNode, SpinUntil
 
 from rclpy._dds import INFINITY, Participant, Reader, WaitSet, Writer, entities
 from rclpy.callback_groups import ReentrantCallbackGroup
@@ -35,7 +36,6 @@ from .fuzz import populated
 from .test_bad_input import allocated
 from .test_messages_codec import MESSAGES
 
-SpinUntil = Callable[..., None]
 MEGABYTE = 1_000_000
 QOS = QoSProfile(depth=10)
 TYPE_NAME = "std_msgs::msg::dds_::UInt8MultiArray_"
@@ -302,7 +302,7 @@ def test_readers_of_a_process_have_messages_of_their_own(node: Node, spin_until:
 
 
 def test_message_outlives_its_context(
-    make_node: Callable[..., Node], context: Context, spin_until: SpinUntil, executor: Any
+    make_node: MakeNode, context: Context, spin_until: SpinUntil, executor: Any
 ) -> None:
     received: list[Image] = []
     node = make_node()
@@ -364,7 +364,7 @@ def test_damaged_large_samples_are_dropped_and_leave_no_memory(
     assert allocated() < before + 20_000
 
 
-def test_threads_read_messages_at_the_same_time(make_node: Callable[..., Node], context: Context) -> None:
+def test_threads_read_messages_at_the_same_time(make_node: MakeNode, context: Context) -> None:
     node = make_node()
     received: list[Image] = []
     done = Future()

@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-from collections.abc import Callable
+from deploy.runtime.tests.nodes import SpinUntil
 
 from rcl_interfaces.msg import Parameter as ParameterMsg
 from rclpy.node import Node
@@ -8,7 +8,7 @@ from rclpy.parameter import Parameter
 from rclpy.parameter_event_handler import ParameterEventHandler
 
 
-def test_a_callback_may_remove_itself(spin_until: Callable[..., None], node: Node) -> None:
+def test_a_callback_may_remove_itself(spin_until: SpinUntil, node: Node) -> None:
     handler = ParameterEventHandler(node)
     called: list[str] = []
     heard: list[object] = []

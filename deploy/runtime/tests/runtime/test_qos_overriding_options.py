@@ -1,9 +1,9 @@
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import pytest
+from deploy.runtime.tests.nodes import MakeNode
 
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.duration import Duration
@@ -24,8 +24,6 @@ from rclpy.qos_overriding_options import (
     _declare_qos_parameters,
 )
 from rclpy.subscription import Subscription
-
-MakeNode = Callable[..., Node]
 
 
 def overrides(entity: str, **policies: Any) -> list[Parameter]:

@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-from collections.abc import Callable
+from deploy.runtime.tests.nodes import SpinUntil
 
 from rclpy._dds.discovery import Discovery
 from rclpy.node import Node
@@ -9,9 +9,7 @@ from rclpy.service_introspection import ServiceIntrospectionState
 from std_srvs.srv import SetBool
 
 
-def test_events_name_a_client_by_its_announced_id_or_its_writer(
-    spin_until: Callable[..., None], node: Node
-) -> None:
+def test_events_name_a_client_by_its_announced_id_or_its_writer(spin_until: SpinUntil, node: Node) -> None:
     service = node.create_service(SetBool, "negate", lambda request, response: response)
     client = node.create_client(SetBool, "negate")
     events: list[SetBool.Event] = []

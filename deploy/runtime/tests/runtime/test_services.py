@@ -1,19 +1,17 @@
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import pytest
+from deploy.runtime.tests.nodes import MakeNode
 
 from rclpy._dds import WaitSet
 from rclpy.context import Context
 from rclpy.exceptions import RCLError
-from rclpy.node import Node
 from std_srvs.srv import Trigger
 
 FIRST = 1  # the number of a client's first request
 
 
-def test_a_cancelled_call_is_forgotten(make_node: Callable[..., Node]) -> None:
+def test_a_cancelled_call_is_forgotten(make_node: MakeNode) -> None:
     client = make_node().create_client(Trigger, "missing")
     future = client.call_async(Trigger.Request())
     assert client.get_pending_request(FIRST) is future
@@ -22,7 +20,7 @@ def test_a_cancelled_call_is_forgotten(make_node: Callable[..., Node]) -> None:
         client.get_pending_request(FIRST)
 
 
-def test_a_call_that_timed_out_is_forgotten(make_node: Callable[..., Node]) -> None:
+def test_a_call_that_timed_out_is_forgotten(make_node: MakeNode) -> None:
     client = make_node().create_client(Trigger, "missing")
     client.call(Trigger.Request(), timeout_sec=0.05)
     with pytest.raises(KeyError):
@@ -30,7 +28,7 @@ def test_a_call_that_timed_out_is_forgotten(make_node: Callable[..., Node]) -> N
 
 
 def test_wait_for_service_ends_in_order_when_the_domain_is_left_meanwhile(
-    make_node: Callable[..., Node], context: Context, monkeypatch: pytest.MonkeyPatch
+    make_node: MakeNode, context: Context, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     node = make_node()
     client = node.create_client(Trigger, "nobody")

@@ -12,6 +12,7 @@ from functools import partial
 from pathlib import Path
 
 import pytest
+from deploy.runtime.tests.nodes import MakeNode
 
 from rclpy._dds.library import blocking
 from rclpy.context import Context
@@ -90,7 +91,7 @@ def other(other_context: Context) -> Iterator[Node]:
 
 @pytest.fixture(params=[SingleThreadedExecutor, partial(MultiThreadedExecutor, 2)], ids=["single", "multi"])
 def flood(
-    request: pytest.FixtureRequest, make_node: Callable[..., Node], context: Context, other: Node
+    request: pytest.FixtureRequest, make_node: MakeNode, context: Context, other: Node
 ) -> Iterator[Flood]:
     flood = Flood(make_node("churned"), other, request.param(context=context), [])
     flood.executor.add_node(flood.node)
@@ -164,7 +165,7 @@ def test_a_thousand_entities_of_each_kind_leave_nothing_behind(flood: Flood, con
 
 @pytest.mark.parametrize("queries", [False, True])
 def test_a_node_that_never_spins_keeps_no_announcements_of_peers(
-    make_node: Callable[..., Node], other: Node, queries: bool
+    make_node: MakeNode, other: Node, queries: bool
 ) -> None:
     node = make_node("deaf")
     if queries:

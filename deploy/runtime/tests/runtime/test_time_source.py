@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable
 from typing import Any
 
 import pytest
+from deploy.runtime.tests.nodes import MakeNode
 
 from builtin_interfaces.msg import Time as TimeMsg
 from rcl_interfaces.msg import SetParametersResult
@@ -29,7 +29,7 @@ def set_use_sim_time(node: Node, value: bool) -> SetParametersResult:
     return node.set_parameters([Parameter("use_sim_time", value=value)])[0]
 
 
-def test_a_rejected_change_keeps_system_time(make_node: Callable[..., Node]) -> None:
+def test_a_rejected_change_keeps_system_time(make_node: MakeNode) -> None:
     node = make_node()
 
     def reject(parameters: list[Parameter]) -> SetParametersResult:
@@ -41,7 +41,7 @@ def test_a_rejected_change_keeps_system_time(make_node: Callable[..., Node]) -> 
     assert not node.get_clock().ros_time_is_active  # type: ignore[attr-defined]
 
 
-def test_a_detached_time_source_no_longer_follows_its_node(make_node: Callable[..., Node]) -> None:
+def test_a_detached_time_source_no_longer_follows_its_node(make_node: MakeNode) -> None:
     node = make_node()
     source = node._time_source
     set_use_sim_time(node, True)
@@ -51,7 +51,7 @@ def test_a_detached_time_source_no_longer_follows_its_node(make_node: Callable[.
     assert source.ros_time_is_active
 
 
-def test_wait_for_message_ends_with_its_context(make_node: Callable[..., Node], context: Context) -> None:
+def test_wait_for_message_ends_with_its_context(make_node: MakeNode, context: Context) -> None:
     node = make_node()
     result: list[tuple[bool, Any]] = []
     thread = threading.Thread(target=lambda: result.append(wait_for_message(String, node, "silence")))
@@ -64,7 +64,7 @@ def test_wait_for_message_ends_with_its_context(make_node: Callable[..., Node], 
 
 
 def test_wait_for_message_ends_if_the_context_ends_before_the_wait(
-    make_node: Callable[..., Node], context: Context, monkeypatch: pytest.MonkeyPatch
+    make_node: MakeNode, context: Context, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     node = make_node()
     create_subscription = node.create_subscription
@@ -93,7 +93,7 @@ def timeout(monkeypatch: pytest.MonkeyPatch) -> float:
     return 0.01
 
 
-def test_timeout_is_two_seconds_of_steady_time(make_node: Callable[..., Node]) -> None:
+def test_timeout_is_two_seconds_of_steady_time(make_node: MakeNode) -> None:
     (timer,) = make_node(parameter_overrides=SIMULATED).timers
     assert timer.timer_period_ns == 2_000_000_000
     assert timer.clock.clock_type == ClockType.STEADY_TIME
@@ -101,7 +101,7 @@ def test_timeout_is_two_seconds_of_steady_time(make_node: Callable[..., Node]) -
 
 def test_silent_clock_topic_is_warned_of_once(
     timeout: float,
-    make_node: Callable[..., Node],
+    make_node: MakeNode,
     executor: SingleThreadedExecutor,
     capfd: pytest.CaptureFixture[str],
 ) -> None:
@@ -114,7 +114,7 @@ def test_silent_clock_topic_is_warned_of_once(
 
 def test_waiting_time_is_no_silence(
     timeout: float,
-    make_node: Callable[..., Node],
+    make_node: MakeNode,
     executor: SingleThreadedExecutor,
     capfd: pytest.CaptureFixture[str],
 ) -> None:
@@ -129,13 +129,13 @@ def test_waiting_time_is_no_silence(
     assert "silent" not in capfd.readouterr().err
 
 
-def test_first_time_ends_the_timeout(make_node: Callable[..., Node]) -> None:
+def test_first_time_ends_the_timeout(make_node: MakeNode) -> None:
     node = make_node(parameter_overrides=SIMULATED)
     node._time_source.clock_callback(ClockMsg(clock=TimeMsg(sec=5)))
     assert list(node.timers) == []
 
 
-def test_timeout_ends_with_simulated_time(make_node: Callable[..., Node]) -> None:
+def test_timeout_ends_with_simulated_time(make_node: MakeNode) -> None:
     node = make_node(parameter_overrides=SIMULATED)
     set_use_sim_time(node, False)
     assert list(node.timers) == []
@@ -145,7 +145,7 @@ def test_timeout_ends_with_simulated_time(make_node: Callable[..., Node]) -> Non
     assert list(node.timers) == []
 
 
-def test_system_time_needs_no_timeout(make_node: Callable[..., Node]) -> None:
+def test_system_time_needs_no_timeout(make_node: MakeNode) -> None:
     assert list(make_node().timers) == []
 
 

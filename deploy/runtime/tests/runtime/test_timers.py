@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import pytest
+from deploy.runtime.tests.nodes import MakeNode
 
 from rclpy.clock import ClockType, ROSClock
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.time import Time
-
-MakeNode = Callable[..., Node]
 
 
 def ros_time(nanoseconds: int) -> Time:

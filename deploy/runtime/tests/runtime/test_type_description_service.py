@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from deploy.runtime.tests.nodes import MakeNode, SpinUntil
 
 from rclpy.executors import SingleThreadedExecutor
-from rclpy.node import Node
 from rosidl_runtime_embedded import message_class
 from type_description_interfaces.srv import GetTypeDescription
 
 
 def test_a_type_in_use_keeps_the_description_it_was_loaded_with(
-    make_node: Callable[..., Node],
+    make_node: MakeNode,
     executor: SingleThreadedExecutor,
-    spin_until: Callable[..., None],
+    spin_until: SpinUntil,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import pytest
+from deploy.runtime.tests.nodes import SpinUntil
 
 from example_interfaces.action import Fibonacci
 from rclpy._wait_set import WaitSet
@@ -18,8 +18,6 @@ from rclpy.node import Node
 from rclpy.subscription import Subscription
 from rclpy.waitable import Waitable
 from std_msgs.msg import Float64
-
-SpinUntil = Callable[..., None]
 
 
 class Recorder(Waitable):

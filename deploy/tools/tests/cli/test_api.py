@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
+from deploy.runtime.tests.nodes import MakeNode
 
 import rclpy
 from rclpy.context import Context
@@ -87,7 +88,7 @@ def test_message_class_may_be_waited_for(talker: Node) -> None:
 
 
 def test_a_topic_of_two_types_has_no_message_class(
-    talker: Node, make_node: Callable[..., Node], other_context: Context
+    talker: Node, make_node: MakeNode, other_context: Context
 ) -> None:
     publish(make_node(context=other_context), Float64, "/chatter")  # Fast DDS allows a participant one type
     wait_for_type(talker, Float64, "/chatter")

@@ -1,10 +1,10 @@
 from __future__ import annotations
 
-from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from deploy.runtime.tests.nodes import MakeNode, SpinUntil
 
 from geometry_msgs.msg import PointStamped
 from message_filters import (
@@ -20,8 +20,6 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.time import Time
 from std_msgs.msg import String
-
-SpinUntil = Callable[..., None]
 
 
 def at(seconds: float) -> Time:
@@ -79,7 +77,7 @@ def test_a_subscriber_passes_the_messages_of_a_topic_on(node: Node, spin_until: 
         _ = subscriber.nothing
 
 
-def test_a_subscriber_takes_the_options_of_a_subscription(make_node: Callable[..., Node]) -> None:
+def test_a_subscriber_takes_the_options_of_a_subscription(make_node: MakeNode) -> None:
     qos = QoSProfile(depth=3, reliability=ReliabilityPolicy.BEST_EFFORT)
     subscriber = Subscriber(make_node(), String, "words", qos_profile=qos, raw=True)
     assert subscriber.sub.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT

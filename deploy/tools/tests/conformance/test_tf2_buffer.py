@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
+from deploy.runtime.tests.nodes import MakeNode, SpinUntil
 
 pytest.importorskip("tf2_msgs.msg", reason="platform: no tf2_msgs here, as with ROS 2's wheels")
 
@@ -37,8 +38,6 @@ from tf2_ros import (
     TypeException,
     convert,
 )
-
-SpinUntil = Callable[..., None]
 
 
 @pytest.fixture
@@ -168,7 +167,7 @@ def test_a_change_of_the_source_of_time_clears_the_buffer(
 
 
 def test_a_buffer_of_a_node_has_a_service_with_all_frames(
-    node: Node, make_node: Callable[..., Node], executor: SingleThreadedExecutor, spin_until: SpinUntil
+    node: Node, make_node: MakeNode, executor: SingleThreadedExecutor, spin_until: SpinUntil
 ) -> None:
     buffer = Buffer(Duration(seconds=5), node)
     buffer.set_transform(transform("base", "tool"), "someone")

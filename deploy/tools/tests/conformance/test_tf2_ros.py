@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
+from deploy.runtime.tests.nodes import MakeNode, SpinUntil
 
 pytest.importorskip("tf2_msgs.msg", reason="platform: no tf2_msgs here, as with ROS 2's wheels")
 
@@ -33,9 +34,6 @@ from tf2_ros import (
     TransformException,
     TransformListener,
 )
-
-MakeNode = Callable[..., Node]
-SpinUntil = Callable[..., None]
 
 
 def x_of(buffer: Buffer, target: str, source: str) -> float:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import functools
 import threading
-from collections.abc import Callable
 from typing import Any
 
 import pytest
+from deploy.runtime.tests.nodes import MakeNode, SpinUntil
 
 pytest.importorskip("tf2_msgs.msg", reason="platform: no tf2_msgs here, as with ROS 2's wheels")
 
@@ -22,8 +22,6 @@ from tf2_ros import Buffer, BufferClient, StaticTransformBroadcaster, TransformB
 
 pytestmark = pytest.mark.own
 
-SpinUntil = Callable[..., None]
-
 
 def test_a_chain_has_all_frames_from_the_source_to_the_target() -> None:
     buffer = Buffer()
@@ -35,7 +33,7 @@ def test_a_chain_has_all_frames_from_the_source_to_the_target() -> None:
     assert chain(target_frame="left", source_frame="map", fixed_frame="left") == ["map", "left"]
 
 
-def test_a_new_static_transform_replaces_the_old_one(make_node: Callable[..., Node]) -> None:
+def test_a_new_static_transform_replaces_the_old_one(make_node: MakeNode) -> None:
     broadcaster = StaticTransformBroadcaster(make_node())
     message = transform("map", "camera", 1.0)
     broadcaster.sendTransform(message)
@@ -86,15 +84,13 @@ def test_a_wait_without_end_ends_with_the_transform() -> None:
     assert not waiting.is_alive()
 
 
-def test_the_padding_of_a_buffer_client_may_be_seconds(make_node: Callable[..., Node]) -> None:
+def test_the_padding_of_a_buffer_client_may_be_seconds(make_node: MakeNode) -> None:
     client = BufferClient(make_node(), "server", timeout_padding=0.5)
     assert not client.can_transform("map", "robot", Time(), Duration(seconds=0.1))
     client.destroy()
 
 
-def test_a_listener_may_spin_its_node_itself(
-    make_node: Callable[..., Node], node: Node, spin_until: SpinUntil
-) -> None:
+def test_a_listener_may_spin_its_node_itself(make_node: MakeNode, node: Node, spin_until: SpinUntil) -> None:
     buffer = Buffer()
     listener = TransformListener(buffer, make_node("listener"), spin_thread=True)
     broadcaster = TransformBroadcaster(node)

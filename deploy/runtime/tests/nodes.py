@@ -1,0 +1,20 @@
+"""What tests do with nodes: the types of their fixtures, and a topic within one node."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from rclpy.node import Node
+from std_msgs.msg import Float64
+
+MakeNode = Callable[..., Node]
+SpinUntil = Callable[..., None]
+
+
+def subscribe(node: Node, topic: str = "x", **options: Any) -> tuple[list[float], Callable[[float], None]]:
+    """Subscribe to a topic of the node's own; return what is received, and a function that publishes."""
+    received: list[float] = []
+    node.create_subscription(Float64, topic, lambda message: received.append(message.data), 10, **options)
+    publisher = node.create_publisher(Float64, topic, 10)
+    return received, lambda value: publisher.publish(Float64(data=value))
