@@ -126,19 +126,3 @@ def test_ctrl_c_cancels_the_goal(server: Server, start: Any, line: str) -> None:
         assert rest.endswith("Canceling goal...\nGoal canceled.\n")
         assert server.canceled.wait(10)
     assert server.begun.is_set() == server.canceled.is_set()
-
-
-@pytest.mark.parametrize(
-    ("arguments", "error"),
-    [
-        (["std_srvs/srv/SetBool"], "The passed action type is invalid\n"),
-        (
-            [TYPE, "{nothing: 1}"],
-            "Failed to populate message fields: "
-            "AttributeError(\"'Fibonacci_Goal' object has no attribute 'nothing'\")\n",
-        ),
-    ],
-)
-def test_goal_of_something_wrong_is_one_line(ros2: Any, arguments: list[str], error: str) -> None:
-    done = ros2("action", "send_goal", "/fibonacci", *arguments)
-    assert (done.stderr, done.returncode) == (error, 1)

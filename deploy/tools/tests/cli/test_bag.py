@@ -307,23 +307,6 @@ def test_clock_begins_after_the_delay_which_comes_once(
         lab.destroy_subscription(subscription)
 
 
-@pytest.mark.parametrize(
-    ("arguments", "error"),
-    [
-        (["record"], "[ERROR] [ros2bag]: Need to specify at least one option out of"),
-        (["record", "-a", "-o", "."], "[ERROR] [ros2bag]: Output folder '.' already exists."),
-        (["record", "/x", "--exclude-regex", "y"], "[ERROR] [ros2bag]: --exclude-regex argument requires"),
-        (["info", "."], "'.' is no bag: it has no metadata.yaml"),
-        (["play", __file__], f"{__file__} is no MCAP file"),
-    ],
-)
-def test_wrong_bags_are_one_line(ros2: Any, arguments: list[str], error: str) -> None:
-    done = ros2("bag", *arguments)
-    assert done.stderr.startswith(error)
-    assert done.stderr.count("\n") == 1
-    assert done.returncode == 1
-
-
 def test_missing_bag_and_wrong_expression_are_wrong_arguments(ros2: Any) -> None:
     assert ros2("bag", "info", "/nowhere").returncode == 2
     assert ros2("bag", "record", "-e", "(").returncode == 2

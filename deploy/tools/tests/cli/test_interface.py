@@ -36,18 +36,6 @@ def test_show_keeps_comments_as_asked(ros2: Any, tmp_path: Path, monkeypatch: py
     assert ros2(*show, "--no-comments").stdout == f"Inner[<=3] inner\n{rest}int8 ONE=1\n"
 
 
-@pytest.mark.parametrize(
-    ("name", "error"),
-    [
-        ("nothing/msg/X", "Unknown package 'nothing'\n"),
-        ("std_msgs/String", "Invalid name 'std_msgs/String'. Expected three parts separated by '/'\n"),
-    ],
-)
-def test_show_of_something_unknown_is_one_line(ros2: Any, name: str, error: str) -> None:
-    done = ros2("interface", "show", name)
-    assert (done.stderr, done.returncode) == (error, 1)
-
-
 def test_list_shows_interfaces_by_kind(ros2: Any) -> None:
     listed = ros2("interface", "list").stdout.splitlines()
     titles = [listed.index(title) for title in ("Messages:", "Services:", "Actions:")]

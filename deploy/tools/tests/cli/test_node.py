@@ -65,8 +65,3 @@ def test_nodes_with_the_same_name_are_a_warning(lab: Any, ros2: Any) -> None:
         'There are 2 nodes in the graph with the exact name "/arm/lab".'
         " You are seeing information about only one of them.\n"
     )
-
-
-def test_unknown_node_is_one_line(lab: Any, ros2: Any) -> None:
-    done = ros2("node", "info", "/nothing", "--no-daemon")
-    assert (done.stderr, done.returncode) == ("Unable to find node '/nothing'\n", 1)

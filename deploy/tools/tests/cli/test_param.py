@@ -80,20 +80,3 @@ def test_describe_shows_type_and_constraints(lab: Any, ros2: Any) -> None:
         "    Min value: 0.0\n    Max value: 10.0\n"
         "Parameter name: names\n  Type: string array\n  Constraints:\n"
     )
-
-
-@pytest.mark.parametrize(
-    ("arguments", "error"),
-    [
-        (["get", "/nothing", "length"], "Node not found\n"),
-        (["list", "/nothing"], "Node not found\n"),
-        (["set", "/nothing", "length", "1"], "Node not found\n"),
-        (["dump", "/nothing"], "Node not found\n"),
-        (["get", "/arm/lab", "nothing"], "Parameter not set\n"),
-    ],
-)
-def test_unknown_nodes_and_parameters_are_one_line(
-    lab: Any, ros2: Any, arguments: list[str], error: str
-) -> None:
-    done = ros2("param", *arguments, "--no-daemon")
-    assert (done.stderr, done.returncode) == (error, 1)

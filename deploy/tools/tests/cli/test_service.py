@@ -38,21 +38,6 @@ def test_call_waits_for_the_service(lab: Any, start: Any) -> None:
     node.destroy_node()
 
 
-@pytest.mark.parametrize(
-    ("arguments", "error"),
-    [
-        (["std_srvs/srv/Nothing"], "The passed service type is invalid\n"),
-        (
-            ["std_srvs/srv/SetBool", "{nothing: 1}"],
-            "Failed to populate field: 'SetBool_Request' object has no attribute 'nothing'\n",
-        ),
-    ],
-)
-def test_call_of_something_wrong_is_one_line(lab: Any, ros2: Any, arguments: list[str], error: str) -> None:
-    done = ros2("service", "call", "/arm/switch", *arguments)
-    assert (done.stderr, done.returncode) == (error, 1)
-
-
 @pytest.mark.own
 def test_type_prints_the_type_or_only_ends_with_1(lab: Any, ros2: Any) -> None:
     assert ros2("service", "type", "/arm/switch").stdout == "std_srvs/srv/SetBool\n"

@@ -50,45 +50,6 @@ def test_verbose_info_describes_endpoints(lab: Any, ros2: Any) -> None:
 
 
 @pytest.mark.parametrize(
-    ("arguments", "error"),
-    [
-        (["info", "/nothing"], "Unknown topic '/nothing'\n"),
-        (["echo", "/nothing"], "Could not determine the type for the passed topic\n"),
-        (["echo", "/arm/chatter", "std_msgs/msg/Nothing"], "The passed message type is invalid\n"),
-        (
-            ["echo", "/arm/chatter", "--field", "nothing"],
-            "Invalid field 'nothing': 'String' object has no attribute 'nothing'\n",
-        ),
-        (["echo", "/arm/chatter", "--field", "."], "Invalid field value '.'\n"),
-    ],
-)
-def test_what_is_unknown_is_one_line_and_exit_code_1(
-    lab: Any, ros2: Any, arguments: list[str], error: str
-) -> None:
-    done = ros2("topic", *arguments, "--no-daemon")
-    assert (done.stderr, done.returncode) == (error, 1)
-
-
-@pytest.mark.own
-@pytest.mark.parametrize(
-    ("arguments", "error"),
-    [
-        (["echo", "/bad name"], "topic name '/bad name' is invalid: "),
-        (["echo", "/arm/chatter", "--filter", "m.data ="], "The filter 'm.data =' is no Python expression: "),
-        (["echo", "/arm/chatter", "--filter", "m.nothing"], "The filter 'm.nothing' failed: "),
-        (["pub", "/arm/x", "std_msgs/msg/String", "data: ["], "The value is no valid YAML: "),
-    ],
-)
-def test_malformed_values_are_one_line_and_exit_code_1(
-    lab: Any, ros2: Any, arguments: list[str], error: str
-) -> None:
-    done = ros2("topic", *arguments)
-    assert done.stderr.startswith(error)
-    assert done.stderr.count("\n") == 1
-    assert done.returncode == 1
-
-
-@pytest.mark.parametrize(
     ("options", "text"),
     [
         (
@@ -210,23 +171,3 @@ def test_pub_repeats_and_sets_the_stamp(lab: Any, ros2: Any) -> None:
 def test_pub_reads_values_from_standard_input(ros2: Any) -> None:
     done = ros2("topic", "pub", "-1", "-w", "0", "/x", "std_msgs/String", "--stdin", input="data: text\n")
     assert "publishing #1: std_msgs.msg.String(data='text')\n" in done.stdout
-
-
-@pytest.mark.parametrize(
-    ("arguments", "error"),
-    [
-        (["std_msgs/msg/Nothing"], "The passed message type is invalid\n"),
-        (["std_msgs/msg/String", "5"], "The passed value needs to be a dictionary in YAML format\n"),
-        (
-            ["std_msgs/msg/String", "nothing: 5"],
-            "Failed to populate field: 'String' object has no attribute 'nothing'\n",
-        ),
-        (
-            ["std_msgs/msg/String", "--max-wait-time-secs", "0.3", "-w", "1"],
-            "Timed out waiting for subscribers: Expected 1 subcribers but only got 0 subscribers\n",
-        ),
-    ],
-)
-def test_pub_of_something_wrong_is_one_line(ros2: Any, arguments: list[str], error: str) -> None:
-    done = ros2("topic", "pub", "/x", *arguments)
-    assert (done.stderr, done.returncode) == (error, 1)
