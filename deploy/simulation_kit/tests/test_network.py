@@ -12,7 +12,7 @@ import rclpy
 from rclpy.duration import Duration
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
-from rclpy_simulation import Delay, Network, Simulation
+from rclpy_simulation import Delay, Network, Process, Simulation
 from std_msgs.msg import Int64
 
 BEST_EFFORT = QoSProfile(depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -66,16 +66,17 @@ class Listener:
         rclpy.spin(node)
 
 
-def publish(simulation: Simulation, process: Any, talker: Talker, *numbers: int) -> None:
+Pair = tuple[Talker, Process, Listener, Process]
+Start = Callable[..., Pair]
+
+
+def publish(simulation: Simulation, process: Process, talker: Talker, *numbers: int) -> None:
     process.interrupt(lambda: [talker.publisher.publish(Int64(data=each)) for each in numbers])
     simulation.run(0.0)
 
 
-Pair = tuple[Talker, Any, Listener, Any]
-
-
 @pytest.fixture
-def start(simulation: Simulation) -> Callable[..., Pair]:
+def start(simulation: Simulation) -> Start:
     """Starts a talker and a listener on two hosts, and waits until they have met."""
 
     def start(offered: QoSProfile | int = 10, requested: QoSProfile | int | None = None) -> Pair:
@@ -89,9 +90,7 @@ def start(simulation: Simulation) -> Callable[..., Pair]:
 
 
 @pytest.mark.simulation(seed=1, network=Network(latency=Delay(0.010, 0.050)))
-def test_latency_has_the_given_median_and_percentile(
-    simulation: Simulation, start: Callable[..., Pair]
-) -> None:
+def test_latency_has_the_given_median_and_percentile(simulation: Simulation, start: Start) -> None:
     talker, talking, listener, _ = start(BEST_EFFORT)
     latencies = []
     for number in range(400):
@@ -104,7 +103,7 @@ def test_latency_has_the_given_median_and_percentile(
 
 
 @pytest.mark.simulation(seed=1, network=Network(latency=EXACT))
-def test_samples_of_a_held_topic_arrive_together(simulation: Simulation, start: Callable[..., Pair]) -> None:
+def test_samples_of_a_held_topic_arrive_together(simulation: Simulation, start: Start) -> None:
     talker, talking, listener, _ = start(BEST_EFFORT)
     begin = simulation.now
     simulation.hold(talker.publisher.topic_name.replace("/", "rt/", 1), 2.0)
@@ -121,9 +120,7 @@ def test_samples_of_a_held_topic_arrive_together(simulation: Simulation, start: 
 
 
 @pytest.mark.simulation(seed=1)
-def test_best_effort_samples_are_lost_at_the_given_rate(
-    simulation: Simulation, start: Callable[..., Pair]
-) -> None:
+def test_best_effort_samples_are_lost_at_the_given_rate(simulation: Simulation, start: Start) -> None:
     talker, talking, listener, _ = start(BEST_EFFORT)
     simulation.network.loss = 0.2
     publish(simulation, talking, talker, *range(1000))
@@ -134,7 +131,7 @@ def test_best_effort_samples_are_lost_at_the_given_rate(
 
 @pytest.mark.simulation(seed=1)
 def test_a_best_effort_reader_of_a_reliable_writer_loses_samples(
-    simulation: Simulation, start: Callable[..., Pair]
+    simulation: Simulation, start: Start
 ) -> None:
     talker, talking, listener, _ = start(1000, BEST_EFFORT)
     simulation.network.loss = 0.2
@@ -144,9 +141,7 @@ def test_a_best_effort_reader_of_a_reliable_writer_loses_samples(
 
 
 @pytest.mark.simulation(seed=1, network=Network(latency=EXACT, retransmission=Delay(0.05, 0.05)))
-def test_reliable_samples_arrive_late_instead_and_in_order(
-    simulation: Simulation, start: Callable[..., Pair]
-) -> None:
+def test_reliable_samples_arrive_late_instead_and_in_order(simulation: Simulation, start: Start) -> None:
     talker, talking, listener, _ = start(1000)
     simulation.network.loss = 0.5
     sent = simulation.now
@@ -157,9 +152,7 @@ def test_reliable_samples_arrive_late_instead_and_in_order(
 
 
 @pytest.mark.simulation(seed=3, network=Network(latency=EXACT, retransmission=Delay(0.05, 0.05)))
-def test_a_short_history_drops_lost_samples_for_newer_ones(
-    simulation: Simulation, start: Callable[..., Pair]
-) -> None:
+def test_a_short_history_drops_lost_samples_for_newer_ones(simulation: Simulation, start: Start) -> None:
     talker, talking, listener, _ = start(1)
     simulation.network.loss = 0.5
     for number in range(100):
@@ -172,7 +165,7 @@ def test_a_short_history_drops_lost_samples_for_newer_ones(
 
 
 @pytest.mark.simulation(seed=1, network=Network(loss=0.5))
-def test_discovery_survives_loss(simulation: Simulation, start: Callable[..., Pair]) -> None:
+def test_discovery_survives_loss(simulation: Simulation, start: Start) -> None:
     *_, listener, _ = start(10)
     assert listener.matched[0][1] == 1
 
@@ -196,9 +189,7 @@ def test_samples_within_a_process_are_not_lost(simulation: Simulation) -> None:
 
 
 @pytest.mark.simulation(seed=2)
-def test_reliable_samples_survive_a_short_partition(
-    simulation: Simulation, start: Callable[..., Pair]
-) -> None:
+def test_reliable_samples_survive_a_short_partition(simulation: Simulation, start: Start) -> None:
     talker, talking, listener, _ = start(3)
     simulation.cut("left", "right")
     publish(simulation, talking, talker, 1, 2, 3, 4, 5)
@@ -211,7 +202,7 @@ def test_reliable_samples_survive_a_short_partition(
 
 
 @pytest.mark.simulation(seed=2)
-def test_a_partition_loses_best_effort_samples(simulation: Simulation, start: Callable[..., Pair]) -> None:
+def test_a_partition_loses_best_effort_samples(simulation: Simulation, start: Start) -> None:
     talker, talking, listener, _ = start(BEST_EFFORT)
     simulation.cut("left", "right")
     publish(simulation, talking, talker, 1)
@@ -223,9 +214,7 @@ def test_a_partition_loses_best_effort_samples(simulation: Simulation, start: Ca
 
 
 @pytest.mark.simulation(seed=2)
-def test_a_long_partition_ends_the_match_and_its_end_renews_it(
-    simulation: Simulation, start: Callable[..., Pair]
-) -> None:
+def test_a_long_partition_ends_the_match_and_its_end_renews_it(simulation: Simulation, start: Start) -> None:
     talker, talking, listener, _ = start(LATCHED)
     publish(simulation, talking, talker, 1)
     simulation.run(1.0)
@@ -245,9 +234,7 @@ def test_a_long_partition_ends_the_match_and_its_end_renews_it(
 
 
 @pytest.mark.simulation(seed=2)
-def test_an_endpoint_made_during_a_partition_is_found_after_it(
-    simulation: Simulation, start: Callable[..., Pair]
-) -> None:
+def test_an_endpoint_made_during_a_partition_is_found_after_it(simulation: Simulation, start: Start) -> None:
     _, talking, _, listening = start()
     late: list[int] = []
 
@@ -272,9 +259,7 @@ def test_an_endpoint_made_during_a_partition_is_found_after_it(
 
 
 @pytest.mark.simulation(seed=2)
-def test_a_goodbye_during_a_partition_is_noticed_by_the_lease(
-    simulation: Simulation, start: Callable[..., Pair]
-) -> None:
+def test_a_goodbye_during_a_partition_is_noticed_by_the_lease(simulation: Simulation, start: Start) -> None:
     _, talking, listener, _ = start()
     simulation.cut("left", "right")
     talking.send_signal(15)
@@ -288,9 +273,7 @@ def test_a_goodbye_during_a_partition_is_noticed_by_the_lease(
 
 
 @pytest.mark.simulation(seed=2)
-def test_a_killed_writer_stays_matched_until_its_lease_ends(
-    simulation: Simulation, start: Callable[..., Pair]
-) -> None:
+def test_a_killed_writer_stays_matched_until_its_lease_ends(simulation: Simulation, start: Start) -> None:
     _, talking, listener, _ = start()
     killed = simulation.now
     talking.kill()
@@ -301,7 +284,7 @@ def test_a_killed_writer_stays_matched_until_its_lease_ends(
 @pytest.mark.simulation(seed=2)
 @pytest.mark.parametrize("fault", ["stop", "kill", "cut"])
 def test_a_silent_participant_loses_its_automatic_liveliness(
-    simulation: Simulation, start: Callable[..., Pair], fault: str
+    simulation: Simulation, start: Start, fault: str
 ) -> None:
     talker, talking, listener, _ = start(QoSProfile(depth=1, liveliness_lease_duration=Duration(seconds=0.5)))
     simulation.run(5.0)
@@ -319,9 +302,7 @@ def test_a_silent_participant_loses_its_automatic_liveliness(
 
 
 @pytest.mark.simulation(seed=2, network=Network(latency=EXACT))
-def test_a_reader_misses_a_deadline_in_each_period_of_silence(
-    simulation: Simulation, start: Callable[..., Pair]
-) -> None:
+def test_a_reader_misses_a_deadline_in_each_period_of_silence(simulation: Simulation, start: Start) -> None:
     talker, talking, listener, _ = start(QoSProfile(depth=1, deadline=Duration(seconds=0.1)))
     simulation.run(1.0)
     assert listener.missed == []
@@ -336,7 +317,7 @@ def test_a_reader_misses_a_deadline_in_each_period_of_silence(
 
 @pytest.mark.simulation(seed=2)
 def test_a_stopped_reader_gets_the_last_samples_when_it_proceeds(
-    simulation: Simulation, start: Callable[..., Pair]
+    simulation: Simulation, start: Start
 ) -> None:
     talker, talking, listener, listening = start(2)
     listening.stop()
@@ -351,7 +332,7 @@ def test_a_stopped_reader_gets_the_last_samples_when_it_proceeds(
 @pytest.mark.simulation(seed=2)
 @pytest.mark.parametrize(("seconds", "counts"), [(9.0, [1]), (15.0, [1, 0, 1])])
 def test_a_stop_longer_than_the_lease_ends_the_match_for_a_while(
-    simulation: Simulation, start: Callable[..., Pair], seconds: float, counts: list[int]
+    simulation: Simulation, start: Start, seconds: float, counts: list[int]
 ) -> None:
     _, talking, listener, _ = start()
     talking.stop()
@@ -362,7 +343,7 @@ def test_a_stop_longer_than_the_lease_ends_the_match_for_a_while(
 
 
 @pytest.mark.simulation(seed=2)
-def test_a_hung_reader_is_alive_for_dds(simulation: Simulation, start: Callable[..., Pair]) -> None:
+def test_a_hung_reader_is_alive_for_dds(simulation: Simulation, start: Start) -> None:
     talker, talking, listener, listening = start()
     listening.hang()
     publish(simulation, talking, talker, 1)
@@ -374,7 +355,7 @@ def test_a_hung_reader_is_alive_for_dds(simulation: Simulation, start: Callable[
 @pytest.mark.simulation(seed=2)
 @pytest.mark.parametrize(("fault", "answer"), [("", True), ("stop", False), ("kill", False)])
 def test_waiting_for_acknowledgements_notices_an_absent_reader(
-    simulation: Simulation, start: Callable[..., Pair], fault: str, answer: bool
+    simulation: Simulation, start: Start, fault: str, answer: bool
 ) -> None:
     talker, talking, _, listening = start()
     if fault:
