@@ -144,7 +144,7 @@ def test_each_parameter_is_set_or_refused_with_a_reason(
         Parameter("speed", value="fast"),
         Parameter("serial", value="B8"),
         Parameter("joint.count", value=5),
-        Parameter("joint.count", value=4),
+        Parameter("joint.count", value=4).to_parameter_msg(),
         Parameter("missing", value=1),
     ]
     results = result(client.set_parameters(wanted)).results
@@ -172,7 +172,7 @@ def test_parameters_are_set_together_or_not_at_all(
         assert not refused.successful
     assert "speed" in refused.reason
     assert server.get_parameter("joint.count").value == 3
-    both = [good, Parameter("speed", value=1.0)]
+    both = [good, Parameter("speed", value=1.0).to_parameter_msg()]
     assert result(client.set_parameters_atomically(both)).result.successful
     assert [server.get_parameter(name).value for name in ("joint.count", "speed")] == [7, 1.0]
 
@@ -193,6 +193,9 @@ def test_a_file_is_loaded(server: Node, client: AsyncParameterClient, result: Re
     results = result(client.load_parameter_file(str(path))).results
     assert [answer.successful for answer in results] == [True, True]
     assert [server.get_parameter(name).value for name in ("speed", "joint.count")] == [1.25, 6]
+    path.write_text("/**: {ros__parameters: {speed: 0.25}}\n/arm/server: {ros__parameters: {note: new}}\n")
+    assert result(client.load_parameter_file_atomically(str(path), use_wildcard=True)).result.successful
+    assert [server.get_parameter(name).value for name in ("speed", "note")] == [0.25, "new"]
 
 
 def test_a_callback_gets_the_future_of_its_call(client: AsyncParameterClient, spin_until: SpinUntil) -> None:
@@ -203,8 +206,8 @@ def test_a_callback_gets_the_future_of_its_call(client: AsyncParameterClient, sp
     assert future.result().values[0].double_value == 0.5
 
 
-def test_a_client_is_not_ready_before_its_server_exists(
-    asking: Node, make_node: MakeNode, executor: SingleThreadedExecutor, result: Result
+def test_a_client_is_ready_while_its_server_has_all_services(
+    asking: Node, make_node: MakeNode, executor: SingleThreadedExecutor, result: Result, spin_until: SpinUntil
 ) -> None:
     client = AsyncParameterClient(asking, "/late")
     assert not client.services_are_ready()
@@ -216,6 +219,10 @@ def test_a_client_is_not_ready_before_its_server_exists(
     assert client.wait_for_services(timeout_sec=10.0)
     assert result(client.get_parameters(["speed"])).values[0].double_value == 3.0
     assert not call.done()  # a request is not kept for later servers
+    (listing,) = (service for service in late.services if service.srv_name.endswith("/list_parameters"))
+    late.destroy_service(listing)
+    spin_until(lambda: not client.services_are_ready())
+    assert not client.wait_for_services(timeout_sec=0.0)
 
 
 # /parameter_events
