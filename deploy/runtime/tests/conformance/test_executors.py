@@ -4,6 +4,7 @@ import threading
 import time
 import weakref
 from collections.abc import Callable, Iterator
+from functools import partial
 
 import pytest
 from deploy.runtime.tests.nodes import MakeNode, SpinUntil, subscribe
@@ -357,17 +358,11 @@ def test_context_shutdown_ends_spin_until_future_complete(
     executor.spin_until_future_complete(Future(), timeout_sec=20)
 
 
+@pytest.mark.parametrize("kind", [SingleThreadedExecutor, partial(MultiThreadedExecutor, 2)])
 def test_a_callback_may_shut_its_executor_down(
-    context: Context, executor: SingleThreadedExecutor, node: Node
+    make_node: MakeNode, context: Context, kind: Callable[..., SingleThreadedExecutor | MultiThreadedExecutor]
 ) -> None:
-    node.create_guard_condition(lambda: executor.shutdown()).trigger()
-    executor.spin()
-    assert executor.get_nodes() == []
-
-
-def test_a_callback_may_shut_its_multi_threaded_executor_down(make_node: MakeNode, context: Context) -> None:
-    node = make_node()
-    executor = MultiThreadedExecutor(2, context=context)
+    node, executor = make_node(), kind(context=context)
     executor.add_node(node)
     node.create_guard_condition(lambda: executor.shutdown()).trigger()
     executor.spin()

@@ -17,7 +17,7 @@ from typing import Any
 import pytest
 from deploy.runtime.tests.nodes import MakeNode, SpinUntil
 
-from rclpy._dds import INFINITY, Participant, Reader, WaitSet, Writer, entities
+from rclpy._dds import Participant, Reader, Writer, entities
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.context import Context
 from rclpy.executors import MultiThreadedExecutor
@@ -35,6 +35,7 @@ from std_msgs.msg import ByteMultiArray, Float64MultiArray, UInt8MultiArray
 from .fuzz import populated
 from .test_bad_input import allocated
 from .test_messages_codec import MESSAGES
+from .test_reader import wait
 
 MEGABYTE = 1_000_000
 QOS = QoSProfile(depth=10)
@@ -146,10 +147,7 @@ def reader(participant: Participant) -> Reader:
 
 def lent(reader: Reader) -> Any:
     """Wait for a sample, and return its octets in the memory of DDS."""
-    waitset = WaitSet()
-    waitset.attach(reader.condition, 0)
-    waitset.wait(INFINITY)
-    waitset.close()
+    wait(reader)
     sample = reader.take(lend=True)
     assert sample is not None
     return sample.data

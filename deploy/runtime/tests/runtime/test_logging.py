@@ -204,19 +204,24 @@ def test_characters_that_the_console_cannot_show_are_escaped(
 # /rosout
 
 
-def test_messages_of_a_node_and_its_children_reach_rosout() -> None:
+@pytest.fixture
+def records() -> Iterator[list[LogRecord]]:
+    """What the publisher of the logger ``node`` gets."""
     records: list[LogRecord] = []
     _logging_output.add_rosout_publisher("node", records.append)
-    try:
-        logger = get_logger("node")
-        child = logger.get_child("child")
-        logger.info("a")
-        child.warning("b")
-        get_logger("node.stranger").info("c")
-        get_logger("other").info("d")
-        logger.debug("e")
-    finally:
-        _logging_output.remove_rosout_publisher(records.append)
+    yield records
+    _logging_output.remove_rosout_publisher(records.append)
+
+
+def test_messages_of_a_node_and_its_children_reach_rosout(records: list[LogRecord]) -> None:
+    logger = get_logger("node")
+    child = logger.get_child("child")
+    logger.info("a")
+    child.warning("b")
+    get_logger("node.stranger").info("c")
+    get_logger("other").info("d")
+    logger.debug("e")
+    _logging_output.remove_rosout_publisher(records.append)
     child.info("f")
     assert [(record.name, record.level, record.message) for record in records] == [
         ("node", 20, "a"),
@@ -226,19 +231,15 @@ def test_messages_of_a_node_and_its_children_reach_rosout() -> None:
     assert records[0].function == "test_messages_of_a_node_and_its_children_reach_rosout"
 
 
-def test_a_deleted_child_logger_is_forgotten() -> None:
-    records: list[LogRecord] = []
-    _logging_output.add_rosout_publisher("node", records.append)
-    try:
-        child, same = get_logger("node").get_child("child"), get_logger("node").get_child("child")
-        del child
-        get_logger("node.child").info("still there")
-        del same
-        get_logger("node.child").info("gone")
-        assert [record.message for record in records] == ["still there"]
-        assert set(_logging_output._rosout) == {"node"}
-    finally:
-        _logging_output.remove_rosout_publisher(records.append)
+def test_a_deleted_child_logger_is_forgotten(records: list[LogRecord]) -> None:
+    child, same = get_logger("node").get_child("child"), get_logger("node").get_child("child")
+    del child
+    get_logger("node.child").info("still there")
+    del same
+    get_logger("node.child").info("gone")
+    assert [record.message for record in records] == ["still there"]
+    assert set(_logging_output._rosout) == {"node"}
+    _logging_output.remove_rosout_publisher(records.append)
     assert not _logging_output._rosout
 
 
@@ -264,9 +265,7 @@ def test_a_child_logger_may_be_collected_during_remove_rosout_publisher() -> Non
     assert _logging_output._rosout == {}
 
 
-def test_a_rosout_publisher_may_log_and_fail(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_a_rosout_publisher_may_log_and_fail(capsys: pytest.CaptureFixture[str]) -> None:
     def publish(record: LogRecord) -> None:
         get_logger("node").error("in publish")
         raise RuntimeError("no network")
@@ -281,15 +280,14 @@ def test_a_rosout_publisher_may_log_and_fail(
     assert "no network" in error
 
 
-def test_rosout_works_without_the_console(capsys: pytest.CaptureFixture[str]) -> None:
-    records: list[LogRecord] = []
-    _logging_output.add_rosout_publisher("node", records.append)
+def test_rosout_works_without_the_console(
+    records: list[LogRecord], capsys: pytest.CaptureFixture[str]
+) -> None:
     _logging_output.enable_console(False)
     try:
         get_logger("node").info("hello")
     finally:
         _logging_output.enable_console(True)
-        _logging_output.remove_rosout_publisher(records.append)
     assert capsys.readouterr().err == ""
     assert len(records) == 1
 
