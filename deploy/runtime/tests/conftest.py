@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 from deploy.runtime.tests.host import ADDRESS, Host
-from deploy.runtime.tests.nodes import MakeNode
+from deploy.runtime.tests.nodes import Call, MakeNode, SpinUntil
 
 from geometry_msgs.msg import PointStamped
 from rclpy.clock import ROSClock
@@ -56,6 +56,20 @@ def node(make_node: MakeNode, executor: SingleThreadedExecutor) -> Node:
     node = make_node()
     executor.add_node(node)
     return node
+
+
+@pytest.fixture
+def call(node: Node, spin_until: SpinUntil) -> Call:
+    """Calls a service from ``node``, with the fields of the request; returns the response."""
+
+    def call(srv_type: Any, name: str, **request: Any) -> Any:
+        client = node.create_client(srv_type, name)
+        spin_until(client.service_is_ready)
+        future = client.call_async(srv_type.Request(**request))
+        spin_until(future.done)
+        return future.result()
+
+    return call
 
 
 @pytest.fixture

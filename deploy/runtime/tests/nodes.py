@@ -10,6 +10,7 @@ from std_msgs.msg import Float64
 
 MakeNode = Callable[..., Node]
 SpinUntil = Callable[..., None]
+Call = Callable[..., Any]
 
 
 def subscribe(node: Node, topic: str = "x", **options: Any) -> tuple[list[float], Callable[[float], None]]:

@@ -7,7 +7,7 @@ from contextlib import suppress
 
 import pytest
 from deploy.runtime.tests.conformance.fibonacci import PACKAGE, Fibonacci
-from deploy.runtime.tests.nodes import MakeNode, SpinUntil
+from deploy.runtime.tests.nodes import Call, MakeNode, SpinUntil
 
 from rclpy.action import (
     ActionClient,
@@ -145,15 +145,9 @@ def test_a_destroyed_action_disappears(
     spin_until(lambda: get_action_names_and_types(node) == [])
 
 
-def test_the_type_of_an_action_in_use_is_described(
-    node: Node, server: ActionServer, spin_until: SpinUntil
-) -> None:
-    service = node.create_client(GetTypeDescription, "node/get_type_description")
-    spin_until(service.service_is_ready)
-    request = GetTypeDescription.Request(type_name=FIBONACCI, type_hash=FIBONACCI_HASH)
-    future = service.call_async(request)
-    spin_until(future.done)
-    response = future.result()
+def test_the_type_of_an_action_in_use_is_described(server: ActionServer, call: Call) -> None:
+    service = "node/get_type_description"
+    response = call(GetTypeDescription, service, type_name=FIBONACCI, type_hash=FIBONACCI_HASH)
     assert (response.successful, response.failure_reason) == (True, "")
     top = response.type_description.type_description
     assert [field.name for field in top.fields] == [

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 from deploy.runtime.tests.conformance.middleware import announced_history
-from deploy.runtime.tests.nodes import SpinUntil
+from deploy.runtime.tests.nodes import Call, SpinUntil
 
 from rclpy.duration import Duration, Infinite
 from rclpy.impl.implementation_singleton import rclpy_implementation
@@ -139,18 +139,17 @@ def test_only_best_available_policies_are_chosen(create: Create) -> None:
     assert (chosen.history, chosen.depth) == announced_history(3)
 
 
-def test_services_with_best_available_qos_use_the_services_default(node: Node, spin_until: SpinUntil) -> None:
+def test_services_with_best_available_qos_use_the_services_default(
+    node: Node, spin_until: SpinUntil, call: Call
+) -> None:
     best = qos_profile_best_available
     node.create_service(Trigger, "serve", lambda request, response: response, qos_profile=best)
-    client = node.create_client(Trigger, "serve", qos_profile=best)
+    node.create_client(Trigger, "serve", qos_profile=best)
     for endpoints_of in (node.get_publishers_info_by_topic, node.get_subscriptions_info_by_topic):
         spin_until(lambda: endpoints_of("rq/serveRequest", no_mangle=True))  # noqa: B023
         (info,) = endpoints_of("rq/serveRequest", no_mangle=True)
         assert policies(info.qos_profile) == (RELIABLE, VOLATILE, AUTOMATIC, Infinite, Infinite)
-    spin_until(client.service_is_ready)
-    future = client.call_async(Trigger.Request())
-    spin_until(future.done)
-    assert future.result() == Trigger.Response()
+    assert call(Trigger, "serve") == Trigger.Response()
 
 
 @pytest.mark.parametrize("policy", ["history", "reliability", "durability", "liveliness"])

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from deploy.runtime.tests.nodes import SpinUntil
+from deploy.runtime.tests.nodes import Call, SpinUntil
 
 import rclpy.lifecycle
 from lifecycle_msgs.msg import State, Transition, TransitionEvent
@@ -27,7 +27,6 @@ from rclpy.lifecycle import (
 from rclpy.node import Node
 from std_msgs.msg import Float64
 
-Call = Callable[..., Any]
 SUCCESS, FAILURE, ERROR = (
     TransitionCallbackReturn.SUCCESS,
     TransitionCallbackReturn.FAILURE,
@@ -77,20 +76,8 @@ def machine(context: Context, executor: SingleThreadedExecutor) -> Any:
 
 
 @pytest.fixture
-def call(node: Node, machine: Machine, spin_until: SpinUntil) -> Call:
-    def call(srv_type: Any, name: str, **request: Any) -> Any:
-        client = node.create_client(srv_type, f"machine/{name}")
-        spin_until(client.service_is_ready)
-        future = client.call_async(srv_type.Request(**request))
-        spin_until(future.done)
-        return future.result()
-
-    return call
-
-
-@pytest.fixture
-def state(call: Call) -> Callable[[], str]:
-    return lambda: str(call(GetState, "get_state").current_state.label)
+def state(machine: Machine, call: Call) -> Callable[[], str]:
+    return lambda: str(call(GetState, "machine/get_state").current_state.label)
 
 
 State_ = Callable[[], str]
@@ -173,21 +160,21 @@ def test_an_error_is_handled_or_final(
 
 def test_other_nodes_ask_for_transitions_by_number_or_label(call: Call, state: State_) -> None:
     by_number = Transition(id=Transition.TRANSITION_CONFIGURE)
-    assert call(ChangeState, "change_state", transition=by_number).success
+    assert call(ChangeState, "machine/change_state", transition=by_number).success
     assert state() == "inactive"
-    assert call(ChangeState, "change_state", transition=Transition(label="activate")).success
+    assert call(ChangeState, "machine/change_state", transition=Transition(label="activate")).success
     assert state() == "active"
-    assert not call(ChangeState, "change_state", transition=Transition(label="configure")).success
+    assert not call(ChangeState, "machine/change_state", transition=Transition(label="configure")).success
     assert state() == "active"
 
 
 def test_other_nodes_learn_whether_a_transition_has_failed(machine: Machine, call: Call) -> None:
     machine.results["configure"] = FAILURE
-    assert not call(ChangeState, "change_state", transition=Transition(label="configure")).success
+    assert not call(ChangeState, "machine/change_state", transition=Transition(label="configure")).success
 
 
 def test_other_nodes_learn_states_and_transitions(machine: Machine, call: Call) -> None:
-    states = call(GetAvailableStates, "get_available_states").available_states
+    states = call(GetAvailableStates, "machine/get_available_states").available_states
     assert {(state.id, state.label) for state in states} == {
         (State.PRIMARY_STATE_UNKNOWN, "unknown"),
         (State.PRIMARY_STATE_UNCONFIGURED, "unconfigured"),
@@ -202,13 +189,13 @@ def test_other_nodes_learn_states_and_transitions(machine: Machine, call: Call) 
         (State.TRANSITION_STATE_ERRORPROCESSING, "errorprocessing"),
     }
     machine.trigger_configure()
-    found = call(GetAvailableTransitions, "get_available_transitions").available_transitions
+    found = call(GetAvailableTransitions, "machine/get_available_transitions").available_transitions
     assert {(one.transition.id, one.transition.label, one.goal_state.label) for one in found} == {
         (Transition.TRANSITION_CLEANUP, "cleanup", "cleaningup"),
         (Transition.TRANSITION_ACTIVATE, "activate", "activating"),
         (Transition.TRANSITION_INACTIVE_SHUTDOWN, "shutdown", "shuttingdown"),
     }
-    graph = call(GetAvailableTransitions, "get_transition_graph").available_transitions
+    graph = call(GetAvailableTransitions, "machine/get_transition_graph").available_transitions
     assert len(graph) == 25
     by_id = {one.transition.id: one for one in graph}
     on_error = by_id[Transition.TRANSITION_ON_ERROR_SUCCESS]

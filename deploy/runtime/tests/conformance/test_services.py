@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 
 import pytest
-from deploy.runtime.tests.nodes import MakeNode, SpinUntil
+from deploy.runtime.tests.nodes import Call, MakeNode, SpinUntil
 
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.context import Context
@@ -28,13 +28,9 @@ def negate(request: SetBool.Request, response: SetBool.Response) -> SetBool.Resp
     return response
 
 
-def test_a_call_gets_its_reply(spin_until: SpinUntil, node: Node) -> None:
+def test_a_call_gets_its_reply(node: Node, call: Call) -> None:
     node.create_service(Trigger, "turn_on", answer)
-    client = node.create_client(Trigger, "turn_on")
-    assert client.wait_for_service(timeout_sec=10)
-    future = client.call_async(Trigger.Request())
-    spin_until(future.done)
-    assert future.result() == Trigger.Response(success=True, message="ok")
+    assert call(Trigger, "turn_on") == Trigger.Response(success=True, message="ok")
 
 
 def test_several_clients_get_their_replies(
@@ -58,7 +54,7 @@ def test_several_clients_get_their_replies(
     assert [future.result().success for _, future in calls] == [not value for value, _ in calls]
 
 
-def test_a_coroutine_may_answer_a_request_later(spin_until: SpinUntil, node: Node) -> None:
+def test_a_coroutine_may_answer_a_request_later(node: Node, call: Call) -> None:
     ready: Future = Future()
 
     async def answer_later(request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
@@ -66,12 +62,8 @@ def test_a_coroutine_may_answer_a_request_later(spin_until: SpinUntil, node: Nod
         return response
 
     node.create_service(Trigger, "later", answer_later, callback_group=MutuallyExclusiveCallbackGroup())
-    client = node.create_client(Trigger, "later")
-    assert client.wait_for_service(timeout_sec=10)
-    future = client.call_async(Trigger.Request())
     node.create_timer(0.05, lambda: ready.done() or ready.set_result("at last"))
-    spin_until(future.done)
-    assert future.result().message == "at last"
+    assert call(Trigger, "later").message == "at last"
 
 
 def test_a_blocking_call_works_while_another_thread_spins(make_node: MakeNode, context: Context) -> None:

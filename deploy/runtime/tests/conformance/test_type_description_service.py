@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import pytest
-from deploy.runtime.tests.nodes import MakeNode, SpinUntil
+from deploy.runtime.tests.nodes import Call, MakeNode
 
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -36,20 +37,8 @@ def node(make_node: MakeNode, executor: SingleThreadedExecutor) -> Node:
 
 
 @pytest.fixture
-def ask(node: Node, make_node: MakeNode, executor: SingleThreadedExecutor, spin_until: SpinUntil) -> Ask:
-    other = make_node("other")
-    executor.add_node(other)
-    client = other.create_client(GetTypeDescription, "node/get_type_description")
-    spin_until(client.service_is_ready)
-
-    def ask(type_name: str, type_hash: str, **request: Any) -> Any:
-        future = client.call_async(
-            GetTypeDescription.Request(type_name=type_name, type_hash=type_hash, **request)
-        )
-        spin_until(future.done)
-        return future.result()
-
-    return ask
+def ask(call: Call) -> Ask:
+    return partial(call, GetTypeDescription, "node/get_type_description")
 
 
 def described(response: Any) -> list[str]:
@@ -61,7 +50,7 @@ def described(response: Any) -> list[str]:
 
 
 def test_a_message_is_described_with_the_files_that_define_it(ask: Ask) -> None:
-    response = ask("std_msgs/msg/Header", HEADER)
+    response = ask(type_name="std_msgs/msg/Header", type_hash=HEADER)
     assert described(response) == ["std_msgs/msg/Header", "builtin_interfaces/msg/Time"]
     header, time = response.type_sources
     assert (header.type_name, header.encoding) == ("std_msgs/msg/Header", "msg")
@@ -71,13 +60,13 @@ def test_a_message_is_described_with_the_files_that_define_it(ask: Ask) -> None:
 
 
 def test_sources_are_included_only_on_request(ask: Ask) -> None:
-    response = ask("std_msgs/msg/Header", HEADER, include_type_sources=False)
+    response = ask(type_name="std_msgs/msg/Header", type_hash=HEADER, include_type_sources=False)
     assert len(described(response)) == 2
     assert response.type_sources == []
 
 
 def test_the_messages_of_a_service_have_implicit_sources(ask: Ask) -> None:
-    response = ask("std_srvs/srv/Trigger", TRIGGER)
+    response = ask(type_name="std_srvs/srv/Trigger", type_hash=TRIGGER)
     names = [
         "std_srvs/srv/Trigger",
         "builtin_interfaces/msg/Time",
@@ -94,8 +83,8 @@ def test_the_messages_of_a_service_have_implicit_sources(ask: Ask) -> None:
 
 
 def test_the_hash_alone_identifies_the_type(ask: Ask) -> None:
-    assert described(ask("std_msgs/msg/Nothing", HEADER))[0] == "std_msgs/msg/Header"
-    assert described(ask("std_msgs/msg/Header", TRIGGER))[0] == "std_srvs/srv/Trigger"
+    assert described(ask(type_name="std_msgs/msg/Nothing", type_hash=HEADER))[0] == "std_msgs/msg/Header"
+    assert described(ask(type_name="std_msgs/msg/Header", type_hash=TRIGGER))[0] == "std_srvs/srv/Trigger"
 
 
 @pytest.mark.parametrize(
@@ -113,6 +102,6 @@ def test_the_hash_alone_identifies_the_type(ask: Ask) -> None:
 def test_a_type_that_the_node_does_not_use_is_not_described(
     ask: Ask, type_name: str, type_hash: str, reason: str
 ) -> None:
-    response = ask(type_name, type_hash)
+    response = ask(type_name=type_name, type_hash=type_hash)
     assert (response.successful, response.failure_reason) == (False, reason)
     assert response.type_sources == []

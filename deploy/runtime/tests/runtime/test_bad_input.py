@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from deploy.runtime.tests.nodes import MakeNode, SpinUntil
+from deploy.runtime.tests.nodes import Call, MakeNode, SpinUntil
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.srv import SetParameters
@@ -170,7 +170,9 @@ def test_random_samples_are_dropped_or_delivered(
         spin_until(lambda done=done: subscription._rclpy_bad_input.count + len(good) == done)
 
 
-def test_a_service_survives_bad_requests(node: Node, participant: Participant, spin_until: SpinUntil) -> None:
+def test_a_service_survives_bad_requests(
+    node: Node, participant: Participant, spin_until: SpinUntil, call: Call
+) -> None:
     def answer(request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
         response.success = request.data
         return response
@@ -179,16 +181,12 @@ def test_a_service_survives_bad_requests(node: Node, participant: Participant, s
     writer = writer_for(participant, "rq/switchRequest", "std_srvs::srv::dds_::SetBool_Request_", spin_until)
     for data in (b"\1", bytes(8), bytes(15), bytes(16), b"\xff" * 40):
         writer.write(HEADER + data)
-    client = node.create_client(SetBool, "switch")
-    spin_until(client.service_is_ready)
-    future = client.call_async(SetBool.Request(data=True))
-    spin_until(future.done)
-    assert future.result() == SetBool.Response(success=True)
+    assert call(SetBool, "switch", data=True) == SetBool.Response(success=True)
     assert service._rclpy_bad_input.count >= 4
 
 
 def test_the_parameter_services_survive_bad_requests(
-    node: Node, participant: Participant, spin_until: SpinUntil
+    participant: Participant, spin_until: SpinUntil, call: Call
 ) -> None:
     writer = writer_for(
         participant,
@@ -199,11 +197,7 @@ def test_the_parameter_services_survive_bad_requests(
     source = random.Random(1)
     for _ in range(200):
         writer.write(HEADER + bytes(16) + source.randbytes(source.randrange(1, 60)))
-    client = node.create_client(SetParameters, "node/set_parameters")
-    spin_until(client.service_is_ready)
-    future = client.call_async(SetParameters.Request())
-    spin_until(future.done)
-    assert future.result() == SetParameters.Response()
+    assert call(SetParameters, "node/set_parameters") == SetParameters.Response()
 
 
 def test_a_client_survives_bad_replies(node: Node, participant: Participant, spin_until: SpinUntil) -> None:
