@@ -10,9 +10,9 @@ from __future__ import annotations
 import importlib.util
 
 import pytest
-from deploy.runtime.tests.conftest import executor, make_node, node, other_context
+from deploy.runtime.tests.conftest import call, executor, make_node, node, other_context
 
-__all__ = ["executor", "make_node", "node", "other_context"]
+__all__ = ["call", "executor", "make_node", "node", "other_context"]
 
 
 def pytest_configure(config: pytest.Config) -> None:

@@ -8,6 +8,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import pytest
@@ -15,7 +16,7 @@ import pytest
 from geometry_msgs.msg import PointStamped
 from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor
 from rclpy.context import Context
-from rclpy.executors import SingleThreadedExecutor
+from rclpy.executors import MultiThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_sensor_data
 from std_msgs.msg import Float64, Header, String
@@ -51,13 +52,13 @@ class Lab(Node):
         return response
 
 
-@pytest.fixture(scope="module")
-def lab(module_domain_id: int) -> Iterator[Lab]:
-    """A node in the domain of the module, which a thread spins."""
+@contextmanager
+def spinning(make: Callable[[Context], Any], domain_id: int) -> Iterator[Any]:
+    """A node in a domain, which a thread spins."""
     context = Context()
-    context.init([], domain_id=module_domain_id)
-    node = Lab(context)
-    executor = SingleThreadedExecutor(context=context)
+    context.init([], domain_id=domain_id)
+    node = make(context)
+    executor = MultiThreadedExecutor(2, context=context)
     executor.add_node(node)
     thread = threading.Thread(target=executor.spin)
     thread.start()
@@ -66,6 +67,12 @@ def lab(module_domain_id: int) -> Iterator[Lab]:
     thread.join()
     node.destroy_node()
     context.try_shutdown()
+
+
+@pytest.fixture(scope="module")
+def lab(module_domain_id: int) -> Iterator[Lab]:
+    with spinning(Lab, module_domain_id) as lab:
+        yield lab
 
 
 Ros2 = Callable[..., "subprocess.CompletedProcess[str]"]

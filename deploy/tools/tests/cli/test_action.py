@@ -7,11 +7,11 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
+from deploy.tools.tests.cli.conftest import spinning
 
 from rclpy.action import ActionServer, CancelResponse, GoalResponse
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.context import Context
-from rclpy.executors import MultiThreadedExecutor
 from rclpy.node import Node
 
 try:
@@ -60,19 +60,9 @@ class Server(Node):
 
 @pytest.fixture(scope="module")
 def server(module_domain_id: int) -> Iterator[Server]:
-    context = Context()
-    context.init([], domain_id=module_domain_id)
-    node = Server(context)
-    executor = MultiThreadedExecutor(2, context=context)
-    executor.add_node(node)
-    thread = threading.Thread(target=executor.spin)
-    thread.start()
-    yield node
-    node.is_ending = True
-    executor.shutdown()
-    thread.join()
-    node.destroy_node()
-    context.try_shutdown()
+    with spinning(Server, module_domain_id) as server:
+        yield server
+        server.is_ending = True
 
 
 @pytest.mark.own  # ROS 2 starts its daemon

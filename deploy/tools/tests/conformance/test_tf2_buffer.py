@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
-from deploy.runtime.tests.nodes import MakeNode, SpinUntil
+from deploy.runtime.tests.nodes import Call, SpinUntil
 
 pytest.importorskip("tf2_msgs.msg", reason="platform: no tf2_msgs here, as with ROS 2's wheels")
 
@@ -166,19 +166,12 @@ def test_a_change_of_the_source_of_time_clears_the_buffer(
     assert buffer.can_transform("base", "camera", Time())
 
 
-def test_a_buffer_of_a_node_has_a_service_with_all_frames(
-    node: Node, make_node: MakeNode, executor: SingleThreadedExecutor, spin_until: SpinUntil
-) -> None:
+def test_a_buffer_of_a_node_has_a_service_with_all_frames(node: Node, call: Call) -> None:
     buffer = Buffer(Duration(seconds=5), node)
     buffer.set_transform(transform("base", "tool"), "someone")
-    asker = make_node("asker")
-    executor.add_node(asker)
-    client = asker.create_client(FrameGraph, "tf2_frames")
-    assert client.wait_for_service(timeout_sec=10)
-    future = client.call_async(FrameGraph.Request())
-    spin_until(future.done)
-    assert future.result().frame_yaml == buffer.all_frames_as_yaml()
-    assert "broadcaster: 'someone'" in future.result().frame_yaml
+    frames = call(FrameGraph, "tf2_frames").frame_yaml
+    assert frames == buffer.all_frames_as_yaml()
+    assert "broadcaster: 'someone'" in frames
 
 
 class Marker:
