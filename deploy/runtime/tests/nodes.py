@@ -1,10 +1,13 @@
-"""What tests do with nodes: the types of their fixtures, and a topic within one node."""
+"""What tests do with nodes: the types of their fixtures, a topic within one node, spinning in a thread."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
+from rclpy.executors import Executor
 from rclpy.node import Node
 from std_msgs.msg import Float64
 
@@ -19,3 +22,16 @@ def subscribe(node: Node, topic: str = "x", **options: Any) -> tuple[list[float]
     node.create_subscription(Float64, topic, lambda message: received.append(message.data), 10, **options)
     publisher = node.create_publisher(Float64, topic, 10)
     return received, lambda value: publisher.publish(Float64(data=value))
+
+
+@contextmanager
+def spinning(executor: Executor, node: Node) -> Iterator[None]:
+    """Spin a node in a thread; the end of the block shuts the executor down."""
+    executor.add_node(node)
+    thread = threading.Thread(target=executor.spin)
+    thread.start()
+    try:
+        yield
+    finally:
+        executor.shutdown()
+        thread.join()

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 from deploy.runtime.tests.conformance.fibonacci import Fibonacci
-from deploy.runtime.tests.nodes import MakeNode, SpinUntil
+from deploy.runtime.tests.nodes import MakeNode, SpinUntil, spinning
 
 from action_msgs.msg import GoalInfo, GoalStatus, GoalStatusArray
 from action_msgs.srv import CancelGoal
@@ -576,10 +576,7 @@ def test_blocking_calls_work_while_another_thread_spins(make_node: MakeNode, con
         node, Fibonacci, "fibonacci", execute, callback_group=group, cancel_callback=accept_cancel
     )
     client = ActionClient(node, Fibonacci, "fibonacci", callback_group=group)
-    with MultiThreadedExecutor(4, context=context) as executor:
-        executor.add_node(node)
-        spinning = threading.Thread(target=executor.spin)
-        spinning.start()
+    with spinning(MultiThreadedExecutor(4, context=context), node):
         assert client.wait_for_server(timeout_sec=10)
         feedback: list[Any] = []
         response = client.send_goal(Fibonacci.Goal(order=1), feedback_callback=feedback.append)
@@ -588,8 +585,6 @@ def test_blocking_calls_work_while_another_thread_spins(make_node: MakeNode, con
         assert answered.wait(10)
         cancelled = sent.result().cancel_goal()
         end = sent.result().get_result()
-        executor.shutdown()
-        spinning.join()
     assert (response.status, list(response.result.sequence)) == (SUCCEEDED, [0, 1, 1])
     assert len(cancelled.goals_canceling) == 1
     assert end.status == CANCELED

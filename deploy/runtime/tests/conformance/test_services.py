@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 
 import pytest
-from deploy.runtime.tests.nodes import Call, MakeNode, SpinUntil
+from deploy.runtime.tests.nodes import Call, MakeNode, SpinUntil, spinning
 
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.context import Context
@@ -70,14 +70,9 @@ def test_a_blocking_call_works_while_another_thread_spins(make_node: MakeNode, c
     node = make_node()
     node.create_service(Trigger, "turn_on", answer)
     client = node.create_client(Trigger, "turn_on", callback_group=MutuallyExclusiveCallbackGroup())
-    with MultiThreadedExecutor(2, context=context) as executor:
-        executor.add_node(node)
-        spinning = threading.Thread(target=executor.spin)
-        spinning.start()
+    with spinning(MultiThreadedExecutor(2, context=context), node):
         assert client.wait_for_service(timeout_sec=10)
         response = client.call(Trigger.Request(), timeout_sec=10)
-        executor.shutdown()
-        spinning.join(10)
     assert response.message == "ok"
 
 

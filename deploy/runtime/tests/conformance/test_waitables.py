@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from deploy.runtime.tests.nodes import MakeNode, SpinUntil
+from deploy.runtime.tests.nodes import MakeNode, SpinUntil, spinning
 
 from rclpy.callback_groups import CallbackGroup, MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
 from rclpy.clock import Clock
@@ -204,18 +204,13 @@ def test_a_waitable_obeys_its_callback_group(make_node: MakeNode, context: Conte
         leave.wait(10)
 
     timer = node.create_timer(0.0, occupy, group)
-    with MultiThreadedExecutor(3, context=context) as executor:
-        executor.add_node(node)
-        spinning = threading.Thread(target=executor.spin)
-        spinning.start()
+    with spinning(MultiThreadedExecutor(3, context=context), node):
         assert entered.wait(10)
         assert bell.executed == []
         leave.set()
         done = threading.Event()
         while not bell.executed:
             assert not done.wait(0.01)
-        executor.shutdown()
-        spinning.join()
     assert bell.executed == ["ding"]
     node.remove_waitable(bell)
 

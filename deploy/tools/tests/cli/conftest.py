@@ -5,13 +5,12 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-import threading
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
 import pytest
+from deploy.runtime.tests.nodes import spinning
 
 from geometry_msgs.msg import PointStamped
 from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor
@@ -53,25 +52,20 @@ class Lab(Node):
 
 
 @contextmanager
-def spinning(make: Callable[[Context], Any], domain_id: int) -> Iterator[Any]:
+def in_domain(make: Callable[[Context], Any], domain_id: int) -> Iterator[Any]:
     """A node in a domain, which a thread spins."""
     context = Context()
     context.init([], domain_id=domain_id)
     node = make(context)
-    executor = MultiThreadedExecutor(2, context=context)
-    executor.add_node(node)
-    thread = threading.Thread(target=executor.spin)
-    thread.start()
-    yield node
-    executor.shutdown()
-    thread.join()
+    with spinning(MultiThreadedExecutor(2, context=context), node):
+        yield node
     node.destroy_node()
     context.try_shutdown()
 
 
 @pytest.fixture(scope="module")
 def lab(module_domain_id: int) -> Iterator[Lab]:
-    with spinning(Lab, module_domain_id) as lab:
+    with in_domain(Lab, module_domain_id) as lab:
         yield lab
 
 
@@ -108,14 +102,3 @@ def ros2(start: Start) -> Ros2:
         return subprocess.CompletedProcess(arguments, process.returncode, out, err)
 
     return run
-
-
-@pytest.fixture
-def wait_until() -> Callable[[Callable[[], object]], None]:
-    def wait(condition: Callable[[], object]) -> None:
-        deadline = time.monotonic() + TIMEOUT
-        while not condition():
-            assert time.monotonic() < deadline
-            time.sleep(0.01)
-
-    return wait

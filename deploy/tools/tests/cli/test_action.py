@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from deploy.tools.tests.cli.conftest import spinning
+from deploy.tools.tests.cli.conftest import in_domain
 
 from rclpy.action import ActionServer, CancelResponse, GoalResponse
 from rclpy.callback_groups import ReentrantCallbackGroup
@@ -60,7 +60,7 @@ class Server(Node):
 
 @pytest.fixture(scope="module")
 def server(module_domain_id: int) -> Iterator[Server]:
-    with spinning(Server, module_domain_id) as server:
+    with in_domain(Server, module_domain_id) as server:
         yield server
         server.is_ending = True
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
+from deploy.runtime.tests.host import wait_until
 from deploy.runtime.tests.nodes import MakeNode
 
 import rclpy
@@ -43,8 +43,6 @@ from ros2topic.api import get_msg_class, get_topic_names, get_topic_names_and_ty
 from std_msgs.msg import Float64, String
 from std_srvs.srv import SetBool
 
-LIMIT = 10.0  # s
-
 
 def publish(node: Node, message_type: Any, topic: str) -> None:
     """Create a publisher; return when the graph shows it."""
@@ -54,10 +52,7 @@ def publish(node: Node, message_type: Any, topic: str) -> None:
 
 def wait_for_type(node: Node, message_type: Any, topic: str) -> None:
     name = f"std_msgs/msg/{message_type.__name__}"
-    deadline = time.monotonic() + LIMIT
-    while name not in dict(node.get_topic_names_and_types()).get(topic, []):
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
+    wait_until(lambda: name in dict(node.get_topic_names_and_types()).get(topic, []))
 
 
 @pytest.fixture
@@ -121,10 +116,7 @@ def asker(lab: Any, module_domain_id: int, monkeypatch: pytest.MonkeyPatch) -> I
     monkeypatch.setenv("ROS_DOMAIN_ID", str(module_domain_id))
     rclpy.init(args=[])
     node = rclpy.create_node("asker")
-    deadline = time.monotonic() + LIMIT
-    while LAB not in [name.full_name for name in get_node_names(node=node)]:
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
+    wait_until(lambda: LAB in [name.full_name for name in get_node_names(node=node)])
     yield node
     node.destroy_node()
     rclpy.shutdown()

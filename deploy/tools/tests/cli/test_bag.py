@@ -15,6 +15,8 @@ from typing import Any
 import pytest
 import yaml
 from click.testing import CliRunner
+from deploy.runtime.tests.host import wait_until
+from deploy.tools.tests.cli.conftest import TIMEOUT
 from mcap.reader import make_reader
 from rosbags.highlevel import AnyReader
 
@@ -28,7 +30,6 @@ from std_msgs.msg import String
 
 pytestmark = pytest.mark.own  # ROS 2's is C++; its bags have the same format
 
-Wait = Callable[[Callable[[], object]], None]
 Record = Callable[..., Path]
 
 
@@ -124,9 +125,7 @@ def test_filters_select_topics(record: Record, ros2: Any) -> None:
     assert ros2("bag", "info", "-t", str(bag)).stdout == "/arm/chatter\n/arm/speed\n"
 
 
-def test_play_keeps_the_pace_and_the_qos(
-    lab: Any, record: Record, ros2: Any, wait_until: Wait, tmp_path: Path
-) -> None:
+def test_play_keeps_the_pace_and_the_qos(lab: Any, record: Record, ros2: Any, tmp_path: Path) -> None:
     bag = record("/arm/chatter", "/arm/point", seconds=2.0)
     # Queues that hold the whole record, and a delay for a late match: a busy machine loses nothing.
     overrides = tmp_path / "qos.yaml"
@@ -245,7 +244,7 @@ SENDS_ANYTHING = importlib.util.find_spec("rosidl_runtime_embedded") is None
     ids=["empty", "JSON", "ROS 1"],
 )
 def test_bad_message_does_not_end_a_play(
-    lab: Any, ros2: Any, wait_until: Wait, tmp_path: Path, bad: list[Any], reason: str
+    lab: Any, ros2: Any, tmp_path: Path, bad: list[Any], reason: str
 ) -> None:
     got: list[str] = []
     everything = QoSProfile(history=HistoryPolicy.KEEP_ALL, depth=0)
@@ -275,9 +274,7 @@ def test_options_are_finite(option: str, value: str) -> None:
     assert f"{option}': {value!r} is not finite." in done.output
 
 
-def test_clock_begins_after_the_delay_which_comes_once(
-    lab: Any, start: Any, wait_until: Wait, tmp_path: Path
-) -> None:
+def test_clock_begins_after_the_delay_which_comes_once(lab: Any, start: Any, tmp_path: Path) -> None:
     events: list[tuple[str, float, float]] = []
 
     def note(name: str, value: float) -> None:
@@ -296,7 +293,7 @@ def test_clock_begins_after_the_delay_which_comes_once(
     def starts() -> list[float]:
         return [at for name, at, value in events if name == "message" and value == 0.0]
 
-    wait_until(lambda: len(starts()) == 3)
+    wait_until(lambda: len(starts()) == 3, TIMEOUT)
     process.send_signal(signal.SIGINT)
     assert process.wait(30) == 0
     times = [value for name, at, value in events if name == "clock" and at < starts()[1] - 0.05]

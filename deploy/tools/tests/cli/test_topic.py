@@ -2,10 +2,10 @@ from __future__ import annotations
 
 import re
 import signal
-from collections.abc import Callable
 from typing import Any
 
 import pytest
+from deploy.runtime.tests.host import wait_until
 
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Float64, Header, String
@@ -141,9 +141,7 @@ def test_hz_waits_for_its_topic(lab: Any, start: Any) -> None:
     lab.destroy_publisher(publisher)
 
 
-def test_pub_once_waits_for_a_subscription(
-    lab: Any, ros2: Any, wait_until: Callable[[Callable[[], object]], None]
-) -> None:
+def test_pub_once_waits_for_a_subscription(lab: Any, ros2: Any) -> None:
     received: list[float] = []
     subscription = lab.create_subscription(Float64, "given", lambda m: received.append(m.data), 10)
     done = ros2("topic", "pub", "--once", "/arm/given", "std_msgs/Float64", "data: 1")
