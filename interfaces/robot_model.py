@@ -26,8 +26,7 @@ def frame_id(frame: str, namespace: str) -> str:
 
 
 def forward_kinematics(l1: float, l2: float, theta1: float, theta2: float) -> tuple[float, float]:
-    """
-    Return the position x, y [m] of the effector (thesis equation 5.1).
+    """Return the position x, y [m] of the effector (thesis equation 5.1).
 
     :param l1, l2: lengths of the links [m].
     :param theta1, theta2: angles of the joints [rad], the second relative to the first link.
@@ -41,8 +40,7 @@ def forward_kinematics(l1: float, l2: float, theta1: float, theta2: float) -> tu
 
 
 def transforms(l1: float, l2: float, theta1: float, theta2: float) -> Iterator[tuple[str, str, Transform]]:
-    """
-    Yield parent, child and transform of each frame but the first.
+    """Yield parent, child and transform of each frame but the first.
 
     :param l1, l2: lengths of the links [m].
     :param theta1, theta2: angles of the joints [rad].

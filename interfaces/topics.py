@@ -414,8 +414,7 @@ def markdown() -> str:
 
 
 def mermaid() -> str:
-    """
-    Return the graph of nodes and topics, without health, in the language of Mermaid.
+    """Return the graph of nodes and topics, without health, in the language of Mermaid.
 
     What a node of the arm reads, the operator sees as well: those arrows are not drawn.
     """

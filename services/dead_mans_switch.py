@@ -40,8 +40,7 @@ def engine_commands(
     period: float = 1.0,
     times: int = 10,
 ) -> Observable[str]:
-    """
-    Emit each wanted command, and repeat it every ``period`` [s] until the engines obey, ``times`` in all.
+    """Emit each wanted command, and repeat it every ``period`` [s] until the engines obey, ``times`` in all.
 
     A person also tries again when the system was not ready for a command, but not against somebody else: the
     opposite command on the topic ends the repetition.

@@ -36,8 +36,7 @@ class EngineState(NamedTuple):
 
 
 def driven_time(states: Observable[EngineState], begin: float, period: float) -> Observable[float]:
-    """
-    Emit every ``period`` [s] the driven time [s]: it passes while the last state is an accepted ``on``.
+    """Emit every ``period`` [s] the driven time [s]: it passes while the last state is an accepted ``on``.
 
     :param begin: the driven time at the beginning.
     """

@@ -38,8 +38,7 @@ class Configuration(NamedTuple):
 
 
 def configurations(states: Iterable[Signal[float]], rate: float = 30.0) -> Observable[Answer[Configuration]]:
-    """
-    Emit the configuration at one common time, ``rate`` times a second, from l1, l2, theta1 and theta2.
+    """Emit the configuration at one common time, ``rate`` times a second, from l1, l2, theta1 and theta2.
 
     A held value counts, too: a dead source does not hide the arm. The stream is steady: a burst every 100 ms,
     as the slowest source sends, would make a pause of a busy machine so much longer.

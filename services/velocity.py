@@ -26,8 +26,7 @@ def speed(pair: tuple[Position, Position]) -> float | Rejected:
 
 
 def effector_speed(positions: Observable[Position]) -> Observable[float | Rejected]:
-    """
-    Emit the speed between each two positions, if it differs from the one before (thesis 5.2.2).
+    """Emit the speed between each two positions, if it differs from the one before (thesis 5.2.2).
 
     Time is that of the stamps: transport jitter, a pause and the burst after it change no speed.
     """

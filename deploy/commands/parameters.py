@@ -30,8 +30,7 @@ WEB = "WEB"  # environment variable: the port of the page, or off
 
 
 def of_system(scenario_name: str, user_file: str) -> dict[str, Any]:
-    """
-    Return the content of the parameter file of all services.
+    """Return the content of the parameter file of all services.
 
     :param scenario_name: name or file of a scenario.
     :param user_file: a parameter file, '' for none.
@@ -59,8 +58,7 @@ def of_system(scenario_name: str, user_file: str) -> dict[str, Any]:
 
 
 def _page_files(user_file: str, given: Mapping[str, Any]) -> dict[str, str]:
-    """
-    Return the files that the page is given: a relative path counts from the folder of the parameter file.
+    """Return the files that the page is given: a relative path counts from the folder of the parameter file.
 
     :raises DeploymentError: if the page cannot have the address and the certificate that it is given.
     """
@@ -79,8 +77,7 @@ def _page_files(user_file: str, given: Mapping[str, Any]) -> dict[str, str]:
 
 
 def _limits(given: Mapping[str, Any], prefix: str) -> dict[str, Any]:
-    """
-    Return the parameters of other services that the page shows, as far as they are given.
+    """Return the parameters of other services that the page shows, as far as they are given.
 
     :param prefix: of the names of the nodes.
     """

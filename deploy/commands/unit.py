@@ -46,8 +46,7 @@ WantedBy=default.target
 
 
 def text(scenario: str, parameter_file: str, environment: Mapping[str, str]) -> str:
-    """
-    Return the content of the unit (systemd.service(5)).
+    """Return the content of the unit (systemd.service(5)).
 
     :param scenario: name or file of a scenario.
     :param parameter_file: '' for none.

@@ -54,8 +54,7 @@ class Bench:
         self._answer()
 
     def kills(self, mutant: Mutant, tests: Sequence[str]) -> bool:
-        """
-        Return whether tests fail, or take too long, with a mutant.
+        """Return whether tests fail, or take too long, with a mutant.
 
         :raises RuntimeError: if they fail without it.
         """

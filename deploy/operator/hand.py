@@ -32,8 +32,7 @@ class Hand:
     """The hand at the terminal of a node."""
 
     def __init__(self, node: ReactiveNode, tell: Callable[[str], None] = say) -> None:
-        """
-        Be released.
+        """Be released.
 
         :param tell: tells the user what becomes of the hand.
         """

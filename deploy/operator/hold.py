@@ -65,8 +65,7 @@ class Hold(NamedTuple):
 
 
 def step(hold: Hold, event: Event, now: float, max_age: float = MAX_NONCE_AGE) -> Hold:
-    """
-    Return the switch after an event.
+    """Return the switch after an event.
 
     A release, a gap between two beats or one stale beat releases the switch until the next press.
 

@@ -97,8 +97,7 @@ class Lives(NamedTuple):
 def line_batches(
     seen: Seen, own_turn_offs: Observable[Span], ticks: Observable[Any], namespace: str = "/"
 ) -> Observable[list[Line]]:
-    """
-    Emit the lines of an arm, at each tick those since the last one in the order of their times, if any.
+    """Emit the lines of an arm, at each tick those since the last one in the order of their times, if any.
 
     :param own_turn_offs: when this terminal has turned off the engines.
     :param namespace: that of the arm; ``/diagnostics`` carries the health of all arms.
@@ -176,8 +175,7 @@ def services(seen: Seen, namespace: str) -> Observable[Line]:
 def unrepeated(
     items: Observable[Timestamp[Any]], is_driven: Observable[bool], key: Callable[[Any], Any]
 ) -> Observable[Timestamp[Any]]:
-    """
-    Emit only changes if a drive moves the joints: a joint that stands publishes its angle again and again.
+    """Emit only changes if a drive moves the joints: a joint that stands publishes its angle again and again.
 
     Without a drive, all are emitted: Listing 5.9 shows values that are published twice. Until it is known,
     there may be one.
@@ -239,8 +237,7 @@ def thinned(items: Observable[Timestamp[Any]], burst: int = BURST) -> Observable
 
 
 class Allowance:
-    """
-    How many items may be shown: one more with each second, up to ``burst``.
+    """How many items may be shown: one more with each second, up to ``burst``.
 
     Seconds are those of the clock: lines of different kinds appear together, of the same moment.
     """

@@ -11,8 +11,7 @@ _patience = PATIENCE  # none while the reader is stuck
 
 
 def say(line: str) -> None:
-    """
-    Print a line to standard output; drop it if the reader is stuck.
+    """Print a line to standard output; drop it if the reader is stuck.
 
     A print to a full pipe or a stopped terminal would wait for its reader, and the system could neither be
     stopped nor revived meanwhile. Nothing is printed if standard output is closed (`>&-`).

@@ -36,8 +36,7 @@ class Switch:
         is_open: Observable[bool],
         now: Callable[[], float],
     ) -> None:
-        """
-        Connect the pages with the other hands.
+        """Connect the pages with the other hands.
 
         :param events: what hands do on pages.
         :param changes: the parameters that are set while a page is open.
@@ -84,8 +83,7 @@ class VirtualSwitch:
         return is_echo
 
     def take(self) -> Observable[bool]:
-        """
-        Release the switch by hand, so that it follows no scenario any more; emits ``False`` when done.
+        """Release the switch by hand, so that it follows no scenario any more; emits ``False`` when done.
 
         Without an answer it ends in a TimeoutError: a dead man's switch that is killed comes back.
         """

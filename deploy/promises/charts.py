@@ -69,8 +69,7 @@ def framed(picture: str, width: float, height: float, title: str) -> str:
 
 
 def timeline(history: History, findings: Sequence[Finding] = ()) -> tuple[str, float, float]:
-    """
-    Return the timeline of an arm as SVG, with its width and height [px].
+    """Return the timeline of an arm as SVG, with its width and height [px].
 
     A row for each program shows its processes, its output and its faults. Lines across all rows show the
     evidence of violated promises.

@@ -35,8 +35,7 @@ EARLY = 0.001  # s by which a message may seem to be sent after its reception: c
 
 @contextmanager
 def _opened(path: Path) -> Iterator[McapFile]:
-    """
-    Open a record.
+    """Open a record.
 
     :raises DeploymentError: if the file cannot be read, or is not a record.
     """
@@ -98,8 +97,7 @@ def load(path: Path, namespace: str = "/") -> History:
 
 
 def late_receptions(history: History) -> list[tuple[float, float]]:
-    """
-    Return the times in which a message waited for the observer, or for its sender: an overload.
+    """Return the times in which a message waited for the observer, or for its sender: an overload.
 
     Messages that a fault of the network may have delayed do not count, nor those of a publisher that the
     observer may not have discovered yet.
@@ -127,8 +125,7 @@ def clock_offsets(faults: Iterable[bytes]) -> set[float]:
 
 
 def time_sent(received: float, stamp: float, offsets: Collection[float], second: int = 1) -> float:
-    """
-    Return when a message was sent, on the clock of its reception.
+    """Return when a message was sent, on the clock of its reception.
 
     :param stamp: its source time, on the arm's time of day.
     :param offsets: by which that has been ahead of the time of day of the receiver.

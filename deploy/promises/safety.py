@@ -224,8 +224,7 @@ def _was_present(history: History, time: float) -> bool:
 
 
 def _commanded(history: History, found: Sequence[Effect], off: Sample) -> bool:
-    """
-    Return whether `turn_off` was commanded just before.
+    """Return whether `turn_off` was commanded just before.
 
     The watchdog needs as many strikes for it as that takes; the other publishers of the contract need none.
     """
@@ -285,8 +284,7 @@ def _abandoned(history: History, found: Sequence[Effect], off: Sample) -> bool:
 def _overlapping(
     history: History, found: Sequence[Effect], lives: Sequence[Life]
 ) -> Iterator[tuple[Life, Life]]:
-    """
-    Yield two processes that live together for longer than one of them may need to start.
+    """Yield two processes that live together for longer than one of them may need to start.
 
     After each overload of the machine, it may need as long again. A process that reports has started.
     """

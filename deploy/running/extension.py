@@ -39,8 +39,7 @@ SENTINEL_TIMEOUT = 3.0  # s between its calls
 
 
 class LossyLog(RotatingFileHandler):  # type: ignore[misc]
-    """
-    A log file that drops lines that it cannot write.
+    """A log file that drops lines that it cannot write.
 
     Its base class raises where a file cannot be opened, and then the program does not start; it raises where
     a file cannot be rolled over, which ends supervisord; and it logs errors to the same full disk.
@@ -98,8 +97,7 @@ class ArmInterface:
         self._poller.register_readable(self._signals)
 
     def programs(self) -> str:
-        """
-        The fields of `Program` (system.py) for each program, in JSON.
+        """The fields of `Program` (system.py) for each program, in JSON.
 
         As values of XML-RPC, they would cost the sentinel three times as much.
         """
@@ -176,8 +174,7 @@ class ArmInterface:
 
 
 def lock_directory() -> None:
-    """
-    Hold a shared lock on the run directory until supervisord ends.
+    """Hold a shared lock on the run directory until supervisord ends.
 
     systemd-tmpfiles leaves a locked directory alone, with everything below it (tmpfiles.d(5), "Age").
     """

@@ -59,8 +59,7 @@ class Machine:
     """Judges the figures of one look after the other."""
 
     def __init__(self, run: Path, period: float) -> None:
-        """
-        Begin without a warning.
+        """Begin without a warning.
 
         :param run: the run directory, for the words.
         :param period: of the looks [s].
@@ -105,8 +104,7 @@ class Machine:
         return found
 
     def _note_step(self, last: Figures, now: Figures) -> None:
-        """
-        Compare the time of day with the monotonic clock.
+        """Compare the time of day with the monotonic clock.
 
         A process may be kept from running between the two readings: only what this cannot explain is a step.
         """

@@ -69,8 +69,7 @@ def start_retries(program: str) -> int:
 
 @contextmanager
 def chosen(own: str, without: Collection[str] = ()) -> Iterator[None]:
-    """
-    Let :func:`path` be a manifest with the programs of a user's file, while a system starts.
+    """Let :func:`path` be a manifest with the programs of a user's file, while a system starts.
 
     :param own: the user's file, '' for none.
     :param without: the programs of ours that do not run.

@@ -24,8 +24,7 @@ USE_SIM_TIME = Declaration("use_sim_time", False, None, "", "whether time is sim
 
 
 def load(path: str, namespace: str) -> dict[str, Any]:
-    """
-    Return the content of a file, with the full name of each node: ROS applies no other in a namespace.
+    """Return the content of a file, with the full name of each node: ROS applies no other in a namespace.
 
     :raises UserError: for errors: a line for each, with file, key and reason.
     """

@@ -98,8 +98,7 @@ class Policy:
         return actions
 
     def _in_own_time(self, observation: Observation) -> Observation:
-        """
-        Return the observation on a clock that stands still while the sentinel cannot observe.
+        """Return the observation on a clock that stands still while the sentinel cannot observe.
 
         A paused or overloaded machine delays the services' reports as well: they are not silent.
         """

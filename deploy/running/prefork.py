@@ -105,8 +105,7 @@ def import_libraries() -> None:
 
 
 class _Late(ModuleType):
-    """
-    A module that the first look at one of its names imports.
+    """A module that the first look at one of its names imports.
 
     The message packages of ROS 2 import numpy for types with matrices: 17 MB that no service needs.
     """
@@ -173,8 +172,7 @@ def executor(execve: Callable[..., NoReturn]) -> Callable[[str, Sequence[str], M
 
 
 def rename(argv: Sequence[str], environment: Mapping[str, str]) -> None:
-    """
-    Give this process another command line and environment in the process table.
+    """Give this process another command line and environment in the process table.
 
     :raises OSError: if the kernel cannot do this.
     """

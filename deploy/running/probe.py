@@ -36,8 +36,7 @@ class Probe:
             self._last_health[program, health.pid] = health.heard
 
     def observe(self) -> Observation:
-        """
-        Return an observation. Raises DeploymentError where supervisord is gone or does not answer.
+        """Return an observation. Raises DeploymentError where supervisord is gone or does not answer.
 
         While all its processes live, supervisord is asked only now and then.
         """

@@ -46,8 +46,7 @@ class Recorder:
     """A file of messages. Thread-safe."""
 
     def __init__(self, path: Path, monotonic: int, epoch: int) -> None:
-        """
-        Create the file.
+        """Create the file.
 
         :param monotonic, epoch: the same moment on the monotonic clock and since 1970 [ns].
         :raises OSError: like all methods, if the disk does not take the messages.
@@ -63,8 +62,7 @@ class Recorder:
         self._writer.add_metadata(METADATA, {"origin": str(self._origin + self._offset)})
 
     def monotonic(self, time_of_day: int, moment: tuple[int, int]) -> int:
-        """
-        Convert a time since 1970 to the monotonic clock [ns].
+        """Convert a time since 1970 to the monotonic clock [ns].
 
         :param moment: what :func:`clocks` returns. The error of reading two clocks changes no time: replayed
             velocities follow from the differences of source times.
@@ -139,8 +137,7 @@ def record(
     lost: Callable[[float, float], None] = lambda begin, end: None,
     is_foreign: Callable[[topics.Topic, bytes], bool] = lambda topic, data: False,
 ) -> None:
-    """
-    Record all topics of the contract in the namespace of a node, for as long as the node is spun.
+    """Record all topics of the contract in the namespace of a node, for as long as the node is spun.
 
     Of the heartbeats between two looks, 50 ms apart, the newest ten are recorded: a flood of them would
     otherwise take the processor from the services.
@@ -161,8 +158,7 @@ def record(
 def _writer(
     node: ReactiveNode, topic: topics.Topic, recorder: Recorder, first: Callable[[str], None]
 ) -> Callable[[bytes, int], int]:
-    """
-    Return what records a message.
+    """Return what records a message.
 
     It takes the message and its DDS source time [ns since 1970], and returns when it was received, on the
     monotonic clock [ns].

@@ -15,8 +15,7 @@ class NoAnswer(Exception):
 
 
 def call(pid: int, method: str, *arguments: object, timeout: float = LIMIT) -> Any:
-    """
-    Call a method of the supervisord with this pid.
+    """Call a method of the supervisord with this pid.
 
     The call goes through the directory in which supervisord works: the socket's own path may be longer than
     the 107 bytes that a unix socket allows.

@@ -60,8 +60,7 @@ class RunDirectory:
                     log.write(f"{RUN} {datetime.now():%Y-%m-%d %H:%M:%S} {RUN}\n".encode())
 
     def forget_settings(self, programs: Sequence[str]) -> None:
-        """
-        Begin without settings, with an empty file for each program.
+        """Begin without settings, with an empty file for each program.
 
         A service that starts late and finds its file is no successor that has lost what was set by hand.
         """

@@ -39,8 +39,7 @@ class Program(NamedTuple):
 
 
 def start(run: Path, environment: Mapping[str, str], within: Sequence[str] = ()) -> int:
-    """
-    Start it in a run directory, and return its pid as soon as it answers. Raises DeploymentError.
+    """Start it in a run directory, and return its pid as soon as it answers. Raises DeploymentError.
 
     :param within: a command in front of its own, such as `ip netns exec NAME`.
     """

@@ -34,8 +34,7 @@ class HealthReporter:
     """Reports the health of a node: every second, and at once to each new subscriber."""
 
     def __init__(self, node: Node, before_report: Callable[[], None] = lambda: None) -> None:
-        """
-        Start to report.
+        """Start to report.
 
         :param before_report: called every second before the report; it may add remarks.
         """
@@ -86,8 +85,7 @@ class HealthReporter:
         self._counts[what] += 1
 
     def refuse(self, subject: str, reason: str, time: int, taken: int | None) -> None:
-        """
-        Count and remark a sample that a signal refused; the next report tells a replay of it.
+        """Count and remark a sample that a signal refused; the next report tells a replay of it.
 
         :param time, taken: that of the sample, and that from which it counts, if it was not dropped [ns].
         """
@@ -155,8 +153,7 @@ def reported_parameters(status: DiagnosticStatus) -> dict[str, Any]:
 
 
 def reported_refusals(status: DiagnosticStatus, subject: str) -> list[tuple[int, int | None]]:
-    """
-    Return the samples of a subject that signals refused, in a report. Raises ValueError.
+    """Return the samples of a subject that signals refused, in a report. Raises ValueError.
 
     Of each: its time, and the time from which its value holds instead; ``None`` if it was dropped [ns].
     """

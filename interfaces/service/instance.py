@@ -14,8 +14,7 @@ class AlreadyRunning(Exception):
 
 
 def claim(node: Node) -> socket.socket:
-    """
-    Claim the name of a node on this host and domain, for as long as the returned socket lives.
+    """Claim the name of a node on this host and domain, for as long as the returned socket lives.
 
     The claim is an abstract unix socket: the kernel frees it when the process ends, however it ends.
 

@@ -26,8 +26,7 @@ def without_shared_memory() -> Iterator[None]:
 
 
 def settings() -> dict[str, str]:
-    """
-    Return the environment that keeps Fast DDS on this machine without shared memory, which LOCALHOST adds.
+    """Return the environment that keeps Fast DDS on this machine without shared memory, which LOCALHOST adds.
 
     The settings are in ``NAME.localhost.xml`` next to ``NAME.xml``, the profiles file of the environment;
     without that file, nothing changes.

@@ -27,8 +27,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, eq=False)
 class Rejected:
-    """
-    An input that a recipe rejects: the recipe emits this, and :meth:`ServiceNode.publish` reports it.
+    """An input that a recipe rejects: the recipe emits this, and :meth:`ServiceNode.publish` reports it.
 
     No two are equal, so that ``distinct_until_changed`` keeps each of them.
     """
@@ -78,8 +77,7 @@ class ServiceNode(ReactiveNode):
         timestamped: bool = False,
         max_age: float | None = None,
     ) -> Observable[Any]:
-        """
-        Return the good values of a topic (:attr:`Topic.value`); the others are dropped and reported.
+        """Return the good values of a topic (:attr:`Topic.value`); the others are dropped and reported.
 
         :param timestamped: see :meth:`ReactiveNode.create_observable`.
         :param max_age: a message that is older [s], or this much ahead of the local clock, is not good.
@@ -95,8 +93,7 @@ class ServiceNode(ReactiveNode):
         timestamped: bool = False,
         max_age: float | None = None,
     ) -> Observable[Any]:
-        """
-        Return the newest value at each tick, if it is good.
+        """Return the newest value at each tick, if it is good.
 
         See :meth:`ReactiveNode.create_sampled_observable`.
 
@@ -144,8 +141,7 @@ class ServiceNode(ReactiveNode):
         *,
         on_demand: bool = False,
     ) -> None:
-        """
-        Publish values on a topic (:attr:`Topic.message`). Bad ones and :class:`Rejected` are dropped and
+        """Publish values on a topic (:attr:`Topic.message`). Bad ones and :class:`Rejected` are dropped and
         reported.
 
         :param on_demand: see :meth:`ReactiveNode.publish_observable`.
@@ -172,8 +168,7 @@ class ServiceNode(ReactiveNode):
         )
 
     def age(self, stamp: datetime) -> float:
-        """
-        Return how long ago a source time or stamp is [s]; negative if its clock is ahead of the local one.
+        """Return how long ago a source time or stamp is [s]; negative if its clock is ahead of the local one.
 
         Stamps are in the time of day, even while ROS time is simulated. This clock may be set, and differs
         between hosts: safety takes only the age at arrival from it, and counts on by the Rx clock.

@@ -11,8 +11,7 @@ from interfaces.service.errors import UserError
 
 
 def check(node: Node, arguments: Sequence[str]) -> None:
-    """
-    Check the command line against the parameters that a node has declared.
+    """Check the command line against the parameters that a node has declared.
 
     A parameter file is not checked here: its ``/**`` may name parameters of other services.
 

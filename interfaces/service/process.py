@@ -36,8 +36,7 @@ _spins = False
 
 
 def run(name: str, wire: Callable[[ServiceNode], None]) -> NoReturn:
-    """
-    Run a service until the process ends.
+    """Run a service until the process ends.
 
     :param name: name of the node, unless remapped.
     :param wire: declares the parameters, builds the recipe and connects it with topics.

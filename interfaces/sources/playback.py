@@ -24,8 +24,7 @@ def state(timeline: Events[T] | Sweep, elapsed: float) -> Observable[Any]:
 
 
 def driven(timeline: Events[T] | Sweep, times: Observable[float]) -> Observable[Any]:
-    """
-    Emit the value at each time of a drive.
+    """Emit the value at each time of a drive.
 
     While time passes, a value is emitted when it has changed, as by :func:`state`. While time stands still,
     the value is emitted again and again: a joint that stands tells where.
@@ -37,8 +36,7 @@ def driven(timeline: Events[T] | Sweep, times: Observable[float]) -> Observable[
 
 
 def events(timeline: Events[T], elapsed: float, *, resume: bool = False) -> Observable[T]:
-    """
-    Emit single events, each once.
+    """Emit single events, each once.
 
     :param resume: whether a process that died has emitted the events up to now; otherwise overdue events are
         emitted at once.
@@ -77,8 +75,7 @@ def _samples(sweep: Sweep, elapsed: float) -> Observable[float]:
 
 
 def follow(parameter: Observable[T], timeline: Observable[T] | None) -> Observable[T]:
-    """
-    Emit the values of a virtual source.
+    """Emit the values of a virtual source.
 
     Without a timeline, these are the parameter's present value and each value that is set. With a timeline,
     they are the timeline's values until the parameter is set by hand, then the parameter's.

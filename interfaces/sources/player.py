@@ -26,8 +26,7 @@ class Player:
     """The scenario of a node, and its timelines as observables."""
 
     def __init__(self, node: ServiceNode, epoch: Epoch) -> None:
-        """
-        Load the scenario that a parameter of the node names.
+        """Load the scenario that a parameter of the node names.
 
         :raises UserError: if the scenario has an error.
         """

@@ -25,8 +25,7 @@ class Settings:
     """The parameters of a node that survive a restart."""
 
     def __init__(self, node: ServiceNode, *, is_restart: bool) -> None:
-        """
-        Declare the parameter that names the folder, and read what the last process kept.
+        """Declare the parameter that names the folder, and read what the last process kept.
 
         :param is_restart: whether this process replaces one that died.
         :raises UserError: if the file of the settings has an error.
@@ -42,8 +41,7 @@ class Settings:
         node.add_post_set_parameters_callback(self._parameters_were_set)
 
     def keep(self, name: str, *, given_back: str = "", if_lost: Any = None) -> Setting:
-        """
-        Keep a parameter of the node.
+        """Keep a parameter of the node.
 
         :param given_back: a boolean parameter: whether the setting is given back to what it replaces. Setting
             the parameter by hand makes it false.
@@ -122,8 +120,7 @@ class Setting:
         """The present value, and each value that is set."""
 
     def instead_of(self, played: Observable[Any] | None) -> Observable[Any]:
-        """
-        Emit what is played until the parameter is set by hand, then the values of the parameter.
+        """Emit what is played until the parameter is set by hand, then the values of the parameter.
 
         A parameter that is given back is followed by what is played again. If nothing is played, its first
         value takes that place.

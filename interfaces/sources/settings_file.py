@@ -22,8 +22,7 @@ class SettingsFile:
     """The settings of one service, in one file."""
 
     def __init__(self, directory: str, service: str) -> None:
-        """
-        Read the file.
+        """Read the file.
 
         :param directory: the folder of the files; empty keeps nothing.
         :raises UserError: for a bad file: forgetting it would not be safe.
@@ -39,8 +38,7 @@ class SettingsFile:
                 raise UserError(f"{self._path}: contains no settings; remove it to start afresh")
 
     def save(self) -> None:
-        """
-        Write the file atomically.
+        """Write the file atomically.
 
         :raises UserError: if that fails; then no file is left, because what it says is not true any more.
         """

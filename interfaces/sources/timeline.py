@@ -42,8 +42,7 @@ class Events(Generic[T]):
 
 @dataclass(frozen=True)
 class Sweep:
-    """
-    A smooth movement between two ends, sampled at a rate.
+    """A smooth movement between two ends, sampled at a rate.
 
     Without a rest it is center + amplitude · sin(2π · t/period + phase).
     """

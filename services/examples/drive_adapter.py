@@ -26,8 +26,7 @@ Order = Callable[[bool], Observable[Any]]
 
 
 def orders(permissions: Observable[bool], order: Order) -> Observable[bool | Rejected]:
-    """
-    Order the drive on while that is permitted, else off, at once and repeatedly; emit what it has obeyed.
+    """Order the drive on while that is permitted, else off, at once and repeatedly; emit what it has obeyed.
 
     After an `on` that failed, the drive is off until it has been forbidden and permitted again.
     """

@@ -33,8 +33,7 @@ SILENCE = 1.0  # s without an angle, after which health tells so
 def joint_angle(
     states: Observable[JointState], joint: str, age: Callable[[JointState], float], max_age: float
 ) -> Observable[float | Rejected]:
-    """
-    Emit the angles of a joint [rad], and a rejection for each state that is too old or out of order.
+    """Emit the angles of a joint [rad], and a rejection for each state that is too old or out of order.
 
     :param age: returns the age of a state's stamp [s].
     :param max_age: an older state is rejected [s].

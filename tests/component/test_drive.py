@@ -31,8 +31,7 @@ PERIOD = 0.125  # s; exact in binary
 def driven(
     states: list[tuple[float, str, float]], until: float, begin: float = 0.0, pause: float = 0.0
 ) -> list[tuple[float, float]]:
-    """
-    Return the driven times, and when they are emitted.
+    """Return the driven times, and when they are emitted.
 
     :param states: when they arrive, the state, and its age.
     :param pause: which the process makes at 2.1 s.

@@ -134,8 +134,7 @@ class Engines:
         presences: list[tuple[float, float]],
         until: float = 60.0,
     ) -> list[tuple[float, str]]:
-        """
-        Return the states and when they change.
+        """Return the states and when they change.
 
         :param commands: when they arrive, their names, and their source times.
         :param presences: when they arrive, and their stamps.

@@ -149,8 +149,7 @@ def test_end_of_the_heartbeats_is_a_silence(scheduler: TestScheduler) -> None:
 
 
 def strikes(heartbeats: list[int], until: int) -> list[int]:
-    """
-    Return when the operator is missed [ms], by a model without Rx.
+    """Return when the operator is missed [ms], by a model without Rx.
 
     A sample counts as a sign of life if a heartbeat came since the sample before it.
     """

@@ -31,8 +31,7 @@ class Looks:
     def look(
         self, times: int = 1, *, late: float = 0.0, pauses: tuple[float, float] = (0.0, 0.0)
     ) -> dict[str, str]:
-        """
-        Return the warnings of the last of so many looks.
+        """Return the warnings of the last of so many looks.
 
         :param late: how late each comes [s].
         :param pauses: how long each is kept from running before and after it reads the time of day [s].

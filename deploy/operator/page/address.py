@@ -23,8 +23,7 @@ _LINE = re.compile(r"The page: https?://\S+:(\d+)/#(\S+)\n")
 
 
 def listen(address: str, port: int, last_port: int | None = None) -> socket.socket:
-    """
-    Return a socket that listens on a port, the default port or one of the next if that is taken.
+    """Return a socket that listens on a port, the default port or one of the next if that is taken.
 
     :param last_port: the port of the last process: an open page looks for its successor there.
     :raises OSError: if it cannot listen; the message is for the user.
@@ -41,8 +40,7 @@ def listen(address: str, port: int, last_port: int | None = None) -> socket.sock
 
 
 def tls(address: str, certificate: str, key: str) -> ssl.SSLContext | None:
-    """
-    Return the TLS context of the page, ``None`` for plain HTTP, which only loopback may use.
+    """Return the TLS context of the page, ``None`` for plain HTTP, which only loopback may use.
 
     :raises UserError: if the address needs TLS, or a file is bad.
     """
@@ -64,8 +62,7 @@ def tls(address: str, certificate: str, key: str) -> ssl.SSLContext | None:
 
 
 def host_names(address: str, port: int, names: Sequence[str]) -> tuple[str, ...]:
-    """
-    Return the ``Host`` headers that reach the page; browsers leave out the port of the scheme.
+    """Return the ``Host`` headers that reach the page; browsers leave out the port of the scheme.
 
     :raises UserError: if no browser sends one of them.
     """
@@ -80,8 +77,7 @@ def host_names(address: str, port: int, names: Sequence[str]) -> tuple[str, ...]
 
 
 class AddressFile:
-    """
-    The line for the user, in the folder of what is kept until the next start of the system.
+    """The line for the user, in the folder of what is kept until the next start of the system.
 
     A process that is restarted keeps port and token, so that an open page finds it again.
     """
@@ -100,8 +96,7 @@ class AddressFile:
         return (int(found[1]), found[2]) if found else (None, secrets.token_urlsafe(32))
 
     def write(self, line: str) -> None:
-        """
-        Keep a line, readable by the user only.
+        """Keep a line, readable by the user only.
 
         :raises UserError: if that is not possible.
         """

@@ -52,8 +52,7 @@ class Connection:
         answer: Callable[[Request], Response | None],
         now: float,
     ) -> None:
-        """
-        Take over a socket. Raises OSError if its client has gone already.
+        """Take over a socket. Raises OSError if its client has gone already.
 
         :param answer: returns the response to a request; ``None`` lets a WebSocket begin.
         :param now: the time [s], as in all methods.

@@ -83,8 +83,7 @@ LIMITS: Mapping[str, tuple[float, float]] = _limits()
 
 
 def parse(text: str | bytes) -> Message:
-    """
-    Return the message that a page has sent.
+    """Return the message that a page has sent.
 
     :raises ProtocolError: if no page sends such a message.
     """

@@ -93,8 +93,7 @@ class PageServer:
         fail: Callable[[Exception], None],
         tls: ssl.SSLContext | None = None,
     ) -> None:
-        """
-        Start to serve, on a thread of its own.
+        """Start to serve, on a thread of its own.
 
         :param listener: a listening TCP socket; the server closes it.
         :param welcome: what every page is told first.

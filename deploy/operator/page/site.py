@@ -52,8 +52,7 @@ class Site:
     def __init__(
         self, token: str, names: tuple[str, ...], scheme: str = "http", folder: Path = STATIC
     ) -> None:
-        """
-        Read the files: there are no others.
+        """Read the files: there are no others.
 
         :param names: the accepted ``Host`` headers, port included. A name of loopback is accepted with any
             port: it is that of a tunnel. A page of somebody else that resolves to loopback has another name.

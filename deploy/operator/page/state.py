@@ -162,8 +162,7 @@ class Engines(NamedTuple):
         return self._replace(cause=BY_WATCHDOG if service == WATCHDOG else BY_NODE.format(service))
 
     def reason(self, now: float, heard_since: float) -> str:
-        """
-        Return why they are off, at a time [s].
+        """Return why they are off, at a time [s].
 
         :param heard_since: since when the health of the services is heard [s].
         """
@@ -211,8 +210,7 @@ def always(
     strangers: Callable[[], Iterable[str]],
     clock: Clock,
 ) -> Observable[Change]:
-    """
-    The changes that count even while no page is open: a page that opens later shows strikes and reasons.
+    """The changes that count even while no page is open: a page that opens later shows strikes and reasons.
 
     :param engines: the states of the engines.
     :param watchdogs: emits for each operator watchdog that appears, whether its strikes are known to begin.
@@ -228,8 +226,7 @@ def always(
 
 
 def while_open(seen: Seen, lines: Observable[Any], namespace: str, clock: Clock) -> Observable[Change]:
-    """
-    The changes that count while a page is open; what was known before is out of date.
+    """The changes that count while a page is open; what was known before is out of date.
 
     :param lines: the batches of lines that the terminal shows.
     :param namespace: that of the arm; ``/diagnostics`` carries the health of all arms.

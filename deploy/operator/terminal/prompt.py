@@ -27,8 +27,7 @@ STOP_TIME = 0.1  # s within which a stop signal takes effect on all threads
 
 
 class Prompt:
-    """
-    A prompt on a thread, for a process whose other threads may print at any time.
+    """A prompt on a thread, for a process whose other threads may print at any time.
 
     Only its thread ever waits for the terminal, so a stuck terminal holds up nothing else.
     """

@@ -32,15 +32,13 @@ Lines that come too fast to be read are thinned to one a second of each kind."""
 
 
 class Terminal:
-    """
-    The terminal of a node that joins the system, open in a ``with``.
+    """The terminal of a node that joins the system, open in a ``with``.
 
     Lines are shown in batches: the node need not spin between them, which saves most of the work.
     """
 
     def __init__(self, node: ReactiveNode, epoch: float) -> None:
-        """
-        Subscribe to what is shown.
+        """Subscribe to what is shown.
 
         :param epoch: the origin of the lines' times [s, monotonic clock].
         """

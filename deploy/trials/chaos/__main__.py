@@ -1,5 +1,4 @@
-"""
-`make chaos`: inject faults into an arm, and judge the record.
+"""`make chaos`: inject faults into an arm, and judge the record.
 
 Exit code 1 if the record violates a promise, or if it confirms none.
 """

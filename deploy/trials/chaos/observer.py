@@ -56,8 +56,7 @@ def _recording(
     lost: Callable[[float, float], None],
     overload: Callable[[float, float], None],
 ) -> Iterator[None]:
-    """
-    Record the messages of an arm on a thread; print `seen NAME` at the first message of each topic.
+    """Record the messages of an arm on a thread; print `seen NAME` at the first message of each topic.
 
     :param lost: receives begin and end of each time in which messages to the observer were lost.
     :param overload: receives begin and end of each time in which the thread was not scheduled.

@@ -44,8 +44,7 @@ class ProcessMonitor:
         report: Callable[[str, Life], None],
         overload: Callable[[float, float], None],
     ) -> None:
-        """
-        :param runs: the run directory of each arm, and its namespace.
+        """:param runs: the run directory of each arm, and its namespace.
         :param report: receives the namespace and each new or ended process.
         :param overload: receives begin and end of each time in which the machine was overloaded.
         """

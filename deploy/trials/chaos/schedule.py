@@ -45,8 +45,7 @@ def random_faults(
     kinds: Iterable[str] = tuple(FAULT_KINDS),
     table: Mapping[str, Any] = FAULT_KINDS,
 ) -> Schedule:
-    """
-    Return one random fault in each interval of ``every`` [s]. The same seed gives the same schedule.
+    """Return one random fault in each interval of ``every`` [s]. The same seed gives the same schedule.
 
     :param table: the kinds, each with its targets and durations.
     """

@@ -92,8 +92,7 @@ class Testbed:
         loss: float = 0.0,
         steps_clock: bool = False,
     ) -> None:
-        """
-        :param directory: for the record and the runtime files; must not exist yet.
+        """:param directory: for the record and the runtime files; must not exist yet.
         :param say: receives a line for each injected fault.
         :param loss: DDS packets that each process loses [%], by Cyclone DDS: not every kernel has netem.
         :param steps_clock: whether the fault `step_clock` can be injected.

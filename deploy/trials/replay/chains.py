@@ -41,8 +41,7 @@ CHAINS: tuple[Chain, ...] = (
     ("motion",),
     (WATCHDOG, CONTROLLER),
 )
-"""
-Services that hear the replayed output of each other. Chains hear the recorded output of each other.
+"""Services that hear the replayed output of each other. Chains hear the recorded output of each other.
 
 So velocity hears the recorded positions: its recipe divides by the time between two emissions, which a
 replay of kinematics changes. The slowest chain is the first: chains run in parallel.
@@ -55,8 +54,7 @@ def outputs(chain: Chain) -> list[Topic]:
 
 
 def inputs(record: Record, namespace: str, chain: Chain) -> list[tuple[Topic, list[Message]]]:
-    """
-    Return the recorded messages that a chain hears, and that none of its services has sent.
+    """Return the recorded messages that a chain hears, and that none of its services has sent.
 
     Of those that were sent before the arm began, it hears the latched ones. A sample that was too late for a
     signal has the time from which its value counted, or is left out.
@@ -163,8 +161,7 @@ def _is_of_arm(message: Message, namespace: str) -> bool:
 
 
 def commands(record: Record, namespace: str) -> tuple[list[Message], list[Message]]:
-    """
-    Return the commands of people, and those of the watchdog.
+    """Return the commands of people, and those of the watchdog.
 
     A record does not name publishers. The watchdog sends ``turn_off`` after its conclusion that the operator
     is incapacitated, until its next conclusion.

@@ -62,8 +62,7 @@ BOUNDS: dict[str, Bounds] = {
     topics.ENGINES.name: Bounds(),
     topics.ENGINES_STATE.name: Bounds(),
 }
-"""
-By topic. A speed between two messages of a burst is that of their jitter, so a lost one may be any number.
+"""By topic. A speed between two messages of a burst is that of their jitter, so a lost one may be any number.
 """
 
 
@@ -105,8 +104,7 @@ def compare(
     excused: Sequence[Interval],
     offsets: Collection[int] = (),
 ) -> Comparison:
-    """
-    Compare the messages of a topic.
+    """Compare the messages of a topic.
 
     :param excused: times in which nothing is compared [ns since 1970].
     :param offsets: by which the arm's time of day has been ahead [ns].

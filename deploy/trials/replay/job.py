@@ -44,8 +44,7 @@ class Outcome(NamedTuple):
 
 
 def run_all(record: Record, jobs: Sequence[Job]) -> list[Outcome]:
-    """
-    Replay chains, as many at a time as there are cores.
+    """Replay chains, as many at a time as there are cores.
 
     :raises Interrupted: after a signal.
     """
@@ -85,8 +84,7 @@ def run(record: Record, job: Job) -> Outcome:
 
 
 def _excused(record: Record, playback: Playback, topic: Topic, known: int) -> list[Interval]:
-    """
-    Return the times in which the output of a chain may differ.
+    """Return the times in which the output of a chain may differ.
 
     :param known: from when on the record shows what the output depends on [ns since 1970].
     """

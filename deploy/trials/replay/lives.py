@@ -84,8 +84,7 @@ class _Seen(NamedTuple):
 
 
 def lives(record: Record, namespace: str, service: str) -> list[ReplayedLife]:
-    """
-    Return the lives of a service's processes.
+    """Return the lives of a service's processes.
 
     Each health report tells the process and how long its node exists. A process that the chaos monkey saw
     end, or that has a successor, ends with its last message: a hung process is as good as dead.
@@ -152,8 +151,7 @@ def _begin_of_work(record: Record, namespace: str, service: str, created: int) -
 
 
 def origin(record: Record, namespace: str, life: ReplayedLife) -> int:
-    """
-    Return when the first watchdog began to expect the operator [ns since 1970].
+    """Return when the first watchdog began to expect the operator [ns since 1970].
 
     A record does not contain it. One with a past began so early that it has the strikes which the record
     shows: for each of them, a silence before the record is made up.
@@ -220,8 +218,7 @@ class Latch(NamedTuple):
 
 
 def latch(record: Record, namespace: str, life: ReplayedLife) -> Latch | None:
-    """
-    Return what the record shows first of the latch of a controller; ``None`` if it shows nothing.
+    """Return what the record shows first of the latch of a controller; ``None`` if it shows nothing.
 
     The latch has two parts. The engines' state is repeated. The time of the last presence is known once there
     is another presence, or once the engines are off for so long that no former presence turns them on.

@@ -47,8 +47,7 @@ class Playback:
 
 
 def replay(record: Record, namespace: str, chain: Chain, parameters: Path | None = None) -> Playback:
-    """
-    Replay a record to the services of a chain.
+    """Replay a record to the services of a chain.
 
     :param parameters: a ROS parameter file.
     """

@@ -83,8 +83,7 @@ def text(message: Message, topic: Topic) -> str:
 
 
 def load(path: Path) -> Record:
-    """
-    Read the topics of the contract, and the events of the chaos monkey.
+    """Read the topics of the contract, and the events of the chaos monkey.
 
     :raises DeploymentError: if the file is damaged, or contains no arm.
     """
@@ -138,8 +137,7 @@ def _read(file: McapFile) -> Record:
 
 
 def _extent(read: Mapping[str, list[_Received]], namespace: str) -> tuple[int, int]:
-    """
-    Return when the first and the last message of an arm's services were received [ns since 1970].
+    """Return when the first and the last message of an arm's services were received [ns since 1970].
 
     Anybody may publish the inputs of the services, /tf and /diagnostics, before the arm begins and after its
     end. They count only if the record has nothing else of the arm.

@@ -41,8 +41,7 @@ class SimulatedArm:
         scenario: Mapping[str, Any],
         start_up: Delay,
     ) -> None:
-        """
-        Start an arm, at the beginning of a simulation.
+        """Start an arm, at the beginning of a simulation.
 
         :param directory: for its parameter file and its settings.
         :param start_up: from the start of a process to that of its program.
@@ -135,8 +134,7 @@ def simulated_arm(
     scenario: Mapping[str, Any],
     durations: Calibration | None = None,
 ) -> Iterator[SimulatedArm]:
-    """
-    Simulate an arm until the end of the ``with``.
+    """Simulate an arm until the end of the ``with``.
 
     :param durations: by default, those of ``calibration.json``.
     """

@@ -30,8 +30,7 @@ from interfaces.sources import scenario_file
 def simulated_services(
     seed: str, network: Network, supervisor: Callable[[], Any] = lambda: None
 ) -> Iterator[Simulation]:
-    """
-    Simulate programs that are services until the end of the ``with``.
+    """Simulate programs that are services until the end of the ``with``.
 
     :param supervisor: returns the present supervisor.
     """
@@ -85,8 +84,7 @@ class Machine:
             yield
 
     def _reachable(self) -> list[Process]:
-        """
-        Return the processes of the caller's host, and of hosts that are not cut off.
+        """Return the processes of the caller's host, and of hosts that are not cut off.
 
         The one supervisor and its sentinel stand for those of both hosts.
         """

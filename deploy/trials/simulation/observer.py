@@ -54,8 +54,7 @@ class Observer:
     def history(
         self, lives: Sequence[Life], faults: Sequence[InjectedFault], end: float, absent: frozenset[str]
     ) -> History:
-        """
-        Return what happened.
+        """Return what happened.
 
         :param end: of the record [s].
         :param absent: programs that this arm does not have.

@@ -49,8 +49,7 @@ class Outcome:
 
 
 def simulate(experiment: Experiment, durations: Calibration | None = None) -> Outcome:
-    """
-    Simulate an experiment, and check the promises.
+    """Simulate an experiment, and check the promises.
 
     :param durations: of a real arm; by default, those of ``calibration.json``.
     :raises DeploymentError: if the experiment has a fault that cannot be simulated, or a bad scenario.

@@ -19,8 +19,7 @@ FIRST_PRESS = 0.5  # s
 
 
 def operator(seed: str, length: float) -> dict[str, Any]:
-    """
-    Return a scenario for ``length`` [s]: all values move, and an operator works and sleeps at random.
+    """Return a scenario for ``length`` [s]: all values move, and an operator works and sleeps at random.
 
     The operator holds the switch, lets go for a moment or for a strike, hammers on it, falls asleep, and
     turns the engines on. Only the watchdog turns them off: so each stop needs a reason.

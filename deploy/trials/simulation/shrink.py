@@ -36,8 +36,7 @@ def minimal(items: Sequence[T], fails: Callable[[Sequence[T]], bool]) -> Sequenc
 
 
 def shrink(outcome: Outcome, tell: Callable[[int], None] = lambda faults: None) -> Outcome:
-    """
-    Return the outcome of a smaller experiment that breaks the first promise that this one breaks.
+    """Return the outcome of a smaller experiment that breaks the first promise that this one breaks.
 
     :param tell: receives the number of faults that are left, after each success.
     """

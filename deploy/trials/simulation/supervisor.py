@@ -36,8 +36,7 @@ class _Supervised:
 
 class Supervisor:
     def __init__(self, simulation: Simulation, programs: list[str], spawn: Callable[[str, int], Process]):
-        """
-        Start all programs.
+        """Start all programs.
 
         :param spawn: starts a process of a program, given its name and the pid of its parent.
         """

@@ -59,8 +59,7 @@ def points(seed: str) -> list[Point]:
 
 
 def cases(seed: str) -> tuple[Sequence[Experiment], str]:
-    """
-    Return all cases and a title.
+    """Return all cases and a title.
 
     Their order is random, three with one fault and then one with two, so every part covers the whole day.
     """

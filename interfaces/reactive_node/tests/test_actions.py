@@ -70,8 +70,7 @@ class Server:
         self.ends[order].set_result(how)
 
     def execute(self, order: int, watch: Watch, spin_until: SpinUntil) -> None:
-        """
-        Spin until the client knows that the goal is accepted.
+        """Spin until the client knows that the goal is accepted.
 
         Feedback may overtake the acceptance, but not by so many callbacks.
         """

@@ -15,8 +15,7 @@ from reactivex.disposable import Disposable
 
 
 class GoalError(Exception):
-    """
-    A goal that did not succeed.
+    """A goal that did not succeed.
 
     :ivar result: what the server returned, of the action's result type; ``None`` if it returned nothing.
     """

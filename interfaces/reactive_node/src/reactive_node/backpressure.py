@@ -17,8 +17,7 @@ _NOTHING: Any = object()  # an item may be None
 def latest(
     work: Callable[[_T], _R], workers: abc.SchedulerBase
 ) -> Callable[[Observable[_T]], Observable[_R]]:
-    """
-    Return an operator that maps items by slow work on another thread, for ``observable.pipe(…)``.
+    """Return an operator that maps items by slow work on another thread, for ``observable.pipe(…)``.
 
     One item is in work at a time. Of the items that arrive meanwhile, only the newest is kept, so a flood
     takes no memory, and an item waits for at most one run. Results are emitted by the scheduler

@@ -12,8 +12,7 @@ DOMAINS = range(30, 102)  # users choose lower ones; the ports of higher ones me
 
 @contextmanager
 def reserved_domain() -> Iterator[int]:
-    """
-    Reserve a ROS domain without participants on this host; other callers get different ones.
+    """Reserve a ROS domain without participants on this host; other callers get different ones.
 
     :raises RuntimeError: if no domain is free.
     """
@@ -32,8 +31,7 @@ def reserved_domain() -> Iterator[int]:
 
 
 def _has_participants(domain: int) -> bool:
-    """
-    Whether a socket has one of the 250 ports of the domain (RTPS 9.6.1).
+    """Whether a socket has one of the 250 ports of the domain (RTPS 9.6.1).
 
     The first ports do not tell: participants keep theirs after those with lower indices have ended.
     """

@@ -27,8 +27,7 @@ _TURN = 0.25  # [s] between two looks for QoS events; an endless wait is a busy 
 
 
 def create_executor(context: Context | None = None) -> Executor:
-    """
-    Return an executor that runs callbacks on the thread that spins it: the fastest that this rclpy has.
+    """Return an executor that runs callbacks on the thread that spins it: the fastest that this rclpy has.
 
     Its interface is that of :class:`rclpy.executors.Executor`. Where it is ROS 2's EventsExecutor, guard
     conditions are refused, QoS events come up to 0.25 s late, a callback group only decides whether an entity

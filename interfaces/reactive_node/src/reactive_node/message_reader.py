@@ -33,8 +33,7 @@ class MessageReader(SharedReader):
         item: Callable[[Any], Any] | None,
         every_publisher: bool,
     ) -> None:
-        """
-        Share a reader among observers; none exists yet.
+        """Share a reader among observers; none exists yet.
 
         :param create: creates a reader of ``node`` with a callback, a QoS and further arguments of
             :meth:`rclpy.node.Node.create_subscription`.

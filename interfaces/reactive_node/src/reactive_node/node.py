@@ -61,8 +61,7 @@ class ReactiveNode(Node):
         every_publisher: bool = False,
         **options: Any,
     ) -> Observable[Any]:
-        """
-        Return the messages of a topic as an observable, cold and shared (thesis 4.3).
+        """Return the messages of a topic as an observable, cold and shared (thesis 4.3).
 
         No DDS reader exists before the first observer subscribes. All observers share one reader. The
         disposal of the last observer destroys it; a new subscription creates a new one. The observable
@@ -109,8 +108,7 @@ class ReactiveNode(Node):
         qos_profile: QoSProfile | int = 10,
         **options: Any,
     ) -> Observable[Any]:
-        """
-        Return the newest message of a topic at each tick, if it has come since the tick before.
+        """Return the newest message of a topic at each tick, if it has come since the tick before.
 
         It is for topics where only the latest message counts (``sample`` of thesis 4.2). What comes between
         two ticks costs no Python: the reader keeps one message, and only a tick reads it. Cold and shared
@@ -133,8 +131,7 @@ class ReactiveNode(Node):
         qos_profile: QoSProfile | int = 10,
         **options: Any,
     ) -> Observable[Any]:
-        """
-        Return at each tick all messages of a topic that have come since the tick before, one by one.
+        """Return at each tick all messages of a topic that have come since the tick before, one by one.
 
         It is for topics where each message counts, but not at once. The reader keeps 1000 messages. All else,
         errors included, is as of :meth:`create_sampled_observable`.
@@ -173,8 +170,7 @@ class ReactiveNode(Node):
         return Observable(reader.subscribe)
 
     def create_parameter_observable(self, name: str) -> Observable[Any]:
-        """
-        Return the values of a declared parameter: the present one at once, then each new one.
+        """Return the values of a declared parameter: the present one at once, then each new one.
 
         A value that another thread or another observer sets during the subscription may come twice.
         A parameter that is not declared is an error of the observable. The observable completes when the
@@ -213,8 +209,7 @@ class ReactiveNode(Node):
     def create_event_observable(
         self, msg_type: Any, topic: str, qos_profile: QoSProfile | int, event: str
     ) -> Observable[Any]:
-        """
-        Return the QoS events of a subscription as an observable, cold and shared.
+        """Return the QoS events of a subscription as an observable, cold and shared.
 
         :param event: ``deadline``, ``liveliness``, ``message_lost``, ``incompatible_qos``,
             ``incompatible_type`` or ``matched``: see :class:`rclpy.event_handler.SubscriptionEventCallbacks`.
@@ -231,8 +226,7 @@ class ReactiveNode(Node):
         return Observable(reader.subscribe)
 
     def create_transform_observable(self, target_frame: str, source_frame: str) -> Observable[Any]:
-        """
-        Return the transforms that turn coordinates in the source frame into those in the target frame.
+        """Return the transforms that turn coordinates in the source frame into those in the target frame.
 
         The items are ``geometry_msgs/msg/TransformStamped``: the latest transform as soon as it is known, at
         once for a late observer, and then each new one. Its stamp is the latest time for which all transforms
@@ -250,8 +244,7 @@ class ReactiveNode(Node):
     def create_call(
         self, srv_type: Any, srv_name: str, *, timeout: float | None = None, **options: Any
     ) -> Callable[[Any], Observable[Any]]:
-        """
-        Return a function from a request to an observable of the response, for ``requests.flat_map(call)``.
+        """Return a function from a request to an observable of the response, for ``requests.flat_map(call)``.
 
         A call begins with its subscription, waits for a server if there is none, and never blocks.
         Disposing abandons it. It completes when the node ends.
@@ -273,8 +266,7 @@ class ReactiveNode(Node):
     def create_action_call(
         self, action_type: Any, action_name: str, **options: Any
     ) -> Callable[[Any], Observable[Any]]:
-        """
-        Return a function from a goal to an observable of its execution, for ``goals.flat_map(act)``.
+        """Return a function from a goal to an observable of its execution, for ``goals.flat_map(act)``.
 
         A goal is sent with each subscription, when there is a server; it waits for one and never blocks.
         The items are the action's feedback messages, then its result message, then the observable completes:
@@ -313,8 +305,7 @@ class ReactiveNode(Node):
         on_demand: bool = False,
         **options: Any,
     ) -> abc.DisposableBase:
-        """
-        Publish every item of an observable until the returned disposable is disposed or the node ends.
+        """Publish every item of an observable until the returned disposable is disposed or the node ends.
 
         The publisher exists from now on: peers need time to discover it, and a publisher that is created
         with the first message loses it. An error of the observable, or a message of another type, is raised
@@ -371,8 +362,7 @@ class ReactiveNode(Node):
         srv_name: str,
         **options: Any,
     ) -> abc.DisposableBase:
-        """
-        Answer the requests of a service until the returned disposable is disposed or the node ends.
+        """Answer the requests of a service until the returned disposable is disposed or the node ends.
 
         The recipe maps the requests to pairs of a request and its response, so it may answer in any order::
 
@@ -420,8 +410,7 @@ class ReactiveNode(Node):
         self.scheduler.schedule(throw)
 
     def destroy_node(self) -> None:
-        """
-        End the node; its observables complete first.
+        """End the node; its observables complete first.
 
         If observers or disposals of recipes raise, one of their errors is raised afterwards.
         """

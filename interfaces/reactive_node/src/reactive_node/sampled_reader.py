@@ -51,8 +51,7 @@ def sampled_messages(
     timestamped: bool = False,
     most: int = 1,
 ) -> Observable[Any]:
-    """
-    Return the messages that a reader holds at each tick, those that have come since the tick before.
+    """Return the messages that a reader holds at each tick, those that have come since the tick before.
 
     :param create: creates the reader of ``node`` with the arguments ``callback_group`` and
         ``event_callbacks``.
@@ -118,8 +117,7 @@ class SampledReader(SharedReader):
         item: Callable[[Any], Any] | None,
         most: int,
     ) -> None:
-        """
-        Share a reader among observers; none exists yet.
+        """Share a reader among observers; none exists yet.
 
         :param create, ticks, timestamped, most: see :func:`sampled_messages`.
         :param scheduler, end, item: see :class:`SharedReader`.

@@ -50,8 +50,7 @@ class _Item(abc.DisposableBase):
 
 
 class NodeScheduler(PeriodicScheduler):
-    """
-    Schedules on a node's executor; any thread may schedule and cancel.
+    """Schedules on a node's executor; any thread may schedule and cancel.
 
     Time is monotonic: it begins with the time of day and then follows the steady clock, so setting the
     machine's clock changes nothing. While the node's ROS time is simulated (``use_sim_time``), this time

@@ -35,8 +35,7 @@ class Requests:
         return response
 
     def answer(self, answer: Any) -> None:
-        """
-        Answer a request, given in a pair with its response.
+        """Answer a request, given in a pair with its response.
 
         :raises TypeError: if it is no such pair.
         :raises ValueError: unless the request waits.

@@ -32,8 +32,7 @@ class SharedReader:
         item: Callable[[Any], Any] | None = None,
         retained: deque[Any] | None = None,
     ) -> None:
-        """
-        Share a reader among observers; none exists yet.
+        """Share a reader among observers; none exists yet.
 
         :param create: creates the reader of ``node``, with a callback that gets what it receives.
         :param scheduler: runs actions on the thread that runs the callback.

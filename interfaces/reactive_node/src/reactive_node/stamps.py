@@ -35,8 +35,7 @@ class _Stamped(NamedTuple, Generic[_T]):
 
 
 class Timestamp(_Stamped[_T]):
-    """
-    A value and its time, with the attributes of the items that RxPY's ``timestamp`` operator emits.
+    """A value and its time, with the attributes of the items that RxPY's ``timestamp`` operator emits.
 
     Its time is kept in nanoseconds since 1970: most messages need no :attr:`timestamp`, which costs more.
     """

@@ -67,8 +67,7 @@ class Window(_NoNode):
         self._events: list[Any] | None = None  # None after a change of entities
 
     def refresh(self) -> None:
-        """
-        See which entities the node has now.
+        """See which entities the node has now.
 
         This takes the place of a look at each message: nothing else destroys a subscription of a node.
         """
@@ -78,8 +77,7 @@ class Window(_NoNode):
         self._events = None
 
     def take_events(self) -> None:
-        """
-        Call the callbacks of QoS events that have come.
+        """Call the callbacks of QoS events that have come.
 
         EventsExecutor must not see them: an event that is on its way while its endpoint is destroyed is a
         segmentation fault (ros2/rclpy#1644).

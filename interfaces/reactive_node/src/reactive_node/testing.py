@@ -55,15 +55,13 @@ class Recording(Generic[_T]):
 
 
 class VirtualTime(TestScheduler):
-    """
-    RxPY's ``TestScheduler`` in seconds: time begins at 0 and passes only while it is told to.
+    """RxPY's ``TestScheduler`` in seconds: time begins at 0 and passes only while it is told to.
 
     A recipe under test is subscribed with :meth:`record`, its inputs are made with :meth:`hot`.
     """
 
     def hot(self, *items: tuple[float, Any]) -> Any:
-        """
-        Return a hot observable that emits each item at its time [s] and never ends.
+        """Return a hot observable that emits each item at its time [s] and never ends.
 
         Its ``subscriptions`` hold the times of subscribing and disposing. For an input that fails or
         completes, use ``create_hot_observable``.

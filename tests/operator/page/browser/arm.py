@@ -29,8 +29,7 @@ class Arm:
     def __init__(
         self, run: Path, domain: int, namespace: str = "", scenario: str = STEADY, **page: object
     ) -> None:
-        """
-        Start the system.
+        """Start the system.
 
         :param namespace: the network namespace of the system; empty for that of this process.
         :param page: parameters of the page.

@@ -96,8 +96,7 @@ class Record:
             time.sleep(0.01)
 
     def await_off(self, moment: float) -> float:
-        """
-        Wait until the engines are off after a moment; when the drive stopped them [s since 1970].
+        """Wait until the engines are off after a moment; when the drive stopped them [s since 1970].
 
         It stops at ``off``, and when no ``on`` has come for ``topics.DRIVE_TIMEOUT``.
         """
