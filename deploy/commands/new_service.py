@@ -32,7 +32,6 @@ class Refused(Exception):
 
 
 def main() -> None:
-    """Write the service that the command line names."""
     name = sys.argv[1]
     try:
         check(name)
@@ -85,10 +84,6 @@ User story (ours): as a robot operator, I find the engines off after a value of
 """
     for old, new in (
         ("Turns the engines off when the effector is too fast.", story),
-        (
-            "The example of a service: engines off when the effector is too fast",
-            f"The {title} in virtual time",
-        ),
         (" when a speed is above the limit [m/s]", " when a value is above the limit"),
         ("lambda speed: speed > limit", "lambda value: value > limit"),
         ("when_a_speed_is", "when_a_value_is"),

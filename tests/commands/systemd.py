@@ -6,13 +6,11 @@ import shlex
 
 
 def command_of(unit: str) -> list[str]:
-    """Return the words of ExecStart."""
     (line,) = _values(unit, "ExecStart")
     return [_plain(word, "%$") for word in shlex.split(line)]
 
 
 def environment_of(unit: str) -> dict[str, str]:
-    """Return the variables that the unit sets."""
     words = [_plain(*shlex.split(line), "%") for line in _values(unit, "Environment")]
     return {name: value for name, _, value in (word.partition("=") for word in words)}
 

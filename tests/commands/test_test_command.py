@@ -12,7 +12,6 @@ import pytest
 from deploy.commands import test as command
 
 HERE = command.Part("", "", ["tests/system", "-x"])
-"""Tests for one rclpy."""
 EMBEDDED = "tests/commands/test_fleet.py tests/mutants tests/trials/replay tests/trials/simulation"
 IGNORED = "--ignore=tests/mutants"
 ONE = "tests/trials/simulation/test_experiment.py::test"

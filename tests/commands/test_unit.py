@@ -1,5 +1,3 @@
-"""The unit that `make unit` writes."""
-
 from __future__ import annotations
 
 import shutil

@@ -1,5 +1,3 @@
-"""The recipes of the virtual operator, and the person who replaces it."""
-
 from __future__ import annotations
 
 import time

@@ -1,5 +1,3 @@
-"""The drive: its recipe, its wiring, and the joints that it moves."""
-
 from __future__ import annotations
 
 import itertools
@@ -31,9 +29,7 @@ PERIOD = 0.125  # s; exact in binary
 def driven(
     states: list[tuple[float, str, float]], until: float, begin: float = 0.0, pause: float = 0.0
 ) -> list[tuple[float, float]]:
-    """Return the driven times, and when they are emitted.
-
-    :param states: when they arrive, the state, and its age.
+    """:param states: when they arrive, the state, and its age.
     :param pause: which the process makes at 2.1 s.
     """
     scheduler = VirtualTime()

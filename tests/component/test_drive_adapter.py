@@ -1,5 +1,3 @@
-"""The example of a real drive: off unless the engines are on and the drive obeys."""
-
 from __future__ import annotations
 
 from collections.abc import Callable

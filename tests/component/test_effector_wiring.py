@@ -1,5 +1,3 @@
-"""The services of the effector's position and speed between their topics."""
-
 from __future__ import annotations
 
 from typing import Any

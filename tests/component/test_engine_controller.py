@@ -134,11 +134,7 @@ class Engines:
         presences: list[tuple[float, float]],
         until: float = 60.0,
     ) -> list[tuple[float, str]]:
-        """Return the states and when they change.
-
-        :param commands: when they arrive, their names, and their source times.
-        :param presences: when they arrive, and their stamps.
-        """
+        """Return the states and when they change; commands and presences have their arrival first."""
         return changes(self.states(commands, presences, until))
 
     def states(

@@ -16,7 +16,6 @@ from tests.component.wiring import Wired
 
 @pytest.fixture
 def wired(make_node: MakeNode, spin_until: SpinUntil, monkeypatch: pytest.MonkeyPatch) -> Any:
-    """Wires a controller; its health is reported on demand."""
     monkeypatch.setattr("interfaces.service.health.PERIOD", 3600.0)
 
     def make(**parameters: Any) -> Controller:

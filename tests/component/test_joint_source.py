@@ -1,5 +1,3 @@
-"""The example of real joints: two joints of a robot become those of the arm."""
-
 from __future__ import annotations
 
 import math

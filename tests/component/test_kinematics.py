@@ -1,5 +1,3 @@
-"""The recipe of the effector's position (thesis 5.2.1)."""
-
 from __future__ import annotations
 
 import cmath

@@ -1,5 +1,3 @@
-"""The recipe of the effector's velocity, and its service."""
-
 from __future__ import annotations
 
 import math

@@ -1,5 +1,3 @@
-"""The recipes of the operator watchdog (thesis 5.2.3)."""
-
 from __future__ import annotations
 
 from datetime import UTC, datetime
@@ -149,10 +147,7 @@ def test_end_of_the_heartbeats_is_a_silence(scheduler: TestScheduler) -> None:
 
 
 def strikes(heartbeats: list[int], until: int) -> list[int]:
-    """Return when the operator is missed [ms], by a model without Rx.
-
-    A sample counts as a sign of life if a heartbeat came since the sample before it.
-    """
+    """Return when the operator is missed [ms], by a model without Rx: each sample looks for heartbeats."""
     missed: list[int] = []
     begin = seen = 10
     pending = sorted(heartbeats)

@@ -31,7 +31,6 @@ OUTPUTS = [OPERATOR_PRESENCE, OPERATOR_ACTIVITY, ENGINES]
 
 @pytest.fixture
 def wired(make_node: MakeNode, spin_until: SpinUntil, monkeypatch: pytest.MonkeyPatch) -> Any:
-    """Wires a watchdog; its health is reported on demand."""
     monkeypatch.setattr("interfaces.service.health.PERIOD", 3600.0)
 
     def make(**parameters: Any) -> Wired:

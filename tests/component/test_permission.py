@@ -1,5 +1,3 @@
-"""The permission to move: young states of the engines, in virtual time."""
-
 from __future__ import annotations
 
 import itertools

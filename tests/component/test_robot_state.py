@@ -1,5 +1,3 @@
-"""The arm for 3D tools: the recipe of its state, its transforms and its URDF."""
-
 from __future__ import annotations
 
 import itertools

@@ -1,5 +1,3 @@
-"""The format of scenario files and the messages for errors in them."""
-
 from __future__ import annotations
 
 from pathlib import Path

@@ -1,5 +1,3 @@
-"""The life of a service as a process: start, refusal, end."""
-
 from __future__ import annotations
 
 import re

@@ -1,5 +1,3 @@
-"""The example of a service: engines off when the effector is too fast."""
-
 from __future__ import annotations
 
 from interfaces.topics import TURN_OFF

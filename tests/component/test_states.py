@@ -1,5 +1,3 @@
-"""A state's topic as a signal, and what its health tells a replay."""
-
 from __future__ import annotations
 
 import json

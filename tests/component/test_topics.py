@@ -1,5 +1,3 @@
-"""The contract, except for its table: what is wrong with a message, and which topics may be silent."""
-
 from __future__ import annotations
 
 import math

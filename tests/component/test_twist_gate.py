@@ -1,5 +1,3 @@
-"""The example of a mobile robot: its velocity commands pass only while the engines are on."""
-
 from __future__ import annotations
 
 import math

@@ -1,5 +1,3 @@
-"""The recipe of the effector's speed (thesis 5.2.2)."""
-
 from __future__ import annotations
 
 import math

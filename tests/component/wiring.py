@@ -15,8 +15,6 @@ from reactive_node.testing import MakeNode, SpinUntil
 
 
 class Wired:
-    """A service and its peer, which has met the publishers of the service."""
-
     def __init__(
         self,
         make_node: MakeNode,

@@ -31,10 +31,7 @@ AGE = 0.02  # s of a message that arrives late
 
 @pytest.fixture
 def play(scheduler: TestScheduler) -> Play:
-    """Plays messages until 60 s; returns the lines that the terminal shows.
-
-    `late` is a message that was sent `AGE` before it arrives; `own` are the times of own turn_offs.
-    """
+    """Return the lines shown until 60 s; `late` was sent `AGE` before it arrives, `own` are own turn_offs."""
 
     def play(script: Iterable[Message], *, late: Any = None, own: Iterable[float] = ()) -> list[Line]:
         def sent(message: Any) -> Timestamp[Any]:

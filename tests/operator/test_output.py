@@ -1,5 +1,3 @@
-"""Output to the user: to a reader, to a stuck reader, and without one."""
-
 from __future__ import annotations
 
 import os

@@ -68,18 +68,15 @@ def _latest(samples: list[Sample], time: float) -> Any:
 
 
 def change(history: History, topic: str, how: Callable[[Sample], Sample | None]) -> History:
-    """Return the history with each message of a topic replaced; ``None`` removes it."""
     samples = sorted(new for s in history.streams[topic] if (new := how(s)) is not None)
     return replace(history, streams=history.streams | {topic: samples})
 
 
 def silent(history: History, topic: str, begin: float, end: float) -> History:
-    """Return the history without the messages of a topic between two times."""
     return change(history, topic, lambda s: None if begin < s.sent < end else s)
 
 
 def with_value(history: History, topic: str, value: Any, begin: float, end: float = END) -> History:
-    """Return the history with another value on a topic between two times."""
     return change(history, topic, lambda s: s._replace(value=value) if begin < s.sent < end else s)
 
 

@@ -22,7 +22,6 @@ TRAVEL = 0.001  # s from the source to the observer, in a history made by hand
 
 
 def resumed(history: History, topic: str, pause: float, begin: float = AT, value: Any = 0.0) -> History:
-    """Return the history in which a topic pauses exactly that long [s]."""
     return added(silent(history, topic, begin, begin + pause), topic, (begin + pause, value))
 
 

@@ -1,5 +1,3 @@
-"""The table of effects: what excuses a violation, on which programs, from when to when, and why."""
-
 from __future__ import annotations
 
 import math
@@ -52,7 +50,6 @@ Row = tuple[set[str], float, float, str]
 
 
 def rows(faults: Sequence[InjectedFault] = (), lives: Sequence[Life] = ()) -> list[Row]:
-    """Return the effects of faults and starts in a record of 100 s."""
     values = [Sample(float(second), float(second), 0.0) for second in range(101)]
     history = History(100.0, dict.fromkeys(topics.CONFIGURATION, values), [*lives], [*faults])
     return [

@@ -1,5 +1,3 @@
-"""Records: their format, the verdict on them, and files that are not records; the command line."""
-
 from __future__ import annotations
 
 import json

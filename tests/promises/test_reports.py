@@ -1,5 +1,3 @@
-"""The reports: the terminal, the page with its list of faults, and the picture."""
-
 from __future__ import annotations
 
 import re

@@ -1,5 +1,3 @@
-"""The safety case cites its evidence: every cited test exists."""
-
 from __future__ import annotations
 
 import re

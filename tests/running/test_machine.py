@@ -1,5 +1,3 @@
-"""What on a machine is about to harm the arm, from made-up figures of the kernel."""
-
 from __future__ import annotations
 
 import math
@@ -31,11 +29,7 @@ class Looks:
     def look(
         self, times: int = 1, *, late: float = 0.0, pauses: tuple[float, float] = (0.0, 0.0)
     ) -> dict[str, str]:
-        """Return the warnings of the last of so many looks.
-
-        :param late: how late each comes [s].
-        :param pauses: how long each is kept from running before and after it reads the time of day [s].
-        """
+        """Return the warnings of the last look; each comes late by ``late`` and pauses for ``pauses`` [s]."""
         for _ in range(times):
             before = self.now + PERIOD + late
             read = before + pauses[0]

@@ -1,5 +1,3 @@
-"""The settings of supervisord.conf for each program, and its reader."""
-
 from __future__ import annotations
 
 import configparser

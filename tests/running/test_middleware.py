@@ -1,5 +1,3 @@
-"""What the nodes of an arm need from the middleware."""
-
 from __future__ import annotations
 
 from pathlib import Path

@@ -1,5 +1,3 @@
-"""The manifest with programs of the user's own."""
-
 from __future__ import annotations
 
 import configparser
@@ -28,7 +26,6 @@ def _environment(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def own(tmp_path: Path) -> Path:
-    """A user's file."""
     return tmp_path / "robot.conf"
 
 

@@ -1,5 +1,3 @@
-"""The sentinel's policy at its limits: exact times, counts and reasons."""
-
 from __future__ import annotations
 
 from collections.abc import Iterable

@@ -1,5 +1,3 @@
-"""The sentinel's policy, on made-up observations; its messages; its probe."""
-
 from __future__ import annotations
 
 import os

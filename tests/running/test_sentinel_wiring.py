@@ -1,5 +1,3 @@
-"""The sentinel between its probe, its policy, its actions and /diagnostics."""
-
 from __future__ import annotations
 
 import os

@@ -105,7 +105,6 @@ class Command:
         os.killpg(self._process.pid, number)
 
     def wait(self, seconds: float = LIMIT) -> int:
-        """Wait until it ends; its exit code."""
         try:
             code = self._process.wait(seconds)
         except subprocess.TimeoutExpired:

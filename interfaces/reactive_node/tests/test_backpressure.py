@@ -1,5 +1,3 @@
-"""Slow work on another thread: only the newest item waits."""
-
 from __future__ import annotations
 
 import asyncio

@@ -1,5 +1,3 @@
-"""The end of a node: its observables complete, and everything is disposed."""
-
 from __future__ import annotations
 
 import importlib.util

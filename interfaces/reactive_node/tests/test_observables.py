@@ -1,5 +1,3 @@
-"""Topics as observables (thesis chapter 4)."""
-
 from __future__ import annotations
 
 import gc

@@ -1,5 +1,3 @@
-"""A node's scheduler: its clock, which setting the time of day must not move, and its limits."""
-
 from __future__ import annotations
 
 from datetime import UTC, datetime, timedelta

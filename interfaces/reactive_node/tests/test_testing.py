@@ -1,5 +1,3 @@
-"""The testing kit: recipes in virtual time, nodes in a free domain."""
-
 from __future__ import annotations
 
 import os

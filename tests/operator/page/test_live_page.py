@@ -60,7 +60,6 @@ class Observer:
         self.engines = message.data
 
     def until(self, condition: Callable[[], object], seconds: float = LIMIT) -> float:
-        """Wait for a condition; returns when it is true [s, monotonic clock]."""
         self._peer.spin_until(condition, seconds)
         return time.monotonic()
 

@@ -1,5 +1,3 @@
-"""The messages of a page: which are accepted, and that no other one does anything."""
-
 from __future__ import annotations
 
 import json

@@ -1,5 +1,3 @@
-"""What pages ask for besides the switch: who may kill and stop processes."""
-
 from __future__ import annotations
 
 from functools import reduce

@@ -1,5 +1,3 @@
-"""The web server of the page: what it serves to whom, on real sockets."""
-
 from __future__ import annotations
 
 import contextlib

@@ -1,5 +1,3 @@
-"""What the pages show of the topics, in virtual time."""
-
 from __future__ import annotations
 
 import math

@@ -47,7 +47,6 @@ def fast_dds_files() -> set[Path]:
 
 
 def unleash(run: Path, *options: str) -> tuple[str, int]:
-    """Run `make chaos`; return its output and its exit code."""
     process = subprocess.Popen(
         [sys.executable, "-m", "deploy.trials.chaos", *options],
         cwd=processes.ROOT,

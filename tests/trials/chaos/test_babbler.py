@@ -1,5 +1,3 @@
-"""The babbler's messages: no reader may accept them, and the checkers recognise them."""
-
 from __future__ import annotations
 
 import random

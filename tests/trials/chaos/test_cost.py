@@ -1,5 +1,3 @@
-"""What an arm costs: the processor time of its own processes, ended ones included."""
-
 from __future__ import annotations
 
 import subprocess

@@ -1,5 +1,3 @@
-"""The plan of `make chaos` that follows from its command line."""
-
 from __future__ import annotations
 
 from pathlib import Path

@@ -168,9 +168,7 @@ def derived(
     change: Callable[[str, Received], Received | None] = lambda topic, received: received,
     *others: tuple[str, int],
 ) -> Path:
-    """Write a record like arm.mcap.
-
-    :param change: returns what replaces a message; ``None`` for nothing.
+    """:param change: returns what replaces a message; ``None`` for nothing.
     :param others: topics that are not the arm's, and when a message of them was received [ns of the record].
     """
     with McapFile(RECORD) as record:

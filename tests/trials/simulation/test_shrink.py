@@ -1,5 +1,3 @@
-"""A schedule that violates a promise is shrunk to the faults that matter."""
-
 from __future__ import annotations
 
 from collections.abc import Sequence

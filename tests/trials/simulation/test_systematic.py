@@ -1,5 +1,3 @@
-"""Systematic faults: at every moment in which a service runs."""
-
 from __future__ import annotations
 
 from collections import Counter

@@ -29,11 +29,7 @@ class Arm:
     def __init__(
         self, run: Path, domain: int, namespace: str = "", scenario: str = STEADY, **page: object
     ) -> None:
-        """Start the system.
-
-        :param namespace: the network namespace of the system; empty for that of this process.
-        :param page: parameters of the page.
-        """
+        """:param namespace: the network namespace of the system; empty for that of this process."""
         self.site = Site(run, domain)
         with socket.create_server(("127.0.0.1", 0)) as free:
             self.port: int = free.getsockname()[1]

@@ -36,7 +36,6 @@ def browser(playwright: Any) -> Iterator[Any]:
 
 @pytest.fixture
 def own_browser(playwright: Any) -> Iterator[Any]:
-    """A Chromium that a test may break."""
     with closing(chromium.launch(playwright)) as browser:
         yield browser
 
