@@ -22,8 +22,7 @@ class EngineState(NamedTuple):
 
 
 def permissions(states: Observable[EngineState]) -> Observable[bool]:
-    """
-    Emit whether a drive may move: with each state, and ``False`` as soon as an ``on`` is not young any more.
+    """Emit whether a drive may move: with each state, and ``False`` as soon as an ``on`` is no longer young.
 
     An ``on`` is accepted for 400 ms from its source time. It begins with ``False``, and ends with the states.
     """

@@ -40,11 +40,7 @@ def forward_kinematics(l1: float, l2: float, theta1: float, theta2: float) -> tu
 
 
 def transforms(l1: float, l2: float, theta1: float, theta2: float) -> Iterator[tuple[str, str, Transform]]:
-    """Yield parent, child and transform of each frame but the first.
-
-    :param l1, l2: lengths of the links [m].
-    :param theta1, theta2: angles of the joints [rad].
-    """
+    """Yield parent, child and transform of each frame but the first; see :func:`forward_kinematics`."""
     yield BASE, LINK1, _transform(0.0, theta1)
     yield LINK1, LINK2, _transform(l1, theta2)
     yield LINK2, EFFECTOR, _transform(l2, 0.0)

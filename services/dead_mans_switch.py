@@ -57,8 +57,6 @@ def engine_commands(
 
 @dataclass(frozen=True)
 class Parameters:
-    """The parameters of the service."""
-
     rate: float = parameter(20.0, (1.0, 10_000.0), "Hz", "heartbeats while pressed", settable=True)
     pressed: bool = parameter(
         False,
@@ -70,7 +68,6 @@ class Parameters:
 
 
 def wire(node: ServiceNode) -> None:
-    """Connect the recipes with their topics."""
     node.declare(Parameters)
     epoch = Epoch(node)
     player, settings = Player(node, epoch), Settings(node, is_restart=epoch.is_past)

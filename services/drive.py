@@ -56,7 +56,6 @@ def driven_time(states: Observable[EngineState], begin: float, period: float) ->
 
 
 def wire(node: ServiceNode) -> None:
-    """Connect the recipe with its topics."""
     epoch = Epoch(node)
     player, settings = Player(node, epoch), Settings(node, is_restart=epoch.is_past)
     rate = player.scenario.drive

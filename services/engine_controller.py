@@ -57,8 +57,6 @@ class Latch(NamedTuple):
 
 @dataclass(frozen=True)
 class Parameters:
-    """Parameters that a user may set."""
-
     max_presence_age: float = parameter(1.0, (0.1, 1.0), "s", "`turn_on` needs a younger presence")
     presence_timeout: float = parameter(
         10.0, (1.0, 10.0), "s", "engines stay on only with a younger presence"
@@ -122,7 +120,6 @@ def engine_state(
 
 
 def wire(node: ServiceNode) -> None:
-    """Connect the recipe with its topics."""
     # The arrival before the age: a pause in between must make a presence older, not younger.
     commands = node.observe(topics.ENGINES, timestamped=True).timestamp()
     presences = node.observe(topics.OPERATOR_PRESENCE).timestamp()

@@ -23,7 +23,6 @@ def effector_position(
 
 
 def wire(node: ServiceNode) -> None:
-    """Connect the recipe with its topics."""
     frame, clock = frame_id(BASE, node.get_namespace()), node.get_clock()
     l1, l2, theta1, theta2 = map(node.observe, (L1, L2, THETA1, THETA2))
     positions = effector_position(l1, l2, theta1, theta2)

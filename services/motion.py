@@ -35,8 +35,6 @@ def effector_velocity(
 
 @dataclass(frozen=True)
 class Parameters:
-    """Parameters that a user may set."""
-
     gap: float = parameter(
         GAP,
         (0.01, 10.0),
@@ -46,7 +44,6 @@ class Parameters:
 
 
 def wire(node: ServiceNode) -> None:
-    """Connect the recipe with its topics."""
     gap = node.declare(Parameters).gap
     frame = frame_id(BASE, node.get_namespace())
 

@@ -32,8 +32,6 @@ class Activity(NamedTuple):
 
 @dataclass(frozen=True)
 class Parameters:
-    """Parameters that a user may set."""
-
     lifespan: float = parameter(0.5, (0.01, 10.0), "s", "an older heartbeat is no sign of life")
     sampling: float = parameter(0.5, (0.01, 10.0), "s", "the operator is reported alive at most this often")
     silence: float = parameter(3.0, (0.1, 60.0), "s", "a silence of this length is a strike")
@@ -88,7 +86,6 @@ def engine_commands(activity: Observable[Activity], *, repeat: float = 0.5) -> O
 
 
 def wire(node: ServiceNode) -> None:
-    """Connect the recipes with their topics."""
     given = node.declare(Parameters)
     epoch = Epoch(node)
 

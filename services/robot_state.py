@@ -54,13 +54,10 @@ def lengths(l1: Observable[float], l2: Observable[float]) -> Observable[tuple[fl
 
 @dataclass(frozen=True)
 class Parameters:
-    """Parameters that a user may set."""
-
     rate: float = parameter(30.0, (5.0, 100.0), "Hz", "how often `joint_states` and `/tf` come")
 
 
 def wire(node: ServiceNode) -> None:
-    """Connect the recipe with its topics."""
     namespace = node.get_namespace()
 
     def joint_state(stamp: Time, it: Configuration) -> JointState:

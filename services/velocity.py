@@ -34,7 +34,6 @@ def effector_speed(positions: Observable[Position]) -> Observable[float | Reject
 
 
 def wire(node: ServiceNode) -> None:
-    """Connect the recipe with its topics."""
     node.publish(EFFECTOR_SPEED, effector_speed(node.observe(EFFECTOR_POSITION)))
 
 

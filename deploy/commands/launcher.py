@@ -156,7 +156,6 @@ def record(system: System) -> None:
 
 
 def _chosen(scenario: str) -> AbstractContextManager[None]:
-    """Choose the manifest of a scenario, with the programs of the user's own file."""
     from deploy.commands.parameters import NONE
 
     without = manifest.VIRTUAL_JOINTS if scenario == NONE else ()
@@ -212,7 +211,6 @@ def _await_services(system: System, member: Member, log_sizes: dict[str, int]) -
 
 
 def _listen(member: Member, programs: list[Program], health: Mapping[str, Health], limit: float) -> None:
-    """Listen until these programs have reported their health, at most `limit` [s]."""
     deadline = time.monotonic() + limit
     while not all(_reports(program, health) for program in programs) and time.monotonic() < deadline:
         member.spin_once()
@@ -275,7 +273,6 @@ def _adopt_environment(system: System) -> bool:
 
 
 def main(arguments: list[str]) -> int:
-    """Obey one command; the exit code."""
     interruption.install()
     parser = argparse.ArgumentParser(prog="launcher")
     commands = parser.add_subparsers(dest="command", required=True)

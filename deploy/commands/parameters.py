@@ -58,10 +58,7 @@ def of_system(scenario_name: str, user_file: str) -> dict[str, Any]:
 
 
 def _page_files(user_file: str, given: Mapping[str, Any]) -> dict[str, str]:
-    """Return the files that the page is given: a relative path counts from the folder of the parameter file.
-
-    :raises DeploymentError: if the page cannot have the address and the certificate that it is given.
-    """
+    """Return the files of the page; relative paths count from the parameter file. Raises DeploymentError."""
     declared = parameter_file.declared().get(manifest.PAGE)
     if declared is None:  # a system without the page
         return {}
@@ -77,10 +74,7 @@ def _page_files(user_file: str, given: Mapping[str, Any]) -> dict[str, str]:
 
 
 def _limits(given: Mapping[str, Any], prefix: str) -> dict[str, Any]:
-    """Return the parameters of other services that the page shows, as far as they are given.
-
-    :param prefix: of the names of the nodes.
-    """
+    """Return the parameters of other services that the page shows, as far as they are given."""
     return {
         name: value
         for service, names in LIMITS.items()

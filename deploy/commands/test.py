@@ -34,8 +34,6 @@ class Part(NamedTuple):
 
 
 class Results(NamedTuple):
-    """The tests that passed, failed and were skipped."""
-
     passed: set[str]
     failed: set[str]
     skipped: set[str]
@@ -99,7 +97,6 @@ def run(part: Part, reports: Path) -> list[int]:
 
 
 def results_in(reports: Path) -> Results:
-    """Return the results in the reports of a directory."""
     tests, failed, skipped = set(), set(), set()
     for report in reports.iterdir():
         for case in ElementTree.parse(report).iter("testcase"):
@@ -137,7 +134,6 @@ def paths(arguments: Sequence[str]) -> list[str]:
 
 
 def ignored(arguments: Sequence[str]) -> list[str]:
-    """Return the paths that an option takes out."""
     return [word.removeprefix(IGNORE) for word in arguments if word.startswith(IGNORE)]
 
 

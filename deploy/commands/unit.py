@@ -46,12 +46,7 @@ WantedBy=default.target
 
 
 def text(scenario: str, parameter_file: str, environment: Mapping[str, str]) -> str:
-    """Return the content of the unit (systemd.service(5)).
-
-    :param scenario: name or file of a scenario.
-    :param parameter_file: '' for none.
-    :param environment: of the command that writes it.
-    """
+    """Return the content of the unit (systemd.service(5)); the parameter file may be ''."""
     scenario, parameter_file = (
         os.path.abspath(it) if Path(it).is_file() else it for it in (scenario, parameter_file)
     )

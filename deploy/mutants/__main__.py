@@ -43,7 +43,6 @@ class Score:
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Run the command line; return the exit code."""
     usage = 'make mutants [MODULES="MODULE ..."]'
     parser = argparse.ArgumentParser(prog="make mutants", usage=usage, description=__doc__)
     parser.add_argument("modules", nargs="*", help="paths of modules; all if there are none")

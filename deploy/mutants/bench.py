@@ -54,10 +54,7 @@ class Bench:
         self._answer()
 
     def kills(self, mutant: Mutant, tests: Sequence[str]) -> bool:
-        """Return whether tests fail, or take too long, with a mutant.
-
-        :raises RuntimeError: if they fail without it.
-        """
+        """Return whether tests fail or hang with a mutant. Raises RuntimeError if they fail without it."""
         if tests not in self._durations:
             began = time.monotonic()
             if self._test(tests, 1800.0) != 0:

@@ -29,13 +29,8 @@ PAUSED = "Released: {}, because this terminal stood still. Press again."
 
 
 class Hand:
-    """The hand at the terminal of a node."""
-
     def __init__(self, node: ReactiveNode, tell: Callable[[str], None] = say) -> None:
-        """Be released.
-
-        :param tell: tells the user what becomes of the hand.
-        """
+        """:param tell: tells the user what becomes of the hand."""
         self._node = node
         self._tell = tell
         self._publisher: Publisher | None = None  # exists while the hand holds: so pages know who holds

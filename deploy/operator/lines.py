@@ -243,7 +243,6 @@ class Allowance:
     """
 
     def __init__(self, burst: int) -> None:
-        """Allow ``burst`` items at first."""
         self._burst = burst
         self._left = burst
         self._second = 0

@@ -45,8 +45,6 @@ UNSEEN_PERIOD = 0.3  # s
 
 @dataclass(frozen=True)
 class Parameters:
-    """What a user may set."""
-
     port: int = parameter(
         address.DEFAULT_PORT,
         (0, 65535),

@@ -11,12 +11,9 @@ _patience = PATIENCE  # none while the reader is stuck
 
 
 def say(line: str) -> None:
-    """Print a line to standard output; drop it if the reader is stuck.
+    """Print a line to standard output; drop it if its reader is stuck, so that stop and revival never wait.
 
-    A print to a full pipe or a stopped terminal would wait for its reader, and the system could neither be
-    stopped nor revived meanwhile. Nothing is printed if standard output is closed (`>&-`).
-
-    :raises BrokenPipeError: if the pipe has no reader any more.
+    Nothing is printed if standard output is closed (`>&-`). Raises BrokenPipeError if a pipe has no reader.
     """
     global _patience
     output: TextIO | None = sys.stdout

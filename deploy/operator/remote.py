@@ -39,7 +39,6 @@ class RemoteParameters:
     """The parameters of a program. Calls that get no answer end in a TimeoutError."""
 
     def __init__(self, node: ReactiveNode, program: str) -> None:
-        """Create the clients; they belong to the node."""
         self._get = node.create_call(GetParameters, f"{program}/get_parameters", timeout=TIMEOUT)
         self._set = node.create_call(SetParameters, f"{program}/set_parameters", timeout=TIMEOUT)
 

@@ -36,11 +36,7 @@ class Switch:
         is_open: Observable[bool],
         now: Callable[[], float],
     ) -> None:
-        """Connect the pages with the other hands.
-
-        :param events: what hands do on pages.
-        :param changes: the parameters that are set while a page is open.
-        :param is_open: whether a page is open.
+        """:param changes: the parameters that are set while a page is open.
         :param now: the clock of the nonces [s].
         """
         virtual = VirtualSwitch(node, now)

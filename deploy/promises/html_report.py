@@ -46,7 +46,6 @@ LEGEND = (
 
 
 def verdict(findings: Sequence[Finding]) -> str:
-    """Return the verdict on all promises in a few words."""
     if broken := [finding.promise for finding in findings if finding.verdict == VIOLATED]:
         return f"{', '.join(broken)} violated"
     if undecided := [f.promise for f in findings if f.verdict == UNKNOWN and f.unknown]:

@@ -35,10 +35,7 @@ EARLY = 0.001  # s by which a message may seem to be sent after its reception: c
 
 @contextmanager
 def _opened(path: Path) -> Iterator[McapFile]:
-    """Open a record.
-
-    :raises DeploymentError: if the file cannot be read, or is not a record.
-    """
+    """Open a record. Raises DeploymentError if the file cannot be read, or is not a record."""
     try:
         with McapFile(path) as file:
             yield file

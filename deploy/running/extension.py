@@ -97,10 +97,7 @@ class ArmInterface:
         self._poller.register_readable(self._signals)
 
     def programs(self) -> str:
-        """The fields of `Program` (system.py) for each program, in JSON.
-
-        As values of XML-RPC, they would cost the sentinel three times as much.
-        """
+        """The fields of `Program` for each program, in JSON: values of XML-RPC cost three times as much."""
         rows = [
             {
                 "name": name,
@@ -174,10 +171,7 @@ class ArmInterface:
 
 
 def lock_directory() -> None:
-    """Hold a shared lock on the run directory until supervisord ends.
-
-    systemd-tmpfiles leaves a locked directory alone, with everything below it (tmpfiles.d(5), "Age").
-    """
+    """Lock the run directory until supervisord ends: systemd-tmpfiles leaves it alone (tmpfiles.d(5))."""
     with suppress(OSError):  # a file system without locks
         fcntl.flock(os.open(os.curdir, os.O_RDONLY), fcntl.LOCK_SH)
 

@@ -59,11 +59,7 @@ class Machine:
     """Judges the figures of one look after the other."""
 
     def __init__(self, run: Path, period: float) -> None:
-        """Begin without a warning.
-
-        :param run: the run directory, for the words.
-        :param period: of the looks [s].
-        """
+        """:param period: of the looks [s]."""
         self._run = run
         self._period = period
         self._last: Figures | None = None
@@ -104,10 +100,7 @@ class Machine:
         return found
 
     def _note_step(self, last: Figures, now: Figures) -> None:
-        """Compare the time of day with the monotonic clock.
-
-        A process may be kept from running between the two readings: only what this cannot explain is a step.
-        """
+        """Note a step of the time of day, unless a pause between the two readings may explain it."""
         forward = (now.time_of_day - now.after) - (last.time_of_day - last.before)
         back = (last.time_of_day - last.after) - (now.time_of_day - now.before)
         if max(forward, back) > CLOCK_STEP:

@@ -45,7 +45,6 @@ class Program(NamedTuple):
     name: str
     """Also the name of its node."""
     module: str
-    """The Python module that the program runs."""
     arguments: tuple[str, ...]
     """The arguments before ``--ros-args``."""
 

@@ -172,10 +172,7 @@ def executor(execve: Callable[..., NoReturn]) -> Callable[[str, Sequence[str], M
 
 
 def rename(argv: Sequence[str], environment: Mapping[str, str]) -> None:
-    """Give this process another command line and environment in the process table.
-
-    :raises OSError: if the kernel cannot do this.
-    """
+    """Give this process another command line and environment in the process table. May raise OSError."""
     global _names
     arguments = b"".join(os.fsencode(word) + b"\0" for word in argv)
     variables = b"".join(os.fsencode(f"{name}={value}") + b"\0" for name, value in environment.items())

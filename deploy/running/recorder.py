@@ -46,9 +46,7 @@ class Recorder:
     """A file of messages. Thread-safe."""
 
     def __init__(self, path: Path, monotonic: int, epoch: int) -> None:
-        """Create the file.
-
-        :param monotonic, epoch: the same moment on the monotonic clock and since 1970 [ns].
+        """:param monotonic, epoch: the same moment on the monotonic clock and since 1970 [ns].
         :raises OSError: like all methods, if the disk does not take the messages.
         """
         self._writer = FileWriter(path, "reactive-arm")
@@ -158,11 +156,7 @@ def record(
 def _writer(
     node: ReactiveNode, topic: topics.Topic, recorder: Recorder, first: Callable[[str], None]
 ) -> Callable[[bytes, int], int]:
-    """Return what records a message.
-
-    It takes the message and its DDS source time [ns since 1970], and returns when it was received, on the
-    monotonic clock [ns].
-    """
+    """Return what records a message and its source time [ns since 1970], and returns its reception [ns]."""
     name, offered = node.resolve_topic_name(topic.name), qos_profiles(topic)
     is_first = True
 

@@ -15,13 +15,11 @@ class NoAnswer(Exception):
 
 
 def call(pid: int, method: str, *arguments: object, timeout: float = LIMIT) -> Any:
-    """Call a method of the supervisord with this pid.
+    """Call a method of the supervisord with this pid. Raises NoAnswer without one in time, or after an error.
 
-    The call goes through the directory in which supervisord works: the socket's own path may be longer than
-    the 107 bytes that a unix socket allows.
+    The call goes through its working directory: a unix socket's path has at most 107 bytes.
 
     :param timeout: for a supervisord that hangs [s].
-    :raises NoAnswer: if there is no answer in time, or an error.
     """
     transport = _UnixTransport(f"/proc/{pid}/cwd/supervisor.sock", timeout)
     try:

@@ -117,8 +117,6 @@ def carry_out(action: Action, run: Path, supervisord: Supervisord) -> None:
 
 @dataclass(frozen=True)
 class Parameters:
-    """The parameters that a user may set."""
-
     period: float = parameter(0.5, (0.05, 1.0), "s", "period at which the processes are observed")
     health_timeout: float = parameter(
         2.7, (1.5, 60.0), "s", "a service without health for this long is killed"

@@ -75,7 +75,6 @@ class Supervisord:
     """A running supervisord. Its methods raise DeploymentError when it does not answer."""
 
     def __init__(self, pid: int) -> None:
-        """:param pid: that of its process."""
         self.pid = pid
 
     def programs(self) -> list[Program]:

@@ -83,11 +83,7 @@ class System(RunDirectory):
         return not processes.await_end([self._supervisor], 0.0)
 
     def stop(self, tell: Callable[[int], None] = lambda count: None) -> int:
-        """End every process of the system, with supervisord's help or without.
-
-        :param tell: is called with their number before they are ended
-        :return: their number
-        """
+        """End every process of the system; return their number, which ``tell`` is called with before."""
         if not self.logs.exists() and not self.members():
             tell(0)
             return 0

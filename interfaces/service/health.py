@@ -34,10 +34,7 @@ class HealthReporter:
     """Reports the health of a node: every second, and at once to each new subscriber."""
 
     def __init__(self, node: Node, before_report: Callable[[], None] = lambda: None) -> None:
-        """Start to report.
-
-        :param before_report: called every second before the report; it may add remarks.
-        """
+        """:param before_report: called every second before the report; it may add remarks."""
         self._node = node
         self._before_report = before_report
         self._started = time.monotonic()

@@ -48,8 +48,7 @@ class ServiceNode(ReactiveNode):
         self.add_on_set_parameters_callback(_only_finite)
 
     def declare(self, parameters: type[T]) -> T:
-        """
-        Declare the parameters of a dataclass (:mod:`interfaces.service.parameters`) and return their values.
+        """Declare a dataclass's parameters (:mod:`interfaces.service.parameters`), and return their values.
 
         :raises ParameterException: if a value that the user gave has the wrong type or is out of range.
         """
@@ -93,12 +92,9 @@ class ServiceNode(ReactiveNode):
         timestamped: bool = False,
         max_age: float | None = None,
     ) -> Observable[Any]:
-        """Return the newest value at each tick, if it is good.
+        """Return the newest value at each tick, if it is good; the topic must not be latched.
 
-        See :meth:`ReactiveNode.create_sampled_observable`.
-
-        :param topic: not a latched one.
-        :param max_age: see :meth:`observe`.
+        See :meth:`ReactiveNode.create_sampled_observable` and, for ``max_age``, :meth:`observe`.
         """
         options = self._reading(topic, timestamped, max_age)
         return self.create_sampled_observable(topic.type, topic.name, ticks, topic.qos, **options)
@@ -141,8 +137,7 @@ class ServiceNode(ReactiveNode):
         *,
         on_demand: bool = False,
     ) -> None:
-        """Publish values on a topic (:attr:`Topic.message`). Bad ones and :class:`Rejected` are dropped and
-        reported.
+        """Publish values on a topic (:attr:`Topic.message`); drop and report bad ones and :class:`Rejected`.
 
         :param on_demand: see :meth:`ReactiveNode.publish_observable`.
         """

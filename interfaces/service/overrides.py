@@ -11,13 +11,11 @@ from interfaces.service.errors import UserError
 
 
 def check(node: Node, arguments: Sequence[str]) -> None:
-    """Check the command line against the parameters that a node has declared.
+    """Check a command line, without the program, against the parameters that a node has declared.
 
     A parameter file is not checked here: its ``/**`` may name parameters of other services.
 
-    :param arguments: the command line, without the program.
-    :raises UserError: for parameters of another node and those that this one does not have, and for options
-        outside of ``--ros-args``.
+    :raises UserError: for parameters that this node does not have, and for options outside of ``--ros-args``.
     """
     if options := [word for word in remove_ros_args(arguments) if word.startswith("-")]:
         raise UserError(f"{' '.join(options)}: no such option; those of ROS follow after --ros-args")

@@ -42,11 +42,7 @@ class Declaration(NamedTuple):
 def parameter(
     default: T, within: tuple[T, T] | None, unit: str, meaning: str, *, settable: bool = False
 ) -> T:
-    """Return the dataclass field of a parameter.
-
-    :param within: the least and the greatest allowed value.
-    :param settable: whether the value may change while the service runs.
-    """
+    """Return the dataclass field of a parameter: see :class:`Declaration`."""
     field: T = dataclasses.field(
         default=default,
         metadata={"within": within, "unit": unit, "meaning": meaning, "settable": settable},

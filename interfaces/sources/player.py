@@ -26,10 +26,7 @@ class Player:
     """The scenario of a node, and its timelines as observables."""
 
     def __init__(self, node: ServiceNode, epoch: Epoch) -> None:
-        """Load the scenario that a parameter of the node names.
-
-        :raises UserError: if the scenario has an error.
-        """
+        """Load the scenario that a parameter of the node names. Raises UserError if it has an error."""
         path = node.declare(_Parameters).scenario
         self.scenario = load(path) if path else Scenario()
         self._epoch = epoch

@@ -22,9 +22,7 @@ class SettingsFile:
     """The settings of one service, in one file."""
 
     def __init__(self, directory: str, service: str) -> None:
-        """Read the file.
-
-        :param directory: the folder of the files; empty keeps nothing.
+        """:param directory: the folder of the files; empty keeps nothing.
         :raises UserError: for a bad file: forgetting it would not be safe.
         """
         self._path = Path(directory) / f"{service}.yaml" if directory else None

@@ -51,7 +51,6 @@ class Parameters:
 
 
 def wire(node: ServiceNode) -> None:
-    """Connect the recipe with its topic and the drive."""
     given = node.declare(Parameters)
     if not given.service and not given.file:
         raise UserError("no drive: set the parameter service or file")

@@ -69,7 +69,6 @@ class Parameters:
 
 
 def wire(node: service.ServiceNode) -> None:
-    """Connect the recipe with its topics."""
     given = node.declare(Parameters)
     source, own = (node.resolve_topic_name(topic.name) for topic in (ROBOT_JOINTS, topics.JOINT_STATES))
     if source == own:  # an old angle would come back with a new stamp

@@ -19,7 +19,6 @@ class Parameters:
 
 
 def wire(node: service.ServiceNode) -> None:
-    """Connect the recipe with its topics."""
     speeds = node.observe(topics.EFFECTOR_VELOCITY).map(lambda velocity: velocity.speed)
     node.publish(topics.ENGINES, too_fast(speeds, node.declare(Parameters).limit))
 

@@ -60,7 +60,6 @@ class Parameters:
 
 
 def wire(node: service.ServiceNode) -> None:
-    """Connect the recipe with its topics."""
     kind = TwistStamped if node.declare(Parameters).stamped else Twist
     source = replace(COMMANDS, type=kind)
     sink = replace(source, name="cmd_vel", publishers=("twist_gate",), subscribers=("the robot",))

@@ -40,10 +40,7 @@ def listen(address: str, port: int, last_port: int | None = None) -> socket.sock
 
 
 def tls(address: str, certificate: str, key: str) -> ssl.SSLContext | None:
-    """Return the TLS context of the page, ``None`` for plain HTTP, which only loopback may use.
-
-    :raises UserError: if the address needs TLS, or a file is bad.
-    """
+    """Return the page's TLS context, ``None`` for HTTP. Raises UserError for a bad file, or missing TLS."""
     try:
         is_loopback = ipaddress.IPv4Address(address).is_loopback
     except ValueError:
@@ -96,10 +93,7 @@ class AddressFile:
         return (int(found[1]), found[2]) if found else (None, secrets.token_urlsafe(32))
 
     def write(self, line: str) -> None:
-        """Keep a line, readable by the user only.
-
-        :raises UserError: if that is not possible.
-        """
+        """Keep a line, readable by the user only. Raises UserError if that is not possible."""
         if self._path is None:
             return
         with suppress(OSError):

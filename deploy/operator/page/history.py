@@ -19,7 +19,6 @@ class History:
         self._noted = -math.inf
 
     def note(self, time: float, moment: dict[str, Any]) -> None:
-        """Note what is shown at a time."""
         if time < self._noted:  # of another scenario
             self._changes.clear()
         elif time - self._noted > GAP and self._changes:

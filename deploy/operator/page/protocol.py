@@ -83,10 +83,7 @@ LIMITS: Mapping[str, tuple[float, float]] = _limits()
 
 
 def parse(text: str | bytes) -> Message:
-    """Return the message that a page has sent.
-
-    :raises ProtocolError: if no page sends such a message.
-    """
+    """Return the message that a page has sent. Raises ProtocolError if no page sends such a message."""
     if not isinstance(text, str):
         raise ProtocolError("a message is binary")
     if len(text) > MAX_SIZE:

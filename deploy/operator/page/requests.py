@@ -34,7 +34,6 @@ class Configuration:
     """The sources of the configuration: set by hand on a page, or given back to the scenario."""
 
     def __init__(self, node: ReactiveNode) -> None:
-        """Create the clients of the sources; they belong to the node."""
         self._programs = {f"config_{name}": name for name in protocol.LIMITS}
         self._sources = {name: RemoteParameters(node, program) for program, name in self._programs.items()}
 

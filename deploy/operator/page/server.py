@@ -93,13 +93,12 @@ class PageServer:
         fail: Callable[[Exception], None],
         tls: ssl.SSLContext | None = None,
     ) -> None:
-        """Start to serve, on a thread of its own.
+        """Serve on a thread that calls ``receive`` with each event of a page.
 
         :param listener: a listening TCP socket; the server closes it.
         :param welcome: what every page is told first.
-        :param receive: called on the thread of the server for each event of a page.
-        :param newest: returns the newest state; called on the thread of the server.
-        :param fail: called on the thread of the server if that ends in an error.
+        :param newest: returns the newest state; called on the thread.
+        :param fail: called on the thread if that ends in an error.
         """
         self._listener = listener
         self._site = site
@@ -141,7 +140,6 @@ class PageServer:
             self._woken.close()
 
     def _serve_once(self) -> None:
-        """Wait for the next bytes or the next update, and handle them."""
         # Without clients there is nothing to do.
         wait = max(0.0, self._due - self._clock.now()) if self._clients else None
         for key, _ in self._selector.select(wait):

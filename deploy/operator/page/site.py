@@ -56,7 +56,6 @@ class Site:
 
         :param names: the accepted ``Host`` headers, port included. A name of loopback is accepted with any
             port: it is that of a tunnel. A page of somebody else that resolves to loopback has another name.
-        :param scheme: ``http`` or ``https``.
         """
         self._token = token.encode()
         self._names = names
@@ -84,7 +83,6 @@ class Site:
         return host in self._names or _without_port(host) in self._loopback
 
     def file(self, path: str) -> Response:
-        """Return the response to a request for a path."""
         if path in self._files:
             return respond(http.HTTPStatus.OK, *self._files[path])
         return respond(http.HTTPStatus.NOT_FOUND)

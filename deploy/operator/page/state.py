@@ -88,7 +88,6 @@ class Recent(NamedTuple):
         return Recent((*self.items, *new)[-most:], self.total + len(new))
 
     def forget(self) -> Recent:
-        """Return it without its items."""
         return Recent((), self.total)
 
     def since(self, count: int) -> tuple[Any, ...]:
@@ -162,10 +161,7 @@ class Engines(NamedTuple):
         return self._replace(cause=BY_WATCHDOG if service == WATCHDOG else BY_NODE.format(service))
 
     def reason(self, now: float, heard_since: float) -> str:
-        """Return why they are off, at a time [s].
-
-        :param heard_since: since when the health of the services is heard [s].
-        """
+        """Return why they are off at a time [s]; the services are heard since ``heard_since`` [s]."""
         is_nameless = now - max(self.caused, heard_since) > REPORTED
         if self.cause == BY_COMMAND and self.strangers and is_nameless:
             return BY_NODE.format(" or ".join(self.strangers))

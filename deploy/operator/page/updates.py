@@ -103,7 +103,6 @@ class Updates:
     """The messages to one page: each tells what has changed since the last one."""
 
     def __init__(self, page: str, clock: Clock) -> None:
-        """:param page: the name of the page."""
         self._page = page
         self._clock = clock
         self._shown: dict[str, Any] = {}

@@ -15,10 +15,7 @@ class Display(Protocol):
         """Print lines; never block."""
 
     def read(self, seconds: float) -> list[str]:
-        """Return typed lines as soon as there are any; wait at most so long [s].
-
-        :raises EOFError: if the user has ended the input (Ctrl-D).
-        """
+        """Return typed lines as soon as there are any; wait at most so long [s]. EOFError after Ctrl-D."""
 
     def close(self) -> None:
         """Leave the terminal as it was."""

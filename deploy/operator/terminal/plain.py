@@ -24,7 +24,6 @@ class PlainLines:
             say(line)
 
     def read(self, seconds: float) -> list[str]:
-        """Return typed lines as soon as there are any; wait at most so long [s]. EOFError after Ctrl-D."""
         if self._input is None:
             time.sleep(seconds)
             return []

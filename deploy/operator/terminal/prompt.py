@@ -27,10 +27,7 @@ STOP_TIME = 0.1  # s within which a stop signal takes effect on all threads
 
 
 class Prompt:
-    """A prompt on a thread, for a process whose other threads may print at any time.
-
-    Only its thread ever waits for the terminal, so a stuck terminal holds up nothing else.
-    """
+    """A prompt on a thread: only this one waits for the terminal, so a stuck one holds up nothing else."""
 
     def __init__(self, words: Sequence[str]) -> None:
         # Only menus need the cursor's position; to ask the terminal for it doubles the cost of a line.
@@ -50,7 +47,6 @@ class Prompt:
             say(text)
 
     def read(self, seconds: float) -> list[str]:
-        """Return typed lines as soon as there are any; wait at most so long [s]. EOFError after Ctrl-D."""
         try:
             line = self._typed.get(timeout=seconds)
         except queue.Empty:

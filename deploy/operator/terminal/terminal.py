@@ -32,16 +32,10 @@ Lines that come too fast to be read are thinned to one a second of each kind."""
 
 
 class Terminal:
-    """The terminal of a node that joins the system, open in a ``with``.
-
-    Lines are shown in batches: the node need not spin between them, which saves most of the work.
-    """
+    """The terminal of a node, open in a ``with``. It shows batches: to spin less saves most of the work."""
 
     def __init__(self, node: ReactiveNode, epoch: float) -> None:
-        """Subscribe to what is shown.
-
-        :param epoch: the origin of the lines' times [s, monotonic clock].
-        """
+        """:param epoch: the origin of the lines' times [s, monotonic clock]."""
         self.has_quit = False
         self._node = node
         self._engines = node.create_publisher(String, topics.ENGINES.name, topics.ENGINES.qos)

@@ -34,7 +34,6 @@ KEPT = 10  # records
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Run the command line; return the exit code."""
     interruption.install()
     set_middleware(os.environ)
     options = plan.parse(arguments)

@@ -11,11 +11,7 @@ class NestedFaults:
         self._under_way: Counter[Hashable] = Counter()
 
     def begin(self, what: Hashable, undo: Callable[[], object]) -> Callable[[], None]:
-        """Count a fault; return how to end it, once.
-
-        :param what: its kind and its target.
-        :param undo: runs at the end, unless another fault of the same kind and target is still under way.
-        """
+        """Count a fault; return how to end it: ``undo`` runs when the last of this kind and target ends."""
         self._under_way[what] += 1
 
         def end() -> None:

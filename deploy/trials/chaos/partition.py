@@ -29,7 +29,6 @@ NETWORK = "10.86.86"  # of the namespaces only
 
 BEGIN, DURATION = 5.0, 12.0  # s
 SCHEDULES = {name: [PlannedFault(BEGIN, name, OPERATOR, DURATION)] for name in ("partition", "bad_line")}
-"""The named scenarios."""
 LENGTH = BEGIN + DURATION + 12.0  # s; Cyclone DDS needs up to 8 s to discover a lost host again
 
 NETEM = ("netem", "loss", "20%", "delay", "100ms", "50ms", "reorder", "25%", "50%")

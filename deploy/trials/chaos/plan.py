@@ -66,10 +66,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
 
 
 def plan(options: argparse.Namespace) -> Plan:
-    """Return the plan that a command line asks for.
-
-    :raises DeploymentError: if it is empty, or not possible on this machine.
-    """
+    """Return the plan of a command line. Raises DeploymentError if it is empty, or not possible here."""
     if options.scenario in partition.SCHEDULES:
         if reason := partition.missing(options.scenario):
             raise DeploymentError(f"{options.scenario} is not possible on this machine: {reason}")

@@ -45,10 +45,7 @@ def random_faults(
     kinds: Iterable[str] = tuple(FAULT_KINDS),
     table: Mapping[str, Any] = FAULT_KINDS,
 ) -> Schedule:
-    """Return one random fault in each interval of ``every`` [s]. The same seed gives the same schedule.
-
-    :param table: the kinds, each with its targets and durations.
-    """
+    """Return a random fault of a table of kinds in each interval of ``every`` [s], the same for a seed."""
     rng = random.Random(seed)
     kinds = [kind for kind in sorted(kinds) for _ in range(WEIGHTS.get(kind, 1))]
     planned = []
@@ -203,7 +200,6 @@ SCENARIOS: dict[str, Callable[[], Schedule]] = {
         complete,
     )
 }
-"""The named scenarios."""
 
 
 def duration(schedule: Schedule) -> float:

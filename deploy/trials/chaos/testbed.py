@@ -177,7 +177,6 @@ class Testbed:
                     heapq.heappush(actions, (end, next(order), once))
 
     def _inject(self, arm: RealArm, planned: PlannedFault) -> tuple[float, Undo] | None:
-        """Inject a fault; return when to end it, and how."""
         _, kind, target, duration = planned
         pid = arm.pid(target) if target in PROGRAMS else 0
         now = time.monotonic()

@@ -28,7 +28,6 @@ from interfaces.service import UserError
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Run the command line; return the exit code."""
     interruption.install()
     options = _parse(arguments)
     output = options.output or options.record.with_suffix(".replayed.mcap")

@@ -124,8 +124,7 @@ def first_latch(record: Record, namespace: str) -> Latch | None:
 
 
 def known(record: Record, namespace: str, topic: Topic) -> int:
-    """
-    Return from when on the record shows what an output depends on [ns since 1970]; its end if it never does.
+    """Return from when on the record shows what an output depends on [ns since 1970]; else its end.
 
     The strikes are known from the beginning: what comes later shows them.
     """

@@ -37,10 +37,8 @@ class Bounds(NamedTuple):
     near: float = 0.0
     """The deviation that those may have."""
     burst: float = 0.02
-    """
-    Messages that follow one another faster are a burst, and only its last one is compared [s]: the order in
-    which samples of several writers arrive is not recorded. It changes no answer of a signal.
-    """
+    """Messages that follow one another faster are a burst, and only its last one is compared [s]: no record
+    shows the order in which samples of several writers arrive. It changes no answer of a signal."""
 
     def __str__(self) -> str:
         parts = [f"{self.value:g} {self.unit}".strip()] if self.value else []
@@ -62,8 +60,7 @@ BOUNDS: dict[str, Bounds] = {
     topics.ENGINES.name: Bounds(),
     topics.ENGINES_STATE.name: Bounds(),
 }
-"""By topic. A speed between two messages of a burst is that of their jitter, so a lost one may be any number.
-"""
+"""By topic. A speed between messages of a burst is that of their jitter, so a lost one may be any number."""
 
 
 class Difference(NamedTuple):

@@ -44,10 +44,7 @@ class Outcome(NamedTuple):
 
 
 def run_all(record: Record, jobs: Sequence[Job]) -> list[Outcome]:
-    """Replay chains, as many at a time as there are cores.
-
-    :raises Interrupted: after a signal.
-    """
+    """Replay chains, as many at a time as there are cores. Raises Interrupted after a signal."""
     context = multiprocessing.get_context("fork")  # the processes share the record
     cores = len(os.sched_getaffinity(0))
     with context.Pool(min(cores, len(jobs)), _prepare, (record,)) as pool, interruption.blocking():

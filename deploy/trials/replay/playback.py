@@ -47,10 +47,7 @@ class Playback:
 
 
 def replay(record: Record, namespace: str, chain: Chain, parameters: Path | None = None) -> Playback:
-    """Replay a record to the services of a chain.
-
-    :param parameters: a ROS parameter file.
-    """
+    """Replay a record to the services of a chain, with a ROS parameter file if there is one."""
     with simulated_services("replay", NETWORK) as simulation:
         player = _Player(simulation, record, namespace, chain)
         for service in chain:

@@ -61,7 +61,6 @@ class Record(NamedTuple):
         return self._replace(begin=begin, end=end)
 
     def of(self, topic: Topic, namespace: str) -> list[Message]:
-        """Return the messages of a topic of the arm in a namespace."""
         return self.messages.get(topic.full_name(namespace), [])
 
     def events(self, name: str, namespace: str) -> Iterator[Any]:

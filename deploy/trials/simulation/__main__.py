@@ -35,7 +35,6 @@ BAR = 40  # characters
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Run the command line; return the exit code."""
     interruption.install()
     try:
         return _run(_parse(arguments))

@@ -134,10 +134,7 @@ def simulated_arm(
     scenario: Mapping[str, Any],
     durations: Calibration | None = None,
 ) -> Iterator[SimulatedArm]:
-    """Simulate an arm until the end of the ``with``.
-
-    :param durations: by default, those of ``calibration.json``.
-    """
+    """Simulate an arm until the end of the ``with``, by default with the durations of a real arm."""
     given = durations or load()
     network = Network(latency=given.latency, discovery=given.discovery)
     arm: SimulatedArm

@@ -30,10 +30,7 @@ from interfaces.sources import scenario_file
 def simulated_services(
     seed: str, network: Network, supervisor: Callable[[], Any] = lambda: None
 ) -> Iterator[Simulation]:
-    """Simulate programs that are services until the end of the ``with``.
-
-    :param supervisor: returns the present supervisor.
-    """
+    """Simulate programs that are services until the end of the ``with``."""
     variables = [(vars(service_process), "_spins")]
     with (
         Simulation(seed, network, variables=variables) as simulation,

@@ -54,11 +54,7 @@ class Observer:
     def history(
         self, lives: Sequence[Life], faults: Sequence[InjectedFault], end: float, absent: frozenset[str]
     ) -> History:
-        """Return what happened.
-
-        :param end: of the record [s].
-        :param absent: programs that this arm does not have.
-        """
+        """Return what happened until ``end`` [s]; the arm does not have the programs in ``absent``."""
         origin = self._origin
         moved = [
             life._replace(

@@ -36,10 +36,7 @@ class _Supervised:
 
 class Supervisor:
     def __init__(self, simulation: Simulation, programs: list[str], spawn: Callable[[str, int], Process]):
-        """Start all programs.
-
-        :param spawn: starts a process of a program, given its name and the pid of its parent.
-        """
+        """:param spawn: starts a process of a program, given its name and the pid of its parent."""
         self._simulation = simulation
         self._spawn = spawn
         self.pid = simulation.next_pid()

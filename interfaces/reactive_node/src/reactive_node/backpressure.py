@@ -19,15 +19,13 @@ def latest(
 ) -> Callable[[Observable[_T]], Observable[_R]]:
     """Return an operator that maps items by slow work on another thread, for ``observable.pipe(…)``.
 
-    One item is in work at a time. Of the items that arrive meanwhile, only the newest is kept, so a flood
-    takes no memory, and an item waits for at most one run. Results are emitted by the scheduler
-    that is passed at ``subscribe`` (``node.scheduler``); a subscription without one is an error. The next run
-    begins when the last result has been emitted, so results do not pile up either.
+    One item is in work at a time; of those that arrive meanwhile, only the newest waits, so a flood takes no
+    memory. Results are emitted by the scheduler of the subscription, ``node.scheduler``; without one, that is
+    an error. The next run begins when the last result has been emitted, so results do not pile up either.
 
-    An error of the work, or of the source, is an error of the observable; it is a RuntimeError if the work
-    raises CancelledError, SystemExit or the like. When the source completes, the items in work and in
-    waiting are finished first. Disposing drops both: no run begins any more, and the result of a run that
-    has begun is lost.
+    An error of the work or of the source is an error of the observable; CancelledError, SystemExit and the
+    like become a RuntimeError. When the source completes, the items in work and in waiting are finished
+    first. Disposing drops both.
 
     :param work: called with an item on ``workers``; returns the result.
     :param workers: the scheduler that runs the work, such as RxPY's ``ThreadPoolScheduler(1)``; in a test,

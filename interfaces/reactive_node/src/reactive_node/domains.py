@@ -12,10 +12,7 @@ DOMAINS = range(30, 102)  # users choose lower ones; the ports of higher ones me
 
 @contextmanager
 def reserved_domain() -> Iterator[int]:
-    """Reserve a ROS domain without participants on this host; other callers get different ones.
-
-    :raises RuntimeError: if no domain is free.
-    """
+    """Reserve a ROS domain without participants on this host. Raises RuntimeError if none is free."""
     with ExitStack() as stack:
         for domain in random.sample(DOMAINS, len(DOMAINS)):
             # An abstract unix socket has one owner, and the kernel frees it when the owner dies.

@@ -33,12 +33,9 @@ class MessageReader(SharedReader):
         item: Callable[[Any], Any] | None,
         every_publisher: bool,
     ) -> None:
-        """Share a reader among observers; none exists yet.
-
-        :param create: creates a reader of ``node`` with a callback, a QoS and further arguments of
-            :meth:`rclpy.node.Node.create_subscription`.
-        :param scheduler, end: see :class:`SharedReader`.
-        :param timestamped, item, every_publisher: see :meth:`ReactiveNode.create_observable`.
+        """:param create: creates a reader of ``node`` with a callback, a QoS and further arguments of
+        :meth:`rclpy.node.Node.create_subscription`. For the others see :class:`SharedReader` and
+        :meth:`ReactiveNode.create_observable`.
         """
         super().__init__(
             node, create, scheduler=scheduler, end=end, item=item, retained=_retention(qos_profile)

@@ -63,26 +63,21 @@ class ReactiveNode(Node):
     ) -> Observable[Any]:
         """Return the messages of a topic as an observable, cold and shared (thesis 4.3).
 
-        No DDS reader exists before the first observer subscribes. All observers share one reader. The
-        disposal of the last observer destroys it; a new subscription creates a new one. The observable
-        completes when the node ends. Subscribing and disposing are safe on any thread and inside a callback.
+        There is no DDS reader before the first observer, one for all observers, and none after the last one.
+        The observable completes when the node ends. Subscribing and disposing are safe on any thread and
+        inside a callback.
 
-        A late observer of a transient-local topic first gets what the shared reader has received, as many
-        messages as its history keeps, while the topic has a publisher. A reader of its own might get fewer:
-        none whose lifespan has passed, none of a publisher that has gone, and no more than each publisher
-        keeps. With BEST_AVAILABLE durability a late observer gets none: a reader does not report which
-        durability that has become.
+        While a transient-local topic has a publisher, a late observer first gets what the shared reader has
+        kept. A reader of its own might get fewer: none whose lifespan has passed, none of a publisher that
+        has gone, no more than each publisher keeps. With BEST_AVAILABLE durability it gets none.
 
-        :param timestamped: whether items are :class:`Timestamp` s of a message and its DDS source time,
-            instead of messages.
-        :param item: turns each message, with ``timestamped`` each Timestamp, into the item, once for all
-            observers and at less cost than the operator ``map``; if it returns ``None``, there is none.
+        :param timestamped: whether items are :class:`Timestamp` s of a message and its DDS source time.
+        :param item: turns each message (or Timestamp) into the item, once for all observers and at less cost
+            than the operator ``map``; ``None`` drops it.
         :param every_publisher: whether a transient-local topic also delivers the messages of volatile
-            publishers, such as those of ``ros2 topic pub``: from the first one on, a second reader listens to
-            them. Without effect on other topics.
+            publishers, such as ``ros2 topic pub``, by a second reader; without effect on other topics.
         :param options: further arguments of :meth:`rclpy.node.Node.create_subscription`; with
-            ``every_publisher`` without ``event_callbacks`` and, as by default, with a mutually exclusive
-            callback group.
+            ``every_publisher`` without ``event_callbacks`` and with a mutually exclusive callback group.
         """
 
         def create_reader(callback: Callable[..., None], qos: QoSProfile | int, **given: Any) -> Subscription:
@@ -110,10 +105,9 @@ class ReactiveNode(Node):
     ) -> Observable[Any]:
         """Return the newest message of a topic at each tick, if it has come since the tick before.
 
-        It is for topics where only the latest message counts (``sample`` of thesis 4.2). What comes between
-        two ticks costs no Python: the reader keeps one message, and only a tick reads it. Cold and shared
-        like :meth:`create_observable`; but late observers get no retained messages, and QoS events are not
-        warned of. It ends as the ticks do.
+        For topics where only the latest message counts (``sample`` of thesis 4.2): what comes between two
+        ticks costs no Python. Cold and shared like :meth:`create_observable`; but late observers get no
+        retained messages, and QoS events are not warned of. It ends as the ticks do.
 
         :param ticks: a period [s] on :attr:`scheduler`, with a tick at once, or an observable of ticks.
         :param qos_profile: its history is replaced.
@@ -131,10 +125,9 @@ class ReactiveNode(Node):
         qos_profile: QoSProfile | int = 10,
         **options: Any,
     ) -> Observable[Any]:
-        """Return at each tick all messages of a topic that have come since the tick before, one by one.
+        """Return at each tick all messages that have come since the tick before; the reader keeps 1000.
 
-        It is for topics where each message counts, but not at once. The reader keeps 1000 messages. All else,
-        errors included, is as of :meth:`create_sampled_observable`.
+        All else, errors included, is as of :meth:`create_sampled_observable`.
         """
         return self._read_at(ticks, msg_type, topic, keep_last(qos_profile, BUFFER), **options)
 
@@ -172,9 +165,8 @@ class ReactiveNode(Node):
     def create_parameter_observable(self, name: str) -> Observable[Any]:
         """Return the values of a declared parameter: the present one at once, then each new one.
 
-        A value that another thread or another observer sets during the subscription may come twice.
-        A parameter that is not declared is an error of the observable. The observable completes when the
-        node ends.
+        A value that is set during the subscription may come twice. An undeclared parameter is an error of the
+        observable. It completes when the node ends.
         """
 
         def subscribe(
@@ -228,12 +220,10 @@ class ReactiveNode(Node):
     def create_transform_observable(self, target_frame: str, source_frame: str) -> Observable[Any]:
         """Return the transforms that turn coordinates in the source frame into those in the target frame.
 
-        The items are ``geometry_msgs/msg/TransformStamped``: the latest transform as soon as it is known, at
-        once for a late observer, and then each new one. Its stamp is the latest time for which all transforms
-        in between are known. All observers share one buffer of tf2 and the readers of ``/tf`` and
-        ``/tf_static``, which exist while there are observers. An invalid name of a frame is an error of the
-        observable. It completes when the node ends. It needs the package ``tf2_ros``, which nothing else of
-        this package imports.
+        Items are ``geometry_msgs/msg/TransformStamped``: the latest one as soon as it is known, then each
+        new one, with the latest time for which all transforms in between are known. All observers share one
+        buffer and the readers of ``/tf`` and ``/tf_static``. An invalid name of a frame is an error of the
+        observable. It completes when the node ends. Only this needs the package ``tf2_ros``.
         """
         if self._transforms is None:
             from reactive_node.transforms import Transforms  # here: tf2 is optional
@@ -268,15 +258,11 @@ class ReactiveNode(Node):
     ) -> Callable[[Any], Observable[Any]]:
         """Return a function from a goal to an observable of its execution, for ``goals.flat_map(act)``.
 
-        A goal is sent with each subscription, when there is a server; it waits for one and never blocks.
-        The items are the action's feedback messages, then its result message, then the observable completes:
-        ``act(goal).last()`` is the result only. A goal that does not succeed is an error of the observable:
-        :class:`~reactive_node.actions.GoalRejected`, :class:`~reactive_node.actions.GoalAborted`,
-        :class:`~reactive_node.actions.GoalCanceled` (by another client), or
-        :class:`~reactive_node.actions.GoalUnknown` (by a server that has forgotten the goal). Disposing, and
-        the end of the node, asks the server to cancel the goal, so ``goals.map(act).switch_latest()``
-        replaces it. A server that vanishes is not noticed: limit its silence by
-        ``act(goal).timeout(seconds)``. The observable completes when the node ends.
+        Each subscription sends the goal when there is a server, and never blocks. Items are the feedback
+        messages, then the result message: ``act(goal).last()`` is the result only. A goal that does not
+        succeed is an error of the observable, one of :mod:`reactive_node.actions`. Disposing, and the end of
+        the node, cancels the goal, so ``goals.map(act).switch_latest()`` replaces it. A server that vanishes
+        is not noticed: limit its silence by ``act(goal).timeout(seconds)``.
 
         :param options: further arguments of :class:`rclpy.action.ActionClient`.
         """
@@ -307,12 +293,10 @@ class ReactiveNode(Node):
     ) -> abc.DisposableBase:
         """Publish every item of an observable until the returned disposable is disposed or the node ends.
 
-        The publisher exists from now on: peers need time to discover it, and a publisher that is created
-        with the first message loses it. An error of the observable, or a message of another type, is raised
-        once out of the spinning of this node.
+        The publisher exists from now on, because peers need time to discover it. An error of the observable,
+        or a message of another type, is raised once out of the spinning of this node.
 
-        :param message: turns each item into a message; if it returns ``None``, nothing is published. By
-            default, the items are the messages.
+        :param message: turns each item into a message; ``None`` publishes nothing.
         :param on_demand: whether the observable is observed only while the topic has subscribers, with a
             new subscription each time. Without them it costs nothing, down to its own topics.
         :param options: further arguments of :meth:`rclpy.node.Node.create_publisher`; with ``on_demand``
@@ -364,13 +348,12 @@ class ReactiveNode(Node):
     ) -> abc.DisposableBase:
         """Answer the requests of a service until the returned disposable is disposed or the node ends.
 
-        The recipe maps the requests to pairs of a request and its response, so it may answer in any order::
+        The recipe maps the requests to pairs of a request and its response, in any order::
 
             node.serve_recipe(lambda requests: requests.map(lambda r: (r, answer(r))), SetBool, "switch")
 
-        It must answer each request once, with the request itself, not a copy. A request without an answer is
-        kept, and its client gets no answer. An error of the recipe, its completion, an answer
-        to a request that does not wait, and a response of another type are raised out of the spinning of
+        It must answer each request once, with the request itself, not a copy; a client without an answer
+        waits. An error of the recipe, its completion, and a wrong answer are raised out of the spinning of
         this node. Then the service ends as well, so clients see that there is no server.
 
         :param options: further arguments of :meth:`rclpy.node.Node.create_service`, without
@@ -410,10 +393,7 @@ class ReactiveNode(Node):
         self.scheduler.schedule(throw)
 
     def destroy_node(self) -> None:
-        """End the node; its observables complete first.
-
-        If observers or disposals of recipes raise, one of their errors is raised afterwards.
-        """
+        """End the node; its observables complete first. One error that this raises is raised afterwards."""
         with ExitStack() as stack:
             stack.callback(super().destroy_node)
             if not self._end.is_stopped:

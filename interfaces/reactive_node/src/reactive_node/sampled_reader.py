@@ -117,11 +117,7 @@ class SampledReader(SharedReader):
         item: Callable[[Any], Any] | None,
         most: int,
     ) -> None:
-        """Share a reader among observers; none exists yet.
-
-        :param create, ticks, timestamped, most: see :func:`sampled_messages`.
-        :param scheduler, end, item: see :class:`SharedReader`.
-        """
+        """For the parameters see :func:`sampled_messages` and :class:`SharedReader`."""
         super().__init__(node, create, scheduler=scheduler, end=end, item=item)
         self._messages = sampled_messages(node, create, ticks, timestamped=timestamped, most=most)
 

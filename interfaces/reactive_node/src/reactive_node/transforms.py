@@ -34,7 +34,6 @@ class Transforms:
     """The buffer of transforms that all observers of a node share; it is filled while there are any."""
 
     def __init__(self, create_observable: Callable[..., Observable[Any]], clock: Clock) -> None:
-        """Share a buffer among observers; it stays empty until then."""
         self._create_observable = create_observable
         self._clock = clock
         self._buffer = BufferCore()
