@@ -63,7 +63,7 @@ def start(system: System, scenario: str, parameter_file: str) -> None:
         print("It runs in the background: make terminal, make status, make logs, make stop.")
 
 
-def unit(scenario: str, parameter_file: str) -> None:
+def unit(system: System, scenario: str, parameter_file: str) -> None:
     """Write the unit with which systemd starts the system."""
     from deploy.commands import parameters
     from deploy.commands import unit as writer
@@ -275,35 +275,20 @@ def _adopt_environment(system: System) -> bool:
 def main(arguments: list[str]) -> int:
     interruption.install()
     parser = argparse.ArgumentParser(prog="launcher")
-    commands = parser.add_subparsers(dest="command", required=True)
-    for name in ("run", "start", "unit", "become"):
+    commands = parser.add_subparsers(required=True)
+    for name, starts in (("run", run), ("start", start), ("unit", unit), ("become", become)):
         command = commands.add_parser(name)
+        command.set_defaults(obey=starts)
         command.add_argument("scenario")
         command.add_argument("parameter_file", nargs="?", default="")
-    for name in ("terminal", "status", "logs", "record"):
-        commands.add_parser(name)
-    options = parser.parse_args(arguments)
+    for name, joins in (("terminal", attach), ("status", status), ("logs", logs), ("record", record)):
+        commands.add_parser(name).set_defaults(obey=joins)
+    options = vars(parser.parse_args(arguments))
 
     set_middleware(os.environ)
-    system = System()
+    obey = options.pop("obey")
     try:
-        match options.command:
-            case "run":
-                run(system, options.scenario, options.parameter_file)
-            case "start":
-                start(system, options.scenario, options.parameter_file)
-            case "unit":
-                unit(options.scenario, options.parameter_file)
-            case "become":
-                become(system, options.scenario, options.parameter_file)
-            case "terminal":
-                attach(system)
-            case "status":
-                status(system)
-            case "logs":
-                logs(system)
-            case "record":
-                record(system)
+        obey(System(), **options)
     except interruption.Interrupted:
         return 0
     except BrokenPipeError:  # the reader has gone, as in `make run | head`
