@@ -156,17 +156,12 @@ def service(name: str, announce: bool = False) -> tuple[str, ...]:
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-def test_signal_ends_a_hung_service(start: Start, number: signal.Signals) -> None:
-    process = start("-c", HANGING)
-    assert process.wait_for_line() == "hangs"
-
-    assert process.end(by=number) == (0, "")
-
-
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-def test_signal_ends_a_service_about_to_publish(start: Start, number: signal.Signals) -> None:
-    process = start("-c", NO_LAST_RESORT + SPEAKING)
-    assert process.wait_for_line() == "speaks"
+@pytest.mark.parametrize(("program", "line"), [(HANGING, "hangs"), (NO_LAST_RESORT + SPEAKING, "speaks")])
+def test_signal_ends_a_service_that_hangs_or_is_about_to_publish(
+    start: Start, number: signal.Signals, program: str, line: str
+) -> None:
+    process = start("-c", program)
+    assert process.wait_for_line() == line
 
     assert process.end(by=number) == (0, "")
 

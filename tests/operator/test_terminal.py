@@ -134,16 +134,17 @@ def test_terminal_never_echoes_a_key_between_the_lines(user: User) -> None:
         assert not termios.tcgetattr(user.terminal)[3] & termios.ECHO
 
 
-def test_several_lines_at_once_are_all_read(user: User) -> None:
+@pytest.mark.parametrize(
+    ("keys", "lines"),
+    [
+        (b"one\rtwo\rthree\r", rb"(?s)read ONE\r\n.*read TWO\r\n.*read THREE\r\n"),
+        (b"pr\t\r", rb"read PRESS\r\n"),  # Tab completes a command
+    ],
+)
+def test_typed_lines_are_all_read(user: User, keys: bytes, lines: bytes) -> None:
     user.await_text(rb"line 0\r\n")
-    user.type(b"one\rtwo\rthree\r")
-    user.await_text(rb"(?s)read ONE\r\n.*read TWO\r\n.*read THREE\r\n")
-
-
-def test_tab_completes_a_command(user: User) -> None:
-    user.await_text(rb"line 0\r\n")
-    user.type(b"pr\t\r")
-    user.await_text(rb"read PRESS\r\n")
+    user.type(keys)
+    user.await_text(lines)
 
 
 def test_arrow_key_repeats_a_command(user: User) -> None:
@@ -158,18 +159,11 @@ DUMB = {"term": "dumb"}
 
 
 @pytest.mark.parametrize("user", [{}, DUMB], ids=["prompt", "plain"], indirect=True)
-def test_ctrl_d_ends_the_input(user: User) -> None:
+@pytest.mark.parametrize(("keys", "end"), [(b"\x04", b"end of input"), (b"a command\x03", b"interrupted")])
+def test_ctrl_d_and_ctrl_c_end_the_terminal(user: User, keys: bytes, end: bytes) -> None:
     user.await_text(rb"line 0\r\n")
-    user.type(b"\x04")
-    user.await_text(rb"end of input\r\n")
-    user.await_end()
-
-
-@pytest.mark.parametrize("user", [{}, DUMB], ids=["prompt", "plain"], indirect=True)
-def test_ctrl_c_interrupts(user: User) -> None:
-    user.await_text(rb"line 0\r\n")
-    user.type(b"half a command\x03")
-    user.await_text(rb"interrupted\r\n")
+    user.type(keys)
+    user.await_text(end + rb"\r\n")
     user.await_end()
 
 

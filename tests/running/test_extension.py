@@ -46,6 +46,21 @@ def interface_of(*states: int, poller: Any) -> ArmInterface:
     return ArmInterface(SimpleNamespace(options=options, process_groups={"arm": group}))
 
 
+def interface_with(**fields: Any) -> tuple[ArmInterface, SimpleNamespace]:
+    """Return an interface, and the process of its program."""
+    velocity = SimpleNamespace(
+        config=SimpleNamespace(name="velocity"),
+        get_state=lambda: ProcessStates.RUNNING,
+        pid=1000,
+        spawnerr=None,
+        backoff=0,
+        **fields,
+    )
+    group = SimpleNamespace(processes={"velocity": velocity})
+    options = SimpleNamespace(poller=SimpleNamespace(poll=None))
+    return ArmInterface(SimpleNamespace(options=options, process_groups={"arm": group})), velocity
+
+
 def test_a_full_disk_costs_only_the_lines_meanwhile(tmp_path: Path) -> None:
     file = tmp_path / "velocity.log"
     file.symlink_to("/dev/full")
@@ -105,17 +120,7 @@ def test_supervisord_uses_it_from_then_on(tmp_path: Path, monkeypatch: pytest.Mo
 
 def test_setting_the_clock_changes_no_uptime(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(events, "callbacks", [])
-    velocity = SimpleNamespace(
-        config=SimpleNamespace(name="velocity"),
-        get_state=lambda: ProcessStates.RUNNING,
-        pid=1000,
-        laststart=time.time(),
-        spawnerr=None,
-        backoff=0,
-    )
-    group = SimpleNamespace(processes={"velocity": velocity})
-    options = SimpleNamespace(poller=SimpleNamespace(poll=None))
-    arm = ArmInterface(SimpleNamespace(options=options, process_groups={"arm": group}))
+    arm, velocity = interface_with(laststart=time.time())
     events.notify(events.ProcessStateStartingEvent(velocity, ProcessStates.STOPPED))
     real = time.time
 
@@ -129,17 +134,7 @@ def test_tells_how_long_a_program_had_no_process(monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(events, "callbacks", [])
     now = [100.0]
     monkeypatch.setattr(time, "monotonic", lambda: now[0])
-    velocity = SimpleNamespace(
-        config=SimpleNamespace(name="velocity"),
-        get_state=lambda: ProcessStates.RUNNING,
-        pid=1000,
-        exitstatus=-1,
-        spawnerr=None,
-        backoff=0,
-    )
-    group = SimpleNamespace(processes={"velocity": velocity})
-    options = SimpleNamespace(poller=SimpleNamespace(poll=None))
-    arm = ArmInterface(SimpleNamespace(options=options, process_groups={"arm": group}))
+    arm, velocity = interface_with(exitstatus=-1)
 
     def notify(at: float, event: Any) -> tuple[int, float]:
         now[0] = at

@@ -133,12 +133,26 @@ def test_a_loss_is_reported_from_the_last_message_before_it(
     assert not covered(reports, 4.1)
 
 
-def test_a_missing_number_is_a_loss(
-    node: Subscriptions, clock: Clock, reports: list[tuple[float, float]]
+@pytest.mark.parametrize(
+    ("topic", "numbers", "lost"),
+    [
+        (topics.L2, [7, 8, 10, 11], [(2.0, 3.0)]),
+        (topics.L2, [7, 1, 2], []),  # a new publisher begins again
+        (topics.ENGINES, [7, 90, 8, 91], []),  # those of several publishers mean nothing
+        (topics.DIAGNOSTICS, [7, 90, 8, 91], []),
+    ],
+)
+def test_a_missing_number_of_a_publisher_is_a_loss(
+    node: Subscriptions,
+    clock: Clock,
+    reports: list[tuple[float, float]],
+    topic: topics.Topic,
+    numbers: list[int],
+    lost: list[tuple[float, float]],
 ) -> None:
-    for at, number in ((1.0, 7), (2.0, 8), (3.0, 10), (4.0, 11)):
-        receive(node, clock, at, number=number)
-    assert reports == [(2.0, 3.0)]
+    for at, number in enumerate(numbers, 1):
+        receive(node, clock, at, topic, number)
+    assert reports == lost
 
 
 def test_pause_between_two_clocks_changes_no_time(
@@ -159,34 +173,11 @@ def test_pause_between_two_clocks_changes_no_time(
     assert recorded == [(2_030_000_000, 1_500_000_000)]
 
 
-def test_numbers_of_a_new_publisher_begin_again(
-    node: Subscriptions, clock: Clock, reports: list[tuple[float, float]]
-) -> None:
-    for at, number in ((1.0, 7), (2.0, 1), (3.0, 2)):
-        receive(node, clock, at, number=number)
-    assert not reports
-
-
 def test_numbers_of_a_foreign_publisher_mean_nothing(
     node: Subscriptions, clock: Clock, reports: list[tuple[float, float]]
 ) -> None:
-    for at, number, data in (
-        (1.0, 7, b""),
-        (2.0, 90, FOREIGN),
-        (3.0, 8, b""),
-        (4.0, 1, FOREIGN),
-        (5.0, 9, b""),
-    ):
-        receive(node, clock, at, number=number, data=data)
-    assert not reports
-
-
-@pytest.mark.parametrize("topic", [topics.ENGINES, topics.DIAGNOSTICS], ids=lambda topic: topic.name)
-def test_numbers_of_several_publishers_mean_nothing(
-    node: Subscriptions, clock: Clock, reports: list[tuple[float, float]], topic: topics.Topic
-) -> None:
-    for at, number in ((1.0, 7), (2.0, 90), (3.0, 8), (4.0, 91)):
-        receive(node, clock, at, topic, number)
+    for at, number in enumerate((7, 90, 8, 1, 9), 1):
+        receive(node, clock, at, number=number, data=FOREIGN if number in (90, 1) else b"")
     assert not reports
 
 

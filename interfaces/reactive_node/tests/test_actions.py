@@ -1,8 +1,6 @@
 from __future__ import annotations
 
 import gc
-import subprocess
-import sys
 import weakref
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -345,11 +343,3 @@ def test_goals_run_in_parallel(node: ReactiveNode, server: Server, spin_until: S
     spin_until(lambda: watch.completed)
 
     assert watch.items == [result(8), result(7)]
-
-
-def test_node_without_actions_does_not_import_them() -> None:
-    program = "import reactive_node, sys; print('rclpy.action' in sys.modules)"
-
-    run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
-
-    assert run.stdout == "False\n"

@@ -18,7 +18,7 @@ from std_msgs.msg import String
 
 from reactive_node import ReactiveNode, Timestamp
 from reactive_node.shared_reader import SharedReader
-from reactive_node.testing import SpinFor, SpinUntil
+from reactive_node.testing import MakeNode, SpinFor, SpinUntil
 
 LATCHED = QoSProfile(depth=3, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
@@ -54,21 +54,12 @@ def texts_into(received: list[str]) -> Callable[[Any], None]:
 # The listings of the thesis
 
 
-def test_listings_4_1_and_4_2_node_subscribes(peer: Node, talker: Talker, spin_until: SpinUntil) -> None:
-    received: list[str] = []
-    peer.create_subscription(String, "topic", texts_into(received), 10)
-
-    talker.say_when_heard("hello")
-
-    spin_until(lambda: received == ["hello"])
-
-
-def test_listing_4_3_reactive_node_replaces_node(
-    node: ReactiveNode, talker: Talker, spin_until: SpinUntil
+@pytest.mark.parametrize("kind", [Node, ReactiveNode])
+def test_listings_4_1_to_4_3_both_kinds_of_nodes_subscribe(
+    make_node: MakeNode, talker: Talker, spin_until: SpinUntil, kind: type[Node]
 ) -> None:
     received: list[str] = []
-    assert isinstance(node, Node)
-    node.create_subscription(String, "topic", texts_into(received), 10)
+    make_node("node_name", kind=kind).create_subscription(String, "topic", texts_into(received), 10)
 
     talker.say_when_heard("hello")
 

@@ -3,15 +3,18 @@ from __future__ import annotations
 import gc
 import threading
 import weakref
+from collections.abc import Callable
 from typing import Any
 
 import pytest
 import reactivex as rx
 from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.node import Node
+from reactivex.abc import DisposableBase
 from reactivex.disposable import Disposable
 from reactivex.subject import Subject
 from std_msgs.msg import Float64, String
+from std_srvs.srv import SetBool
 
 from reactive_node import ReactiveNode
 from reactive_node.testing import SpinFor, SpinUntil
@@ -105,8 +108,18 @@ def test_observable_on_demand_is_observed_while_there_are_subscribers(
     assert happened == ["observed", "disposed"]
 
 
-def test_publisher_is_forgotten_after_disposal(node: ReactiveNode) -> None:
-    sink = node.publish_observable(rx.never(), Float64, "numbers")
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda node: node.publish_observable(rx.never(), Float64, "numbers"),
+        lambda node: node.serve_recipe(lambda requests: requests.ignore_elements(), SetBool, "switch"),
+    ],
+    ids=["publisher", "service"],
+)
+def test_publisher_and_service_are_forgotten_after_disposal(
+    node: ReactiveNode, make: Callable[[ReactiveNode], DisposableBase]
+) -> None:
+    sink = make(node)
     disposed = weakref.ref(sink)
 
     sink.dispose()

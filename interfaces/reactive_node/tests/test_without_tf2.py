@@ -8,8 +8,9 @@ import pytest
 from reactive_node.testing import MakeNode
 
 
-def test_node_without_transforms_does_not_import_tf2() -> None:
-    program = "import reactive_node, sys; print([name for name in sys.modules if 'tf2' in name])"
+@pytest.mark.parametrize("package", ["tf2", "rclpy.action"])
+def test_node_without_transforms_and_actions_imports_neither(package: str) -> None:
+    program = f"import reactive_node, sys; print([name for name in sys.modules if '{package}' in name])"
 
     run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
 

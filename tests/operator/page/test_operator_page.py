@@ -170,6 +170,11 @@ class World:
         end = self._clock() + seconds
         self.until(lambda: self._clock() >= end)
 
+    def assert_silence(self, seconds: float = 0.5) -> None:
+        count = len(self.heartbeats)
+        self.for_seconds(seconds)
+        assert len(self.heartbeats) == count
+
     def delay(self, seconds: float) -> None:
         end = self._clock() + seconds
         while self._clock() < end:
@@ -215,9 +220,7 @@ def test_held_page_is_a_hand_on_the_switch(world: World) -> None:
 
         page.release()
         world.until(lambda: page.shown["switch"] == {"held": False, "by": None})
-        count = len(world.heartbeats)
-        world.for_seconds(0.5)
-        assert len(world.heartbeats) == count
+        world.assert_silence()
 
 
 def test_closed_page_is_no_hand(world: World) -> None:
@@ -225,9 +228,7 @@ def test_closed_page_is_no_hand(world: World) -> None:
         page.press()
         world.until(lambda: len(world.heartbeats) > 5)
     world.for_seconds(0.1)
-    count = len(world.heartbeats)
-    world.for_seconds(0.5)
-    assert len(world.heartbeats) == count
+    world.assert_silence()
 
 
 def test_silent_page_is_released_until_the_next_press(world: World) -> None:
@@ -284,9 +285,7 @@ def test_press_on_a_page_takes_the_switch_from_the_parameter(world: World) -> No
         world.until(lambda: page.shown["switch"] == {"held": True, "by": "this_page"})
         page.release()
         world.until(lambda: page.shown["switch"] == {"held": False, "by": None})
-        count = len(world.heartbeats)
-        world.for_seconds(0.5)
-        assert len(world.heartbeats) == count
+        world.assert_silence()
 
 
 def test_pressed_parameter_takes_the_switch_from_a_page(world: World) -> None:
@@ -310,9 +309,7 @@ def test_released_parameter_releases_a_page(world: World) -> None:
         world.for_seconds(0.2)
         world.set_pressed(False)
         world.until(lambda: page.shown["switch"] == {"held": False, "by": None})
-        count = len(world.heartbeats)
-        world.for_seconds(0.4)  # in which the page goes on to beat
-        assert len(world.heartbeats) == count
+        world.assert_silence(0.4)  # in which the page goes on to beat
 
 
 @pytest.fixture
@@ -350,9 +347,7 @@ def test_page_takes_the_switch_from_a_hand_at_a_terminal(world: World, terminal:
         world.until(lambda: not terminal.holds)
         page.release()
         world.until(lambda: page.shown["switch"] == {"held": False, "by": None})
-        count = len(world.heartbeats)
-        world.for_seconds(0.5)
-        assert len(world.heartbeats) == count
+        world.assert_silence()
 
 
 def test_release_of_a_hand_at_a_terminal_releases_a_page(world: World, terminal: Hand) -> None:
