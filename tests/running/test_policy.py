@@ -95,10 +95,11 @@ def test_stop_counts_from_its_observation() -> None:
 
 def test_duplicate_is_killed_at_the_timeout() -> None:
     run = Run(program("a"))
+    run.now = 5.0
     duplicate = Process(777, "a")
 
     assert run.first(9.0, duplicates=[duplicate]) == (
-        1.0,
+        6.0,
         [Action("kill", "a", 777, "process 777 was a duplicate")],
     )
 

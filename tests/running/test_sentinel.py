@@ -41,7 +41,6 @@ class Run:
         *,
         silent: Iterable[str] = (),
         stopped: Iterable[int] = (),
-        duplicates: Iterable[Process] = (),
     ) -> list[tuple[float, Action]]:
         decided = []
         for _ in range(round(seconds / PERIOD)):
@@ -55,42 +54,9 @@ class Run:
                 [*self.programs.values()],
                 dict(self.last_health),
                 frozenset(stopped),
-                frozenset(duplicates),
             )
             decided += [(self.now, action) for action in self.policy.decide(observation)]
         return decided
-
-
-def test_spares_services_that_report_their_health() -> None:
-    run = Run()
-    assert run.observe(60.0) == []
-    assert not run.policy.kill_inhibited_by
-
-
-def test_kills_a_silent_service_after_three_seconds() -> None:
-    run = Run()
-    run.observe(20.0)
-    (when, action), *_ = run.observe(5.0, silent=["kinematics"])
-    assert action[:3] == ("kill", "kinematics", PIDS["kinematics"])
-    assert "no health" in action.reason
-    assert 22.0 < when <= 23.0
-
-
-def test_gives_a_new_process_time_to_start() -> None:
-    run = Run()
-    run.observe(20.0)
-    run.programs["velocity"] = program("velocity", pid=500)
-    assert run.observe(9.0, silent=["velocity"]) == []
-    (_, action), *_ = run.observe(2.0, silent=["velocity"])
-    assert action[:3] == ("kill", "velocity", 500)
-
-
-def test_a_new_sentinel_counts_the_time_that_a_process_has_had() -> None:
-    run = Run()
-    run.programs["velocity"] = program("velocity", uptime=300.0)
-    (when, action), *_ = run.observe(7.0, silent=["velocity"])
-    assert action[:3] == ("kill", "velocity", PIDS["velocity"])
-    assert when <= 6.0
 
 
 def test_ignores_the_health_of_another_process_of_that_name() -> None:
@@ -165,56 +131,6 @@ def test_kills_no_silent_service_when_most_are_silent_at_once() -> None:
 def test_kills_no_silent_service_before_the_first_health() -> None:
     run = Run()
     assert {action.program for _, action in run.observe(60.0, silent=SERVICES)} <= {SENTINEL}
-
-
-def test_waits_for_new_observations_after_a_pause_of_its_own() -> None:
-    run = Run()
-    run.observe(20.0)
-    run.now += 30.0
-    assert run.observe(2.5, stopped=[PIDS["velocity"]]) == []
-
-
-def test_waits_longer_where_its_own_observations_are_late() -> None:
-    run = Run()
-    run.observe(20.0)
-    for _ in range(5):
-        run.now += 3 * PERIOD
-        assert run.observe(PERIOD, silent=["velocity"]) == []
-    assert run.observe(3.0, silent=["velocity"])
-
-
-def test_kills_a_duplicate_that_does_not_end_itself() -> None:
-    run = Run()
-    run.observe(20.0)
-    duplicate = Process(777, "kinematics")
-    assert run.observe(1.0, duplicates=[duplicate]) == []
-    ((_, action),) = run.observe(PERIOD, duplicates=[duplicate])
-    assert action[:3] == ("kill", "kinematics", 777)
-
-
-def test_revives_a_fatal_program_with_growing_delay() -> None:
-    run = Run()
-    run.observe(20.0)
-    revived = []
-    for _ in range(10):
-        run.programs["velocity"] = program("velocity", "FATAL")
-        decided = run.observe(70.0)
-        assert all(action.verb == "revive" for _, action in decided)
-        revived.append(decided[0][0] - (run.now - 70.0))
-        run.programs["velocity"] = program("velocity", "BACKOFF")
-        run.observe(1.0)
-    assert revived[0] == 1.0 + PERIOD
-    assert revived == sorted(revived)
-    assert 60.0 <= revived[-1] <= 61.0
-
-
-def test_a_program_that_ran_again_is_revived_quickly() -> None:
-    run = Run()
-    for pid in (501, 502, 503):
-        run.programs["velocity"] = program("velocity", "FATAL")
-        assert run.observe(1.5)[0][1].verb == "revive"
-        run.programs["velocity"] = program("velocity", pid=pid)
-        assert run.observe(5.0) == []
 
 
 def test_spares_a_program_that_was_stopped_on_purpose() -> None:
