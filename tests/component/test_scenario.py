@@ -47,16 +47,13 @@ def test_restarted_state_begins_with_its_last_value(scheduler: TestScheduler) ->
     assert played(scheduler, playback.state(events, 2.0)) == [(0, "b"), (1.0, "c")]
 
 
-def test_resumed_source_does_not_repeat_events(scheduler: TestScheduler) -> None:
+@pytest.mark.parametrize(("resume", "overdue"), [(True, []), (False, [(0, "a"), (0, "b")])])
+def test_overdue_events_come_at_once_unless_a_source_resumes(
+    scheduler: TestScheduler, resume: bool, overdue: list[tuple[float, str]]
+) -> None:
     events = Events(((0.0, "a"), (1.0, "b"), (3.0, "c")))
 
-    assert played(scheduler, playback.events(events, 1.5, resume=True)) == [(1.5, "c")]
-
-
-def test_overdue_events_come_at_once(scheduler: TestScheduler) -> None:
-    events = Events(((0.0, "a"), (1.0, "b"), (3.0, "c")))
-
-    assert played(scheduler, playback.events(events, 1.5)) == [(0, "a"), (0, "b"), (1.5, "c")]
+    assert played(scheduler, playback.events(events, 1.5, resume=resume)) == [*overdue, (1.5, "c")]
 
 
 def test_event_at_the_origin_is_emitted(scheduler: TestScheduler) -> None:

@@ -334,14 +334,19 @@ def test_setting_ends_single_heartbeats_for_good(
     assert heartbeats == []
 
 
-def test_setting_that_cannot_be_kept_is_reported(
-    make_source: Make, make_node: Make, spin_until: SpinUntil, tmp_path: Path
-) -> None:
-    messages: list[str] = []
+@pytest.fixture
+def messages(make_node: Make) -> list[str]:
+    heard: list[str] = []
     topic = topics.DIAGNOSTICS
     make_node("peer", kind=Node).create_subscription(
-        topic.type, topic.name, lambda it: messages.append(it.status[0].message), topic.qos
+        topic.type, topic.name, lambda it: heard.append(it.status[0].message), topic.qos
     )
+    return heard
+
+
+def test_setting_that_cannot_be_kept_is_reported(
+    make_source: Make, messages: list[str], spin_until: SpinUntil, tmp_path: Path
+) -> None:
     (tmp_path / "file").touch()
     node = make_source(settings=str(tmp_path / "file" / "settings"))
     values = emitted(node, Source(node).follow("value"))
@@ -412,13 +417,8 @@ def full_disk(*arguments: Any) -> None:
 
 
 def test_lost_settings_are_reported(
-    make_source: Make, make_node: Make, spin_until: SpinUntil, tmp_path: Path
+    make_source: Make, messages: list[str], spin_until: SpinUntil, tmp_path: Path
 ) -> None:
-    messages: list[str] = []
-    topic = topics.DIAGNOSTICS
-    make_node("peer", kind=Node).create_subscription(
-        topic.type, topic.name, lambda it: messages.append(it.status[0].message), topic.qos
-    )
     node = make_source(settings=str(tmp_path), scenario_epoch=time.monotonic() - 1.0)
 
     Source(node)

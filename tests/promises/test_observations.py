@@ -204,20 +204,18 @@ def test_violation_is_reported_with_evidence_and_exit_code_1(tmp_path: Path) -> 
     assert "processes 7 and 8 are both velocity" in page
 
 
-def test_exit_code_is_0_if_promises_hold(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("seconds", "code", "verdict"),
+    [(20, 0, "All exercised promises hold"), (0, 1, "No promise was exercised")],
+)
+def test_exit_code_is_0_if_promises_are_known_to_hold(
+    seconds: int, code: int, verdict: str, tmp_path: Path
+) -> None:
     path = tmp_path / "record.mcap"
-    recorded(path, ONE)
+    recorded(path, ONE, seconds=seconds)
     done = replay(path)
-    assert done.returncode == 0
-    assert "\nAll exercised promises hold\nReport: " in done.stdout
-
-
-def test_exit_code_is_1_if_no_promise_is_known_to_hold(tmp_path: Path) -> None:
-    path = tmp_path / "record.mcap"
-    recorded(path, ONE, seconds=0)
-    done = replay(path)
-    assert done.returncode == 1
-    assert "\nNo promise was exercised\nReport: " in done.stdout
+    assert done.returncode == code
+    assert f"\n{verdict}\nReport: " in done.stdout
 
 
 @pytest.mark.parametrize(

@@ -279,26 +279,14 @@ def engines(play: Play, *states: tuple[float, str]) -> None:
         play.say(time, topics.ENGINES_STATE, engines)
 
 
-def test_engines_that_were_never_on_say_so(play: Play) -> None:
-    engines(play, (210, OFF))
+@pytest.mark.parametrize(
+    ("states", "why"), [([(210.9, OFF)], state.NOT_YET), ([(210, OFF), (210.9, ON)], "")]
+)
+def test_engines_that_were_never_on_or_are_on(play: Play, states: list[tuple[float, str]], why: str) -> None:
+    engines(play, *states)
 
-    assert view(play.run(211), "page", 210.1)["engines"] == {
-        "state": "off",
-        "why": state.NOT_YET,
-        "since": None,
-        "refused": None,
-    }
-
-
-def test_engines_that_are_on_need_no_reason(play: Play) -> None:
-    engines(play, (210, OFF), (211, ON))
-
-    assert view(play.run(212), "page", 211.1)["engines"] == {
-        "state": "on",
-        "why": "",
-        "since": None,
-        "refused": None,
-    }
+    shown = {"state": states[-1][1], "why": why, "since": None, "refused": None}
+    assert view(play.run(212), "page", 211)["engines"] == shown
 
 
 def test_silent_controller_is_no_state(play: Play) -> None:
@@ -394,16 +382,11 @@ def test_page_turned_them_off(play: Play) -> None:
     assert view(play.run(222), "page", 221.1)["engines"]["why"] == state.BY_PAGE
 
 
-def test_controller_turned_them_off_without_a_command(play: Play) -> None:
-    engines(play, (209, ON), (209.1, OFF))
+@pytest.mark.parametrize(("off", "cause"), [(209.1, BY_CONTROLLER), (211, state.RESTARTED)])
+def test_controller_turned_them_off_or_was_stopped(play: Play, off: float, cause: str) -> None:
+    engines(play, (209, ON), (off, OFF))
 
-    assert view(play.run(210), "page", 209.2)["engines"]["why"] == BY_CONTROLLER
-
-
-def test_controller_was_stopped(play: Play) -> None:
-    engines(play, (209, ON), (211, OFF))
-
-    assert view(play.run(212), "page", 211.1)["engines"]["why"] == state.RESTARTED
+    assert why(play.run(212), off + 0.1) == cause
 
 
 def test_controller_was_killed_and_is_back_at_once(play: Play) -> None:

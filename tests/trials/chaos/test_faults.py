@@ -48,30 +48,30 @@ def arm(tmp_path: Path) -> RealArm:
     return StoppedArm("/arm1", System(tmp_path))
 
 
+def injected(kind: str, arm: RealArm, target: str) -> Undo:
+    undo = FAULT_KINDS[kind].inject(arm, target)
+    assert undo is not None
+    return undo
+
+
 def test_full_disk_without_supervisord_changes_nothing(arm: RealArm) -> None:
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    undo = FAULT_KINDS["full_disk"].inject(arm, NO_TARGET)
+    undo = injected("full_disk", arm, NO_TARGET)
     assert resource.getrlimit(resource.RLIMIT_FSIZE) == before
-    assert undo is not None
     undo()
     assert resource.getrlimit(resource.RLIMIT_FSIZE) == before
 
 
 def test_duplicate_of_a_stopped_program_starts_nothing(arm: RealArm) -> None:
-    undo = FAULT_KINDS["double"].inject(arm, "sentinel")
-    assert undo is not None
-    undo()
+    injected("double", arm, "sentinel")()
 
 
 def test_two_crash_loops_restore_the_parameters(arm: RealArm) -> None:
     good = {ALL_NODES: {KEY: {"scenario": "demo"}}}
     arm.system.parameters.write_text(yaml.safe_dump(good))
-    first = FAULT_KINDS["crash_loop"].inject(arm, "config_l1")
-    second = FAULT_KINDS["crash_loop"].inject(arm, "sentinel")
+    first, second = (injected("crash_loop", arm, target) for target in ("config_l1", "sentinel"))
     during = yaml.safe_load(arm.system.parameters.read_text())
     assert during.keys() == {ALL_NODES, "/arm1/config_l1", "/arm1/sentinel"}
-    assert first is not None
-    assert second is not None
     first()
     second()
     assert yaml.safe_load(arm.system.parameters.read_text()) == good
@@ -80,9 +80,7 @@ def test_two_crash_loops_restore_the_parameters(arm: RealArm) -> None:
 def test_overlapping_crash_loops_of_a_program_last_until_the_last_one_ends(arm: RealArm) -> None:
     good = {ALL_NODES: {KEY: {"scenario": "demo"}}}
     arm.system.parameters.write_text(yaml.safe_dump(good))
-    first, second = (FAULT_KINDS["crash_loop"].inject(arm, "sentinel") for _ in range(2))
-    assert first is not None
-    assert second is not None
+    first, second = (injected("crash_loop", arm, "sentinel") for _ in range(2))
     first()
     assert "/arm1/sentinel" in yaml.safe_load(arm.system.parameters.read_text())
     second()
@@ -94,9 +92,7 @@ def test_supervisord_stays_dead_although_an_overlapping_fault_ends(
 ) -> None:
     starts: list[System] = []
     monkeypatch.setattr(System, "start_again", lambda system: starts.append(system))
-    first, second = (FAULT_KINDS["kill_supervisor"].inject(arm, ALL) for _ in range(2))
-    assert first is not None
-    assert second is not None
+    first, second = (injected("kill_supervisor", arm, ALL) for _ in range(2))
     first()
     assert starts == []
     second()
@@ -126,9 +122,7 @@ def test_a_fault_lasts_although_an_overlapping_one_ends(
             await_members(arm.system, 1)
             monkeypatch.setattr(arm, "pid", lambda program: process.pid)
             monkeypatch.setattr(System, "supervisor", lambda system: process.pid)
-            first, second = (FAULT_KINDS[kind].inject(arm, "velocity") for _ in range(2))
-            assert first is not None
-            assert second is not None
+            first, second = (injected(kind, arm, "velocity") for _ in range(2))
             await_wrong(process.pid, True)
             first()
             assert is_wrong(process.pid)
@@ -154,8 +148,7 @@ def await_members(system: System, count: int) -> list[processes.Process]:
 
 @pytest.fixture
 def babbler(arm: RealArm, domain_id: int) -> Iterator[int]:
-    undo: Undo | None = FAULT_KINDS["babble"].inject(arm, NO_TARGET)
-    assert undo is not None
+    undo = injected("babble", arm, NO_TARGET)
     try:
         (member,) = await_members(arm.system, 1)
         yield member.pid
@@ -263,14 +256,18 @@ def test_a_process_that_is_reaped_while_it_is_found_leaves_no_handle(
     monitor = monitor_of(arm, [])
     monitor.scan()
     assert velocity.returncode is not None
-    ended = threading.Event()
-    ended.set()
-    monitor.run(ended)  # closes its handles
+    close(monitor)
     assert handles() == before
 
 
 def monitor_of(arm: RealArm, seen: list[Life]) -> ProcessMonitor:
     return ProcessMonitor({arm.system.run: "/"}, lambda _, life: seen.append(life), lambda *_: None)
+
+
+def close(monitor: ProcessMonitor) -> None:
+    ended = threading.Event()
+    ended.set()
+    monitor.run(ended)
 
 
 FORKING = """
@@ -314,9 +311,7 @@ def test_slow_child_of_supervisord_is_identified_by_its_program(
             supervisord.stdin.write("become velocity\n")
             supervisord.stdout.readline()
             monitor.scan()
-            ended = threading.Event()
-            ended.set()
-            monitor.run(ended)  # closes its handles
+            close(monitor)
         finally:
             supervisord.kill()  # its child then reads the end of its input
     assert [(life.program, life.pid) for life in seen] == [("", supervisord.pid), ("velocity", child)]
@@ -328,9 +323,7 @@ def test_babbler_is_not_a_program_of_the_arm(
     seen: list[Life] = []
     monitor = monitor_of(arm, seen)
     monitor.scan()
-    ended = threading.Event()
-    ended.set()
-    monitor.run(ended)  # closes its handles
+    close(monitor)
     assert [(life.program, life.pid) for life in seen] == [("velocity", velocity.pid)]
     killed: list[int] = []
     monkeypatch.setattr(processes, "open_handles", lambda run, pids: killed.extend(pids) or [])
