@@ -1,10 +1,6 @@
-"""Reads and checks a user's parameter file. It has the form of ROS 2::
+"""Reads and checks a user's parameter file, in the form of ROS 2 (interfaces/README.md).
 
-    operator_watchdog:
-      ros__parameters:
-        silence: 2.0
-
-with `/**` for all services that have the parameter. The services of an arm in a namespace may be named with
+`/**` stands for all services that have the parameter. The services of an arm in a namespace may be named with
 the namespace or without.
 """
 

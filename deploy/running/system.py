@@ -126,7 +126,6 @@ class System(RunDirectory):
             os.environ[manifest.VARIABLE] = shutil.move(manifest.path(), str(self.run / MANIFEST))
 
     def _end_members(self) -> None:
-        """End the live processes without supervisord's help."""
         for _ in range(3):  # a process that is being forked shows only in the next round
             left = self.members()
             if not left:

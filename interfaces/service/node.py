@@ -178,7 +178,6 @@ class ServiceNode(ReactiveNode):
         return f"it is {age:.3f} s old" if age > 0 else f"its clock is {-age:.3f} s ahead of ours"
 
     def remark(self, subject: str, reason: str) -> None:
-        """Make the next health report a warning with this reason."""
         self.health.remark(subject, reason)
 
     def _remark_other_types(self) -> None:

@@ -23,12 +23,10 @@ the sources play nothing. ::
                                             # is that of the service `drive`, which tells it at this rate [Hz]
     repeat: 60.0                            # everything except the sweeps starts again every 60 s
 
-Every sample of a moving joint gives a position (``combine_latest``). If both joints move, their samples
-alternate: a position shows a full step of one joint, but its time since the last position, which is the other
-joint's, is only a part of the step's time. The published speed is then about twice the true speed. Any speed
-is also wrong by as much as `kinematics` is late, because positions are stamped there. In ``demo.yaml`` the
-joints take turns (``phase``, ``rest``), which leaves only the second error. The topic
-``effector/velocity`` has neither: a speed guard should listen to that.
+Every sample of a moving joint gives a position (``combine_latest``). If both joints move, a position shows a
+full step of one joint after a part of its time, so the speed is about twice the true one. In ``demo.yaml``,
+the joints take turns (``phase``, ``rest``). Any speed is also wrong by as much as `kinematics` is late. The
+topic ``effector/velocity`` has neither error: a speed guard should listen to that.
 """
 
 from __future__ import annotations

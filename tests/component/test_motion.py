@@ -26,7 +26,6 @@ GAP = 0.1  # s
 def sampled(
     scheduler: VirtualTime, value: Callable[[float], float], times: list[float], delay: float = 0.002
 ) -> Any:
-    """Return a topic's values with their source times."""
     return scheduler.hot(*((t + delay, stamped(value(t), round(t * NS))) for t in times))
 
 

@@ -20,7 +20,6 @@ def changes(*states: tuple[float, str, float], until: float = 3.0) -> list[tuple
 
 
 def permitted(*states: tuple[float, str, float]) -> list[tuple[float, bool]]:
-    """Return the changes, each with its time [s] to a hundredth."""
     return [(round(at, 2), is_on) for at, is_on in changes(*states)]
 
 

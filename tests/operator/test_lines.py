@@ -255,7 +255,6 @@ def processes(time: float, restarts: int, pid: int, age: float = 0.25) -> Messag
 
 
 def alive(time: float, pid: int) -> Message:
-    """The health of the process."""
     pairs = {"pid": str(pid), "published": "1", "seconds_since_output": ""}
     values = [KeyValue(key=key, value=value) for key, value in pairs.items()]
     status = DiagnosticStatus(name="/kinematics", level=DiagnosticStatus.OK, message="running", values=values)

@@ -230,7 +230,6 @@ class Machine:
         self.probe = Probe(run, Asked(os.getppid()))
 
     def observe(self, times: int = 1) -> Observation:
-        """Observe a number of times; return the last observation."""
         for _ in range(times):
             self.now += PERIOD
             observation = self.probe.observe()

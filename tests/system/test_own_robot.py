@@ -72,7 +72,6 @@ class Robot:
             self.spin(0.2)
 
     def spin(self, seconds: float) -> None:
-        """Let time pass."""
         end = time.monotonic() + seconds
         while time.monotonic() < end:
             self.peer.spin_once(0.05)

@@ -48,7 +48,6 @@ class Systemd:
             heard = self._socket.recv(100).decode()
 
     def close(self) -> None:
-        """Hear nothing more."""
         self._socket.close()
 
 

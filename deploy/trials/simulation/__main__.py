@@ -150,7 +150,6 @@ def _explain(experiment: Experiment, title: str) -> int:
 
 
 def _conclude(outcome: Outcome, title: str) -> int:
-    """Report on one experiment; return the exit code."""
     experiment = outcome.experiment
     directory = processes.run_directory() / "simulation"
     name = "".join(each if each.isalnum() else "-" for each in experiment.seed)

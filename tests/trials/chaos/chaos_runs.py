@@ -34,7 +34,6 @@ class ChaosRun:
 
 
 def chaos_run(run: Path, *options: str) -> ChaosRun:
-    """Run `make chaos` with one arm; its files are in a directory."""
     before = fast_dds_files()
     result = ChaosRun(run, *unleash(run, *options))
     result.left_in_shared_memory = fast_dds_files() - before

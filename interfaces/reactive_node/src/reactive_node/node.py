@@ -1,11 +1,4 @@
-"""Topics as observables, observables as topics (thesis chapter 4).
-
-A :class:`ReactiveNode` is a node like any other and creates observables, as in Listings 4.3 to 4.5::
-
-    node = ReactiveNode("node_name")
-    observable = node.create_observable(String, "topic")
-    observable.subscribe(print, scheduler=node.scheduler)
-"""
+"""Topics as observables, observables as topics (thesis chapter 4)."""
 
 from __future__ import annotations
 

@@ -14,7 +14,6 @@ class Requests:
     """The requests of a service as items, until each is answered."""
 
     def __init__(self, node: Node, srv_type: Any, srv_name: str, scheduler: abc.SchedulerBase) -> None:
-        """Emit the requests of a service of ``node`` by ``scheduler``, as ``observable``."""
         self.observable: Subject[Any] = Subject()
         self._node = node
         self._srv_type = srv_type

@@ -88,7 +88,6 @@ def missing() -> str:
 
 @contextmanager
 def playwright() -> Iterator[Any]:
-    """Start Playwright; skip the test where that is not possible."""
     if reason := missing():
         pytest.skip(reason)
     from playwright.sync_api import sync_playwright
@@ -98,7 +97,6 @@ def playwright() -> Iterator[Any]:
 
 
 def launch(started: Any, *, executable: str = CHROMIUM) -> Any:
-    """Start a Chromium with an empty profile."""
     return started.chromium.launch(
         executable_path=executable,
         args=FLAGS,

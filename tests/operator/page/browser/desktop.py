@@ -182,7 +182,6 @@ class PlainPage:
                 return answer["result"]
 
     def add_init_script(self, script: str) -> None:
-        """Run JavaScript before that of the page, from the next load on."""
         self._call("Page.addScriptToEvaluateOnNewDocument", self._session, source=script)
 
     def reload(self) -> None:
