@@ -15,11 +15,10 @@ import rclpy
 from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import Point, PointStamped
 from rclpy.context import Context
-from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.qos import QoSProfile
 from rclpy.serialization import serialize_message
 from rclpy.time import Time
 from reactivex.subject import Subject
@@ -312,25 +311,18 @@ class Readers:
 
     def __init__(self, node: ServiceNode, monkeypatch: pytest.MonkeyPatch) -> None:
         self.alive: list[SimpleNamespace] = []
-        self.qos: list[QoSProfile] = []
-        self.events: list[SubscriptionEventCallbacks] = []
         monkeypatch.setattr(node, "create_subscription", self._create)
         monkeypatch.setattr(node, "destroy_subscription", self.alive.remove)
 
-    def _create(
-        self, _: Any, __: Any, callback: Any, qos: QoSProfile, *, event_callbacks: Any = None, **___: Any
-    ) -> SimpleNamespace:
+    def _create(self, _: Any, __: Any, callback: Any, *___: Any, **____: Any) -> SimpleNamespace:
         self.alive.append(SimpleNamespace(callback=callback))
-        self.qos.append(qos)
-        self.events.append(event_callbacks)
         return self.alive[-1]
 
-    def receive(self, message: Any, *seconds: float) -> None:
-        for at in seconds:
-            info = {"source_timestamp": to_nanoseconds(at_time(at))}
-            for callback in [reader.callback for reader in self.alive]:
-                takes_info = len(inspect.signature(callback).parameters) == 2
-                callback(bytes(serialize_message(message)), *[info] * takes_info)
+    def receive(self, message: Any, at: float) -> None:
+        info = {"source_timestamp": to_nanoseconds(at_time(at))}
+        for callback in [reader.callback for reader in self.alive]:
+            takes_info = len(inspect.signature(callback).parameters) == 2
+            callback(bytes(serialize_message(message)), *[info] * takes_info)
 
 
 def at_time(seconds: float) -> datetime:
@@ -350,58 +342,6 @@ def test_items_are_the_good_values(service: ServiceNode, readers: Readers, topic
     for data in (1.5, math.nan, 2.0):
         readers.receive(number(data), 7.0)
     assert received == [1.5, Timestamp(1.5, at_time(7.0)), 2.0, Timestamp(2.0, at_time(7.0))]
-
-
-def test_error_of_a_check_is_an_error_of_the_observable(service: ServiceNode, readers: Readers) -> None:
-    errors: list[Exception] = []
-    service.observe(dataclasses.replace(topics.L1, problem=failing)).subscribe(on_error=errors.append)
-    readers.receive(number(0.0), 1.0)
-    readers.receive(number(0.0), 2.0)
-    assert [type(error) for error in errors] == [LookupError]
-    assert not readers.alive
-
-
-def test_error_of_an_observer_is_no_error_of_the_observable(service: ServiceNode, readers: Readers) -> None:
-    def fail(_: float) -> None:
-        raise ValueError("planted")
-
-    errors: list[Exception] = []
-    service.observe(topics.L1).subscribe(fail, errors.append)
-    with pytest.raises(ValueError, match="planted"):
-        readers.receive(number(0.0), 1.0)
-    assert not errors
-
-
-def test_copies_of_latched_messages_are_dropped(service: ServiceNode, readers: Readers) -> None:
-    received: list[Any] = []
-    service.observe(topics.L1, timestamped=True).subscribe(received.append)
-    readers.events[0].incompatible_qos(None)  # from now on, a second reader listens
-    readers.receive(number(1.5), *range(17))
-    assert received == [Timestamp(1.5, at_time(at)) for at in range(17)]
-    readers.receive(number(1.5), 0.0)  # forgotten: only the last sixteen are known
-    assert len(received) == 18
-
-
-def test_one_reader_delivers_no_copies(service: ServiceNode, readers: Readers) -> None:
-    received: list[Any] = []
-    service.observe(topics.L1).subscribe(received.append)
-    readers.receive(number(1.5), 1.0, 1.0)
-    assert received == [1.5] * 2
-
-
-def test_events_of_one_time_are_no_copies(service: ServiceNode, readers: Readers) -> None:
-    received: list[Any] = []
-    service.observe(topics.ENGINES).subscribe(received.append)
-    readers.receive(String(data="turn_off"), 1.0, 1.0)
-    assert received == ["turn_off"] * 2
-
-
-def test_volatile_publishers_get_one_reader(service: ServiceNode, readers: Readers) -> None:
-    service.observe(topics.L1).subscribe()
-    assert readers.qos == [topics.L1.qos]
-    for _ in range(2):
-        readers.events[0].incompatible_qos(None)
-    assert [(qos.depth, qos.durability) for qos in readers.qos[1:]] == [(1, DurabilityPolicy.VOLATILE)]
 
 
 @pytest.mark.parametrize("topic", [topics.L1, topics.EFFECTOR_SPEED], ids=lambda topic: topic.name)

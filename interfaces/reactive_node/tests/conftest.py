@@ -10,9 +10,10 @@ from rclpy.context import Context
 from rclpy.executors import Executor, SingleThreadedExecutor
 from rclpy.node import Node
 
+from interfaces.reactive_node.tests.simulated import Simulation
 from reactive_node import ReactiveNode
 from reactive_node.executor import create_executor
-from reactive_node.testing import MakeNode
+from reactive_node.testing import MakeNode, SpinUntil
 
 EXECUTORS = [lambda context: SingleThreadedExecutor(context=context)]
 if importlib.util.find_spec("rclpy.experimental"):
@@ -23,6 +24,11 @@ if importlib.util.find_spec("rclpy.experimental"):
 def executor(request: pytest.FixtureRequest, context: Context) -> Iterator[Executor]:
     with request.param(context) as executor:
         yield executor
+
+
+@pytest.fixture
+def simulation(make_node: MakeNode, spin_until: SpinUntil) -> Simulation:
+    return Simulation(make_node, spin_until)
 
 
 @pytest.fixture

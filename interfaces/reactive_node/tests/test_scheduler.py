@@ -15,9 +15,9 @@ from rclpy.parameter import Parameter
 from rclpy.time import Time
 from reactivex.disposable import BooleanDisposable
 from reactivex.subject import Subject
-from rosgraph_msgs.msg import Clock as ClockMessage
 from std_msgs.msg import Empty
 
+from interfaces.reactive_node.tests.simulated import Simulation
 from reactive_node import ReactiveNode
 from reactive_node.scheduler import NodeScheduler
 from reactive_node.testing import MakeNode, SpinFor, SpinUntil
@@ -215,34 +215,6 @@ def test_setting_wall_clock_changes_nothing(
         spin_until(lambda seen=seen: len(ticks) >= seen + 5)
 
     assert all(timedelta(0) < b - a < timedelta(minutes=1) for a, b in pairwise(ticks))
-
-
-def test_now_begins_with_time_of_day(scheduler: NodeScheduler) -> None:
-    assert abs(scheduler.now - datetime.now(UTC)) < timedelta(seconds=5)
-
-
-class Simulation:
-    def __init__(self, make_node: MakeNode, spin_until: SpinUntil) -> None:
-        self.spin_until = spin_until
-        self.clock = make_node("simulator")
-        self.publisher = self.clock.create_publisher(ClockMessage, "/clock", 10)
-        self.node = make_node("simulated", parameter_overrides=[Parameter("use_sim_time", value=True)])
-        spin_until(lambda: self.publisher.get_subscription_count() > 0)
-
-    def set(self, seconds: float) -> None:
-        self.publisher.publish(_clock(seconds))
-        self.spin_until(lambda: self.node.get_clock().now().nanoseconds == round(seconds * 1e9))
-
-
-def _clock(seconds: float) -> ClockMessage:
-    message = ClockMessage()
-    message.clock.sec, message.clock.nanosec = divmod(round(seconds * 1e9), 10**9)
-    return message
-
-
-@pytest.fixture
-def simulation(make_node: MakeNode, spin_until: SpinUntil) -> Simulation:
-    return Simulation(make_node, spin_until)
 
 
 def test_simulated_time_is_followed_and_stands_still(

@@ -4,12 +4,11 @@ from datetime import UTC, datetime, timedelta
 from typing import Any
 
 import pytest
-from builtin_interfaces.msg import Time
 from rclpy.clock import ClockType
 from rclpy.parameter import Parameter
 from reactivex.disposable import BooleanDisposable
-from rosgraph_msgs.msg import Clock
 
+from interfaces.reactive_node.tests.simulated import Simulation
 from reactive_node import ReactiveNode
 from reactive_node.testing import MakeNode, SpinFor, SpinUntil
 
@@ -60,20 +59,13 @@ def test_heap_is_cleaned_when_most_of_many_items_are_cancelled(node: ReactiveNod
 
 @pytest.mark.parametrize(("late", "runs"), [(50_000_000, 6), (50_000_001, 1)])
 def test_periodic_action_catches_up_if_it_is_at_most_50_ms_late(
-    make_node: MakeNode, spin_until: SpinUntil, spin_for: SpinFor, late: int, runs: int
+    simulation: Simulation, spin_until: SpinUntil, spin_for: SpinFor, late: int, runs: int
 ) -> None:
-    publisher = make_node("simulator").create_publisher(Clock, "/clock", 10)
-    node = make_node("simulated", parameter_overrides=[Parameter("use_sim_time", value=True)])
-    spin_until(publisher.get_subscription_count)
     ran: list[datetime] = []
-
-    def simulate(nanoseconds: int) -> None:
-        publisher.publish(Clock(clock=Time(sec=100, nanosec=nanoseconds)))
-        spin_until(lambda: node.get_clock().now().nanoseconds == 100 * 10**9 + nanoseconds)
-
-    simulate(0)
-    node.scheduler.schedule_periodic(0.01, lambda _: ran.append(node.scheduler.now))
-    simulate(10_000_000 + late)
+    scheduler = simulation.node.scheduler
+    simulation.set_to(100 * 10**9)
+    scheduler.schedule_periodic(0.01, lambda _: ran.append(scheduler.now))
+    simulation.set_to(100 * 10**9 + 10_000_000 + late)
     spin_until(lambda: len(ran) >= runs)
     spin_for(0.05)
 
@@ -156,14 +148,9 @@ def test_no_timer_waits_without_actions(node: ReactiveNode, spin_until: SpinUnti
     assert [timer for timer in node.timers if not timer.is_canceled()] == []
 
 
-def test_time_goes_on_where_simulated_time_ends_and_begins(
-    make_node: MakeNode, spin_until: SpinUntil
-) -> None:
-    publisher = make_node("simulator").create_publisher(Clock, "/clock", 10)
-    node = make_node("simulated", parameter_overrides=[Parameter("use_sim_time", value=True)])
-    spin_until(publisher.get_subscription_count)
-    publisher.publish(Clock(clock=Time(sec=1000)))
-    spin_until(lambda: node.get_clock().now().nanoseconds == 1000 * 10**9)
+def test_time_goes_on_where_simulated_time_ends_and_begins(simulation: Simulation) -> None:
+    simulation.set(1000.0)
+    node = simulation.node
     timers: list[int] = []
 
     for simulated in (False, True, False, True):
@@ -188,16 +175,13 @@ def test_result_of_an_action_that_disposed_itself_is_disposed(
 
 
 def test_periodic_action_keeps_its_rate_from_the_first_simulated_time(
-    make_node: MakeNode, spin_until: SpinUntil, spin_for: SpinFor
+    simulation: Simulation, spin_for: SpinFor
 ) -> None:
-    publisher = make_node("simulator").create_publisher(Clock, "/clock", 10)
-    node = make_node("simulated", parameter_overrides=[Parameter("use_sim_time", value=True)])
-    spin_until(publisher.get_subscription_count)
     ran: list[float] = []
-    node.scheduler.schedule_periodic(10.0, lambda _: ran.append(node.scheduler.now.timestamp()))
+    scheduler = simulation.node.scheduler
+    scheduler.schedule_periodic(10.0, lambda _: ran.append(scheduler.now.timestamp()))
     for second in (1234, 1243, 1244, 1253, 1254):
-        publisher.publish(Clock(clock=Time(sec=second)))
-        spin_until(lambda second=second: node.get_clock().now().nanoseconds == second * 10**9)
+        simulation.set(second)
         spin_for(0.02)
 
     assert ran == [1244.0, 1254.0]
