@@ -17,24 +17,13 @@ from reactive_node.stamps import Timestamp
 class Grid:
     """Asks at all multiples of a period, from now on."""
 
-    def __init__(
-        self,
-        run: Run,
-        node: Node,
-        period: int,
-        answer: Callable[[Answer[Any]], None],
-        *,
-        steady: bool = False,
-    ) -> None:
-        """The period is in ns; ``answer`` receives the answers. See :meth:`Signal.sample`."""
+    def __init__(self, run: Run, node: Node, period: int, answer: Callable[[Answer[Any]], None]) -> None:
+        """The period is in ns; ``answer`` receives the answers."""
         self._node, self._period, self._answer = node, period, answer
-        self._run, self._steady = run, steady
         self.restart(run.now())
 
     def answer(self, horizon: int) -> None:
         """Answer what is asked up to a time [ns]."""
-        if self._steady:
-            horizon = min(horizon, self._run.now() - self._run.longest_wait())
         while self._next <= horizon:
             time, self._next = self._next, self._next + self._period
             value, mark = self._node.at(time)

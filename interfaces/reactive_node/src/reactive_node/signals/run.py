@@ -45,11 +45,14 @@ class Questions(Protocol):
 class Run:
     """One evaluation, from its subscription to its disposal."""
 
-    def __init__(self, observer: abc.ObserverBase[Any], scheduler: abc.SchedulerBase | None) -> None:
+    def __init__(
+        self, observer: abc.ObserverBase[Any], scheduler: abc.SchedulerBase | None, steady: bool
+    ) -> None:
         if scheduler is None:
             raise ValueError("a signal needs a clock: subscribe(…, scheduler=node.scheduler)")
         self.observer = observer
         self._scheduler = scheduler
+        self._steady = steady
         self._nodes: dict[Any, Any] = {}
         self._sources: list[Source] = []
         self._memories: list[Memory] = []
@@ -84,10 +87,6 @@ class Run:
         if isinstance(memory, Source):
             self._sources.append(memory)
 
-    def longest_wait(self) -> int:
-        """Return how long it takes at most until the value at a time is known [ns]."""
-        return max((source.wait + source.high for source in self._sources), default=0)
-
     def start(self, questions: Questions) -> abc.DisposableBase:
         """Begin to receive samples and to answer."""
         self._questions = questions
@@ -108,7 +107,7 @@ class Run:
             self.observer.on_error(error)
 
     def _advance(self, now: int) -> None:
-        horizon = now
+        horizon = now - self._longest_wait() if self._steady else now
         for source in self._sources:
             source.settle(now)
             horizon = min(horizon, source.horizon() - source.high)
@@ -121,6 +120,10 @@ class Run:
             memory.forget(horizon + memory.low)  # what was asked up to there is answered
         self._arm(now)
 
+    def _longest_wait(self) -> int:
+        """Return how long it takes at most until a value is known [ns]."""
+        return max((source.wait + source.high for source in self._sources), default=0)
+
     def _restart(self, now: int) -> None:
         for memory in self._memories:
             memory.restart(now)
@@ -132,7 +135,7 @@ class Run:
         time = self._questions.next()
         if time is None:
             return
-        due = time + self.longest_wait()
+        due = time + self._longest_wait()
         if self._armed_for is not None and self._armed_for <= due:
             return  # it looks early, and then is armed again
         self._armed_for = due
@@ -146,18 +149,19 @@ class Run:
 
 
 def evaluation(
-    signal: Any, ask: Callable[[Run, Node], Questions], *, before: int = 0
+    signal: Any, ask: Callable[[Run, Node], Questions], *, before: int = 0, steady: bool = False
 ) -> Callable[[abc.ObserverBase[Any], abc.SchedulerBase | None], abc.DisposableBase]:
     """
     Return how to subscribe to the answers of a signal.
 
     :param before: how far before its time an answer needs values [ns].
+    :param steady: whether each answer comes when it is known at the latest.
     """
 
     def subscribe(
         observer: abc.ObserverBase[Any], scheduler: abc.SchedulerBase | None = None
     ) -> abc.DisposableBase:
-        run = Run(observer, scheduler)
+        run = Run(observer, scheduler, steady)
         node: Node = run.node(signal)
         node.needs(-before, 0)
         return run.start(ask(run, node))

@@ -52,9 +52,9 @@ class Signal(Generic[T]):
         every = nanoseconds("the period", period)
 
         def ask(run: Run, node: Node) -> Grid:
-            return Grid(run, node, every, run.observer.on_next, steady=steady)
+            return Grid(run, node, every, run.observer.on_next)
 
-        return Observable(evaluation(self, ask))
+        return Observable(evaluation(self, ask, steady=steady))
 
     def snapshot(
         self,
