@@ -21,6 +21,7 @@ from interfaces.topics import ALIVE, INCAPACITATED, MISSED, TURN_OFF
 from reactive_node.stamps import Timestamp
 
 READING = 0.1  # s between two looks for a heartbeat: thousands of them cost no more than those of a switch
+DISCOVERY = 1.0  # s from the start of a successor until it surely hears the heartbeats
 
 
 class Activity(NamedTuple):
@@ -56,20 +57,24 @@ def operator_activity(
     A return between the strikes does not reset them. The first heartbeat after the last strike is ALIVE at
     once and begins new strikes.
 
-    :param resumes: whether the first sample comes with the first heartbeat: the engines wait for a successor.
+    :param resumes: whether the engines wait for a successor. It samples the first heartbeat at once. It
+        counts no silence before that one until it has surely discovered the switch.
     """
 
     def watch(heartbeats: Observable[Timestamp[Any]]) -> Observable[Activity]:
         alive = heartbeats.map(lambda heartbeat: Activity(ALIVE, heartbeat.timestamp))
-        ticks = rx.interval(given.sampling)
-        return (
-            alive.sample(alive.take(1).concat(ticks) if resumes else ticks)
+        conclusions = (
+            alive.sample(rx.interval(given.sampling))
             .timeout(given.silence)
             .catch(lambda error, _: rx.throw(error).start_with(Activity(MISSED)))
             .retry(given.strikes)
             .catch(lambda error, _: alive.take(1).start_with(Activity(INCAPACITATED)))
             .repeat()
         )
+        if not resumes:
+            return conclusions
+        first = alive.take(1).map(conclusions.start_with)
+        return rx.amb(first, rx.timer(DISCOVERY).map(lambda _: conclusions)).merge_all()
 
     return heartbeats.concat(rx.never()).publish(watch)  # the end of a source is a silence
 

@@ -12,7 +12,7 @@ from reactivex.testing import ReactiveTest, TestScheduler
 
 from interfaces.topics import ALIVE, INCAPACITATED, MISSED, TURN_OFF
 from reactive_node.stamps import Timestamp
-from services.operator_watchdog import Activity, engine_commands, operator_activity
+from services.operator_watchdog import Activity, Parameters, engine_commands, operator_activity
 
 on_next, on_completed, subscribe = ReactiveTest.on_next, ReactiveTest.on_completed, ReactiveTest.subscribe
 
@@ -192,6 +192,22 @@ def test_watchdog_that_resumes_reports_the_first_heartbeat_at_once(scheduler: Te
     assert watched.alive == [0.3, 0.8, 1.8]
     assert [round(time, 3) for time in watched.missed] == [4.8, 7.8, 10.8]
     assert [round(time, 3) for time in watched.incapacitated] == [10.8]
+
+
+def test_successor_waits_for_its_first_heartbeat_before_a_strike(scheduler: TestScheduler) -> None:
+    quick = Parameters(sampling=0.05, silence=0.25, strikes=1)
+
+    watched = watch(scheduler, hot(scheduler, 0.9), 2.0, given=quick, resumes=True)
+
+    assert watched.alive == [0.9]
+    assert [round(time, 3) for time in watched.missed] == [1.15]
+
+
+def test_successor_that_hears_nothing_begins_to_count(scheduler: TestScheduler) -> None:
+    watched = watch(scheduler, hot(scheduler), 11.0, resumes=True)
+
+    assert [round(time, 3) for time in watched.missed] == [4.01, 7.01, 10.01]
+    assert [round(time, 3) for time in watched.incapacitated] == [10.01]
 
 
 @given(st.lists(st.integers(1, 2499), min_size=1, max_size=20))
