@@ -20,7 +20,7 @@ from interfaces.service.epoch import Epoch
 from interfaces.topics import ALIVE, INCAPACITATED, MISSED, TURN_OFF
 from reactive_node.stamps import Timestamp
 
-READING = 0.1  # s between two looks for a heartbeat: thousands of them cost no more than those of a switch
+READING = 0.1  # s at most between two looks for a heartbeat: thousands cost no more than those of a switch
 DISCOVERY = 1.0  # s from the start of a successor until it surely hears the heartbeats
 
 
@@ -43,6 +43,12 @@ class Parameters:
         """Raise UserError if each silence would be over before the operator is reported."""
         if self.sampling >= self.silence:
             raise UserError(f"sampling: must be less than silence, {self.silence:g} s, not {self.sampling:g}")
+
+    @property
+    def reading(self) -> float:
+        """Time between two looks for a heartbeat [s]."""
+        # Samples come equally long after a look, or the jitter would add to a silence.
+        return self.sampling / math.ceil(self.sampling / min(READING, self.lifespan / 2))
 
 
 DEFAULTS = Parameters()
@@ -97,10 +103,8 @@ def wire(node: ServiceNode) -> None:
     def warn(activity: Activity) -> None:
         node.get_logger().warning(f"operator {activity.conclusion}")
 
-    # Samples come equally long after a look, or the jitter would add to a silence.
-    reading = given.sampling / math.ceil(given.sampling / min(READING, given.lifespan / 2))
     heartbeats = node.observe_sampled(
-        topics.OPERATOR_HEARTBEAT, reading, timestamped=True, max_age=given.lifespan
+        topics.OPERATOR_HEARTBEAT, given.reading, timestamped=True, max_age=given.lifespan
     )
     # Silences count from the origin of the scenario: before it, no operator is expected.
     activity = epoch.start(operator_activity(heartbeats, given, resumes=epoch.is_past)).share()
