@@ -57,8 +57,7 @@ DEFAULTS = Parameters()
 def operator_activity(
     heartbeats: Observable[Timestamp[Any]], given: Parameters = DEFAULTS, *, resumes: bool = False
 ) -> Observable[Activity]:
-    """
-    Emit whether the operator is alive, missed, incapacitated (Listings 5.7 and 5.8).
+    """Emit whether the operator is alive, missed, incapacitated (Listings 5.7 and 5.8).
 
     A return between the strikes does not reset them. The first heartbeat after the last strike is ALIVE at
     once and begins new strikes.

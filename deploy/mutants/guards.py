@@ -25,6 +25,10 @@ GUARDS: dict[str, tuple[str, ...]] = {
         "tests/component/test_readme.py",
     ),
     "services/drive.py": ("tests/component/test_drive.py",),
+    "deploy/running/reaction.py": (
+        "tests/running/test_reaction.py",
+        "tests/running/test_parameter_file.py",
+    ),
     "interfaces/topics.py": (
         "tests/component/test_topics.py",
         "tests/component/test_readme.py",

@@ -7,10 +7,11 @@ the namespace or without.
 from __future__ import annotations
 
 import importlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from deploy.running import interruption, manifest
+from deploy.running.reaction import Reaction, reaction
 from deploy.running.run_directory import ALL, KEY
 from interfaces.service import UserError
 from interfaces.service.parameters import Declaration, declarations
@@ -28,10 +29,21 @@ def load(path: str, namespace: str) -> dict[str, Any]:
         document = yaml_file.load(path)
     if found := [f"{path}: {key}: {problem}" for key, problem in problems(document, namespace)]:
         raise UserError("\n".join(found))
+    try:
+        reaction_to(document, namespace).check()
+    except UserError as error:
+        raise UserError(f"{path}: {error}") from None
     prefix = namespace.rstrip("/") + "/"
     return {
         node if node == ALL else prefix + _program_of(node, namespace): document[node] for node in document
     }
+
+
+def reaction_to(document: Mapping[str, Any], namespace: str) -> Reaction:
+    """Return the reaction of an arm whose services start with the content of a parameter file."""
+    shared = document.get(ALL, {}).get(KEY, {})
+    given = {_program_of(node, namespace): content[KEY] for node, content in document.items()}
+    return reaction({program: shared | given.get(program, {}) for program in declared()})
 
 
 def declared() -> dict[str, dict[str, Declaration]]:

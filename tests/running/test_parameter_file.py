@@ -98,6 +98,38 @@ def test_all_errors_of_a_file_are_reported_a_line_for_each(tmp_path: Path) -> No
     assert [line.split(": ")[:2] for line in lines] == [[str(file), key] for key in keys]
 
 
+@pytest.mark.parametrize(
+    ("content", "reason"),
+    [
+        (
+            "operator_watchdog: {ros__parameters: {sampling: 3.0}}",
+            "sampling: must be less than silence, 3 s, not 3",
+        ),
+        (
+            "operator_watchdog: {ros__parameters: {silence: 1.0, strikes: 1}}",
+            "max_presence_age must be at most 0.45 s, not 1: "
+            "a turn_on after the last strike would turn the engines on without an operator",
+        ),
+        (
+            "engine_controller: {ros__parameters: {presence_timeout: 2.0}}",
+            "presence_timeout must be at least 2.2 s, not 2: "
+            "lifespan, sampling and a restart of the operator watchdog, 1.2 s",
+        ),
+        (
+            "{/**: {ros__parameters: {lifespan: 9.0}}, /arm1/velocity: {ros__parameters: {}}}",
+            "presence_timeout must be at least 10.7 s, not 10: "
+            "lifespan, sampling and a restart of the operator watchdog, 1.2 s",
+        ),
+    ],
+)
+def test_values_that_contradict_each_other_are_refused(tmp_path: Path, content: str, reason: str) -> None:
+    file = tmp_path / "mine.yaml"
+    file.write_text(content)
+    with pytest.raises(UserError) as raised:
+        parameter_file.load(str(file), "/arm1")
+    assert str(raised.value) == f"{file}: {reason}"
+
+
 def test_1e3_is_a_number(tmp_path: Path) -> None:
     file = tmp_path / "mine.yaml"
     file.write_text("dead_mans_switch: {ros__parameters: {rate: 1e3}}")

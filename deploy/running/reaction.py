@@ -1,0 +1,97 @@
+"""How soon the engines stop: what follows from the parameters of the arm (deploy/SAFETY.md derives it)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import fields, replace
+from typing import Any, NamedTuple
+
+from interfaces.service import UserError
+from interfaces.topics import DRIVE_TIMEOUT
+from services import engine_controller, operator_watchdog
+from services.engine_controller import CLOCK_TOLERANCE
+
+DELAY = 0.05  # s of scheduling and transport on the way to the drive
+BEAT = 0.05  # s between two heartbeats of a switch
+RESTART = 1.2  # s from the death of the operator watchdog to its next presence, on two busy cores
+
+
+class Reaction(NamedTuple):
+    """The parameters that decide how soon the engines stop, and the bounds that follow [s]."""
+
+    watchdog: operator_watchdog.Parameters
+    controller: engine_controller.Parameters
+
+    @property
+    def off_within(self) -> float:
+        """From the last sign of life until the engines are off, whatever dies: F3 acts after F2."""
+        return round(self._by_timeout + DRIVE_TIMEOUT + DELAY, 3)
+
+    @property
+    def off_after_one_death(self) -> float:
+        """The same if the watchdog or the controller dies: F2 acts, or F3 after F1."""
+        by_drive = min(self._by_strikes, self._by_timeout) + DRIVE_TIMEOUT
+        return round(max(self._by_timeout + self.controller.repeat, by_drive) + DELAY, 3)
+
+    @property
+    def off_undisturbed(self) -> float:
+        """The same if nothing dies: F1 acts, or F2 if its time is shorter."""
+        return round(min(self._by_strikes, self._by_timeout + self.controller.repeat) + DELAY, 3)
+
+    @property
+    def longest_restart(self) -> float:
+        """How long the watchdog may be away while the engines stay on."""
+        return self.controller.presence_timeout - self.watchdog.lifespan - self.watchdog.sampling
+
+    @property
+    def words(self) -> str:
+        """The bounds in one sentence, without a full stop."""
+        return (
+            f"Engines stop within {self.off_within:g} s"
+            f" ({self.off_after_one_death:g} s if one process dies, {self.off_undisturbed:g} s if none does)"
+        )
+
+    def check(self) -> None:
+        """Raise UserError if no arm can work with these parameters."""
+        watchdog, controller = self.watchdog, self.controller
+        most = round(watchdog.strikes * watchdog.silence - watchdog.sampling - BEAT, 3)
+        if controller.max_presence_age > most:
+            raise UserError(
+                f"max_presence_age must be at most {most:g} s, not {controller.max_presence_age:g}: "
+                "a turn_on after the last strike would turn the engines on without an operator"
+            )
+        if self.longest_restart < RESTART:
+            least = watchdog.lifespan + watchdog.sampling + RESTART
+            raise UserError(
+                f"presence_timeout must be at least {least:g} s, not {controller.presence_timeout:g}: "
+                f"lifespan, sampling and a restart of the operator watchdog, {RESTART:g} s"
+            )
+
+    @property
+    def _by_strikes(self) -> float:
+        """From the last sign of life until the watchdog sends `turn_off` (F1)."""
+        watchdog = self.watchdog
+        return watchdog.lifespan + watchdog.sampling + watchdog.strikes * watchdog.silence
+
+    @property
+    def _by_timeout(self) -> float:
+        """From the last sign of life until the controller sends no further `on` (F2)."""
+        return self.controller.presence_timeout + CLOCK_TOLERANCE
+
+
+def reaction(given: Mapping[str, Mapping[str, Any]]) -> Reaction:
+    """Return the reaction of an arm.
+
+    :param given: parameters by program; those that are not given have their defaults.
+    :raises UserError: if the values of one program contradict each other.
+    """
+
+    def of(program: str, defaults: Any) -> Any:
+        known = {field.name for field in fields(defaults)}
+        values = {name: value for name, value in given.get(program, {}).items() if name in known}
+        return replace(defaults, **values)
+
+    return Reaction(
+        of("operator_watchdog", operator_watchdog.DEFAULTS),
+        of("engine_controller", engine_controller.DEFAULTS),
+    )

@@ -1,0 +1,43 @@
+"""How soon the engines stop, by the parameters of the services."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from deploy.running.reaction import reaction
+
+
+def of_watchdog(**parameters: Any) -> dict[str, dict[str, Any]]:
+    return {"operator_watchdog": parameters}
+
+
+def test_engines_of_the_thesis_stop_within_10_5_s() -> None:
+    words = "Engines stop within 10.5 s (10.45 s if one process dies, 10.05 s if none does)"
+    assert reaction({}).words == words
+
+
+@pytest.mark.parametrize(
+    ("given", "undisturbed", "one_death", "any_death"),
+    [
+        (of_watchdog(strikes=1), 4.05, 10.2, 10.5),
+        (of_watchdog(strikes=1) | {"engine_controller": {"repeat": 0.2}}, 4.05, 10.3, 10.5),
+        (of_watchdog(silence=1.0, sampling=0.25), 3.8, 10.2, 10.5),
+        ({"engine_controller": {"presence_timeout": 5.0}}, 5.2, 5.5, 5.5),  # F2 acts before F1
+        ({"velocity": {"strikes": 1}}, 10.05, 10.45, 10.5),
+    ],
+)
+def test_bounds_follow_from_the_parameters(
+    given: dict[str, dict[str, Any]], undisturbed: float, one_death: float, any_death: float
+) -> None:
+    found = reaction(given)
+    assert (found.off_undisturbed, found.off_after_one_death, found.off_within) == (
+        undisturbed,
+        one_death,
+        any_death,
+    )
+
+
+def test_parameters_of_the_thesis_do_not_contradict_each_other() -> None:
+    reaction({}).check()
