@@ -307,7 +307,7 @@ TF = Topic(
 OPERATOR_HEARTBEAT = Topic(
     "operator_heartbeat",
     Bool,
-    _qos(1, reliable=False, lifespan=0.5),
+    _qos(1, reliable=False),
     "",
     ("dead_mans_switch", *OPERATOR_NODES),
     ("operator_watchdog", *OPERATOR_NODES),
@@ -318,11 +318,11 @@ OPERATOR_HEARTBEAT = Topic(
 OPERATOR_PRESENCE = Topic(
     "operator_presence",
     Header,
-    _qos(1, lifespan=1.0),
+    _qos(1),
     "",
     ("operator_watchdog",),
     ("engine_controller", "operator_page"),
-    "the operator was seen alive; `stamp` is the source time of that heartbeat. At most 2 Hz",
+    "the operator was seen alive; `stamp` is the source time of that heartbeat. At most 2 Hz by default",
     longest_gap=1.0,
     follows=OPERATOR_HEARTBEAT.name,
 )
@@ -355,7 +355,7 @@ ENGINES_STATE = Topic(
     "",
     ("engine_controller",),
     ("drive", "dead_mans_switch", *OPERATOR_NODES),
-    f"`{ON}` or `{OFF}`, on every change and at 10 Hz: the drive accepts an `{ON}` for "
+    f"`{ON}` or `{OFF}`, on every change and at 10 Hz by default: the drive accepts an `{ON}` for "
     f"{1000 * DRIVE_TIMEOUT:.0f} ms",
     _not_one_of(ON, OFF),
 )
@@ -390,8 +390,7 @@ def _describe(qos: QoSProfile) -> str:
         f"last {qos.depth}",
     ]
     if qos.lifespan.nanoseconds:
-        seconds = qos.lifespan.nanoseconds / 1e9
-        parts.append(f"lifespan {seconds:g} s" if seconds >= 1 else f"lifespan {seconds * 1000:g} ms")
+        parts.append(f"lifespan {qos.lifespan.nanoseconds / 1e6:g} ms")
     return ", ".join(parts)
 
 

@@ -120,8 +120,8 @@ def _lifespan(nanoseconds: int) -> str:
     )
 
 
-def test_lifespan_of_a_second_is_in_seconds() -> None:
-    assert topics._describe(topics.OPERATOR_PRESENCE.qos).endswith("lifespan 1 s")
+def test_lifespan_is_told_if_there_is_one() -> None:
+    assert topics._describe(topics.DRIVEN_TIME.qos).endswith("last 1, lifespan 400 ms")
     assert topics._describe(QoSProfile(depth=3)) == "reliable, volatile, last 3"
 
 
