@@ -12,17 +12,16 @@ import math
 from deploy.promises.effects import MISSED, disturbing, effects
 from deploy.promises.findings import Evidence, Finding
 from deploy.promises.history import SWITCH, History, between, gaps
-from deploy.promises.limits import OFF_WITHIN
 from interfaces import topics
 
 
 def joints_stand_in_time(history: History) -> Finding:
-    """S6: with a drive, no joint moves later than 10.5 s after the operator's last sign of life."""
-    found = effects(history)
+    """S6: with a drive, no joint moves later than S1 allows after the operator's last sign of life."""
+    found, allowed = effects(history), history.reaction.off_within
     evidence, cases, unknown, longest = [], 0, 0, 0.0
     alive = [s.sent for s in history.signs_of_life()] if history.stream(topics.DRIVEN_TIME) else []
     for begin, end in gaps(alive, -math.inf, history.end) if alive else ():
-        if end - begin <= OFF_WITHIN:
+        if end - begin <= allowed:
             continue
         last = max(_last_move(history, joint, begin, end) for joint in topics.JOINTS)
         if last == -math.inf:
@@ -31,15 +30,15 @@ def joints_stand_in_time(history: History) -> Finding:
         since = max([begin, *(min(each.end, last) for each in blind)])
         if begin == -math.inf:
             evidence.append(Evidence(last, "a joint moved before the operator's first sign of life"))
-        elif last - since > OFF_WITHIN:
+        elif last - since > allowed:
             text = f"a joint still moved {last - since:.2f} s after the operator's last sign of life"
-            evidence.append(Evidence(since + OFF_WITHIN, text))
-        elif last - begin > OFF_WITHIN:
+            evidence.append(Evidence(since + allowed, text))
+        elif last - begin > allowed:
             unknown += 1  # the observer may have missed the last sign of life
             continue
         longest = max(longest, last - since)
         cases += 1
-    measured = f"joints stood within {longest:.2f} s, allowed {OFF_WITHIN} s"
+    measured = f"joints stood within {longest:.2f} s, allowed {allowed:g} s"
     return Finding("S6", cases, measured, evidence, unknown, worst=longest)
 
 

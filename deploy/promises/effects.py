@@ -38,7 +38,6 @@ RESTARTED = 0.02  # a process may be noted to start so long before the last mess
 AT_ONCE = 0.001  # a fault so soon after a recovery may have come first
 REDISCOVERY = 10.0  # after a partition until the hosts have discovered each other again
 SENDING = 0.02  # a fault may interrupt what was sent so shortly before or after
-SAMPLING = 0.5  # the watchdog samples: it may date a silence too early, or use a heartbeat late, by so much
 MATCHED = 2.0  # from the start of a process until every reader knows its publishers
 NEW_SWITCH = 3.0  # from the start of a switch until the observer surely knows its publishers
 FLOWING = 1.2  # a program without a message for so long is silent: the slowest output has 1 Hz
@@ -96,9 +95,12 @@ def _of_faults(history: History) -> Iterator[Effect]:
                 yield Effect((WATCHDOG,), begin, replaced, DEAF, fault)
         if kind == names.PARTITION:
             yield Effect((WATCHDOG,), begin, end + REDISCOVERY, DEAF, fault)
+        is_away = kind in ("crash_loop", "kill_supervisor") and target in (WATCHDOG, ALL)
+        if is_away and end + SLOWEST - begin > history.reaction.longest_restart:
+            yield Effect((WATCHDOG,), begin, end + SLOWEST, DEAF, fault)
         if (kind, target) == (names.HOLD, topics.OPERATOR_HEARTBEAT.name):
             # They are too old when they arrive.
-            yield Effect((WATCHDOG,), begin, end + SAMPLING, DEAF, fault)
+            yield Effect((WATCHDOG,), begin, end + history.reaction.watchdog.sampling, DEAF, fault)
         if kind == STEP:  # while it spreads, clocks differ, and the age of a heartbeat is wrong
             yield Effect((WATCHDOG,), begin, begin + SPREAD, DEAF, fault)
         if target in (SENTINEL, ALL):
@@ -107,6 +109,9 @@ def _of_faults(history: History) -> Iterator[Effect]:
             yield Effect((target,), begin - SENDING, begin + SENDING, CUT_OFF, fault)
         if kind == names.BAD_LINE:
             yield Effect((ALL,), begin, end, DELAYED, fault)
+            # It may delay or lose as many heartbeats as a silence has.
+            if history.reaction.watchdog.silence < 2 * BAD_TRANSPORT:
+                yield Effect((WATCHDOG,), begin, end + SLOWEST, DEAF, fault)
         if kind == names.OVERLOAD:
             yield Effect((ALL,), begin, end, OVERLOADED, fault)
         if kind == names.LOSS:

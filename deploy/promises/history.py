@@ -10,9 +10,11 @@ import math
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, NamedTuple
 
 from deploy.running import manifest
+from deploy.running.reaction import Reaction, reaction
 from interfaces import topics
 
 PROGRAMS = tuple(program.name for program in manifest.programs())
@@ -79,7 +81,8 @@ class Sample(NamedTuple):
     """DDS source time."""
     received: float
     value: Any
-    """The content: a float, a bool or a string; (x, y) of a position, (node, pid) of a health report."""
+    """The content: a float, a bool or a string; (x, y) of a position, (node, pid) of a health report, then
+    (name, value) of each parameter that is not the default."""
 
 
 class Life(NamedTuple):
@@ -123,6 +126,15 @@ class History:
     def lacks(self, program: str) -> bool:
         """Return whether the arm does not have a program. Without a drive, that program does nothing."""
         return program in self.absent or (program == DRIVE and not self.stream(topics.DRIVEN_TIME))
+
+    @cached_property
+    def reaction(self) -> Reaction:
+        """How soon the engines must stop, by the parameters that the services report."""
+        given: dict[str, dict[str, Any]] = {}
+        for sample in self.stream(topics.DIAGNOSTICS):
+            node, _, *parameters = sample.value
+            given.setdefault(node, {}).update(parameters)
+        return reaction(given)
 
     @property
     def injected(self) -> list[InjectedFault]:

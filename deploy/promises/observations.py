@@ -28,6 +28,7 @@ from deploy.promises.marks import is_babble
 from deploy.running.errors import DeploymentError
 from deploy.running.recorder import METADATA
 from interfaces import topics
+from interfaces.service.health import reported_parameters
 
 PROCESSES, FAULTS = "/chaos/processes", "/chaos/faults"  # topics
 EARLY = 0.001  # s by which a message may seem to be sent after its reception: clocks are read one by one
@@ -169,5 +170,6 @@ def values(topic: topics.Topic, data: bytes, prefix: str) -> list[Any]:
         reporter, _, subject = status.name.removeprefix(prefix).partition(": ")
         if status.name.startswith(prefix) and "/" not in reporter and subject in ("", reporter):
             with suppress(ValueError):  # a foreign node may use the key for something else
-                found += [(reporter, int(pair.value)) for pair in status.values if pair.key == "pid"]
+                given = reported_parameters(status).items()
+                found += [(reporter, int(pair.value), *given) for pair in status.values if pair.key == "pid"]
     return found

@@ -18,7 +18,7 @@ from deploy.promises.effects import (
     OVERLOADED,
     REPLACED,
     SAME,
-    SAMPLING,
+    SILENT,
     STARTING,
     SUSPENDED,
     TRANSPORT,
@@ -32,9 +32,11 @@ from deploy.promises.findings import Evidence, Finding, count, how_often
 from deploy.promises.history import (
     ALL,
     CONTROLLER,
+    SILENCE,
     SWITCH,
     WATCHDOG,
     History,
+    InjectedFault,
     Life,
     Sample,
     between,
@@ -43,18 +45,23 @@ from deploy.promises.history import (
     merged,
     running,
 )
-from deploy.promises.limits import MAX_PRESENCE_AGE, OFF_WITHIN, PRESENCE_TIMEOUT, STRIKE, STRIKES
 from deploy.promises.positions import PublishedValues, may_lack_values
 from interfaces import topics
 from interfaces.topics import DRIVE_TIMEOUT, INCAPACITATED, OFF, ON, TURN_OFF, TURN_ON
 
+FAIL_SAFES = {
+    WATCHDOG: (SILENT, SUSPENDED, DEAF, DELAYED, *MISSED),
+    CONTROLLER: (SILENT, SUSPENDED, *MISSED),
+}
+"""The programs of F1 and F2 (deploy/SAFETY.md), and the effects that may keep them from acting in time."""
+
 
 def engines_off_in_time(history: History) -> Finding:
-    """S1: engines are off at most 10.5 s after the operator's last sign of life."""
+    """S1: engines are off in time after the operator's last sign of life."""
     alive = [s.sent for s in history.signs_of_life()]
-    evidence, longest, cases, unknown = [], 0.0, 0, 0
-    on = list(running(history))
-    overloads = merged((each.begin, each.end) for each in effects(history) if each.why == OVERLOADED)
+    evidence, longest, longest_undisturbed, cases, unknown = [], 0.0, 0.0, 0, 0
+    given, on, found = history.reaction, list(running(history)), effects(history)
+    overloads = merged((each.begin, each.end) for each in found if each.why == OVERLOADED)
     for begin, end in gaps(alive, -math.inf, history.end):
         late = _overlapping_part(on, begin, end)
         if not late:
@@ -69,16 +76,22 @@ def engines_off_in_time(history: History) -> Finding:
         if since == -math.inf:
             evidence.append(Evidence(late[0][0], "engines on before the operator's first sign of life"))
             continue
-        if lasted <= OFF_WITHIN < min(late[-1][1], end) - begin:
+        stopped = min(late[-1][1], end)
+        allowed = _allowed(history, found, begin, stopped)
+        if lasted <= allowed < stopped - begin:
             unknown += 1
             continue
         longest = max(longest, lasted)
+        if allowed == given.off_undisturbed:
+            longest_undisturbed = max(longest_undisturbed, lasted)
         # The silence exercises the promise if it lasts until the engines are off.
-        cases += late[-1][1] < end and end - begin > MAX_PRESENCE_AGE
-        if lasted > OFF_WITHIN:
+        cases += late[-1][1] < end and end - begin > given.controller.max_presence_age
+        if lasted > allowed:
             text = f"engines still on {lasted:.2f} s after the operator's last sign of life"
-            evidence.append(Evidence(since + OFF_WITHIN, text))
-    measured = f"off within {longest:.2f} s, allowed {OFF_WITHIN} s"
+            evidence.append(Evidence(since + allowed, text))
+    measured = f"off within {longest:.2f} s, allowed {given.off_within:g} s"
+    if longest_undisturbed:
+        measured += f"; undisturbed {longest_undisturbed:.2f} s, allowed {given.off_undisturbed:g} s"
     return Finding("S1", cases, measured, evidence, unknown, worst=longest)
 
 
@@ -94,11 +107,11 @@ def engines_stay_on(history: History) -> Finding:
         else:
             evidence.append(Evidence(off.sent, "engines turned off although the operator was present"))
     states = history.stream(topics.ENGINES_STATE)
-    heartbeats = history.signs_of_life()
+    heartbeats, age = history.signs_of_life(), history.reaction.controller.max_presence_age
     for fault in history.faults:
         if fault.kind == "kill" and fault.target != CONTROLLER:
             before = last_sent(states, fault.begin)
-            alive = between(heartbeats, fault.begin - MAX_PRESENCE_AGE, fault.begin)
+            alive = between(heartbeats, fault.begin - age, fault.begin)
             kills += bool(before and before.value == ON and alive)
     measured = f"{count(kills, 'kill')} while on; turned off {how_often(permitted)} for a permitted reason"
     return Finding("S2", kills, measured, evidence, unknown)
@@ -108,14 +121,14 @@ def turned_on_with_operator(history: History) -> Finding:
     """S3: engines turn on only by a `turn_on` with the operator present."""
     commands = [s for s in history.stream(topics.ENGINES) if s.value == TURN_ON]
     heartbeats = history.signs_of_life()
-    found = effects(history)
+    found, age = effects(history), history.reaction.controller.max_presence_age
     evidence, cases, unknown, oldest = [], 0, 0, 0.0
     before = -math.inf
     for stopped, on in _starts(history):
         # A command turns the engines on once; the next start needs another one.
-        command = between(commands, max(before, on.sent - MAX_PRESENCE_AGE - TRANSPORT), on.sent + SAME)
+        command = between(commands, max(before, on.sent - age - TRANSPORT), on.sent + SAME)
         before = on.sent + SAME + 0.001
-        seen = between(heartbeats, on.sent - MAX_PRESENCE_AGE - TRANSPORT, on.sent + SAME)
+        seen = between(heartbeats, on.sent - age - TRANSPORT, on.sent + SAME)
         if command and seen:
             cases += 1
             oldest = max(oldest, on.sent - seen[-1].sent)
@@ -123,11 +136,11 @@ def turned_on_with_operator(history: History) -> Finding:
             found, SWITCH, on.sent, on.sent, UNDISCOVERED
         ):
             unknown += 1
-        elif not undisturbed(found, ALL, max(stopped, on.sent - MAX_PRESENCE_AGE), on.sent, *MISSED):
+        elif not undisturbed(found, ALL, max(stopped, on.sent - age), on.sent, *MISSED):
             unknown += 1  # the observer may have missed the command, or the states that kept them on
         else:
             missing = "a turn_on" if not command else "a sign of life"
-            evidence.append(Evidence(on.sent, f"engines turned on without {missing} in the last second"))
+            evidence.append(Evidence(on.sent, f"engines turned on without {missing} in the last {age:g} s"))
     measured = f"turned on {how_often(cases)}, operator seen at most {oldest:.2f} s before"
     return Finding("S3", cases, measured, evidence, unknown)
 
@@ -161,7 +174,7 @@ def single_instances(history: History) -> Finding:
         if life.ended is not None and not undisturbed(found, ALL, second.sent, life.ended, *MISSED):
             unknown += 1  # the observer may have noted the end too late
         else:
-            name, pid = second.value
+            name, pid, *_ = second.value
             together = f"process {pid} runs {name} while process {life.pid} lives"
             evidence.append(Evidence(second.sent, together))
     for program in {life.program for life in history.lives}:
@@ -171,6 +184,19 @@ def single_instances(history: History) -> Finding:
         cases += len(lives) - 1
         evidence += [_two(a, b) for a, b in _overlapping(history, found, lives)]
     return Finding("S5", cases, f"restarts and duplicates: {cases}", sorted(evidence), unknown)
+
+
+def _allowed(history: History, found: Sequence[Effect], begin: float, end: float) -> float:
+    """Return within which time [s] the engines must be off, by the fail-safes that a fault hits."""
+    hits = [
+        any(
+            not isinstance(each.cause, InjectedFault) or each.cause.kind != SILENCE
+            for each in disturbing(found, program, begin, end, *why)
+        )
+        for program, why in FAIL_SAFES.items()
+    ]
+    given = history.reaction
+    return (given.off_undisturbed, given.off_after_one_death, given.off_within)[sum(hits)]
 
 
 def _overlapping_part(
@@ -218,9 +244,10 @@ def _was_away(found: Sequence[Effect], on: Sample, off: Sample) -> bool:
 
 
 def _was_present(history: History, time: float) -> bool:
-    """Return whether the operator watchdog reported the operator's presence in the second before."""
+    """Return whether the operator watchdog reported the operator's presence just before."""
     presences = history.stream(topics.OPERATOR_PRESENCE)
-    return bool(between(presences, time - MAX_PRESENCE_AGE - TRANSPORT, time + SAME))
+    age = history.reaction.controller.max_presence_age
+    return bool(between(presences, time - age - TRANSPORT, time + SAME))
 
 
 def _commanded(history: History, found: Sequence[Effect], off: Sample) -> bool:
@@ -232,7 +259,7 @@ def _commanded(history: History, found: Sequence[Effect], off: Sample) -> bool:
     just_before = between(commands, off.sent - _transport(found, off.sent), off.sent + SAME)
     if not all(_is_of_watchdog(history, command) for command in just_before):
         return True
-    return bool(just_before) and _strikes(history, found, off.sent) >= STRIKES
+    return bool(just_before) and _strikes(history, found, off.sent) >= history.reaction.watchdog.strikes
 
 
 def _is_of_watchdog(history: History, command: Sample) -> bool:
@@ -258,26 +285,30 @@ def _strikes(history: History, found: Sequence[Effect], time: float) -> float:
     since = max([*commands, *starts], default=0.0)
     heartbeats = [s.sent for s in history.signs_of_life()]
     begin = max((t for t in heartbeats if t <= since), default=0.0)
-    # A suspended watchdog receives no heartbeat either; S2 does not cover that.
+    given = history.reaction.watchdog
+    # A suspended watchdog receives no heartbeat either, nor the last one before; S2 does not cover that.
     deaf = [
-        (max(effect.begin, begin), min(effect.end, time))
+        (max(effect.begin - given.reading, begin), min(effect.end, time))
         for effect in disturbing(found, WATCHDOG, begin, time, DEAF)
     ]
     # Intervals that only touch have a heartbeat in between.
     silences = merged([*gaps(heartbeats, begin, time), *deaf])
-    return sum((end - begin + SAMPLING) // STRIKE for begin, end in silences)
+    return sum((end - begin + given.sampling) // given.silence for begin, end in silences)
 
 
 def _abandoned(history: History, found: Sequence[Effect], off: Sample) -> bool:
-    """Return whether the operator or a suspended watchdog left the controller without presence for 10 s."""
-    begin = off.sent - PRESENCE_TIMEOUT + SAMPLING + TRANSPORT  # a presence is as old as its stamp
+    """Return whether the operator or a suspended watchdog left the controller without a presence."""
+    given = history.reaction
+    # A presence is as old as its stamp.
+    begin = off.sent - given.controller.presence_timeout + given.watchdog.sampling + TRANSPORT
     deaf = list(disturbing(found, WATCHDOG, begin, off.sent, DEAF))
     for presence in between(history.stream(topics.OPERATOR_PRESENCE), begin, off.sent - TRANSPORT):
         # A presence sent right after resuming may stem from an older heartbeat.
         if not any(each.begin < presence.sent <= each.end + TRANSPORT for each in deaf):
             return False
     heartbeats = [s.sent for s in history.signs_of_life()]
-    silent = any(two - one > MAX_PRESENCE_AGE for one, two in gaps(heartbeats, begin, off.sent))
+    absence = given.controller.max_presence_age
+    silent = any(two - one > absence for one, two in gaps(heartbeats, begin, off.sent))
     return silent or bool(deaf)
 
 
@@ -305,7 +336,7 @@ def _reports_beside_another(history: History) -> Iterator[tuple[Sample, Life]]:
     lives = {(life.program, life.pid): life for life in history.lives}
     instances: dict[str, set[int]] = {}
     for sample in history.stream(topics.DIAGNOSTICS):
-        name, pid = sample.value
+        name, pid, *_ = sample.value
         known = instances.setdefault(name, set())
         if pid in known:
             continue

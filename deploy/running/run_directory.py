@@ -84,15 +84,15 @@ class RunDirectory:
 
     def origin(self) -> float:
         """The origin of the running system's scenario [s, monotonic clock]; NOT_YET before it begins."""
-        return float(self._written_parameters()[ALL][KEY]["scenario_epoch"])
+        return float(self.written_parameters()[ALL][KEY]["scenario_epoch"])
 
     def keep_origin(self, origin: float) -> None:
         """Write the origin of the scenario [s, monotonic clock] for services that start from now on."""
-        document = self._written_parameters()
+        document = self.written_parameters()
         document[ALL][KEY]["scenario_epoch"] = origin
         self.write_parameters(document)
 
-    def _written_parameters(self) -> dict[str, Any]:
+    def written_parameters(self) -> dict[str, Any]:
         import yaml
 
         try:
@@ -133,9 +133,17 @@ def make_directory(path: Path, mode: int = 0o777) -> None:
         ) from None
 
 
+def with_parameters(parameters: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the content of two parameter files in one: the given values count."""
+    return {
+        node: {KEY: parameters.get(node, {KEY: {}})[KEY] | given.get(node, {KEY: {}})[KEY]}
+        for node in {**parameters, **given}
+    }
+
+
 def scenario_parameters(
     scenario: Path | str, origin: float, settings: str | Path = SETTINGS
-) -> dict[str, object]:
+) -> dict[str, Any]:
     """The parameters that all services share, as the content of a ROS parameter file.
 
     :param scenario: its file, '' for none.

@@ -34,6 +34,16 @@ def engines_turn_off_after(silence: float) -> History:
     return added(history, "engines/state", (AT + silence, OFF))
 
 
+def with_kills(turned_off: Callable[[float], History], *programs: str) -> Callable[[float], History]:
+    def build(silence: float) -> History:
+        history = turned_off(silence)
+        for program in programs:
+            history = faulty(history, InjectedFault("kill", program, AT + 4.0, AT + 4.0))
+        return history
+
+    return build
+
+
 def last_on_after(silence: float) -> History:
     history = silent(without_operator(good()), "engines/state", AT + silence - 0.05, END)
     return added(history, "engines/state", (AT + silence, ON))
@@ -123,8 +133,12 @@ def replaced_after(hang: float) -> History:
 
 BOUNDS: list[tuple[str, Callable[[float], History], float, float]] = [
     # promise, history with a time [s], the longest or shortest time that is allowed, a time beyond
-    ("S1", engines_turn_off_after, 10.49, 10.51),
-    ("S1", last_on_after, 10.09, 10.11),  # then the drive stops, 0.4 s later
+    ("S1", engines_turn_off_after, 10.04, 10.06),
+    ("S1", with_kills(engines_turn_off_after, "operator_watchdog"), 10.44, 10.46),
+    ("S1", with_kills(engines_turn_off_after, "engine_controller"), 10.44, 10.46),
+    ("S1", with_kills(engines_turn_off_after, "kinematics"), 10.04, 10.06),
+    ("S1", with_kills(engines_turn_off_after, "operator_watchdog", "engine_controller"), 10.49, 10.51),
+    ("S1", with_kills(last_on_after, "operator_watchdog", "engine_controller"), 10.09, 10.11),  # then F3 acts
     ("S2", turned_off_with_a_presence_before, 9.37, 9.33),
     ("S2", turned_off_after_three_silences_of, 2.51, 2.49),
     ("S2", turned_off_after_a_command_before, 0.14, 0.16),

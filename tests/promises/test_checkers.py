@@ -75,6 +75,26 @@ def test_s1_detects_engines_that_turn_on_again() -> None:
     assert verdict("S1", history) == VIOLATED
 
 
+def test_s2_permits_a_crash_loop_of_the_watchdog_if_engines_wait_less() -> None:
+    loop = InjectedFault("crash_loop", "operator_watchdog", 20.0, 24.0)
+    history = faulty(silent(good(), "operator_presence", 20.0, 25.0), loop)
+    history = with_value(history, "engines/state", OFF, 21.5)
+    assert verdict("S2", history) == VIOLATED
+    quick = ("presence_timeout", 1.36), ("max_presence_age", 0.2)
+    watchdog = ("lifespan", 0.12), ("sampling", 0.04), ("silence", 0.29), ("strikes", 1)
+    history = added(history, "/diagnostics", (6.0, ("engine_controller", 110, *quick)))
+    history = added(history, "/diagnostics", (6.0, ("operator_watchdog", 109, *watchdog)))
+    assert verdict("S2", history) == UNKNOWN
+
+
+def test_s1_is_judged_by_the_parameters_that_the_services_report() -> None:
+    quick = (("silence", 0.6), ("strikes", 1))
+    history = added(good(), "/diagnostics", (6.0, ("operator_watchdog", 109, *quick)))
+    assert history.reaction.off_undisturbed == 1.65
+    assert verdict("S1", asleep(history, 20.0, 21.5)) == HOLDS
+    assert verdict("S1", asleep(history, 20.0, 21.7)) == VIOLATED
+
+
 def test_s1_released_switch_is_not_a_sign_of_life() -> None:
     history = asleep(good(), 20.0, 50.0)
     history = added(history, "operator_heartbeat", *((20.0 + n, False) for n in range(30)))

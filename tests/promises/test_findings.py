@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from deploy.promises.effects import SAMPLING, TRANSPORT
+from deploy.promises.effects import TRANSPORT
 from deploy.promises.findings import Evidence, Finding
 from deploy.promises.history import (
     ALL,
@@ -27,7 +27,6 @@ from deploy.promises.history import (
     Life,
     Sample,
 )
-from deploy.promises.limits import PRESENCE_TIMEOUT
 from deploy.promises.marks import STEP
 from deploy.promises.promises import CHECKERS
 from interfaces.topics import ALIVE, DRIVE_TIMEOUT, INCAPACITATED, MISSED, OFF, ON, TURN_OFF, TURN_ON
@@ -80,6 +79,9 @@ def overload(begin: float, end: float) -> InjectedFault:
 
 # S1
 
+STOPPED = [InjectedFault("stop", each, 0.0, 40.0) for each in ("operator_watchdog", "engine_controller")]
+"""Faults after which only the drive stops the engines."""
+
 
 def test_s1_counts_silences_that_last_until_the_engines_are_off() -> None:
     heartbeats = [*steps(1, 2), *steps(4, 5), *steps(6, 8), *steps(10, 12), (30.0, True), (31.0, True)]
@@ -91,19 +93,19 @@ def test_s1_counts_silences_that_last_until_the_engines_are_off() -> None:
         (10.0, ON),
         (22.5, OFF),  # 10.5 s after the last heartbeat
     )
-    assert CHECKERS["S1"](history(heartbeats=heartbeats, states=states)) == Finding(
+    assert CHECKERS["S1"](history(heartbeats=heartbeats, states=states, faults=STOPPED)) == Finding(
         "S1", 2, "off within 10.50 s, allowed 10.5 s", [], worst=10.5
     )
 
 
 def test_s1_operator_who_is_never_silent_is_no_case() -> None:
-    found = CHECKERS["S1"](history(heartbeats=steps(0, 40), states=engines((0.0, ON))))
+    found = CHECKERS["S1"](history(heartbeats=steps(0, 40), states=engines((0.0, ON)), faults=STOPPED))
     assert found == Finding("S1", 0, "off within 0.25 s, allowed 10.5 s", [], worst=0.25)
 
 
 def test_s1_evidence_has_the_moment_of_the_violation() -> None:
     states = engines((1.0, ON), (1.5, OFF), (5.0, ON), (17.0, OFF))
-    assert CHECKERS["S1"](history(heartbeats=[(5.0, True)], states=states)) == Finding(
+    assert CHECKERS["S1"](history(heartbeats=[(5.0, True)], states=states, faults=STOPPED)) == Finding(
         "S1",
         1,
         "off within 12.00 s, allowed 10.5 s",
@@ -136,7 +138,9 @@ def test_s1_silence_begins_after_an_overload_at_the_latest(
     overloads: list[InjectedFault], off: float, lasted: float
 ) -> None:
     found = CHECKERS["S1"](
-        history(heartbeats=[(2.0, True)], states=engines((2.0, ON), (off, OFF)), faults=overloads)
+        history(
+            heartbeats=[(2.0, True)], states=engines((2.0, ON), (off, OFF)), faults=[*overloads, *STOPPED]
+        )
     )
     is_late, is_known = lasted > 10.5, lasted > 10.5 or off <= 12.5
     assert [each.text for each in found.evidence] == (
@@ -239,7 +243,7 @@ def heard_but_in(*silences: tuple[float, float]) -> list[tuple[float, bool]]:
 SILENCES = ((4.0, 7.0), (8.0, 11.0), (12.0, 15.0))  # a strike each
 AFTER_A_PAUSE = [(at, state) for at, state in engines((0.0, ON), (20.0, OFF)) if not 19.0 < at < 20.0]
 UNSEEN = {"presences": steps(0, 10), "heartbeats": steps(0, 40)}
-FIRST_UNSEEN = 20.0 - PRESENCE_TIMEOUT + SAMPLING + TRANSPORT
+FIRST_UNSEEN = 20.0 - 10.0 + 0.5 + TRANSPORT
 SHORT = heard_but_in(*SILENCES[:2], (12.0, 14.25))  # the last silence lacks 0.75 s of a strike
 COMMANDED = {"commands": [(20.0, TURN_OFF)], "heartbeats": heard_but_in(*SILENCES)}
 
@@ -325,6 +329,9 @@ def suspended_with_a_presence_at(time: float) -> dict[str, Any]:
         (COMMANDED | {"heartbeats": SHORT, "faults": [stopped(NO_TARGET, 14.0, 14.0, STEP)]}, True),
         (COMMANDED | {"heartbeats": SHORT, "faults": [stopped(NO_TARGET, 13.25, 13.25, STEP)]}, False),
         (COMMANDED | {"heartbeats": SHORT, "faults": [stopped(NO_TARGET, 14.5, 14.5, STEP)]}, False),
+        # and so has the heartbeat of 14.25 s, if it is read after the step
+        (COMMANDED | {"heartbeats": SHORT, "faults": [stopped(NO_TARGET, 14.3125, 14.3125, STEP)]}, True),
+        (COMMANDED | {"heartbeats": SHORT, "faults": [stopped(NO_TARGET, 14.375, 14.375, STEP)]}, False),
         # late heartbeats are no sign of life
         (
             COMMANDED | {"heartbeats": SHORT, "faults": [stopped("operator_heartbeat", 14.0, 15.0, HOLD)]},
@@ -390,9 +397,9 @@ def test_s3_each_start_needs_a_command_and_a_sign_of_life_of_its_own() -> None:
         4,
         "turned on 4 times, operator seen at most 0.50 s before",
         [
-            Evidence(20.0, "engines turned on without a turn_on in the last second"),
-            Evidence(25.5, "engines turned on without a turn_on in the last second"),
-            Evidence(35.0, "engines turned on without a sign of life in the last second"),
+            Evidence(20.0, "engines turned on without a turn_on in the last 1 s"),
+            Evidence(25.5, "engines turned on without a turn_on in the last 1 s"),
+            Evidence(35.0, "engines turned on without a sign of life in the last 1 s"),
         ],
     )
 

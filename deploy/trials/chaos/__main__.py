@@ -29,6 +29,7 @@ from deploy.running.system import System
 from deploy.trials.chaos import plan
 from deploy.trials.chaos.arm import file_suffix
 from deploy.trials.chaos.cost import Cost
+from interfaces.service import UserError
 
 KEPT = 10  # records
 
@@ -44,7 +45,7 @@ def main(arguments: Sequence[str]) -> int:
     except interruption.Interrupted:
         print("Interrupted: all processes have been stopped.")
         return 130
-    except (DeploymentError, OSError) as error:
+    except (DeploymentError, UserError, OSError) as error:
         print(error, file=sys.stderr)
         return 1
 

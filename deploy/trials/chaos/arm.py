@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
+from typing import Any
 
 from deploy.promises.marks import BABBLER
 from deploy.running import processes
@@ -22,6 +23,8 @@ class RealArm:
         self.namespace = namespace
         self.system = system
         self.domain = 0  # ROS_DOMAIN_ID
+        self.parameters: Mapping[str, Any] = {}
+        """The content of the user's parameter file."""
         self.nested = NestedFaults()
         self.clock = Clock(system.run.parent / f"clock{file_suffix(namespace)}")
         self._environment: dict[str, str] = {}

@@ -29,7 +29,7 @@ from interfaces import topics
 from interfaces.service import middleware
 
 RATES = {"flood": 10_000.0, "babble": 200.0, "pretend": 2.0}  # Hz; of babble, over all topics
-PRETENDED_AGE = 2.0  # s of a presence: too old for `turn_on`, young enough to leave the engines on
+PRETENDED_AGE = 1.2  # s of a presence: too old for `turn_on`, young enough to leave the engines on
 
 _INVALID_STAMPS = (Time(sec=0), Time(sec=2**31 - 1))  # of a presence: too old, and in the future
 

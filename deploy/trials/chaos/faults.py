@@ -18,7 +18,7 @@ from deploy.promises import marks
 from deploy.promises.history import ALL, NO_TARGET, PROGRAMS
 from deploy.promises.marks import BABBLER
 from deploy.running import parameter_file, processes
-from deploy.running.run_directory import KEY
+from deploy.running.run_directory import KEY, with_parameters
 from deploy.trials.chaos import clock
 from deploy.trials.chaos.arm import RealArm
 
@@ -121,8 +121,9 @@ def crash_loop(arm: RealArm, program: str) -> Undo:
     """SIGKILL a program after giving a parameter the wrong type: the program refuses to start."""
     path = arm.system.parameters
     node = f"{arm.namespace.rstrip('/')}/{program}"
+    given = {node: arm.parameters[node]} if node in arm.parameters else {}
     bad = {node: {KEY: {PARAMETERS[program]: "not a number"}}}
-    arm.system.write_parameters(yaml.safe_load(path.read_text()) | bad)
+    arm.system.write_parameters(with_parameters(yaml.safe_load(path.read_text()), bad))
     _send(arm, arm.pid(program), signal.SIGKILL)
 
     def repair() -> None:
@@ -130,7 +131,7 @@ def crash_loop(arm: RealArm, program: str) -> Undo:
             # The file is read again: another program may have a bad parameter now.
             left = yaml.safe_load(path.read_text())
             left.pop(node, None)
-            arm.system.write_parameters(left)
+            arm.system.write_parameters(left | given)
 
     return arm.nested.begin(("crash_loop", program), repair)
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from deploy.promises import marks
+from deploy.running import parameter_file
 from deploy.running.errors import DeploymentError
 from deploy.trials.chaos import clock, partition, schedule, schedule_file
 from deploy.trials.chaos.faults import FAULT_KINDS
@@ -54,19 +55,28 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     add("--arms", type=int, default=1, help="they share the random faults; each gets a whole scenario")
     add("--loss", type=number(0, 100), default=0.0, help="percent of all DDS packets that are lost")
     add("--schedule", type=Path, metavar="FILE", help="run a schedule, such as `make simulate` writes")
+    add("--parameters", default="", metavar="FILE", help="a ROS parameter file for the services")
     add("--replay", type=Path, metavar="RECORD", help="only judge a record")
     options = parser.parse_args(arguments)
     if not 1 <= options.arms <= len(DOMAINS):
         parser.error(f"--arms must be from 1 to {len(DOMAINS)}: each arm needs a ROS domain")
     if options.arms > 1 and options.scenario in partition.SCHEDULES:
         parser.error(f"--scenario {options.scenario} allows only one arm")
-    if options.schedule and (options.scenario != RANDOM or options.arms > 1):
-        parser.error("--schedule has faults of its own, for one arm")
+    if options.schedule and (options.scenario != RANDOM or options.arms > 1 or options.parameters):
+        parser.error("--schedule has faults and parameters of its own, for one arm")
     return options
 
 
 def plan(options: argparse.Namespace) -> Plan:
     """Return the plan of a command line. Raises DeploymentError if it is empty, or not possible here."""
+    planned = _faults_and_arms(options)
+    if not options.parameters:
+        return planned
+    testbed = partial(planned.testbed, parameters=partial(parameter_file.load, options.parameters))
+    return planned._replace(title=f"{planned.title}, {options.parameters}", testbed=testbed)
+
+
+def _faults_and_arms(options: argparse.Namespace) -> Plan:
     if options.scenario in partition.SCHEDULES:
         if reason := partition.missing(options.scenario):
             raise DeploymentError(f"{options.scenario} is not possible on this machine: {reason}")
@@ -98,7 +108,10 @@ def _scheduled(path: Path) -> Plan:
     if unknown := sorted(kinds - FAULT_KINDS.keys()):
         raise DeploymentError(f"{path}: only make simulate can inject {', '.join(unknown)}")
     title = f"Schedule {path}, {experiment.length:.0f} s"
-    return Plan(title, [experiment.faults], experiment.length, partial(Testbed, scenario=experiment.scenario))
+    testbed = partial(
+        Testbed, scenario=experiment.scenario, parameters=lambda namespace: experiment.parameters
+    )
+    return Plan(title, [experiment.faults], experiment.length, testbed)
 
 
 def _fleet(arms: int) -> Callable[..., Testbed]:

@@ -4,6 +4,7 @@
 
     seed: 7 shift 12
     length: 45.0                                          # s
+    parameters: {}                                        # as in a parameter file, nodes by full names
     scenario: {l1: {...}, operator: {...}, engines: ...}  # as in a scenario file
     faults:
       - {at: 5.0, kind: kill, target: kinematics, duration: 0.0}
@@ -14,7 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -34,12 +35,15 @@ class Experiment:
     """[s] of the scenario."""
     scenario: Mapping[str, Any]
     faults: Schedule
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+    """The content of a parameter file of the services."""
 
 
 def save(experiment: Experiment, path: Path) -> None:
     document = {
         "seed": experiment.seed,
         "length": experiment.length,
+        "parameters": dict(experiment.parameters),
         "scenario": dict(experiment.scenario),
         "faults": [each._asdict() for each in experiment.faults],
     }
@@ -52,7 +56,9 @@ def load(path: Path) -> Experiment:
         document: Any = yaml.safe_load(path.read_text(encoding="utf-8"))
         scenario = _checked(document, "scenario", dict, "mapping")
         faults = [_fault(each) for each in _checked(document, "faults", list, "list")]
-        return Experiment(str(document["seed"]), _seconds("length", document["length"]), scenario, faults)
+        length = _seconds("length", document["length"])
+        parameters = _checked({"parameters": {}} | document, "parameters", dict, "mapping")
+        return Experiment(str(document["seed"]), length, scenario, faults, parameters)
     except OSError as error:
         raise DeploymentError(f"{path}: {error.strerror}") from None
     except (yaml.YAMLError, UnicodeDecodeError, KeyError, TypeError, ValueError) as error:

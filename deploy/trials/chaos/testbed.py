@@ -41,7 +41,7 @@ from deploy.promises.history import (
 from deploy.running import interruption, processes
 from deploy.running.environment import NAMESPACE
 from deploy.running.errors import DeploymentError
-from deploy.running.run_directory import scenario_parameters
+from deploy.running.run_directory import scenario_parameters, with_parameters
 from deploy.running.system import System
 from deploy.trials.chaos import clock
 from deploy.trials.chaos.arm import RealArm, file_suffix
@@ -91,11 +91,13 @@ class Testbed:
         say: Callable[[str], None] = lambda text: None,
         loss: float = 0.0,
         steps_clock: bool = False,
+        parameters: Callable[[str], Mapping[str, Any]] = lambda namespace: {},
     ) -> None:
         """:param directory: for the record and the runtime files; must not exist yet.
         :param say: receives a line for each injected fault.
         :param loss: DDS packets that each process loses [%], by Cyclone DDS: not every kernel has netem.
         :param steps_clock: whether the fault `step_clock` can be injected.
+        :param parameters: returns the content of a parameter file for the arm in a namespace.
         """
         self.record = directory / "record.mcap"
         self.arms = [RealArm(name, System(directory / f"run{file_suffix(name)}")) for name in namespaces]
@@ -107,6 +109,7 @@ class Testbed:
         self._say = say
         self._loss = loss
         self._steps_clock = steps_clock
+        self.parameters_of = parameters
         self._stack = ExitStack()
         self.epoch = 0.0  # origin of the scenario, on the monotonic clock
         self._origin = 0.0  # of the record
@@ -127,8 +130,9 @@ class Testbed:
             environment |= {"PYTHONPATH": os.pathsep.join(path), **faked}
             for arm in self.arms:
                 arm_environment = {NAMESPACE: arm.namespace, "ROS_DOMAIN_ID": str(arm.domain)}
+                arm.parameters = self.parameters_of(arm.namespace)
                 with _environment(environment | arm_environment | arm.clock.environment()):
-                    self.start(arm, parameters)
+                    self.start(arm, with_parameters(parameters, arm.parameters))
                 arm.environment()
                 # One arm after the other: starting together would take each of them too long.
                 self.await_messages([arm], [topics.ENGINES_STATE], lines)
@@ -205,7 +209,7 @@ class Testbed:
         for arm, condition in itertools.product(self.arms, conditions):
             self._record(condition, arm)
 
-    def _parameters(self) -> dict[str, object]:
+    def _parameters(self) -> dict[str, Any]:
         """Return the parameters of all arms, with an origin of the scenario that they share."""
         scenario = self._directory / "scenario.yaml"
         scenario.write_text(yaml.safe_dump(dict(self.scenario)))

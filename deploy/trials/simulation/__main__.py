@@ -17,7 +17,7 @@ from deploy.promises.findings import count, how_often
 from deploy.promises.history import STUCK_DRIVE
 from deploy.promises.html_report import html, verdict
 from deploy.promises.text_report import text
-from deploy.running import interruption, processes
+from deploy.running import interruption, parameter_file, processes
 from deploy.running.errors import DeploymentError
 from deploy.running.run_directory import make_directory
 from deploy.trials.chaos import schedule_file
@@ -30,6 +30,7 @@ from deploy.trials.simulation.outcome import Outcome, simulate
 from deploy.trials.simulation.shrink import shrink
 from deploy.trials.simulation.summary import Summary
 from deploy.trials.simulation.workers import summaries
+from interfaces.service import UserError
 
 BAR = 40  # characters
 
@@ -41,7 +42,7 @@ def main(arguments: Sequence[str]) -> int:
     except interruption.Interrupted:
         print("Interrupted.")
         return 130
-    except DeploymentError as error:
+    except (DeploymentError, UserError) as error:
         print(error, file=sys.stderr)
         return 1
 
@@ -62,9 +63,13 @@ def _parse(arguments: Sequence[str]) -> argparse.Namespace:
     )
     add("--faults", type=names(FAULT_KINDS), default=tuple(FAULT_KINDS), help=of_kinds)
     add("--schedule", type=Path, metavar="FILE", help="run this schedule instead")
+    add("--parameters", default="", metavar="FILE", help="a ROS parameter file for the services")
     minutes = "for a number of minutes, inject faults at every message and timer of an operator's day instead"
     add("--systematic", type=number(0.01, 100_000), metavar="MINUTES", help=minutes)
-    return parser.parse_args(arguments)
+    options = parser.parse_args(arguments)
+    if options.parameters and (options.schedule or options.systematic):
+        parser.error("--parameters are for random faults: a schedule has parameters of its own")
+    return options
 
 
 def _run(options: argparse.Namespace) -> int:
@@ -74,8 +79,11 @@ def _run(options: argparse.Namespace) -> int:
     if options.systematic:
         experiments, title = systematic.cases(seed)
         return _run_all(experiments, title, 60 * options.systematic)
-    experiments = plan.experiments(seed, options.hours, options.every, options.faults)
+    parameters = parameter_file.load(options.parameters, "/") if options.parameters else {}
+    experiments = plan.experiments(seed, options.hours, options.every, options.faults, parameters)
     title = f"Simulated arm, seed {seed}, {options.hours:g} h, a fault every {options.every:g} s"
+    if options.parameters:
+        title += f", {options.parameters}"
     return _run_all(experiments, title, math.inf)
 
 

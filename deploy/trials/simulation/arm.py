@@ -16,7 +16,7 @@ from deploy.promises.history import SWITCH, Life
 from deploy.running import manifest
 from deploy.running.errors import DeploymentError
 from deploy.running.processes import MARK
-from deploy.running.run_directory import SETTINGS, scenario_parameters
+from deploy.running.run_directory import SETTINGS, scenario_parameters, with_parameters
 from deploy.running.system import SERVICE_GRACE
 from deploy.trials.chaos.nested_faults import NestedFaults
 from deploy.trials.simulation.calibration import Calibration, load
@@ -30,6 +30,7 @@ PROGRAMS = tuple(each for each in manifest.programs() if each.name != manifest.P
 NAMES = tuple(each.name for each in PROGRAMS)
 ROBOT, CONTROL = "robot", "operator"
 """The hosts; the dead man's switch runs on the operator's."""
+NO_PARAMETERS: Mapping[str, Any] = {}
 LEAD = 1.0  # s from the start of the arm to the origin of the scenario
 
 
@@ -40,11 +41,13 @@ class SimulatedArm:
         directory: Path,
         scenario: Mapping[str, Any],
         start_up: Delay,
+        parameters: Mapping[str, Any],
     ) -> None:
         """Start an arm, at the beginning of a simulation.
 
         :param directory: for its parameter file and its settings.
         :param start_up: from the start of a process to that of its program.
+        :param parameters: the content of a parameter file.
         """
         self.simulation = simulation
         self._ended: list[Life] = []
@@ -64,8 +67,10 @@ class SimulatedArm:
         origin = (BOOT / SECOND) + simulation.now + LEAD
         self.origin = simulation.now + LEAD
         """The beginning of the scenario [s of the simulation]."""
-        self.parameters = scenario_parameters(file, origin, directory / SETTINGS)
-        """The content of the parameter file."""
+        self.given = parameters
+        """The content of the user's parameter file."""
+        self.parameters = with_parameters(scenario_parameters(file, origin, directory / SETTINGS), parameters)
+        """The content of the parameter file of all services."""
         self._programs = {each.name: each for each in PROGRAMS}
         self.write_parameters()
         self.supervisor = Supervisor(simulation, list(NAMES), self.spawn)
@@ -133,11 +138,15 @@ def simulated_arm(
     directory: Path,
     scenario: Mapping[str, Any],
     durations: Calibration | None = None,
+    parameters: Mapping[str, Any] = NO_PARAMETERS,
 ) -> Iterator[SimulatedArm]:
-    """Simulate an arm until the end of the ``with``, by default with the durations of a real arm."""
+    """Simulate an arm until the end of the ``with``, by default with the durations of a real arm.
+
+    :param parameters: the content of a parameter file.
+    """
     given = durations or load()
     network = Network(latency=given.latency, discovery=given.discovery)
     arm: SimulatedArm
     with simulated_services(seed, network, lambda: arm.supervisor) as simulation:
-        arm = SimulatedArm(simulation, directory, scenario, given.start_up)
+        arm = SimulatedArm(simulation, directory, scenario, given.start_up, parameters)
         yield arm

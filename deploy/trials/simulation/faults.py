@@ -11,7 +11,7 @@ from rclpy_simulation import Delay, Process
 
 from deploy.promises import marks
 from deploy.promises.history import ALL, FALSE_PRESENCE, HOLD, NO_TARGET, OPERATOR, PARTITION, STUCK_DRIVE
-from deploy.running.run_directory import KEY
+from deploy.running.run_directory import KEY, with_parameters
 from deploy.trials.chaos import clock
 from deploy.trials.chaos.faults import PARAMETERS, Undo
 from deploy.trials.simulation import people
@@ -80,13 +80,15 @@ def _double(arm: SimulatedArm, program: str, duration: float) -> Undo:
 
 def _crash_loop(arm: SimulatedArm, program: str, duration: float) -> Undo:
     node = f"/{program}"
-    arm.parameters[node] = {KEY: {PARAMETERS[program]: "not a number"}}
+    given = {node: arm.given[node]} if node in arm.given else {}
+    arm.parameters = with_parameters(arm.parameters, {node: {KEY: {PARAMETERS[program]: "not a number"}}})
     arm.write_parameters()
     if process := arm.process(program):
         process.kill()
 
     def repair() -> None:
         del arm.parameters[node]
+        arm.parameters |= given
         arm.write_parameters()
 
     return arm.nested.begin(("crash_loop", program), repair)

@@ -58,7 +58,9 @@ def simulate(experiment: Experiment, durations: Calibration | None = None) -> Ou
         if planned.kind not in KINDS or planned.target not in KINDS[planned.kind].targets:
             raise DeploymentError(f"a simulation has no fault {planned.kind} of {planned.target}")
     with tempfile.TemporaryDirectory(prefix="reactive-arm-") as directory:
-        with simulated_arm(experiment.seed, Path(directory), experiment.scenario, durations) as arm:
+        with simulated_arm(
+            experiment.seed, Path(directory), experiment.scenario, durations, experiment.parameters
+        ) as arm:
             observer = Observer(arm.simulation, arm.origin)
             arm.simulation.start(view, name="viewer", host=ROBOT)
             injected: list[InjectedFault] = []

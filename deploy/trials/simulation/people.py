@@ -7,18 +7,20 @@ import random
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from deploy.running.reaction import Reaction
 from deploy.trials.chaos import babbler
 from deploy.trials.chaos.testbed import sources
 from interfaces import topics
 
+NAP = 1.5, 4.5  # s beyond the bound of S1: just long enough for an attack on the fail-safes
 RATE = 5.0  # Hz, of each source: the least with which L2 can be checked
 FLOOD_RATE = 500.0  # Hz; 25 times the rate of the switch
 BABBLE_RATE = 100.0  # Hz, over all topics
-PRETENCE_RATE = 2.0  # Hz; that of the watchdog
+PRETENCE_RATE = 10.0  # Hz
 FIRST_PRESS = 0.5  # s
 
 
-def operator(seed: str, length: float) -> dict[str, Any]:
+def operator(seed: str, length: float, reaction: Reaction) -> dict[str, Any]:
     """Return a scenario for ``length`` [s]: all values move, and an operator works and sleeps at random.
 
     The operator holds the switch, lets go for a moment or for a strike, hammers on it, falls asleep, and
@@ -35,7 +37,7 @@ def operator(seed: str, length: float) -> dict[str, Any]:
         for _ in range(rng.randrange(1, 4)):
             at = round(rng.uniform(begin, now + 2.0), 3)
             commands.append({"at": at, "command": topics.TURN_ON})
-        now += _away(rng)
+        now += _away(rng, reaction)
     commands.sort(key=lambda command: float(command["at"]))
     return {**sources(RATE), "operator": {"pressed": pressed}, "engines": commands}
 
@@ -50,10 +52,12 @@ def _hold(rng: random.Random, now: float) -> Iterator[tuple[float, float]]:
     yield now, now + rng.uniform(1.0, 60.0)
 
 
-def _away(rng: random.Random) -> float:
+def _away(rng: random.Random, reaction: Reaction) -> float:
     """Return how long the operator leaves the switch alone: a moment, a strike, or asleep [s]."""
-    moment, strike, asleep = (0.05, 1.0), (2.5, 4.0), (8.0, 30.0)
-    nap = 12.0, 15.0  # just long enough for an attack on the fail-safes
+    moment, asleep = (0.05, 1.0), (8.0, 30.0)
+    watchdog = reaction.watchdog
+    strike = watchdog.silence - watchdog.sampling, watchdog.silence + 1.0
+    nap = reaction.off_within + NAP[0], reaction.off_within + NAP[1]
     return rng.uniform(*rng.choice((moment, strike, asleep, nap, nap)))
 
 

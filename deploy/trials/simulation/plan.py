@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
+from deploy.running import parameter_file
 from deploy.trials.chaos.schedule import random_faults
 from deploy.trials.chaos.schedule_file import Experiment
 from deploy.trials.simulation import people
+from deploy.trials.simulation.arm import NO_PARAMETERS
 from deploy.trials.simulation.attacks import attacked
 from deploy.trials.simulation.faults import FAULT_KINDS
 
@@ -15,17 +18,29 @@ LENGTH = 600.0  # s of an experiment, which begins with the start of the arm; th
 QUIET = 15.0  # s at the end of an experiment, in which the arm recovers from the last fault
 
 
-def experiments(seed: str, hours: float, every: float, kinds: Sequence[str]) -> list[Experiment]:
+def experiments(
+    seed: str, hours: float, every: float, kinds: Sequence[str], parameters: Mapping[str, Any] = NO_PARAMETERS
+) -> list[Experiment]:
     """Return experiments of some hours, with a random fault in each interval of ``every`` [s]."""
     seconds = 3600.0 * hours
     # A rest of at most QUIET would have no fault, and perhaps no operator: it belongs to the one before.
     number = max(1, math.ceil((seconds - QUIET) / LENGTH))
     lengths = [LENGTH] * (number - 1) + [seconds - (number - 1) * LENGTH]
-    return [experiment(f"{seed} shift {index}", length, every, kinds) for index, length in enumerate(lengths)]
+    return [
+        experiment(f"{seed} shift {index}", length, every, kinds, parameters)
+        for index, length in enumerate(lengths)
+    ]
 
 
-def experiment(seed: str, length: float, every: float, kinds: Sequence[str]) -> Experiment:
+def experiment(
+    seed: str,
+    length: float,
+    every: float,
+    kinds: Sequence[str],
+    parameters: Mapping[str, Any] = NO_PARAMETERS,
+) -> Experiment:
     """Return an experiment with a random operator, random faults and, if they are of all kinds, attacks."""
     faults = random_faults(seed, length - QUIET, every=every, kinds=kinds, table=FAULT_KINDS)
-    quiet = Experiment(seed, length, people.operator(seed, length), faults)
+    scenario = people.operator(seed, length, parameter_file.reaction_to(parameters, "/"))
+    quiet = Experiment(seed, length, scenario, faults, parameters)
     return attacked(quiet) if set(kinds) == set(FAULT_KINDS) else quiet

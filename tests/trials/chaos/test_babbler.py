@@ -46,8 +46,8 @@ def test_pretended_presence_is_marked_and_too_old_for_turn_on(monkeypatch: pytes
     monkeypatch.setattr(time, "time_ns", lambda: 12_500_000_000)
     babbler.pretend(node, 2.0)
     (presence,) = sent
-    assert (presence.stamp.sec, presence.stamp.nanosec) == (10, 500_000_000)
-    assert engine_controller.DEFAULTS.max_presence_age < babbler.PRETENDED_AGE < 10.0
+    assert (presence.stamp.sec, presence.stamp.nanosec) == (11, 300_000_000)
+    assert engine_controller.DEFAULTS.max_presence_age < babbler.PRETENDED_AGE < 1.36
     assert is_babble(topics.OPERATOR_PRESENCE, serialize_message(presence))
 
 

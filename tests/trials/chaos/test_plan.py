@@ -10,13 +10,15 @@ from deploy.trials.chaos.schedule import PlannedFault
 from deploy.trials.chaos.schedule_file import Experiment, save
 from deploy.trials.chaos.testbed import SCENARIO, Testbed
 
+PARAMETERS = {"/engine_controller": {"ros__parameters": {"presence_timeout": 5.0}}}
+
 
 def schedule(path: Path, kind: str = "kill", target: str = "velocity") -> str:
-    save(Experiment("7", 30.0, SCENARIO, [PlannedFault(6.0, kind, target)]), path)
+    save(Experiment("7", 30.0, SCENARIO, [PlannedFault(6.0, kind, target)], PARAMETERS), path)
     return str(path)
 
 
-def test_a_schedule_is_played_with_its_operator_and_its_length(tmp_path: Path) -> None:
+def test_a_schedule_is_played_with_its_operator_parameters_and_length(tmp_path: Path) -> None:
     path = schedule(tmp_path / "schedule.yaml")
     planned = plan.plan(plan.parse(["--schedule", path]))
     assert planned.schedules == [[PlannedFault(6.0, "kill", "velocity")]]
@@ -24,6 +26,15 @@ def test_a_schedule_is_played_with_its_operator_and_its_length(tmp_path: Path) -
     assert path in planned.title
     testbed = planned.testbed(tmp_path)
     assert testbed.scenario == SCENARIO
+    assert testbed.parameters_of("/") == PARAMETERS
+
+
+def test_a_parameter_file_is_for_each_arm_of_a_fleet(tmp_path: Path) -> None:
+    file = tmp_path / "mine.yaml"
+    file.write_text("velocity: {ros__parameters: {use_sim_time: false}}")
+    planned = plan.plan(plan.parse(["--arms", "2", "--parameters", str(file)]))
+    assert str(file) in planned.title
+    assert [*planned.testbed(tmp_path).parameters_of("/arm2")] == ["/arm2/velocity"]
 
 
 def test_a_fault_that_only_a_simulation_has_is_refused(tmp_path: Path) -> None:
@@ -62,10 +73,10 @@ def test_only_a_step_of_the_clock_needs_libfaketime() -> None:
     assert [each.steps_clock for each in plans] == [False, True]
 
 
-@pytest.mark.parametrize("other", [["--scenario", "briefly"], ["--arms", "2"]])
-def test_a_schedule_excludes_other_faults_and_arms(
+@pytest.mark.parametrize("other", [["--scenario", "briefly"], ["--arms", "2"], ["--parameters", "mine.yaml"]])
+def test_a_schedule_excludes_other_faults_parameters_and_arms(
     other: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(SystemExit):
         plan.parse(["--schedule", schedule(tmp_path / "schedule.yaml"), *other])
-    assert "--schedule has faults of its own, for one arm" in capsys.readouterr().err
+    assert "--schedule has faults and parameters of its own, for one arm" in capsys.readouterr().err

@@ -7,7 +7,6 @@ import pytest
 from deploy.promises.effects import TRANSPORT
 from deploy.promises.findings import HOLDS
 from deploy.promises.history import PROGRAMS, SILENCE, Sample, between, running
-from deploy.promises.limits import OFF_WITHIN
 from deploy.promises.marks import STEP
 from deploy.promises.promises import CHECKERS
 from deploy.trials.chaos.clock import missing
@@ -41,7 +40,7 @@ def test_engines_turn_off_in_time_with_a_stopped_controller(run: ChaosRun) -> No
     stop = next(f for f in history.faults if (f.kind, f.target) == ("stop", "engine_controller"))
     assert stop.begin < off <= stop.begin + DRIVE_TIMEOUT + TRANSPORT  # by the drive, without a command
     assert not between(history.stream(ENGINES), begin, off)  # the watchdog has lost its strikes
-    assert off - begin <= OFF_WITHIN
+    assert off - begin <= history.reaction.off_within
 
 
 def test_hung_programs_and_a_stopped_sentinel_are_replaced(run: ChaosRun) -> None:

@@ -12,7 +12,7 @@ import pytest
 
 from deploy.running.processes import ROOT
 from deploy.trials.chaos.schedule import PlannedFault
-from deploy.trials.chaos.schedule_file import Experiment, save
+from deploy.trials.chaos.schedule_file import Experiment, load, save
 from deploy.trials.chaos.testbed import SCENARIO
 from deploy.trials.simulation import plan
 from deploy.trials.simulation.faults import FAULT_KINDS
@@ -43,13 +43,16 @@ def test_the_same_seed_gives_the_same_record(tmp_path: Path) -> None:
 
 def test_a_schedule_is_played_and_reported(tmp_path: Path) -> None:
     path = tmp_path / "schedule.yaml"
-    save(Experiment("1", 10.0, SCENARIO, [PlannedFault(5.0, "kill", "operator_watchdog")]), path)
+    faults = [PlannedFault(5.0, "kill", "operator_watchdog")]
+    parameters = {"/engine_controller": {"ros__parameters": {"presence_timeout": 5.0}}}
+    save(Experiment("1", 10.0, SCENARIO, faults, parameters), path)
     run = make_simulate(tmp_path, "--schedule", str(path))
     output, errors = run.communicate()
     assert (run.returncode, errors) == (0, "")
     report = re.search(r"Report: (.*)", output)
     assert report is not None
     assert "<html" in Path(report[1]).read_text(encoding="utf-8")
+    assert load(tmp_path / "simulation" / "1.yaml").parameters == parameters
 
 
 @pytest.mark.parametrize(
@@ -58,6 +61,8 @@ def test_a_schedule_is_played_and_reported(tmp_path: Path) -> None:
         (["--hours", "much"], "'much' is not a number"),
         (["--faults", "magic"], "'magic' is not one of kill,"),
         (["--schedule", "nowhere.yaml"], "nowhere.yaml: No such file or directory"),
+        (["--parameters", "nowhere.yaml"], "nowhere.yaml: No such file or directory"),
+        (["--parameters", "mine.yaml", "--systematic", "1"], "--parameters are for random faults"),
     ],
 )
 def test_a_users_mistake_is_one_line(arguments: list[str], reason: str, tmp_path: Path) -> None:

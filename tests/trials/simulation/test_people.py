@@ -1,23 +1,27 @@
 from __future__ import annotations
 
 import itertools
+from functools import partial
 from pathlib import Path
 
 import yaml
 
+from deploy.running.reaction import reaction
 from deploy.trials.simulation import people
 from interfaces import topics
 from interfaces.sources.scenario_file import load
 
+operator = partial(people.operator, reaction=reaction({}))
+
 
 def test_the_operator_of_a_seed_is_always_the_same() -> None:
-    assert people.operator("1", 600.0) == people.operator("1", 600.0) != people.operator("2", 600.0)
+    assert operator("1", 600.0) == operator("1", 600.0) != operator("2", 600.0)
 
 
 def test_operators_hold_hammer_and_sleep(tmp_path: Path) -> None:
     holds, breaks = [], []
     for seed in range(20):
-        pressed = people.operator(str(seed), 600.0)["operator"]["pressed"]
+        pressed = operator(str(seed), 600.0)["operator"]["pressed"]
         holds += [each["to"] - each["from"] for each in pressed]
         breaks += [two["from"] - one["to"] for one, two in itertools.pairwise(pressed)]
     assert min(holds) < 0.1
@@ -29,7 +33,7 @@ def test_operators_hold_hammer_and_sleep(tmp_path: Path) -> None:
 
 def test_an_operator_is_a_scenario_in_which_only_the_watchdog_turns_off(tmp_path: Path) -> None:
     path = tmp_path / "scenario.yaml"
-    path.write_text(yaml.safe_dump(people.operator("3", 300.0)))
+    path.write_text(yaml.safe_dump(operator("3", 300.0)))
     scenario = load(path)
     assert scenario.commands is not None
     assert {command for _, command in scenario.commands.items} == {topics.TURN_ON}
