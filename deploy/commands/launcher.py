@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, NoReturn
 from deploy.commands.stop import stop
 from deploy.operator.output import say
 from deploy.running import interruption, manifest, messages, rclpy_choice
-from deploy.running.environment import ADOPTED, NAMESPACE, set_middleware
+from deploy.running.environment import ADOPTED, NAMESPACE, namespace_of, set_middleware
 from deploy.running.errors import DeploymentError
 from deploy.running.machine import LOOPBACK_DOWN, loopback_is_up
 from deploy.running.run_directory import ALL, KEY, LEAD, MANIFEST, RUN
@@ -113,6 +113,7 @@ def status(system: System) -> None:
     programs = system.programs()
     running = [program for program in programs if program.pid]
     print(f"{rclpy_choice.words()}, {place(os.environ)}")
+    print(_bound(system))
     if page := system.page:
         print(page)
     if not loopback_is_up():  # so no health can be heard, not even that of the sentinel, which tells of it
@@ -239,6 +240,7 @@ def _show(system: System, member: Member, *, owner: bool = False) -> None:
     signal.signal(signal.SIGTTIN, signal.SIG_IGN)
     parent = os.getppid()
     with Terminal(member.node, system.origin()) as terminal:
+        say(_bound(system))
         say(HELP)
         is_connected = True
         while not terminal.has_quit:
@@ -255,6 +257,16 @@ def _show(system: System, member: Member, *, owner: bool = False) -> None:
                     return
                 say("supervisord was killed: everything has started again.")
         member.spin_some()  # sends what was typed just before `quit`
+
+
+def _bound(system: System) -> str:
+    """The line that tells how soon the engines stop."""
+    from deploy.running.parameter_file import reaction_to
+
+    try:
+        return reaction_to(system.written_parameters(), namespace_of(os.environ)).words
+    except DeploymentError as error:
+        return str(error)
 
 
 def _adopt_environment(system: System) -> bool:

@@ -25,6 +25,7 @@ from deploy.operator.remote import parameter_changes
 from deploy.operator.switch import VIRTUAL_SWITCH, Switch
 from deploy.running import manifest
 from deploy.running.machine import loopback_is_up
+from deploy.running.reaction import reaction
 from interfaces import service, topics
 from interfaces.service import ServiceNode, UserError, parameter
 from interfaces.service.epoch import Epoch
@@ -231,12 +232,14 @@ def note(node: ServiceNode, file: address.AddressFile, line: str) -> None:
 
 
 def welcome(given: _Parameters) -> dict[str, Any]:
+    of_this_arm = reaction({"engine_controller": {"presence_timeout": given.presence_timeout}})
     return {
         "programs": protocol.PROGRAMS,
         "limits": protocol.LIMITS,
         "strikes": given.strikes,
         "silence": given.silence,
         "presence_timeout": given.presence_timeout,
+        "off_within": of_this_arm.off_within,
         "beat": server.UPDATE_PERIOD,
         "max_nonce_age": hold.MAX_NONCE_AGE,
     }

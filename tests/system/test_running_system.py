@@ -54,10 +54,11 @@ def status(site: Site, until: Callable[[list[str]], bool]) -> dict[str, list[str
 def test_status_tells_the_runtime_and_the_address_of_the_page(module_site: Site) -> None:
     code, printed = module_site.do("status")
     assert code == 0, printed
-    where, page, header, *_ = printed.splitlines()
+    where, bound, page, header, *_ = printed.splitlines()
     expected = "embedded rclpy" if os.environ.get("RUNTIME") else "rclpy of "
     assert where.startswith(expected)
     assert f"ROS domain {module_site.domain}" in where
+    assert bound == "Engines stop within 10.5 s (10.45 s if one process dies, 10.05 s if none does)"
     assert page == System(module_site.run).page
     assert page.startswith("The page: http://127.0.0.1:")
     assert header.startswith("SERVICE")
@@ -234,6 +235,7 @@ def test_the_operator_commands_switch_and_engines_from_the_terminal(
 ) -> None:
     begin = module_site.begin_in_terminal if in_terminal else module_site.begin_command
     terminal = begin(sys.executable, "-m", "deploy.commands.launcher", "terminal")
+    terminal.await_line("Engines stop within 10.5 s")
     terminal.await_line("Engines are off")
     terminal.insist("press\n", "Operator is alive")
     terminal.insist("turn_on\n", "Engines are on")

@@ -393,6 +393,7 @@ def test_page_shows_the_limits_of_this_arm(
     limits = {"silence": 2.0, "strikes": 5, "presence_timeout": 4.0}
     with World(make_node, spin_until, tmp_path, **limits).page() as page:
         assert {name: page.welcome[name] for name in limits} == limits
+        assert page.welcome["off_within"] == 4.5
 
 
 def test_slider_sets_its_source(world: World) -> None:

@@ -2,9 +2,8 @@
 
 import { alert, announce, onChange } from "./announce.js";
 import { byId, setAttributes, setText } from "./dom.js";
-import { number, sentence } from "./format.js";
+import { sentence } from "./format.js";
 
-const ENGINES_MARGIN = 0.5; // s after the presence timeout until the engines are off at the latest (promise S1)
 const SHORT = 400; // ms; a shorter press is taken for a click
 
 /** Title and hint of the button by its state; `stop`: time until the engines are off [s]. */
@@ -12,7 +11,7 @@ const WORDS = {
   offline: () => ["Not connected", "Released. Holding needs a connection."],
   released: () => ["Hold to run", "Released. Press and hold here."],
   pressing: () => ["Pressed", "Waiting for the switch …"],
-  held: (stop) => ["Held by you", `Let go, and the engines stop within ${number(stop, 1)} s.`],
+  held: (stop) => ["Held by you", `Let go, and the engines stop within ${stop} s.`],
   releasing: () => ["Let go", "Waiting for the switch …"],
   other_page: () => ["Held on another page", "Only one page can hold at a time."],
   terminal: () => ["Hold to run", "The terminal holds. Hold here to take over."],
@@ -42,8 +41,7 @@ export class HoldButton {
 
   render(model, hold, isLive) {
     const state = holdState(isLive, hold, model.switch);
-    const stop = (model.welcome?.presence_timeout ?? 10) + ENGINES_MARGIN;
-    const [title, hint] = WORDS[state](stop);
+    const [title, hint] = WORDS[state](model.welcome?.off_within);
     setAttributes(this._button, {
       "data-state": state,
       "aria-pressed": hold.held,
