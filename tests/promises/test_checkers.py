@@ -233,11 +233,11 @@ def test_s5_holds_for_successors() -> None:
 
 def test_s5_permits_a_duplicate_that_starts_slowly_on_an_overloaded_machine() -> None:
     history = good()
-    history = replace(history, lives=[*history.lives, Life("kinematics", 777, 20.0, 24.0)])
+    history = replace(history, lives=[*history.lives, Life("kinematics", 777, 20.0, 26.0)])
     assert verdict("S5", history) == VIOLATED
     overload = InjectedFault("overload", NO_TARGET, 21.8, 22.0)
     assert verdict("S5", faulty(history, overload)) == HOLDS
-    earlier = overload._replace(begin=21.7, end=21.9)  # 2.1 s before the duplicate ends
+    earlier = overload._replace(begin=21.7, end=21.9)  # 4.1 s before the duplicate ends
     assert verdict("S5", faulty(history, earlier)) == VIOLATED
     reporting = added(faulty(history, overload), "/diagnostics", (23.0, ("kinematics", 777)))
     assert verdict("S5", reporting) == VIOLATED

@@ -457,10 +457,10 @@ def test_s5_names_the_processes_in_the_order_of_their_start() -> None:
     lives = [
         Life("velocity", 5, 10.0, 20.0),
         Life("velocity", 9, 0.0, None),
-        Life("", 2, 5.0, 9.0),
+        Life("", 2, 5.0, 9.5),
         Life("", 1, 0.0, None),
-        Life(KINEMATICS, 7, 0.0, 6.0),
-        Life(KINEMATICS, 8, 4.0, None),  # starts for two seconds
+        Life(KINEMATICS, 7, 0.0, 8.0),
+        Life(KINEMATICS, 8, 4.0, None),  # starts for four seconds
     ]
     assert CHECKERS["S5"](history(lives=lives)) == Finding(
         "S5",
