@@ -257,7 +257,8 @@ def test_what_is_typed_just_before_quit_is_obeyed(module_site: Site) -> None:
     terminal.type("release\nquit\n")
     assert terminal.wait() == 0
 
-    module_site.begin_command(*launcher).await_line("Not received signal from operator")
+    # On a busy machine, the next terminal may come after all strikes; the last one is repeated.
+    module_site.begin_command(*launcher).await_line("Not received signal from operator|Turning off engines")
 
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
