@@ -24,6 +24,7 @@ from reactivex.subject import Subject
 
 from deploy.benchmarks.scale import Fleet
 from deploy.running import interruption
+from deploy.running.environment import NAMESPACE, set_middleware
 from interfaces.robot_model import forward_kinematics
 from interfaces.sources.scenario_file import load
 from interfaces.topics import EFFECTOR_SPEED, EFFECTOR_VELOCITY, THETA1, THETA2
@@ -203,7 +204,8 @@ def speed(seconds: float = SECONDS) -> Row:
         fleet.start()
         (arm,) = fleet.arms
         context = rclpy.Context()
-        os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+        os.environ[NAMESPACE] = arm.namespace
+        set_middleware(os.environ)  # which keeps the arms of a domain apart
         rclpy.init(context=context, domain_id=fleet.domain, signal_handler_options=SignalHandlerOptions.NO)
         node = Node("benchmark", context=context, namespace=arm.namespace)
 
