@@ -53,8 +53,8 @@ BUGS: dict[str, Bug] = {
     "a strike takes 4 s": Bug(WATCHDOG, "silence: float = parameter(3.0,", "silence: float = parameter(4.0,"),
     "a released switch is a sign of life": Bug(
         WATCHDOG,
-        "        topics.OPERATOR_HEARTBEAT, reading",
-        "        replace(topics.OPERATOR_HEARTBEAT, problem=lambda _: ''), reading",
+        "        topics.OPERATOR_HEARTBEAT, given.reading",
+        "        replace(topics.OPERATOR_HEARTBEAT, problem=lambda _: ''), given.reading",
     ),
     "a presence from the future counts": Bug(CONTROLLER, "if age < -CLOCK_TOLERANCE:", "if age < -1e12:"),
     "an older presence replaces a newer one": Bug(CONTROLLER, "seen=max(latch.seen, ", "seen=min(event.at, "),

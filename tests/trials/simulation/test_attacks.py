@@ -22,7 +22,7 @@ from interfaces import topics
 from .bugs import BUGS, CASES, PROFILES, QUICK_BUGS, planted
 
 RELEASE = 14.0  # s
-ALONE = {"thesis": {"F1": 6, "F2": 6, "F3": 4}, "quick": {"F1": 4, "F2": 6, "F3": 2}}
+ALONE = {"thesis": {"F1": 6, "F2": 6, "F3": 4}, "quick": {"F1": 4, "F2": 5, "F3": 2}}
 """Of six attacks: sometimes a successor turns off before the fail-safe has to."""
 THESIS = parameter_file.reaction_to({}, "/")
 DAYS = 30  # within which a bug must be found
