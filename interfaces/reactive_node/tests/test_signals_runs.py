@@ -194,8 +194,11 @@ def test_state_that_was_not_settled_survives_a_set_clock(delay: float) -> None:
     state.on_next(stamped("new", round((clock.time - delay) * SECOND)))
     for clock.time in (5.0, 6.0):
         state.on_next(stamped("older", -1))
-
     assert found[-1] == Answer(5800 * MS, ("new", "new"))
+
+    for clock.time in (7.0, 8.0):
+        state.on_next(stamped("late", 5500 * MS))
+    assert found[-1] == Answer(7800 * MS, ("late", "late"))
 
 
 def test_events_of_a_future_that_was_set_back_are_forgotten() -> None:
