@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import importlib
+import sys
 from typing import Any
 
 import pytest
@@ -202,7 +203,8 @@ def test_incompatible_type_callbacks_do_not_prevent_other_events(
     assert {type(info) for info in heard} == {QoSPublisherMatchedInfo, QoSSubscriptionMatchedInfo}
 
 
-def test_the_deprecated_module_qos_event_works_and_warns() -> None:
+def test_the_deprecated_module_qos_event_works_and_warns(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delitem(sys.modules, "rclpy.qos_event", raising=False)  # another test may have imported it
     with pytest.warns(UserWarning, match="deprecated"):
         qos_event = importlib.import_module("rclpy.qos_event")
     assert qos_event.SubscriptionEventCallbacks is SubscriptionEventCallbacks
