@@ -67,8 +67,7 @@ def present(alternatives: Iterable[Alternative]) -> list[Alternative]:
 def compare(
     alternatives: Sequence[Alternative], scenarios: Sequence[Scenario], rounds: int
 ) -> Iterator[tuple[str, dict[str, float]]]:
-    """
-    Yield the figures of each measurement with the alternative's title; a round measures all of them.
+    """Yield the figures of each measurement with the alternative's title; a round measures all of them.
 
     Each round and scenario has its own random order: neither a machine that becomes slower, nor what was
     measured just before, favours one.

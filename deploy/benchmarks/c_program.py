@@ -39,8 +39,7 @@ def build() -> str:
 
 
 def command(program: str, job: Job, settings: str = "") -> list[str]:
-    """
-    Return the command of a process of PIPELINE or SERVICES.
+    """Return the command of a process of PIPELINE or SERVICES.
 
     :param settings: a file of Cyclone DDS in ``links/``; by default, those of the embedded runtime.
     """

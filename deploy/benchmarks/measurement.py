@@ -139,8 +139,7 @@ def measure_subscribers(alternative: Alternative, scenario: Scenario, count: int
 
 
 def _cost(run: _Run, pids: Sequence[int], seconds: float) -> tuple[dict[str, Any], list[float]]:
-    """
-    Return what the sink has seen at the end, and the processor time of an item in each process [µs].
+    """Return what the sink has seen at the end, and the processor time of an item in each process [µs].
 
     The source keeps sending, so this process may read the clocks later than the sink reports, if the time
     between both readings is that of the measurement.

@@ -106,8 +106,7 @@ class Fleet:
         self.arms.append(arm)
 
     def restart(self) -> float:
-        """
-        Kill a service of the last arm, and return how long it takes until the next one is heard [s].
+        """Kill a service of the last arm, and return how long it takes until the next one is heard [s].
 
         :raises MeasurementFailed: if it is not heard.
         """

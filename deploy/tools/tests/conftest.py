@@ -1,5 +1,4 @@
-"""
-Fixtures for the tests of the tools: plain nodes.
+"""Fixtures for the tests of the tools: plain nodes.
 
 The tests pass on ROS 2's own tools as well, except for those marked `own`: they need what ROS 2 does
 differently (its daemon, tracebacks) or what its installation may lack.

@@ -30,8 +30,7 @@ def _check_name(resource_name: str) -> None:
 
 
 def get_resource(resource_type: str, resource_name: str) -> tuple[str, str]:
-    """
-    Return the content of a resource and its prefix.
+    """Return the content of a resource and its prefix.
 
     :raises LookupError: if no prefix has it.
     :raises OSError: if it cannot be read, or AMENT_PREFIX_PATH is unset.

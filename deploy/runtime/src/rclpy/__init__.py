@@ -60,8 +60,7 @@ def init(
     domain_id: int | None = None,
     signal_handler_options: SignalHandlerOptions | None = None,
 ) -> None:
-    """
-    Initialize a context: it joins the DDS domain.
+    """Initialize a context: it joins the DDS domain.
 
     :param args: command line arguments, ``sys.argv`` if ``None``; ROS arguments follow ``--ros-args``.
     :param context: context to initialize; the default context if ``None``.
@@ -99,8 +98,7 @@ def get_global_executor() -> Executor:
 
 
 def shutdown(*, context: Context | None = None, uninstall_handlers: bool | None = None) -> None:
-    """
-    Shut down a context: spinning ends.
+    """Shut down a context: spinning ends.
 
     :param context: context to shut down; the default context if ``None``.
     :param uninstall_handlers: whether to stop handling signals; by default, only for the default context.

@@ -1,5 +1,4 @@
-"""
-Parses the ROS arguments of a command line: those between `--ros-args` and `--`.
+"""Parses the ROS arguments of a command line: those between `--ros-args` and `--`.
 
 Source of the grammar: docs.ros.org, "Passing ROS arguments to nodes via the command-line".
 `_parameter_values` parses the values of `-p`, `_parameter_files` the files of `--params-file`.
@@ -53,8 +52,7 @@ class RemapRule:
 
 @dataclass(frozen=True, slots=True)
 class RosArguments:
-    """
-    The ROS arguments of a process, which apply to its nodes.
+    """The ROS arguments of a process, which apply to its nodes.
 
     `log_level` is the default level (`None`: not given), `log_levels` maps names of loggers to their levels.
     `remaining` is the command line without its ROS arguments.
@@ -114,8 +112,7 @@ class RosArguments:
 
 
 def parse(argv: list[str] | None) -> RosArguments:
-    """
-    Parse a command line, by default `sys.argv`.
+    """Parse a command line, by default `sys.argv`.
 
     :raises RCLInvalidROSArgsError: if a ROS argument has an invalid value; the message is one line.
     :raises UnknownROSArgsError: if a ROS argument is unknown.

@@ -33,8 +33,7 @@ class SubscriptionEndpoint:
 
 @dataclass(frozen=True)
 class ServiceEndpoint:
-    """
-    The DDS writer and reader of a service or client, its node, and the service's fully qualified name.
+    """The DDS writer and reader of a service or client, its node, and the service's fully qualified name.
 
     Writer and reader announce the identifier in USER_DATA.
     """

@@ -28,8 +28,7 @@ class ExecutorOffers(ExecutorEntities):
         self._rclpy_round: deque[Task] | None = None  # those to return before the next wait
 
     def _rclpy_next_offer(self, nodes: list[Node] | None) -> Offer | None:
-        """
-        Return a task that was returned before, but is not done, and can run now; ``None``: wait for others.
+        """Return a task that was returned before, is not done, and can run now; ``None``: wait for others.
 
         Between two waits, each such task is returned once.
         """

@@ -119,8 +119,7 @@ class Graph(GraphQueries):
         return own
 
     def _drop(self, node: weakref.ref[Node]) -> None:
-        """
-        Tell the listening thread that a node was garbage-collected.
+        """Tell the listening thread that a node was garbage-collected.
 
         The garbage collector calls this on any thread, which may hold any lock: this must not wait for one.
         """
@@ -223,8 +222,7 @@ class Graph(GraphQueries):
     def wait_for(
         self, condition: Callable[[], bool], timeout: float | None, alive: Callable[[], bool]
     ) -> bool:
-        """
-        Wait until ``condition`` is true; check it whenever the graph changes.
+        """Wait until ``condition`` is true; check it whenever the graph changes.
 
         :param timeout: [s]; ``None`` or negative: no limit.
         :param alive: called at least ten times a second; the wait ends when it returns False.

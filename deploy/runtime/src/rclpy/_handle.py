@@ -9,8 +9,7 @@ _Entity = TypeVar("_Entity")
 
 
 class Handle:
-    """
-    An entity, or its representative, as the subject of a ``with``.
+    """An entity, or its representative, as the subject of a ``with``.
 
     In rclpy, the ``with`` delays the destruction of the entity. Here the destruction of an entity in use is
     safe, so the ``with`` does nothing.

@@ -10,8 +10,7 @@ Listener = TypeVar("Listener")
 
 
 class Listeners(Generic[Listener]):
-    """
-    A set of objects that does not keep them alive.
+    """A set of objects that does not keep them alive.
 
     Other threads and signal handlers may change it during an iteration: a ``WeakSet`` would fail, and a lock
     may already be held by the interrupted thread. An iteration copies the references first, in one step.

@@ -18,8 +18,7 @@ if TYPE_CHECKING:
 
 
 class NodeGraph(NodeNames):
-    """
-    Names, types and endpoints in the node's domain that discovery has found so far.
+    """Names, types and endpoints in the node's domain that discovery has found so far.
 
     Every query raises InvalidHandle if the node was destroyed, and RCLError after the shutdown.
     """

@@ -15,8 +15,7 @@ if TYPE_CHECKING:
 
 
 class NodeNames:
-    """
-    The node's name, and the expanded and remapped names of its topics and services.
+    """The node's name, and the expanded and remapped names of its topics and services.
 
     Subclasses by users may use any private name that rclpy's `Node` does not have. To avoid collisions, the
     private names that only this runtime has begin with ``_rclpy_``, in all parts of `Node`.
@@ -74,8 +73,7 @@ class NodeNames:
             raise RCLError(f"failed to resolve name: {error}") from error
 
     def _rclpy_expanded(self, name: str, *, is_service: bool = False) -> str:
-        """
-        Return the fully qualified name of a topic or service.
+        """Return the fully qualified name of a topic or service.
 
         :raises ValueError: if the given name is invalid.
         :raises InvalidTopicNameException, InvalidServiceNameException: if the expanded name is invalid.

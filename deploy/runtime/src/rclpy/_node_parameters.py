@@ -37,8 +37,7 @@ _DEPTH_RECURSIVE = 0
 
 
 class NodeParameters(NodeNames):
-    """
-    Parameters by name, each with a descriptor, and the callbacks that check and observe changes.
+    """Parameters by name, each with a descriptor, and the callbacks that check and observe changes.
 
     A node inherits from this class, calls `_rclpy_init_parameters` when its clock exists, and implements
     `_rclpy_publish_parameter_event`.
@@ -77,8 +76,7 @@ class NodeParameters(NodeNames):
         descriptor: ParameterDescriptor | None = None,
         ignore_override: bool = False,
     ) -> Parameter:
-        """
-        Declare a parameter and set it to its override, else to `value`.
+        """Declare a parameter and set it to its override, else to `value`.
 
         :param value: the default, or a `Parameter.Type` to leave the parameter uninitialized.
         :param descriptor: its name and type are ignored: they follow from `name` and the value.
@@ -100,8 +98,7 @@ class NodeParameters(NodeNames):
         parameters: list[tuple[str] | tuple[str, Any] | tuple[str, Any, ParameterDescriptor]],
         ignore_override: bool = False,
     ) -> list[Parameter]:
-        """
-        Declare several parameters; see `declare_parameter`.
+        """Declare several parameters; see `declare_parameter`.
 
         :param namespace: prefix of all names, separated by a dot, unless it is empty.
         :param parameters: tuples of name, optionally value or type, and optionally descriptor.
@@ -136,8 +133,7 @@ class NodeParameters(NodeNames):
         raise InvalidParameterValueException(parameter.name, parameter.value, result.reason)
 
     def undeclare_parameter(self, name: str) -> None:
-        """
-        Remove a parameter, without callbacks and without an event.
+        """Remove a parameter, without callbacks and without an event.
 
         :raises ParameterNotDeclaredException: if it is not declared.
         :raises ParameterImmutableException: if it is read-only.
@@ -160,8 +156,7 @@ class NodeParameters(NodeNames):
         return [self.get_parameter_type(name) for name in names]
 
     def get_parameter_type(self, name: str) -> Parameter.Type:
-        """
-        Return the number of a parameter's type, as rclpy does; NOT_SET if it need not be declared and is not.
+        """Return the number of a parameter's type, as rclpy; NOT_SET if it need not be declared and is not.
 
         :raises ParameterNotDeclaredException: if it is not declared and must be.
         """
@@ -177,8 +172,7 @@ class NodeParameters(NodeNames):
         return [self.get_parameter(name) for name in names]
 
     def get_parameter(self, name: str) -> Parameter:
-        """
-        Return a parameter. If it need not be declared and is not, its type is NOT_SET.
+        """Return a parameter. If it need not be declared and is not, its type is NOT_SET.
 
         :raises ParameterNotDeclaredException: if it is not declared and must be.
         :raises ParameterUninitializedException: if it was declared with a type only and never set.
@@ -209,8 +203,7 @@ class NodeParameters(NodeNames):
         }
 
     def list_parameters(self, prefixes: list[str], depth: int) -> ListParametersResult:
-        """
-        List the names of parameters, and their prefixes.
+        """List the names of parameters, and their prefixes.
 
         :param prefixes: list parameters with or below these names; all parameters if the list is empty.
         :param depth: list names with fewer dots than this below the prefix; 0: all.
@@ -233,8 +226,7 @@ class NodeParameters(NodeNames):
     # Setting
 
     def set_parameters(self, parameter_list: list[Parameter]) -> list[SetParametersResult]:
-        """
-        Set parameters one by one; setting a parameter to NOT_SET undeclares it.
+        """Set parameters one by one; setting a parameter to NOT_SET undeclares it.
 
         :returns: for each, whether it was set, and the reason if not.
         :raises ParameterNotDeclaredException: for the first parameter that is not declared and must be; the
@@ -243,8 +235,7 @@ class NodeParameters(NodeNames):
         return [self._set_parameters_atomically([parameter]) for parameter in parameter_list]
 
     def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
-        """
-        Set all parameters or none; setting a parameter to NOT_SET undeclares it.
+        """Set all parameters or none; setting a parameter to NOT_SET undeclares it.
 
         :returns: whether they were set, and the reason if not.
         :raises ParameterNotDeclaredException: if a parameter is not declared and must be.
@@ -278,8 +269,7 @@ class NodeParameters(NodeNames):
         descriptors: dict[str, ParameterDescriptor] | None = None,
         keep_unset: bool = False,
     ) -> SetParametersResult:
-        """
-        Check the values, ask the callbacks, set the parameters, publish the event, notify the callbacks.
+        """Check the values, ask the callbacks, set the parameters, publish the event, notify the callbacks.
 
         :param descriptors: new descriptors of all parameters; `None`: their current ones.
         :param keep_unset: whether to store parameters that are not set, instead of undeclaring them.
@@ -370,8 +360,7 @@ class NodeParameters(NodeNames):
     # Describing
 
     def describe_parameter(self, name: str) -> ParameterDescriptor:
-        """
-        Return the descriptor of a parameter; an empty one if it need not be declared and is not.
+        """Return the descriptor of a parameter; an empty one if it need not be declared and is not.
 
         :raises ParameterNotDeclaredException: if it is not declared and must be.
         """
@@ -392,8 +381,7 @@ class NodeParameters(NodeNames):
         descriptor: ParameterDescriptor,
         alternative_value: ParameterValue | None = None,
     ) -> ParameterValue:
-        """
-        Replace the descriptor of a parameter; set the alternative value if it rejects the current value.
+        """Replace the descriptor of a parameter; set the alternative value if it rejects the current value.
 
         :returns: the new value of the parameter.
         :raises ParameterNotDeclaredException: if it is not declared and must be.

@@ -1,5 +1,4 @@
-"""
-Reads parameter files, and values in YAML, as `rcl_yaml_param_parser` does.
+"""Reads parameter files, and values in YAML, as `rcl_yaml_param_parser` does.
 
 A file maps names of nodes to `ros__parameters`, a tree of parameters. Names may be nested in namespaces and
 contain the wildcards `*` and `**`.

@@ -58,8 +58,7 @@ class ServiceSide(Owner):
         service_event_qos_profile: QoSProfile,
         introspection_state: ServiceIntrospectionState,
     ) -> None:
-        """
-        Publish the events of future calls on ``<service>/_service_event``.
+        """Publish the events of future calls on ``<service>/_service_event``.
 
         A new clock or QoS takes effect only if the state was OFF before, as in rclpy.
 

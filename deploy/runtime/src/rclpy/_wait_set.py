@@ -48,8 +48,7 @@ class WaitSet:
         return len(self._entities[kind]) - 1
 
     def is_ready(self, entity_type: str, index: int) -> bool:
-        """
-        Return whether an entity is ready after the wait.
+        """Return whether an entity is ready after the wait.
 
         :param entity_type: such as ``"guard_condition"``.
         :param index: what the ``add_`` method has returned.

@@ -48,8 +48,7 @@ class Client(ServiceSide):
         return self._rclpy_requests
 
     def call(self, request: Any, timeout_sec: float | None = None) -> Any:
-        """
-        Call the service and wait for the reply, at most ``timeout_sec``; return ``None`` without a reply.
+        """Call the service and wait for the reply, at most ``timeout_sec``; return ``None`` without a reply.
 
         Another thread must spin the node, so do not call this in a callback.
 
@@ -65,8 +64,7 @@ class Client(ServiceSide):
         return future.result()
 
     def call_async(self, request: Any) -> Future:
-        """
-        Call the service; the future gets the reply. To stop waiting, cancel it or remove the request.
+        """Call the service; the future gets the reply. To stop waiting, cancel it or remove the request.
 
         A server on another DDS than Cyclone would misread the request: then it is logged, and not sent.
 

@@ -60,8 +60,7 @@ class JumpThreshold:
         min_backward: Duration | None,
         on_clock_change: bool = True,
     ) -> None:
-        """
-        Select jumps by size and cause.
+        """Select jumps by size and cause.
 
         :param min_forward: the shortest jump forward to report, ``None``: none; positive.
         :param min_backward: the shortest jump backward to report, ``None``: none; negative.
@@ -269,8 +268,7 @@ class Clock:
         pre_callback: JumpHandlePreCallbackType | None = None,
         post_callback: Callable[[TimeJump], None] | None = None,
     ) -> JumpHandle:
-        """
-        Call back before and after time jumps.
+        """Call back before and after time jumps.
 
         The caller must keep the handle alive. ``post_callback`` gets the jump.
 
@@ -292,8 +290,7 @@ class Clock:
         )
 
     def sleep_until(self, until: Time, context: Context | None = None) -> bool:
-        """
-        Sleep until the time ``until`` of this clock.
+        """Sleep until the time ``until`` of this clock.
 
         :return: whether the time was reached; ``False`` if the context was shut down or the source of ROS
             time changed.

@@ -6,8 +6,7 @@ from enum import IntEnum
 
 
 class ClockType(IntEnum):
-    """
-    Type of a clock or time; the values are those of `rcl_clock_type_t`.
+    """Type of a clock or time; the values are those of `rcl_clock_type_t`.
 
     `ROS_TIME` is simulated time while `use_sim_time` is set, otherwise system time. `SYSTEM_TIME` is wall
     time since 1970. `STEADY_TIME` is monotonic, with an arbitrary origin.

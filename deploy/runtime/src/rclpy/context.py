@@ -51,8 +51,7 @@ class ContextHandle(Handle):
 
 
 class Context(AbstractContextManager["Context"]):
-    """
-    The shared state of nodes: arguments, DDS domain, and whether rclpy is shut down.
+    """The shared state of nodes: arguments, DDS domain, and whether rclpy is shut down.
 
     A ``with`` initializes the context and shuts it down at its end.
     """
@@ -88,8 +87,7 @@ class Context(AbstractContextManager["Context"]):
         initialize_logging: bool = True,
         domain_id: int | None = None,
     ) -> None:
-        """
-        Initialize the context.
+        """Initialize the context.
 
         :param args: command line arguments, ``sys.argv`` if ``None``; ROS arguments follow ``--ros-args``.
         :param initialize_logging: whether the arguments configure logging, unless another context did.

@@ -167,8 +167,7 @@ class Executor(ExecutorOffers, AbstractContextManager["Executor"]):
             self.spin_once()
 
     def spin_once(self, timeout_sec: float | None = None) -> None:
-        """
-        Run one callback; wait for it at most ``timeout_sec`` (``None`` or negative: no limit).
+        """Run one callback; wait for it at most ``timeout_sec`` (``None`` or negative: no limit).
 
         Custom executors implement this with :meth:`wait_for_ready_callbacks`.
         """
@@ -186,8 +185,7 @@ class Executor(ExecutorOffers, AbstractContextManager["Executor"]):
     def spin_once_until_future_complete(
         self, future: Future, timeout_sec: float | TimeoutObject | None = None
     ) -> None:
-        """
-        Run one callback, unless ``future`` is done before one is ready.
+        """Run one callback, unless ``future`` is done before one is ready.
 
         Custom executors that support :meth:`spin_until_future_complete` implement this.
         """
@@ -199,8 +197,7 @@ class Executor(ExecutorOffers, AbstractContextManager["Executor"]):
         nodes: list[Node] | None = None,
         condition: Callable[[], bool] = lambda: False,
     ) -> Offer:
-        """
-        Wait for a ready callback and return it as a task, with its entity and node.
+        """Wait for a ready callback and return it as a task, with its entity and node.
 
         :param nodes: wait for callbacks of these nodes; ``None``: those of this executor.
         :raises TimeoutException, ShutdownException, ExternalShutdownException, ConditionReachedException:
@@ -237,8 +234,7 @@ class Executor(ExecutorOffers, AbstractContextManager["Executor"]):
         *,
         once: bool = False,
     ) -> type[Exception] | None:
-        """
-        Wait for work and hand it on, until the deadline has passed or there is another reason to end.
+        """Wait for work and hand it on, until the deadline has passed or there is another reason to end.
 
         :param handle: gets a ready entity or task; returns whether there was work to do.
         :param condition: whether the caller wants the end; asked at first, and after each :meth:`wake`.

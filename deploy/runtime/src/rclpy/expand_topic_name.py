@@ -10,8 +10,7 @@ __all__ = ["expand_topic_name"]
 
 
 def expand_topic_name(topic_name: str, node_name: str, node_namespace: str) -> str:
-    """
-    Expand `topic_name` for the node `node_name` in `node_namespace`.
+    """Expand `topic_name` for the node `node_name` in `node_namespace`.
 
     `chatter` is relative to the namespace, `~/chatter` private to the node, `/chatter` absolute. `{node}`,
     `{ns}` and `{namespace}` are replaced. The result may still be invalid: see `validate_full_topic_name`.

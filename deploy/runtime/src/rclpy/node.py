@@ -109,8 +109,7 @@ class Node(NodeParameters, NodeGraph):
         automatically_declare_parameters_from_overrides: bool = False,
         enable_logger_service: bool = False,
     ) -> None:
-        """
-        Create a node.
+        """Create a node.
 
         :param node_name: its name, unless remapped (``__node``).
         :param context: its context; the default context if ``None``.
@@ -306,8 +305,7 @@ class Node(NodeParameters, NodeGraph):
         qos_overriding_options: QoSOverridingOptions | None = None,
         publisher_class: type[Publisher] = Publisher,
     ) -> Publisher:
-        """
-        Create a publisher.
+        """Create a publisher.
 
         :param qos_profile: the offered QoS, or only the depth of the history.
         :param callback_group: the group of its event callbacks.
@@ -355,8 +353,7 @@ class Node(NodeParameters, NodeGraph):
         qos_overriding_options: QoSOverridingOptions | None = None,
         raw: bool = False,
     ) -> Subscription:
-        """
-        Create a subscription.
+        """Create a subscription.
 
         :param callback: called with each message, and with its info if it takes two arguments.
         :param qos_profile: the requested QoS, or only the depth of the history.
@@ -441,8 +438,7 @@ class Node(NodeParameters, NodeGraph):
         qos_profile: QoSProfile = qos_profile_services_default,
         callback_group: CallbackGroup | None = None,
     ) -> Service:
-        """
-        Create a service.
+        """Create a service.
 
         :param callback: gets a request and an empty response, and returns the response.
         :raises InvalidServiceNameException: if the service's name is invalid.
@@ -502,8 +498,7 @@ class Node(NodeParameters, NodeGraph):
         clock: Clock | None = None,
         autostart: bool = True,
     ) -> Timer:
-        """
-        Create a timer.
+        """Create a timer.
 
         :param timer_period_sec: period [s].
         :param clock: its clock; the node's if ``None``.

@@ -90,8 +90,7 @@ class Parameter:
         return cls(param_msg.name, type_, value)
 
     def __init__(self, name: str, type_: Parameter.Type | None = None, value: Any = None) -> None:
-        """
-        Create a parameter; by default, its type is that of the value.
+        """Create a parameter; by default, its type is that of the value.
 
         :raises TypeError: if `type_` is not a type, or if it is missing and no type fits the value.
         :raises ValueError: if the value does not have the type.
@@ -193,8 +192,7 @@ def parameter_dict_from_yaml_file(
     target_nodes: list[str] | None = None,
     namespace: str = "",
 ) -> dict[str, ParameterMsg]:
-    """
-    Read the parameters of nodes from a YAML file, by name.
+    """Read the parameters of nodes from a YAML file, by name.
 
     :param use_wildcard: whether to include those of `/**`; those of nodes override them.
     :param target_nodes: names of nodes as in the file; all nodes if the list is empty.

@@ -35,8 +35,7 @@ class ParameterEventCallbackHandle:
 
 
 class ParameterEventHandler:
-    """
-    Subscribes to `/parameter_events` and calls the matching callbacks, the last added first.
+    """Subscribes to `/parameter_events` and calls the matching callbacks, the last added first.
 
     Callbacks for parameters get the parameter's message, as in rclpy. They may add and remove callbacks, with
     effect from the next event.
@@ -144,8 +143,7 @@ class ParameterEventHandler:
     def add_parameter_callback(
         self, parameter_name: str, node_name: str, callback: Callable[[ParameterMsg], None]
     ) -> ParameterCallbackHandle:
-        """
-        Call `callback` with the message of a parameter when it is declared or changes.
+        """Call `callback` with the message of a parameter when it is declared or changes.
 
         :param node_name: a fully qualified name, one relative to this node's namespace, or '' for this node.
         """

@@ -50,8 +50,7 @@ class Publisher(Owner):
         return self._rclpy_name
 
     def publish(self, msg: Any) -> None:
-        """
-        Publish a message, or a serialized message (``bytes``).
+        """Publish a message, or a serialized message (``bytes``).
 
         :raises TypeError: if ``msg`` is not of the publisher's type, or a field has a wrong type.
         :raises ValueError: if a field has a value that its type cannot represent.

@@ -1,5 +1,4 @@
-"""
-Quality of service: the policies that publishers offer and subscriptions request.
+"""Quality of service: the policies that publishers offer and subscriptions request.
 
 Source of the presets: `rmw/qos_profiles.h`; of the policies' numbers: `rmw/types.h`.
 """
@@ -187,8 +186,7 @@ class QoSProfile:
     )
 
     def __init__(self, **kwargs: Any) -> None:
-        """
-        Create a profile from policies by name; other policies are those of `qos_profile_default`.
+        """Create a profile from policies by name; other policies are those of `qos_profile_default`.
 
         :raises InvalidQoSProfileException: without `history` and `depth`, or for KEEP_LAST without `depth`.
         """
@@ -324,8 +322,7 @@ class QoSCompatibility(IntEnum):
 def qos_check_compatible(
     publisher_qos: QoSProfile, subscription_qos: QoSProfile
 ) -> tuple[QoSCompatibility, str]:
-    """
-    Return whether endpoints with these profiles match, and why not. Source: `rmw_dds_common`.
+    """Return whether endpoints with these profiles match, and why not. Source: `rmw_dds_common`.
 
     The reasons end with semicolons. "System default" and "unknown" lead to warnings.
     """

@@ -1,5 +1,4 @@
-"""
-QoS policies of publishers and subscriptions as read-only parameters of their node.
+"""QoS policies of publishers and subscriptions as read-only parameters of their node.
 
 The parameters are named `qos_overrides.<topic>.<publisher|subscription>[_<id>].<policy>`.
 """
@@ -90,8 +89,7 @@ def _declare_qos_parameters(
     qos: QoSProfile,
     options: QoSOverridingOptions,
 ) -> None:
-    """
-    Declare the parameters of an entity and set their values in `qos`.
+    """Declare the parameters of an entity and set their values in `qos`.
 
     :param topic_name: the fully qualified name of the topic.
     :raises TypeError: if `entity_type` is neither a publisher nor a subscription.

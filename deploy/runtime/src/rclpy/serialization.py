@@ -11,8 +11,7 @@ _Message = TypeVar("_Message")
 
 
 def serialize_message(message: Any) -> bytes:
-    """
-    Serialize a message as CDR, with a header of four bytes.
+    """Serialize a message as CDR, with a header of four bytes.
 
     :raises AttributeError: if it is not a message.
     :raises TypeError, ValueError: if a field has an invalid value.
@@ -24,8 +23,7 @@ def serialize_message(message: Any) -> bytes:
 
 
 def deserialize_message(serialized_message: bytes, message_type: type[_Message]) -> _Message:
-    """
-    Deserialize a message from the bytes of `serialize_message`.
+    """Deserialize a message from the bytes of `serialize_message`.
 
     :raises AttributeError: if `message_type` is not a message or service type.
     :raises RuntimeError: if it is a service type.

@@ -153,8 +153,7 @@ def install_signal_handlers(options: SignalHandlerOptions = SignalHandlerOptions
 
 
 def uninstall_signal_handlers() -> None:
-    """
-    Stop handling signals: restore the previous handlers.
+    """Stop handling signals: restore the previous handlers.
 
     Only the main thread can do so. After a call on another thread, the next signal restores them, and they
     handle it.

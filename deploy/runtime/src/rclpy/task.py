@@ -88,8 +88,7 @@ class Future:
         self._rclpy_complete()
 
     def add_done_callback(self, callback: Callable[[Any], Any]) -> None:
-        """
-        Call `callback` with this future when it is done or cancelled, or now if it is done.
+        """Call `callback` with this future when it is done or cancelled, or now if it is done.
 
         The callback runs as a task of the future's executor, if there is one. It should not raise.
         """
@@ -181,8 +180,7 @@ class Task(Future):
         self._task_lock = threading.Lock()
 
     def __call__(self) -> None:
-        """
-        Run the function, or the coroutine until its next `await`, and store the result or exception.
+        """Run the function, or the coroutine until its next `await`, and store the result or exception.
 
         Does nothing if the task is done, cancelled, or running on another thread.
         """

@@ -39,8 +39,7 @@ class Time:
         nanoseconds: int = 0,
         clock_type: ClockType = ClockType.SYSTEM_TIME,
     ):
-        """
-        Create the time `seconds` plus `nanoseconds` after the epoch of `clock_type`.
+        """Create the time `seconds` plus `nanoseconds` after the epoch of `clock_type`.
 
         :raises TypeError: if `clock_type` is not a clock type.
         :raises ValueError: if `seconds` or `nanoseconds` are negative.

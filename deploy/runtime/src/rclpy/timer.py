@@ -204,8 +204,7 @@ class Rate:
         self._rclpy_end()
 
     def sleep(self) -> None:
-        """
-        Sleep until the next tick, or not at all if a tick came since the last sleep.
+        """Sleep until the next tick, or not at all if a tick came since the last sleep.
 
         :raises ROSInterruptException: if the context is shut down before or during the sleep.
         :raises RuntimeError: if the rate was destroyed before; its destruction during the sleep just ends it.

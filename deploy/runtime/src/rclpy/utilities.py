@@ -41,8 +41,7 @@ def shutdown(*, context: Context | None = None) -> None:
 
 
 def try_shutdown(*, context: Context | None = None) -> None:
-    """
-    Shut down ``context`` (by default the default one) unless it is already shut down.
+    """Shut down ``context`` (by default the default one) unless it is already shut down.
 
     The next default context is a new one, even after a shutdown by a signal.
     """

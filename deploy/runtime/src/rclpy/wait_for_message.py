@@ -23,8 +23,7 @@ def wait_for_message(
     qos_profile: QoSProfile | int = 1,
     time_to_wait: float | int = -1,
 ) -> tuple[bool, Any]:
-    """
-    Wait for the next message on `topic`, at most `time_to_wait` seconds; negative: no limit.
+    """Wait for the next message on `topic`, at most `time_to_wait` seconds; negative: no limit.
 
     No other callback of the node runs during the wait, unless another thread spins the node.
 

@@ -39,8 +39,7 @@ class NumberOfEntities:
 
 
 class Waitable:
-    """
-    Base class of what :meth:`rclpy.node.Node.add_waitable` adds to a node.
+    """Base class of what :meth:`rclpy.node.Node.add_waitable` adds to a node.
 
     Before each wait, the executor calls :meth:`add_to_wait_set`. If :meth:`is_ready` afterwards, it calls
     :meth:`take_data`, and runs :meth:`execute` with the result. The wait set accepts the handles of guard

@@ -41,8 +41,7 @@ _NUL = Item("x", 1)
 def make_serializer(
     definition: MessageDefinition, message_class: Callable[[str], type]
 ) -> Callable[..., bytes | Pieces]:
-    """
-    Function from a message to bytes. It raises TypeError or ValueError with type, field and value.
+    """Function from a message to bytes. It raises TypeError or ValueError with type, field and value.
 
     With :class:`.Pieces` as its second argument, it returns one for a message with a long sequence.
     """

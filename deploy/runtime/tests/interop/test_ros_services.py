@@ -1,5 +1,4 @@
-"""
-Services between nodes on the embedded rclpy and nodes on ROS 2's own.
+"""Services between nodes on the embedded rclpy and nodes on ROS 2's own.
 
 ROS 2 has no common form of requests: its middlewares for Cyclone DDS and for Fast DDS cannot call each other
 (ros2/rmw_cyclonedds#184). The tests show that a call is refused with a reason and does no harm. Parameters

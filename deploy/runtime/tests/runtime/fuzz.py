@@ -1,5 +1,4 @@
-"""
-Damaged input for each decoder of untrusted bytes: it is refused with ValueError, or read as a valid value.
+"""Damaged input for each decoder of untrusted bytes: it is refused with ValueError, or read as a valid value.
 
 ``python deploy/runtime/tests/runtime/fuzz.py 1000000`` feeds each decoder that many inputs: in batches, on
 all processors, and with a limit on the memory that a process may allocate. FUZZ_SEED repeats a run.

@@ -13,8 +13,7 @@ class Discovery:
     def __init__(
         self, participants: Callable[[], dict[bytes, str]], endpoints: Callable[[], Iterable[Endpoint]]
     ) -> None:
-        """
-        Create what shows the entities.
+        """Create what shows the entities.
 
         :param participants: returns the GUID and USER_DATA of every known participant.
         :param endpoints: returns every known endpoint.

@@ -51,8 +51,7 @@ class Kernel:
         self.schedule(self.now + delay, action)
 
     def run_until(self, end: int, condition: Callable[[], object] | None = None) -> bool:
-        """
-        Let time pass until ``end`` [ns], or until a condition is true after an event.
+        """Let time pass until ``end`` [ns], or until a condition is true after an event.
 
         :return: whether the condition is true; without one, ``False``.
         """

@@ -57,8 +57,7 @@ def _rclpy_state() -> list[tuple[State, Callable[[], Any]]]:
 
 
 class Simulation:
-    """
-    Programs in virtual time, for as long as the ``with`` lasts.
+    """Programs in virtual time, for as long as the ``with`` lasts.
 
     The same seed gives the same run, on every machine. A program is anything that spins a single-threaded
     executor. It must not wait outside of rclpy, ``time.sleep`` and ``threading.Event``: such a wait would
@@ -73,8 +72,7 @@ class Simulation:
     def __init__(
         self, seed: int | str = 0, network: Network | None = None, *, variables: Iterable[Variable] = ()
     ) -> None:
-        """
-        Prepare a simulation at time 0.
+        """Prepare a simulation at time 0.
 
         :param network: how the network behaves.
         :param variables: module variables that each process has for itself, besides those of rclpy.
@@ -155,8 +153,7 @@ class Simulation:
         parent: int = 1,
         delay: Delay = _START,
     ) -> Process:
-        """
-        Start a program.
+        """Start a program.
 
         :param arguments: of its command line.
         :param environment: its environment variables; by default, none.
@@ -213,8 +210,7 @@ class Simulation:
         self._domains.heal(one, other)
 
     def hold(self, topic: str, seconds: float) -> None:
-        """
-        Let the samples arrive together at the end of a time that are sent in it: their path stalls.
+        """Let the samples arrive together at the end of a time that are sent in it: their path stalls.
 
         :param topic: as DDS names it, for example ``rt/chatter``.
         """
@@ -226,8 +222,7 @@ class Simulation:
         self._processes.listeners.append(listener)
 
     def tap(self, listener: Callable[[Any, Any], None]) -> None:
-        """
-        Call a function with the writer and the sample of every message, before it is sent.
+        """Call a function with the writer and the sample of every message, before it is sent.
 
         It runs within the writing process. It may kill or stop any process, this one too: then the message
         is not sent, or only after SIGCONT.

@@ -53,8 +53,7 @@ class Owner(Protocol):
 
 
 class Thread:
-    """
-    A thread of a simulated process.
+    """A thread of a simulated process.
 
     It is a greenlet, which runs until it waits: in a DDS wait set, in ``time.sleep``, or for a condition or
     event of ``threading``.

@@ -8,8 +8,7 @@ from rclpy_simulation.process import Process
 
 
 class Watchdog:
-    """
-    Rings when nothing has renewed it for a period.
+    """Rings when nothing has renewed it for a period.
 
     DDS runs it in a process: while that is stopped, it does not ring, and afterwards for all that time.
     """

@@ -27,8 +27,7 @@ class UnreadableError(Exception):
 
 
 class McapFile:
-    """
-    An MCAP file that is being read; close it by `with`.
+    """An MCAP file that is being read; close it by `with`.
 
     A file may be compressed by zstd, and so may each of its messages, as rosbag2 does. Summary and indexes
     are used where they are complete. Otherwise, the file is read from its beginning.
@@ -83,8 +82,7 @@ class McapFile:
     def messages(
         self, topics: Collection[str] | None = None, begin: int | None = None, end: int | None = None
     ) -> Iterator[tuple[Channel, Message]]:
-        """
-        Yield messages in the order of their log times; in a file without indexes, in the order of writing.
+        """Yield messages in the order of their log times; in a file without indexes, in the order of writing.
 
         :param topics: whose messages are yielded; ``None`` for all.
         :param begin, end: the first and the last log time [ns].

@@ -19,15 +19,13 @@ _PIECE = 1024 * 1024  # bytes that wait at most
 
 
 class FileWriter(Writer):
-    """
-    An MCAP writer whose file is whole after each :meth:`save`, whatever ends the process or the machine.
+    """An MCAP writer whose file is whole after each :meth:`save`, whatever ends the process or the machine.
 
     When the disk is full, the error names the file and the free space, and the file keeps what it has.
     """
 
     def __init__(self, path: Path, library: str, **options: Any) -> None:
-        """
-        Create a file with the profile ``ros2``.
+        """Create a file with the profile ``ros2``.
 
         :param library: the name of the program.
         :param options: of :class:`mcap.writer.Writer`.
@@ -39,8 +37,7 @@ class FileWriter(Writer):
         self.flush()  # type: ignore[no-untyped-call]
 
     def save(self) -> None:
-        """
-        Close the current chunk, and bring everything so far to the disk; without effect on a closed file.
+        """Close the current chunk, and bring everything so far to the disk; without effect on a closed file.
 
         The process may be killed at any time after this call. A thread waits for the disk: the machine may
         lose power a call later.

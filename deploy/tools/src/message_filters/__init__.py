@@ -63,8 +63,7 @@ class Cache(SimpleFilter):
     """Keeps the last messages of a filter, and outputs each message."""
 
     def __init__(self, f: SimpleFilter, cache_size: int = 1, allow_headerless: bool = False) -> None:
-        """
-        Keep the last ``cache_size`` messages of ``f``.
+        """Keep the last ``cache_size`` messages of ``f``.
 
         :param allow_headerless: whether a message without header gets the time of its arrival; otherwise it
             is ignored.
@@ -158,8 +157,7 @@ class ApproximateTimeSynchronizer(TimeSynchronizer):
     def __init__(
         self, fs: Sequence[SimpleFilter], queue_size: int, slop: float, allow_headerless: bool = False
     ) -> None:
-        """
-        Take the messages of ``fs``; of each, the ``queue_size`` latest wait for the others.
+        """Take the messages of ``fs``; of each, the ``queue_size`` latest wait for the others.
 
         :param slop: all stamps of a group differ by less than this [s].
         :param allow_headerless: whether a message without header gets the time of its arrival; otherwise it

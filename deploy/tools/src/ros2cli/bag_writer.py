@@ -67,8 +67,7 @@ class BagWriter:
 
 
 def definition(type_name: str) -> tuple[str, str]:
-    """
-    Return the encoding and the text of the definition of a message, followed by those of its fields.
+    """Return the encoding and the text of the definition of a message, followed by those of its fields.
 
     Without a definition file, the encoding is ``unknown``, as in rosbag2; parts of services have none.
     """

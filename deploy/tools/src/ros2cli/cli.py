@@ -13,8 +13,7 @@ if TYPE_CHECKING:
 
 
 def main() -> int:
-    """
-    Run the command in ``sys.argv``.
+    """Run the command in ``sys.argv``.
 
     :return: 0; 1 for an error of the command or a closed pipe; 2 for wrong arguments and, as in ROS 2, the
         number of the signal that ended it: 2 for Ctrl-C, 15 for SIGTERM.

@@ -9,8 +9,7 @@ import click
 
 
 def condition(text: str | None) -> Callable[[Any], bool]:
-    """
-    Return the function that evaluates an expression; without one, it is always true.
+    """Return the function that evaluates an expression; without one, it is always true.
 
     The expression may use all of Python: it comes from the user's own command line.
 

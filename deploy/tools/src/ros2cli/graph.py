@@ -41,8 +41,7 @@ def node(
     use_sim_time: bool = False,
     arguments: list[str] | None = None,
 ) -> Iterator[Node]:
-    """
-    Create a node, by default a hidden one, and shut everything down at the end.
+    """Create a node, by default a hidden one, and shut everything down at the end.
 
     :param spin_time: how long it looks for other nodes at first [s].
     :param until: ends this as soon as it is true and nothing more appears.
@@ -73,8 +72,7 @@ def node(
 
 
 def default_spin_time() -> float:
-    """
-    How long a node looks for others at first, unless the user says otherwise [s].
+    """How long a node looks for others at first, unless the user says otherwise [s].
 
     A new participant of Fast DDS announces itself before it listens. It may miss the answer of a peer, which
     answers only once, and hears of it with the peer's next announcement: by default within 3 s.
@@ -164,8 +162,7 @@ def spin(node: Node, until: Future | None = None, timeout: float | None = None) 
 def spinning(
     node: Node, until: Future | None = None, timeout: float | None = None
 ) -> Iterator[concurrent.futures.Future[None]]:
-    """
-    Run the callbacks of a node in a thread until the scope is left; arguments as of `spin`.
+    """Run the callbacks of a node in a thread until the scope is left; arguments as of `spin`.
 
     In the main thread, a signal would interrupt rclpy anywhere, even between two steps that belong together,
     or it would have to wait while rclpy waits in C.

@@ -30,8 +30,7 @@ def get_topic_names(*, node: Node, include_hidden_topics: bool = False) -> list[
 def get_msg_class(
     node: Node, topic: str, blocking: bool = False, include_hidden_topics: bool = False
 ) -> Any | None:
-    """
-    Return the class of a topic's messages; print a warning if nobody publishes or subscribes to it yet.
+    """Return the class of a topic's messages; print a warning if nobody publishes or subscribes to it yet.
 
     :param blocking: wait for the topic; otherwise return ``None``.
     :raises RuntimeError: if the name is invalid, or the type is unknown or not the only one.

@@ -29,8 +29,7 @@ def message_to_yaml(
     no_str: bool = False,
     flow_style: bool = False,
 ) -> str:
-    """
-    Convert a message to YAML.
+    """Convert a message to YAML.
 
     :param truncate_length: length at which strings and arrays are cut; ``None``: they are not.
     :param no_arr: whether type and length replace the elements of arrays.

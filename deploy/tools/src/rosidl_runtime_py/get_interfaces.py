@@ -1,5 +1,4 @@
-"""
-Finds the interfaces of packages by their definition files: ``msg/*.msg``, ``srv/*.srv``, ``action/*.action``.
+"""Finds the interfaces of packages by their files: ``msg/*.msg``, ``srv/*.srv``, ``action/*.action``.
 
 The folder of a package lies next to rclpy (rclpy-cyclonedds), below ``share`` of a prefix in
 AMENT_PREFIX_PATH, or below ``share`` of the prefix into which rclpy is installed (ROS 2's wheels). The first

@@ -18,8 +18,7 @@ _TIME = ("builtin_interfaces", "msg", "Time")
 def set_message_fields(
     msg: Any, values: dict[str, Any], expand_header_auto: bool = False, expand_time_now: bool = False
 ) -> list[Callable[[Any], None]]:
-    """
-    Set fields of a message from a dictionary by their names.
+    """Set fields of a message from a dictionary by their names.
 
     :param expand_header_auto: whether a ``std_msgs/Header`` may be ``auto``: its stamp is set later.
     :param expand_time_now: whether a ``builtin_interfaces/Time`` may be ``now``: it is set later.

@@ -34,8 +34,7 @@ _TYPES = {
 
 
 def dtype_from_fields(fields: Iterable[PointField], point_step: int | None = None) -> np.dtype[Any]:
-    """
-    Return the type of a point with these fields, in this machine's byte order.
+    """Return the type of a point with these fields, in this machine's byte order.
 
     A field without a name becomes ``unnamed_field_<number>``. A field of several elements becomes several
     fields, ``<name>_0`` and so on.
@@ -67,8 +66,7 @@ def read_points(
     uvs: Iterable[int] | None = None,
     reshape_organized_cloud: bool = False,
 ) -> NDArray[Any]:
-    """
-    Return the points as a structured array, which shares the memory of the message if possible.
+    """Return the points as a structured array, which shares the memory of the message if possible.
 
     :param field_names: the fields to read, by default all.
     :param skip_nans: whether to omit points with a NaN in one of these fields; a dense cloud has no such
@@ -126,8 +124,7 @@ def read_points_list(
 def create_cloud(
     header: Header, fields: Sequence[PointField], points: Iterable[Any], point_step: int | None = None
 ) -> PointCloud2:
-    """
-    Return a cloud of points.
+    """Return a cloud of points.
 
     :param points: the values of each point, in the order of the fields; or an array with a row for each
         point; or a structured array with the type of :func:`dtype_from_fields`. Another dimension makes an

@@ -24,8 +24,7 @@ _LOGGER = get_logger("tf2")
 
 
 class BufferCore:
-    """
-    Stores transforms between frames for some time, and computes those between any two connected frames.
+    """Stores transforms between frames for some time, and computes those between any two connected frames.
 
     A transform from a frame ``source`` to a frame ``target`` turns coordinates in ``source`` into coordinates
     in ``target`` [m]. Between two received transforms it is interpolated; the time 0 asks for the latest time
@@ -44,8 +43,7 @@ class BufferCore:
     # Input
 
     def set_transform(self, transform: TransformStamped, authority: str) -> None:
-        """
-        Add the transform from ``child_frame_id`` to ``header.frame_id`` at ``header.stamp``.
+        """Add the transform from ``child_frame_id`` to ``header.frame_id`` at ``header.stamp``.
 
         An invalid transform, or one that is older than the cache, is logged and ignored.
 
@@ -99,8 +97,7 @@ class BufferCore:
     # Lookups
 
     def lookup_transform_core(self, target_frame: str, source_frame: str, time: TimeLike) -> TransformStamped:
-        """
-        Return the transform from ``source_frame`` to ``target_frame``.
+        """Return the transform from ``source_frame`` to ``target_frame``.
 
         :raises InvalidArgumentException: if a frame ID is empty or begins with a slash.
         :raises LookupException: if a frame does not exist.
@@ -119,8 +116,7 @@ class BufferCore:
         source_time: TimeLike,
         fixed_frame: str,
     ) -> TransformStamped:
-        """
-        Return the transform from the source at one time to the target at another one.
+        """Return the transform from the source at one time to the target at another one.
 
         ``fixed_frame`` does not move between the two times. Errors are those of
         :meth:`lookup_transform_core`.
@@ -160,8 +156,7 @@ class BufferCore:
             )
 
     def get_latest_common_time(self, target_frame: str, source_frame: str) -> Time:
-        """
-        Return the latest time at which all transforms between the frames are known; 0 if all are static.
+        """Return the latest time at which all transforms between the frames are known; 0 if all are static.
 
         :raises LookupException: if a frame does not exist.
         :raises TransformException: if nothing connects the frames.
@@ -177,8 +172,7 @@ class BufferCore:
     def lookupVelocityCore(
         self, tracking_frame: str, observation_frame: str, time: TimeLike, averaging_interval: TimeLike
     ) -> Twist:
-        """
-        Return the linear [m/s] and angular [rad/s] velocity of one frame as another one observes it.
+        """Return the linear [m/s] and angular [rad/s] velocity of one frame as another one observes it.
 
         It is the mean over an interval around the time; the interval ends at the latest transform at the
         latest. Errors are those of :meth:`lookup_transform_core`.
@@ -203,8 +197,7 @@ class BufferCore:
         time: TimeLike,
         averaging_interval: TimeLike,
     ) -> Twist:
-        """
-        Return the velocity of the body of ``tracking_frame`` at ``reference_point``, see
+        """Return the velocity of the body of ``tracking_frame`` at ``reference_point``, see
         :meth:`lookupVelocityCore`.
 
         :param reference_frame: the frame whose axes the result uses.

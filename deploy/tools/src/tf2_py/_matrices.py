@@ -48,8 +48,7 @@ def translation_of(matrix: Matrix) -> Vector:
 
 
 def rotation_of(matrix: Matrix) -> Quaternion:
-    """
-    Return the rotation of a transform as a unit quaternion.
+    """Return the rotation of a transform as a unit quaternion.
 
     One component is not close to 0 and divides the others (Shepperd, 1978). It is positive, as in tf2: w if
     the angle is less than 120°, and otherwise the largest of x, y and z.

@@ -48,8 +48,7 @@ def _compose(links: dict[str, Link]) -> Matrix:
 
 
 def find_path(frames: Frames, target: str, source: str, stamp: int) -> Path:
-    """
-    Find the path between two frames at a time, or through the latest transforms if it is 0.
+    """Find the path between two frames at a time, or through the latest transforms if it is 0.
 
     :raises ConnectivityException: if nothing connects the frames.
     :raises ExtrapolationException: if a transform that would connect them is not known at that time.

@@ -104,8 +104,7 @@ class TimeCache:
         self._samples.clear()
 
     def at(self, stamp: int) -> Sample | Interpolation | None:
-        """
-        Return the transform at a time, or ``None`` if the latest is wanted and there is none.
+        """Return the transform at a time, or ``None`` if the latest is wanted and there is none.
 
         :raises ExtrapolationException: if the time is not between two samples, or at one of them.
         """

@@ -30,8 +30,7 @@ def average_velocity(
     interval: int,
     latest: int,
 ) -> Twist:
-    """
-    Return the velocity of a body around a time, see ``BufferCore.lookupVelocityFullCore``.
+    """Return the velocity of a body around a time, see ``BufferCore.lookupVelocityFullCore``.
 
     The numbers are those of tf2.
 

@@ -22,15 +22,13 @@ from tf2_ros.buffer_interface import NO_WAIT, BufferInterface
 
 
 class Buffer(BufferCore, BufferInterface):
-    """
-    Stores transforms and waits for them. A :class:`~tf2_ros.TransformListener` fills it.
+    """Stores transforms and waits for them. A :class:`~tf2_ros.TransformListener` fills it.
 
     When time jumps back, or simulated time begins or ends, all but the static transforms are removed.
     """
 
     def __init__(self, cache_time: Duration | None = None, node: Node | None = None) -> None:
-        """
-        Create an empty buffer.
+        """Create an empty buffer.
 
         :param cache_time: how long transforms are kept, 10 s by default.
         :param node: its clock detects jumps, and it gets the service ``tf2_frames``, which returns all frames

@@ -37,8 +37,7 @@ _EXCEPTIONS = {
 
 
 class BufferClient(BufferInterface):
-    """
-    Asks the buffer of a buffer server (``tf2_msgs/action/LookupTransform``) for transforms.
+    """Asks the buffer of a buffer server (``tf2_msgs/action/LookupTransform``) for transforms.
 
     Its methods wait for the server: another thread must spin the node meanwhile.
     """
@@ -50,8 +49,7 @@ class BufferClient(BufferInterface):
         check_frequency: float = 10.0,
         timeout_padding: Duration | float = _PADDING,
     ) -> None:
-        """
-        Create a client.
+        """Create a client.
 
         :param ns: the name of the action.
         :param check_frequency: not used: the client does not poll.
@@ -67,8 +65,7 @@ class BufferClient(BufferInterface):
     def lookup_transform(
         self, target_frame: str, source_frame: str, time: Time | TimeMsg, timeout: Duration = NO_WAIT
     ) -> TransformStamped:
-        """
-        Return the transform from ``source_frame`` to ``target_frame``.
+        """Return the transform from ``source_frame`` to ``target_frame``.
 
         :param timeout: how long the server may wait for it.
         :raises TypeError: if the time is no time.

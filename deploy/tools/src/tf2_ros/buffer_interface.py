@@ -35,8 +35,7 @@ class NotImplementedException(Exception):
 
 
 class BufferInterface:
-    """
-    Base of buffers, which look transforms up between frames.
+    """Base of buffers, which look transforms up between frames.
 
     The time 0 asks for the latest transform. Errors are subclasses of ``tf2_py.TransformException``.
     """
@@ -51,8 +50,7 @@ class BufferInterface:
         timeout: Duration = NO_WAIT,
         new_type: type | None = None,
     ) -> Any:
-        """
-        Return an object in another frame, at the time of its header.
+        """Return an object in another frame, at the time of its header.
 
         :param timeout: how long to wait for the transform.
         :param new_type: a type to convert the result to, see :func:`convert`.
@@ -179,8 +177,7 @@ def _registered(functions: dict[Any, Callable[..., Any]], key: Any) -> Callable[
 
 
 def convert(a: Any, b_type: type) -> Any:
-    """
-    Return an object as another type: directly if possible, otherwise through a message.
+    """Return an object as another type: directly if possible, otherwise through a message.
 
     An object that has the type already is copied.
 

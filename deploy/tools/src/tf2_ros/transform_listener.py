@@ -26,8 +26,7 @@ class TransformListener:
         qos: QoSProfile | int | None = None,
         static_qos: QoSProfile | int | None = None,
     ) -> None:
-        """
-        Subscribe to the transforms.
+        """Subscribe to the transforms.
 
         :param spin_thread: whether a thread of the listener spins the node; nothing else may spin it then.
         :param qos: for ``/tf``; by default reliable with the last 100 messages.

@@ -51,8 +51,7 @@ _BEGINNING = ct.c_size_t.from_param(0)
 
 
 class Sample(NamedTuple):
-    """
-    A received message: CDR with encapsulation header, source time [ns since 1970], and its writer.
+    """A received message: CDR with encapsulation header, source time [ns since 1970], and its writer.
 
     The CDR is bytes, or a memoryview if it is lent. Nothing may write to that: other readers of this process
     have the same memory.
@@ -148,8 +147,7 @@ class Participant:
 
 @cache
 def _keep_memory() -> None:
-    """
-    Make malloc keep what large messages free: new memory from the kernel costs ten times as much as a copy.
+    """Make malloc keep what large messages free: new memory of the kernel costs ten times as much as a copy.
 
     By default, glibc keeps up to twice the largest block that was ever freed, of at most 32 MiB (mallopt(3),
     M_MMAP_THRESHOLD). This one is never touched, so it takes no memory.
@@ -288,8 +286,7 @@ class Reader(_Endpoint):
         self._buffers: list[tuple[Serdata, SampleInfo, tuple[Any, ...]]] = []
 
     def take(self, lend: bool = False) -> Sample | None:
-        """
-        Return the next message, ``None`` if there is none. Several threads may take.
+        """Return the next message, ``None`` if there is none. Several threads may take.
 
         :param lend: whether the data of a large message may be a view of DDS's own memory instead of bytes.
         """
@@ -322,8 +319,7 @@ class Reader(_Endpoint):
         return sample
 
     def take_message(self, msg_type: Any, raw: bool) -> tuple[Any, dict[str, Any]] | None:
-        """
-        Return the next message and its info, ``None`` if there is none, for code that polls its subscription.
+        """Return the next message and its info, ``None`` if there is none: for polling a subscription.
 
         :param raw: whether to return the serialized message.
         :raises RCLError: if it is not a message of ``msg_type``.

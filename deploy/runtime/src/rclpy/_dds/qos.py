@@ -113,8 +113,7 @@ def user_data_value(data: str, key: str) -> str:
 
 
 def profile_of(qos: int | None) -> QoSProfile:
-    """
-    Return the ROS profile of a discovered endpoint; history is UNKNOWN if it is not announced.
+    """Return the ROS profile of a discovered endpoint; history is UNKNOWN if it is not announced.
 
     Endpoints with equal policies share it: a domain has many endpoints, and few profiles.
     """

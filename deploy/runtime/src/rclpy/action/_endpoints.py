@@ -76,8 +76,7 @@ def _never_called(message: Any, response: Any = None) -> None:
 def creation(
     node: Node, kind: str, action_type: Any, action_name: str, group: CallbackGroup
 ) -> Iterator[Endpoints]:
-    """
-    Announce all endpoints that the block creates together; if it fails, destroy them.
+    """Announce all endpoints that the block creates together; if it fails, destroy them.
 
     :param kind: the subject of error messages.
     :raises AttributeError: if ``action_type`` is not the type of an action.

@@ -115,8 +115,7 @@ class ActionClient(ActionWaitable):
         feedback_sub_qos_profile: QoSProfile = QoSProfile(depth=10),  # noqa: B008
         status_sub_qos_profile: QoSProfile = qos_profile_action_status_default,
     ) -> None:
-        """
-        Create an action client.
+        """Create an action client.
 
         :param node: the node, whose executor runs the callbacks.
         :param action_type: the type of the action.
@@ -170,8 +169,7 @@ class ActionClient(ActionWaitable):
         feedback_callback: Callable[[Any], Any] | None = None,
         goal_uuid: UUID | None = None,
     ) -> Future:
-        """
-        Send a goal; the future gets a :class:`ClientGoalHandle` when the server accepts or rejects the goal.
+        """Send a goal; the future gets a :class:`ClientGoalHandle` when the server accepts or rejects it.
 
         :param feedback_callback: called with each feedback message: ``goal_id`` and ``feedback``.
         :param goal_uuid: the UUID of the goal; random if ``None``.

@@ -205,8 +205,7 @@ class ActionServer(ActionWaitable):
         status_pub_qos_profile: QoSProfile = qos_profile_action_status_default,
         result_timeout: float = 900,
     ) -> None:
-        """
-        Create an action server.
+        """Create an action server.
 
         :param node: the node, whose executor runs the callbacks.
         :param action_type: the type of the action.
@@ -354,8 +353,7 @@ class ActionServer(ActionWaitable):
         self._rclpy_respond(self._rclpy_cancel_service, response, request_id)
 
     def _rclpy_goals_to_cancel(self, goal_info: GoalInfo) -> tuple[int, list[ServerGoalHandle]]:
-        """
-        Return the response's code, and the goals that a request to cancel selects.
+        """Return the response's code, and the goals that a request to cancel selects.
 
         A UUID without a stamp selects this goal. Otherwise, the stamp selects all goals that were accepted
         until then, in addition to the goal with the UUID; without both, all goals are selected.

@@ -1,5 +1,4 @@
-"""
-The levels of all loggers: a tree with dots in the names.
+"""The levels of all loggers: a tree with dots in the names.
 
 A logger without a level has the level of its nearest ancestor that has one, or else the default level.
 """

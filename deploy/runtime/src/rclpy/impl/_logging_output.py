@@ -1,5 +1,4 @@
-"""
-Writes log messages to the console, in rcutils' format, and to the `/rosout` publishers of the nodes.
+"""Writes log messages to the console, in rcutils' format, and to the `/rosout` publishers of the nodes.
 
 Environment variables configure the console as in ROS 2: `RCUTILS_CONSOLE_OUTPUT_FORMAT`,
 `RCUTILS_COLORIZED_OUTPUT`, `RCUTILS_LOGGING_USE_STDOUT` and `RCUTILS_LOGGING_BUFFERED_STREAM`. Source:

@@ -100,8 +100,7 @@ def _check_options(options: dict[str, Any]) -> None:
 
 
 class RcutilsLogger:
-    """
-    Logs messages under a name; names form a tree, with dots.
+    """Logs messages under a name; names form a tree, with dots.
 
     Filters apply to each logging call in the source separately: `once=True`, `skip_first=True`,
     `throttle_duration_sec=` [s] with the optional clock `throttle_time_source_type=`.
@@ -140,8 +139,7 @@ class RcutilsLogger:
         return LoggingSeverity(severity) >= _logging_levels.effective_level(self.name)
 
     def log(self, message: str, severity: int | LoggingSeverity, **kwargs: Any) -> bool:
-        """
-        Log `message`, unless the level or a filter rejects it.
+        """Log `message`, unless the level or a filter rejects it.
 
         :param kwargs: filters (see the class), and `name` to log under another name.
         :returns: whether it was logged.

@@ -49,8 +49,7 @@ class LifecycleNodeMixin(ManagedEntity):
         enable_communication_interface: bool = True,
         callback_group: CallbackGroup | None = None,
     ) -> None:
-        """
-        Initialize the lifecycle.
+        """Initialize the lifecycle.
 
         :param enable_communication_interface: whether other nodes may ask for transitions.
         :param callback_group: the group of the services for this; the node's default group if ``None``.
