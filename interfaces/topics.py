@@ -205,6 +205,8 @@ OPERATOR_NODES = ("terminal", "operator_page")
 """The nodes that show the arm to its operator."""
 _VIEWERS = ("RViz", "Foxglove")
 _CONFIGURED = ("kinematics", "motion", "robot_state", *OPERATOR_NODES)
+EVERY_SERVICE = "every service"
+"""In place of the names of all programs of the arm."""
 
 L1 = Topic("l1", Float64, _STATE, "m", ("config_l1",), _CONFIGURED, "length of the first link", _not_a_length)
 L2 = Topic(
@@ -364,14 +366,21 @@ DIAGNOSTICS = Topic(
     DiagnosticArray,
     _EVENTS,
     "",
-    ("every service",),
+    (EVERY_SERVICE,),
     ("sentinel", *OPERATOR_NODES),
     "health, at 1 Hz, and at once to a new subscriber",
     longest_gap=1.0,
 )
 
-CONTRACT = tuple(each for each in [*globals().values()] if isinstance(each, Topic) and each.type)
-"""All topics above whose type is installed."""
+ROWS = tuple(each for each in [*globals().values()] if isinstance(each, Topic))
+"""All topics above."""
+CONTRACT = tuple(topic for topic in ROWS if topic.type)
+"""Those whose type is installed."""
+PARAMETER_CLIENTS = {
+    "terminal": (EVERY_SERVICE,),
+    "operator_page": ("config_l1", "config_l2", "config_theta1", "config_theta2", "dead_mans_switch"),
+}
+"""The nodes that read and set parameters of others, and whose."""
 CONFIGURATION = {topic.name: topic for topic in (L1, L2, THETA1, THETA2)}
 """The four sources of the manipulator's configuration, by topic name (thesis 5.2.1)."""
 JOINTS = (THETA1, THETA2)

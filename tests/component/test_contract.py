@@ -37,7 +37,7 @@ def used(endpoints: Any) -> set[str]:
 def promised(node: str) -> tuple[set[str], set[str]]:
     return (
         {topic.name for topic in topics.CONTRACT if node in topic.subscribers},
-        {topic.name for topic in topics.CONTRACT if {node, "every service"} & set(topic.publishers)},
+        {topic.name for topic in topics.CONTRACT if {node, topics.EVERY_SERVICE} & set(topic.publishers)},
     )
 
 
@@ -74,6 +74,7 @@ def test_service_reads_and_publishes_what_the_contract_says(
     spin_until(lambda: used(node.subscriptions) >= promised(program.name)[0])
 
     assert (used(node.subscriptions), used(node.publishers)) == promised(program.name)
+    assert not list(node.clients)  # see topics.PARAMETER_CLIENTS
 
 
 def test_terminal_reads_and_publishes_what_the_contract_says(
@@ -88,8 +89,10 @@ def test_terminal_reads_and_publishes_what_the_contract_says(
 
     assert used(node.subscriptions) == reads
     assert used(node.publishers) == publishes - {topics.DIAGNOSTICS.name}
+    assert list(node.clients)  # the start of a system sets a parameter of every service, too
+    assert topics.PARAMETER_CLIENTS["terminal"] == (topics.EVERY_SERVICE,)
 
 
 def test_contract_names_only_programs_of_the_arm() -> None:
-    known = {*PROGRAMS, *topics.OPERATOR_NODES, "RViz", "Foxglove", "sensor", "every service"}
+    known = {*PROGRAMS, *topics.OPERATOR_NODES, "RViz", "Foxglove", "sensor", topics.EVERY_SERVICE}
     assert {name for topic in topics.CONTRACT for name in (*topic.publishers, *topic.subscribers)} <= known

@@ -112,12 +112,19 @@ def test_page_reads_and_publishes_what_the_contract_says(hand: Hand, observer: O
         "publishers": node.get_publisher_names_and_types_by_node,
     }
     for role, ask in endpoints.items():
-        named = {name for name, topic in names.items() if {PAGE, "every service"} & set(getattr(topic, role))}
+        named = {
+            name for name, topic in names.items() if {PAGE, topics.EVERY_SERVICE} & set(getattr(topic, role))
+        }
         observer.until(
             lambda ask=ask, named=named: (
                 {name for name, _ in ask(PAGE, "/") if name in names} | FOR_A_WHILE == named | FOR_A_WHILE
             )
         )
+
+    def servers() -> set[str]:
+        return {name.split("/")[1] for name, _ in node.get_client_names_and_types_by_node(PAGE, "/")}
+
+    observer.until(lambda: servers() == {*topics.PARAMETER_CLIENTS[PAGE]})
 
 
 def test_release_is_visible_at_once(hand: Hand, observer: Observer) -> None:
