@@ -1,0 +1,175 @@
+"""A keystore as SROS2 makes it, for ROS 2 and the embedded rclpy. openssl's command line makes the keys.
+
+::
+
+    public/   ca.cert.pem, and links to it: identity_ca.cert.pem, permissions_ca.cert.pem
+    private/  ca.key.pem, and links to it; an export has no such folder
+    enclaves/ governance.xml, governance.p7s (signed), and a folder for each enclave with cert.pem,
+              key.pem, permissions.xml, permissions.p7s (signed), and links to CA and governance
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+from collections.abc import Collection, Iterator, Mapping
+from contextlib import contextmanager
+from datetime import datetime
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from deploy.running.errors import DeploymentError
+from deploy.security import documents
+from deploy.security.rights import Rights
+
+CA = "sros2CA"  # the name that SROS2 gives it
+DAYS = 3650  # of validity, as in SROS2
+_REQUEST = "[req]\nprompt = no\ndistinguished_name = name\n[name]\nCN = {}\n"
+_LINKED_TO_CA = ("identity_ca", "permissions_ca")
+
+
+class Keystore:
+    """The keystore in a folder."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self._enclaves = folder / "enclaves"
+        self._ca = folder / "public" / "ca.cert.pem"
+        self._ca_key = folder / "private" / "ca.key.pem"
+
+    def write(self, rights: Mapping[str, Rights], domains: Collection[int]) -> None:
+        """
+        Write governance and enclaves. Keys and certificates that exist stay, permissions are written again.
+
+        :param rights: those of each enclave, such as ``/kinematics``.
+        :param domains: the ROS domains in which they join.
+        :raises DeploymentError: if openssl is missing or fails, or if this is an export, which has no CA key.
+        """
+        with _private():
+            self._write_ca()
+            self._sign(self._enclaves / "governance", documents.governance(domains))
+            for enclave, each in rights.items():
+                self._write_enclave(enclave, each, domains)
+
+    def enclaves(self) -> list[str]:
+        """Return the enclaves that exist, sorted."""
+        found = self._enclaves.glob("**/cert.pem")
+        return sorted(f"/{path.parent.relative_to(self._enclaves).as_posix()}" for path in found)
+
+    def export(self, folder: Path, enclaves: Collection[str]) -> None:
+        """
+        Copy what the host of these enclaves needs: no key of the CA, and none of another enclave.
+
+        :raises DeploymentError: if the folder exists, or an enclave does not.
+        """
+        if missing := sorted({*enclaves} - {*self.enclaves()}):
+            raise DeploymentError(f"{self.folder} has no enclave {', '.join(missing)}")
+        if folder.exists():
+            raise DeploymentError(f"{folder} exists already: an export needs a new folder")
+        with _private():
+            shutil.copytree(self.folder / "public", folder / "public", symlinks=True)
+            (folder / "enclaves").mkdir()
+            for document in ("governance.xml", "governance.p7s"):
+                shutil.copy2(self._enclaves / document, folder / "enclaves")
+            for enclave in enclaves:
+                place = enclave.lstrip("/")
+                shutil.copytree(self._enclaves / place, folder / "enclaves" / place, symlinks=True)
+
+    def _write_ca(self) -> None:
+        if self._ca.exists() and not self._ca_key.exists():
+            raise DeploymentError(f"{self.folder} has no key of its CA: add enclaves where it was made")
+        if not self._ca.exists():
+            for folder in (self._ca.parent, self._ca_key.parent, self._enclaves):
+                folder.mkdir(parents=True, exist_ok=True)
+            self._certify(CA, self._ca, self._ca_key, "critical,CA:true,pathlen:1")
+        for name in _LINKED_TO_CA:
+            _link(self._ca.with_name(f"{name}.cert.pem"), self._ca)
+            _link(self._ca_key.with_name(f"{name}.key.pem"), self._ca_key)
+
+    def _write_enclave(self, enclave: str, rights: Rights, domains: Collection[int]) -> None:
+        folder = self._enclaves / enclave.lstrip("/")
+        folder.mkdir(parents=True, exist_ok=True)
+        certificate, key = folder / "cert.pem", folder / "key.pem"
+        if not certificate.exists():
+            issuer = ["-CA", str(self._ca), "-CAkey", str(self._ca_key)]
+            self._certify(enclave, certificate, key, "CA:false", issuer)
+        for name in _LINKED_TO_CA:
+            _link(folder / f"{name}.cert.pem", self._ca.with_name(f"{name}.cert.pem"))
+        _link(folder / "governance.p7s", self._enclaves / "governance.p7s")
+        text = documents.permissions(enclave, rights, domains, _validity(certificate))
+        self._sign(folder / "permissions", text)
+
+    def _certify(
+        self, name: str, certificate: Path, key: Path, constraints: str, issuer: Collection[str] = ()
+    ) -> None:
+        """Make a key on P-256 and its certificate, which comes last: without it, both are made again."""
+        with TemporaryDirectory() as folder:
+            request, made = Path(folder, "request"), Path(folder, "made")
+            request.write_text(_REQUEST.format(name))
+            _openssl(
+                *(
+                    "req",
+                    "-x509",
+                    "-config",
+                    str(request),
+                    "-newkey",
+                    "ec",
+                    "-pkeyopt",
+                    "ec_paramgen_curve:P-256",
+                ),
+                *(
+                    "-nodes",
+                    "-sha256",
+                    "-days",
+                    str(DAYS),
+                    "-addext",
+                    f"basicConstraints={constraints}",
+                    *issuer,
+                ),
+                *("-keyout", str(key), "-out", str(made)),
+            )
+            shutil.move(made, certificate)
+
+    def _sign(self, document: Path, text: str) -> None:
+        """Write NAME.xml and, signed, NAME.p7s. A process that starts reads the old or the new one."""
+        plain, signed = document.with_suffix(".xml"), document.with_suffix(".p7s")
+        new = document.with_suffix(".new")
+        plain.write_text(text)
+        signer = ["-signer", str(self._ca), "-inkey", str(self._ca_key)]
+        _openssl("smime", "-sign", "-text", "-in", str(plain), "-out", str(new), *signer)
+        os.replace(new, signed)
+
+
+def _validity(certificate: Path) -> tuple[datetime, datetime]:
+    """Return from when to when a certificate is valid."""
+    text = _openssl("x509", "-in", str(certificate), "-noout", "-startdate", "-enddate")
+    begin, end = (
+        datetime.strptime(line.partition("=")[2], "%b %d %H:%M:%S %Y GMT") for line in text.splitlines()
+    )
+    return begin, end
+
+
+def _link(link: Path, target: Path) -> None:
+    if not link.is_symlink():
+        link.symlink_to(os.path.relpath(target, link.parent))
+
+
+def _openssl(*arguments: str) -> str:
+    try:
+        done = subprocess.run(["openssl", *arguments], capture_output=True, text=True)
+    except FileNotFoundError:
+        raise DeploymentError("A keystore needs the command openssl 3: apt-get install openssl") from None
+    if done.returncode:
+        raise DeploymentError(f"openssl {arguments[0]}: {' '.join(done.stderr.split())}")
+    return done.stdout
+
+
+@contextmanager
+def _private() -> Iterator[None]:
+    """Make files that only the user can read."""
+    mask = os.umask(0o077)
+    try:
+        yield
+    finally:
+        os.umask(mask)
