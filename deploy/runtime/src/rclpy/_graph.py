@@ -47,7 +47,7 @@ class Graph(GraphQueries):
     def __init__(self, domain_id: int, enclave: str) -> None:
         super().__init__()
         self._lock = threading.RLock()
-        self.participant = _dds.Participant(domain_id, f"enclave={enclave};")
+        self.participant = _dds.Participant(domain_id, enclave)
         hash_ = f"typehash={TYPE_HASH};"
         self._writer = self.participant.create_writer(TOPIC, TYPE, WRITER_QOS, hash_)
         reader = self.participant.create_reader(TOPIC, TYPE, READER_QOS, hash_)

@@ -10,6 +10,6 @@ from rclpy._dds import Participant
 @pytest.fixture
 def participant(domain_id: int) -> Iterator[Participant]:
     """A DDS participant in the test's domain, without a node, that may write arbitrary bytes."""
-    participant = Participant(domain_id, "enclave=/;")
+    participant = Participant(domain_id, "/")
     yield participant
     participant.close()

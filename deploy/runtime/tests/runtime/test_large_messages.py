@@ -170,7 +170,7 @@ def test_lent_octets_outlive_later_messages_and_the_reader(reader: Reader, write
 
 
 def test_lent_octets_outlive_the_participant(domain_id: int) -> None:
-    participant = Participant(domain_id, "")
+    participant = Participant(domain_id, "/")
     reader = participant.create_reader("rt/x", TYPE_NAME, QOS, "")
     participant.create_writer("rt/x", TYPE_NAME, QOS, "").write(octets(1))
     first = lent(reader)

@@ -20,10 +20,10 @@ from rclpy_simulation.process import running_process
 class Participant:
     """A simulated participant of the process that creates it."""
 
-    def __init__(self, domains: Domains, domain_id: int, user_data: str) -> None:
+    def __init__(self, domains: Domains, domain_id: int, enclave: str) -> None:
         process = running_process()
         self.domain_id = domain_id
-        self.user_data = user_data
+        self.user_data = f"enclave={enclave};"
         self.process = process
         self.host = process.host
         self.kernel = process.kernel

@@ -75,11 +75,13 @@ def default_spin_time() -> float:
     """How long a node looks for others at first, unless the user says otherwise [s].
 
     A new participant of Fast DDS announces itself before it listens. It may miss the answer of a peer, which
-    answers only once, and hears of it with the peer's next announcement: by default within 3 s.
+    answers only once, and hears of it with the peer's next announcement: by default within 3 s. With
+    security, participants first check each other's keys.
     """
     import rclpy
 
-    return 3.2 if "fastrtps" in rclpy.get_rmw_implementation_identifier() else 0.5
+    is_secure = os.environ.get("ROS_SECURITY_ENABLE") == "true"
+    return 3.2 if is_secure or "fastrtps" in rclpy.get_rmw_implementation_identifier() else 0.5
 
 
 def discover(node: Node, spin_time: float, until: Callable[[Node], bool] | None = None) -> None:

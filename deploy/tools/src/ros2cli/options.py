@@ -39,7 +39,7 @@ def direct_options(verb: _Verb) -> _Verb:
         "--spin-time",
         type=FINITE_FLOAT,
         callback=lambda context, parameter, value: default_spin_time() if value is None else value,
-        show_default="0.5, or 3.2 with Fast DDS",
+        show_default="0.5, or 3.2 with Fast DDS or security",
         help="Time in seconds to look for nodes. It looks longer while it still finds more.",
     )(verb)
     return click.option("-s", "--use-sim-time", is_flag=True, help="Enable ROS simulation time.")(verb)

@@ -19,14 +19,17 @@ from pathlib import Path
 
 from rclpy.exceptions import RCLError
 
-from .library import PRECONDITION_NOT_MET, NetworkAddress, blocking, checked, libc
+from . import security
+from .library import IS_RECENT, PRECONDITION_NOT_MET, NetworkAddress, blocking, checked, libc
 
 RANGES = ("SUBNET", "LOCALHOST", "OFF", "SYSTEM_DEFAULT")
 _COMMENT = re.compile("<!--.*?-->", re.DOTALL)
 _CHOICE = re.compile(r"<(networkinterface|transport|useipv6)\b", re.IGNORECASE)  # Cyclone ignores case, too
 _NO_MULTICAST = "<AllowMulticast>false</AllowMulticast>"
 # Packets to localhost arrive on the loopback interface. Otherwise, Cyclone drops them if it does not use it.
-_FROM_ANY_INTERFACE = "<Internal><ExtendedPacketInfo>false</ExtendedPacketInfo></Internal>"
+_FROM_ANY_INTERFACE = (
+    "<Internal><ExtendedPacketInfo>false</ExtendedPacketInfo></Internal>" if IS_RECENT else ""
+)
 # On loopback, the fewer datagrams a large message needs, the less time it takes. If they overflow
 # the receiving socket, whose size the kernel limits (net.core.rmem_max), one request covers 256 fragments.
 _LARGE_DATAGRAMS = "<MaxMessageSize>65000 B</MaxMessageSize><FragmentSize>64000 B</FragmentSize>"
@@ -40,6 +43,9 @@ _LARGEST_SOCKET = Path("/proc/sys/net/core/rmem_max")
 _LOOPBACK_IS_DOWN = (
     "the loopback interface is down, but nodes of one host meet through it: run `ip link set lo up`"
 )
+# Version 0.10 neither knows nor needs these: it asks peers without end, and obeys AllowMulticast alone.
+_FOREVER = ' PruneDelay="inf"' if IS_RECENT else ""
+_NEVER_MULTICAST = ' allow_multicast="false"' if IS_RECENT else ""
 _AF_INET = 2
 _IFF_UP, _IFF_LOOPBACK = 0x1, 0x8
 
@@ -60,10 +66,7 @@ def domain_id_from_environment(environment: Mapping[str, str] | None = None) -> 
 def configuration(environment: Mapping[str, str] | None = None, domain_id: int = 0) -> str:
     """Return Cyclone's configuration of a domain. Raises RCLError if the environment is invalid."""
     environment = os.environ if environment is None else environment
-    if environment.get("ROS_SECURITY_ENABLE") == "true":  # no other spelling counts, as in ROS 2
-        raise RCLError(
-            "ROS_SECURITY_ENABLE is true, but this runtime has no DDS security: unset it, or use ROS 2"
-        )
+    security.check(environment)
     discovery_range = environment.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "").strip().upper() or "SUBNET"
     if discovery_range not in RANGES:
         raise RCLError(
@@ -107,7 +110,7 @@ def _localhost(peers: list[str], choices: set[str]) -> tuple[str, str]:
     datagrams, internal = (_LARGE_DATAGRAMS, _large_bursts()) if interfaces else ("", _FROM_ANY_INTERFACE)
     general = f"<General>{_NO_MULTICAST}{interfaces}{datagrams}</General>{internal}"
     # By default, Cyclone 11 asks every 30 s, and only for 30 s.
-    return general, "<SPDPInterval>8s</SPDPInterval>" + _peers(peers, choices, ' PruneDelay="inf"')
+    return general, "<SPDPInterval>8s</SPDPInterval>" + _peers(peers, choices, _FOREVER)
 
 
 def _large_bursts() -> str:
@@ -187,7 +190,7 @@ def _loopback_and_default() -> str:
     if any(not flags & _IFF_LOOPBACK for _, flags in interfaces):
         chosen.append('autodetermine="true"')
     # Multicast in CYCLONEDDS_URI must not leave the host by mistake: it must name the interfaces, too.
-    elements = "".join(f'<NetworkInterface {choice} allow_multicast="false"/>' for choice in chosen)
+    elements = "".join(f"<NetworkInterface {choice}{_NEVER_MULTICAST}/>" for choice in chosen)
     return f"<Interfaces>{elements}</Interfaces>"
 
 

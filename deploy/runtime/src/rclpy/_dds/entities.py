@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import ctypes as ct
+import os
 import time
 from array import array
+from contextlib import nullcontext
 from functools import cache
 from sys import is_finalizing
 from typing import Any, NamedTuple
@@ -14,11 +16,12 @@ from rclpy.exceptions import InvalidHandle, RCLError
 from rclpy.qos import QoSProfile
 from rosidl_runtime_embedded.pieces import LARGE, Pieces
 
-from . import domain, qos, status
+from . import domain, log, qos, security, status
 from .discovery import Discovery
 from .library import (
     ANY_STATE,
     BYTES_HEADER,
+    IS_RECENT,
     LIBRARY_HANDLE,
     SERDATA_KIND_DATA,
     TIMEOUT,
@@ -28,6 +31,7 @@ from .library import (
     Pointer,
     SampleInfo,
     Serdata,
+    SerdataHeader,
     TopicDescriptor,
     blocking,
     checked,
@@ -97,19 +101,28 @@ def _guid(handle: int) -> bytes:
 class Participant:
     """A participant of this process in a DDS domain."""
 
-    def __init__(self, domain_id: int, user_data: str) -> None:
+    def __init__(self, domain_id: int, enclave: str) -> None:
+        """
+        Join a domain.
+
+        :param enclave: its keys are used where the environment asks for security.
+        :raises RCLError: if the environment or its keys do not allow it.
+        """
         self.domain_id = domain_id
-        domain.enter(domain_id)
-        try:
-            with qos.participant_qos(user_data) as participant_qos:
-                what = f"cannot join DDS domain {domain_id}"
-                self.handle = checked(blocking.dds_create_participant(domain_id, participant_qos, None), what)
-        except Exception:
-            domain.leave(domain_id)
-            raise
+        properties = security.properties(enclave, os.environ)
+        with log.kept() if properties else nullcontext(str) as reasons:
+            domain.enter(domain_id)
+            try:
+                with qos.participant_qos(f"enclave={enclave};", properties) as participant_qos:
+                    self.handle = blocking.dds_create_participant(domain_id, participant_qos, None)
+                checked(self.handle, f"cannot join DDS domain {domain_id}{reasons()}")
+            except Exception:
+                domain.leave(domain_id)
+                raise
         self.gid = _guid(self.handle)
         self.publisher = checked(blocking.dds_create_publisher(self.handle, None, None), "publisher")
         self.subscriber = checked(blocking.dds_create_subscriber(self.handle, None, None), "subscriber")
+        self._sertype = None if IS_RECENT else self._find_sertype()
 
     def create_discovery(self) -> Discovery:
         return Discovery(self.handle)
@@ -124,13 +137,44 @@ class Participant:
         handle = blocking.dds_create_topic(self.handle, ct.byref(descriptor), name.encode(), None, None)
         return checked(handle, f"cannot create topic {name} of type {type_name}")
 
+    def _find_sertype(self) -> int:
+        """
+        Return a type for the samples of all writers. Version 0.10 of Cyclone has no function for it.
+
+        It is in a sample that is written and taken here. The topic, which keeps it, is one that each enclave
+        may use. Nobody else has its type, so nothing is sent.
+        """
+        topic = self._topic("ros_discovery_info", "octet")
+        reader = checked(blocking.dds_create_reader(self.subscriber, topic, None, None), "reader")
+        writer = checked(blocking.dds_create_writer(self.publisher, topic, None, None), "writer")
+        checked(blocking.dds_write(writer, ct.byref(ct.c_uint8())), "cannot write")
+        serdata, info = Serdata(), SampleInfo()
+        entity = Entity.from_param(reader)
+        checked(
+            quick.dds_takecdr(entity, ct.byref(serdata), _ONE_SAMPLE, ct.byref(info), _ANY), "cannot take"
+        )
+        sertype: int = SerdataHeader.from_address(serdata.value or 0).type
+        quick.ddsi_serdata_unref(serdata)
+        blocking.dds_delete(writer)
+        blocking.dds_delete(reader)
+        return sertype
+
+    def _sertype_of(self, writer: int) -> int:
+        if self._sertype is not None:
+            return self._sertype
+        sertype = Pointer()
+        checked(quick.dds_get_entity_sertype(writer, ct.byref(sertype)), "cannot read a writer's type")
+        assert sertype.value is not None
+        return sertype.value
+
     def create_writer(self, topic: str, type_name: str, profile: QoSProfile, user_data: str) -> Writer:
         """Create a writer on the DDS topic ``topic`` (mangled: ``rt/...``) of DDS type ``type_name``."""
         handle = self._topic(topic, type_name)
         try:
             with qos.endpoint_qos(profile, user_data) as writer_qos:
                 writer = blocking.dds_create_writer(self.publisher, handle, writer_qos, None)
-            return Writer(checked(writer, f"cannot create a writer on {topic}"))
+            checked(writer, f"cannot create a writer on {topic}")
+            return Writer(writer, self._sertype_of(writer))
         finally:
             blocking.dds_delete(handle)
 
@@ -216,12 +260,10 @@ class _Endpoint(Handle):
 
 
 class Writer(_Endpoint):
-    def __init__(self, handle: int) -> None:
+    def __init__(self, handle: int, sertype: int) -> None:
         super().__init__(handle)
-        sertype = Pointer()
-        checked(quick.dds_get_entity_sertype(handle, ct.byref(sertype)), "cannot read a writer's type")
         # None once closed: DDS frees it with the writer.
-        self._sertype: Any = Pointer.from_param(sertype.value)
+        self._sertype: Any = Pointer.from_param(sertype)
         instance = ct.c_uint64()
         checked(quick.dds_get_instance_handle(handle, ct.byref(instance)), "cannot read a writer's handle")
         self.instance_handle = instance.value

@@ -1,9 +1,11 @@
 """The C functions of Eclipse Cyclone DDS that this runtime needs, through ctypes.
 
-The PyPI distribution ``cyclonedds`` contains the C library. Its Python layer is not imported: it holds the
-interpreter lock while it writes, announces XTypes information that ROS 2 nodes do not announce, and takes
-130 ms to import. The C functions below are Cyclone's interface for applications with messages in CDR, which
-``rmw_cyclonedds`` uses, too.
+The PyPI distribution ``cyclonedds`` contains the C library, version 11, without DDS security. Where security
+is wanted, another library is loaded (:mod:`.security`), which may be of version 0.10, as in Debian.
+
+The Python layer of Cyclone DDS is not imported: it holds the interpreter lock while it writes, announces
+XTypes information that ROS 2 nodes do not announce, and takes 130 ms to import. The C functions below are
+Cyclone's interface for applications with messages in CDR, which ``rmw_cyclonedds`` uses, too.
 
 The library is loaded twice. Calls of ``blocking`` release the interpreter lock: for functions that may wait.
 Calls of ``quick`` keep it, which costs less: for functions that never block.
@@ -13,10 +15,13 @@ from __future__ import annotations
 
 import ctypes as ct
 import importlib.util
+import os
 from pathlib import Path
 from struct import Struct
 from types import ModuleType
 from typing import Any
+
+from . import security
 
 Entity = ct.c_int32
 Pointer = ct.c_void_p
@@ -46,6 +51,18 @@ class DDSError(RuntimeError):
 
 class Serdata(ct.c_void_p):
     """struct ddsi_serdata *: a sample in DDS's memory. As a result, it is not converted to a number."""
+
+
+class SerdataHeader(ct.Structure):
+    """struct ddsi_serdata of version 0.10, as far as it is read."""
+
+    _fields_ = [
+        ("ops", Pointer),
+        ("hash", ct.c_uint32),
+        ("references", ct.c_uint32),
+        ("kind", ct.c_int),
+        ("type", Pointer),
+    ]
 
 
 class TopicDescriptor(ct.Structure):
@@ -130,6 +147,8 @@ NetworkAddress._fields_ = [
 
 
 def _path() -> str:
+    if security.is_wanted(os.environ) and (found := security.library(os.environ)):
+        return str(found)  # without one, the first context tells the user
     spec = importlib.util.find_spec("cyclonedds")
     if spec is None or not spec.submodule_search_locations:
         raise ImportError("Eclipse Cyclone DDS is not installed: pip install 'cyclonedds>=11.0.1,<12'")
@@ -171,6 +190,7 @@ _BLOCKING: dict[str, tuple[Any, list[Any]]] = {
     "dds_set_guardcondition": (ct.c_int32, [Entity, ct.c_bool]),
     "dds_take_guardcondition": (ct.c_int32, [Entity, ct.POINTER(ct.c_bool)]),
     "dds_writecdr": (ct.c_int32, [Entity, Serdata]),
+    "dds_write": (ct.c_int32, [Entity, Pointer]),
     "dds_wait_for_acks": (ct.c_int32, [Entity, Duration]),
     "dds_assert_liveliness": (ct.c_int32, [Entity]),
     "dds_get_status_mask": (ct.c_int32, [Entity, ct.POINTER(ct.c_uint32)]),
@@ -194,7 +214,6 @@ _QUICK: dict[str, tuple[Any, list[Any]]] = {
         Serdata,
         [Pointer, ct.c_int, ct.c_size_t, Pointer, ct.c_size_t],
     ),
-    "dds_get_entity_sertype": (ct.c_int32, [Entity, ct.POINTER(Pointer)]),
     "dds_get_guid": (ct.c_int32, [Entity, ct.POINTER(Guid)]),
     "dds_get_instance_handle": (ct.c_int32, [Entity, ct.POINTER(ct.c_uint64)]),
     "dds_get_matched_publications": (ct.c_int32, [Entity, Pointer, ct.c_size_t]),
@@ -205,6 +224,7 @@ _QUICK: dict[str, tuple[Any, list[Any]]] = {
     "dds_free": (None, [Pointer]),
     "dds_create_qos": (Pointer, []),
     "dds_delete_qos": (None, [Pointer]),
+    "dds_qset_prop": (None, [Pointer, ct.c_char_p, ct.c_char_p]),
     "dds_qset_userdata": (None, [Pointer, ct.c_char_p, ct.c_size_t]),
     "dds_qset_durability": (None, [Pointer, ct.c_int]),
     "dds_qset_durability_service": (
@@ -249,6 +269,10 @@ _LIBC: dict[str, tuple[Any, list[Any]]] = {
 }
 
 LOCK_KEEPING = ct.PyDLL(_path())
+IS_RECENT = hasattr(LOCK_KEEPING, "dds_get_entity_sertype")
+"""Whether the library is of version 11, not 0.10."""
+if IS_RECENT:
+    _QUICK["dds_get_entity_sertype"] = ct.c_int32, [Entity, ct.POINTER(Pointer)]
 blocking = functions(ct.CDLL(_path()), _BLOCKING)
 quick = functions(LOCK_KEEPING, _QUICK)
 libc = functions(ct.CDLL(None), _LIBC)

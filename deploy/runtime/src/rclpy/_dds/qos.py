@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import ctypes as ct
-from collections.abc import Iterator
+import os
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from functools import lru_cache
 
@@ -82,10 +83,12 @@ def endpoint_qos(profile: QoSProfile, user_data: str) -> Iterator[int]:
 
 
 @contextmanager
-def participant_qos(user_data: str) -> Iterator[int]:
+def participant_qos(user_data: str, properties: Mapping[str, str]) -> Iterator[int]:
     """Create the DDS QoS of a participant; the end of the ``with`` frees it."""
     qos = quick.dds_create_qos()
     try:
+        for name, value in properties.items():
+            quick.dds_qset_prop(qos, name.encode(), os.fsencode(value))
         encoded = user_data.encode()
         quick.dds_qset_userdata(qos, encoded, len(encoded))
         yield qos
