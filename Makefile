@@ -18,6 +18,9 @@ MODULES ?=
 BENCH ?=
 NAME ?=
 ARMS ?=
+SECURE ?=
+EXPORT ?=
+ENCLAVES ?=
 SHELL := /bin/sh
 MAKEFLAGS += --no-print-directory
 PY := deploy/commands/venv.sh
@@ -28,17 +31,18 @@ HOLD := $(shell env --block-signal=INT echo env --block-signal=INT 2>/dev/null)
 export PYTHON SCENARIO PARAMETERS MANIFEST WEB RUNTIME
 
 # The variables of each command. Others on the command line are refused, except by `make stop`: it must not fail.
-USED_BY_run := SCENARIO PARAMETERS MANIFEST WEB
+USED_BY_run := SCENARIO PARAMETERS MANIFEST WEB SECURE
 USED_BY_start := $(USED_BY_run)
 USED_BY_unit := $(USED_BY_run)
 USED_BY_fleet := ARMS
-USED_BY_chaos := MINUTES SEED CHAOS
+USED_BY_chaos := MINUTES SEED CHAOS SECURE
 USED_BY_simulate := HOURS SEED SCHEDULE SIMULATE
 USED_BY_replay := RECORD REPLAY
 USED_BY_test := TESTS
 USED_BY_mutants := MODULES
 USED_BY_bench := BENCH
 USED_BY_new-service := NAME
+USED_BY_keystore := MANIFEST EXPORT ENCLAVES
 # Those of the environment may also stand on the command line of make.
 ENVIRONMENT := ROS_% RMW_% CYCLONEDDS_% FASTRTPS_% FASTDDS_% REACTIVE_ARM_% PIP_% PYTHONPATH PATH
 GOALS := $(or $(MAKECMDGOALS),help)
@@ -48,12 +52,21 @@ GIVEN := $(foreach name,$(.VARIABLES),$(if $(filter command,$(origin $(name))),$
 $(foreach name,$(filter-out $(USED) $(ENVIRONMENT),$(GIVEN)),$(error make $(GOALS) has no variable $(name); it has $(USED)))
 endif
 
-.PHONY: help setup tables run start unit stop status logs record terminal fleet chaos simulate replay test mutants check bench new-service
+# Short for ROS 2's own variables.
+ifneq ($(if $(filter stop,$(GOALS)),,$(SECURE)),)
+$(if $(filter-out yes,$(SECURE)),$(error SECURE=$(SECURE): it is yes, or empty))
+export ROS_SECURITY_ENABLE := true
+export ROS_SECURITY_STRATEGY := Enforce
+export ROS_SECURITY_KEYSTORE := $(or $(ROS_SECURITY_KEYSTORE),$(CURDIR)/.keystore)
+endif
+
+.PHONY: help setup tables run start unit stop status logs record terminal fleet chaos simulate replay test mutants check bench new-service keystore
 
 help:
 	@echo "make run      start the system, show it in this terminal, stop it with Ctrl-C"
 	@echo "make start    start it in the background          (run, start: SCENARIO=demo, listing_5_9, none or a file)"
 	@echo "                                                  (PARAMETERS=file; WEB=off for no page, or its port;"
+	@echo "                                                  SECURE=yes: only with the keys of make keystore;"
 	@echo "                                                  MANIFEST=file with programs of your own)"
 	@echo "make unit     write a systemd unit that starts it at each boot    (the same variables)"
 	@echo "make terminal attach this terminal to it"
@@ -62,6 +75,7 @@ help:
 	@echo "make record   record its messages until Ctrl-C     (MCAP for Foxglove and ros2 bag, in .run/records)"
 	@echo "make fleet    watch all arms of this host, one line each  (ARMS=\"/arm1 /arm2=5\" for those of other hosts)"
 	@echo "make stop     stop it"
+	@echo "make keystore write the keys with which only this arm's processes meet  (EXPORT=folder ENCLAVES=\"names\" for a host)"
 	@echo "make chaos    break a system on purpose and check its promises  (MINUTES=5 SEED= CHAOS=--help for more)"
 	@echo "make simulate the same in virtual time, hours in minutes  (HOURS=1 SEED= SCHEDULE=file SIMULATE=--help for more)"
 	@echo "make replay   feed a record through these services and show what differs  (RECORD= REPLAY=--help for more)"
@@ -88,6 +102,10 @@ terminal status logs record:
 fleet:
 	@test -e $(STAMP) || { echo ".venv is not set up: make setup" >&2; exit 1; }
 	@RUNTIME=embedded exec $(HOLD) $(PY) -m deploy.commands.fleet $(ARMS)
+
+keystore: export ROS_SECURITY_KEYSTORE := $(or $(ROS_SECURITY_KEYSTORE),$(CURDIR)/.keystore)
+keystore: setup
+	@exec $(HOLD) $(PY) -m deploy.commands.launcher keystore "$(EXPORT)" "$(ENCLAVES)"
 
 stop:
 	@exec $(HOLD) deploy/commands/python.sh deploy.commands.stop "$$PYTHON"

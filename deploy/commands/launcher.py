@@ -1,4 +1,4 @@
-"""The commands behind `make run`, `start`, `unit`, `terminal`, `status`, `logs` and `record`."""
+"""The commands behind `make run`, `start`, `unit`, `terminal`, `status`, `logs`, `record` and `keystore`."""
 
 from __future__ import annotations
 
@@ -151,9 +151,17 @@ def record(system: System) -> None:
         raise DeploymentError(messages.unattended(system.run))
     from deploy.commands import record
     from deploy.commands.member import Member
+    from deploy.security.rights import RECORDER
 
-    with Member() as member:
+    with Member(RECORDER) as member:
         record.write(system.run / RECORDS, member, system)
+
+
+def keystore(_: System, export: str, enclaves: str) -> None:
+    from deploy.commands import keystore as writer
+
+    with manifest.chosen(os.environ.get("MANIFEST", "")):
+        writer.write(export, enclaves)
 
 
 def _chosen(scenario: str) -> AbstractContextManager[None]:
@@ -295,6 +303,10 @@ def main(arguments: list[str]) -> int:
         command.add_argument("parameter_file", nargs="?", default="")
     for name, joins in (("terminal", attach), ("status", status), ("logs", logs), ("record", record)):
         commands.add_parser(name).set_defaults(obey=joins)
+    keys = commands.add_parser("keystore")
+    keys.set_defaults(obey=keystore)
+    keys.add_argument("export", nargs="?", default="")
+    keys.add_argument("enclaves", nargs="?", default="")
     options = vars(parser.parse_args(arguments))
 
     set_middleware(os.environ)

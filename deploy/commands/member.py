@@ -15,7 +15,8 @@ from rclpy.task import Future
 from deploy.running import interruption, manifest
 from deploy.running.environment import namespace_of
 from deploy.running.errors import DeploymentError
-from interfaces.service import middleware
+from deploy.security.rights import TERMINAL
+from interfaces.service import enclave, middleware
 from reactive_node import ReactiveNode
 from reactive_node.executor import create_executor
 
@@ -25,12 +26,18 @@ SPIN_TIME = 0.01  # s
 class Member:
     """In a `with`, this process takes part in the system's communication; it handles no signals."""
 
-    def __init__(self) -> None:
-        """Join. Raises DeploymentError if the environment does not allow it."""
+    def __init__(self, name: str = TERMINAL) -> None:
+        """
+        Join. Raises DeploymentError if the environment does not allow it.
+
+        :param name: of the enclave, and with the pid of the node.
+        """
+        namespace = namespace_of(os.environ)
+        arguments = enclave.arguments(name, namespace)
         try:
             with middleware.without_shared_memory():
-                rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
-                self.node = ReactiveNode(f"terminal_{os.getpid()}", namespace=namespace_of(os.environ))
+                rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
+                self.node = ReactiveNode(f"{name}_{os.getpid()}", namespace=namespace)
         except RuntimeError as error:
             rclpy.try_shutdown()
             raise DeploymentError(f"Cannot join the ROS graph: {error}") from None

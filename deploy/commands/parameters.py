@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -12,12 +13,14 @@ from rclpy.validate_namespace import validate_namespace
 
 from deploy.operator.page.address import DEFAULT_PORT, host_names, tls
 from deploy.running import manifest, parameter_file, processes
-from deploy.running.environment import NAMESPACE, namespace_of
+from deploy.running.environment import ENFORCE, KEYSTORE, NAMESPACE, SECURITY, STRATEGY, namespace_of
 from deploy.running.errors import DeploymentError
 from deploy.running.processes import ROOT
 from deploy.running.run_directory import ALL, KEY, NOT_YET, scenario_parameters
 from deploy.running.system import System
-from interfaces.service import UserError, instance
+from deploy.security.keystore import Keystore
+from deploy.security.rights import TERMINAL
+from interfaces.service import UserError, enclave, instance
 from interfaces.sources import scenario_file
 
 SCENARIOS = ROOT / "deploy" / "scenarios"
@@ -116,9 +119,28 @@ def check_environment(system: System) -> None:
     reach = os.environ.get(DISCOVERY_RANGE, "")
     if reach.strip().upper() == "OFF":
         raise DeploymentError(f"{DISCOVERY_RANGE}={reach} keeps the services apart: set LOCALHOST or SUBNET")
+    _check_keys(namespace)
     if not system.members():  # the start reports a running system, and replaces orphans
         for program in manifest.programs():
             _check_claim(f"{namespace.rstrip('/')}/{program.name}", int(domain), namespace)
+
+
+def _check_keys(namespace: str) -> None:
+    """Raise DeploymentError if security is wanted, but not for every process, or without its keys."""
+    if os.environ.get(SECURITY) != "true":
+        return
+    if (strategy := os.environ.get(STRATEGY)) != ENFORCE:
+        raise DeploymentError(f"{STRATEGY}={strategy} lets processes join without keys: set it to {ENFORCE}")
+    if not os.environ.get(KEYSTORE):
+        raise DeploymentError(f"{SECURITY}=true needs {KEYSTORE}: the folder that make keystore wrote")
+    keystore = Keystore(Path(os.environ[KEYSTORE]).absolute())
+    os.environ[KEYSTORE] = str(keystore.folder)  # the services work in the run directory
+    needed = {
+        enclave.path(name, namespace) for name in (*map(attrgetter("name"), manifest.programs()), TERMINAL)
+    }
+    if missing := sorted(needed - {*keystore.enclaves()}):
+        others = f" and {len(missing) - 1} others" if missing[1:] else ""
+        raise DeploymentError(f"{keystore.folder} has no keys for {missing[0]}{others}: make keystore")
 
 
 def _check_claim(node: str, domain: int, namespace: str) -> None:

@@ -98,6 +98,11 @@ def check_runtime(environment: Mapping[str, str], ros: str) -> None:
             f" ({platform.machine()}, {' '.join(filter(None, platform.libc_ver())) or 'no glibc'}):"
             " source an installed ROS 2, or use RUNTIME=embedded, which needs x86_64 with glibc 2.17"
         )
+    if not runtime and not ros and environment.get("ROS_SECURITY_ENABLE") == "true":
+        raise SetupError(
+            "ROS_SECURITY_ENABLE=true: PyPI has ROS 2's rclpy without DDS security: use RUNTIME=embedded with"
+            " `apt-get install libddsc0debian`, or source an installed ROS 2"
+        )
     rmw = environment.get("RMW_IMPLEMENTATION") or FAST_DDS
     if not runtime and not ros and rmw != FAST_DDS:
         raise SetupError(

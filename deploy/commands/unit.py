@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from deploy.commands.parameters import WEB
-from deploy.running.environment import ADOPTED, namespace_of
+from deploy.running.environment import ADOPTED, KEYSTORE, namespace_of
 from deploy.running.errors import DeploymentError
 from deploy.running.extension import SENTINEL_START_TIMEOUT
 from deploy.running.processes import ROOT, RUN_DIRECTORY
@@ -54,8 +54,8 @@ def text(scenario: str, parameter_file: str, environment: Mapping[str, str]) -> 
     # By the shell: systemd allows fewer characters in the path of a program than in arguments.
     command = ["/bin/sh", str(ROOT / "deploy" / "commands" / "venv.sh"), *become]
     kept = {name: value for name, value in environment.items() if name.startswith(KEPT) and value}
-    if MANIFEST in kept:
-        kept[MANIFEST] = os.path.abspath(kept[MANIFEST])
+    for name in {MANIFEST, KEYSTORE} & kept.keys():
+        kept[name] = os.path.abspath(kept[name])
     return UNIT.format(
         root=_escaped(str(ROOT)),
         command=" ".join(_quoted(word).replace("$", "$$") for word in command),

@@ -10,6 +10,14 @@ from pathlib import Path
 from deploy.running import manifest, processes, rclpy_choice
 
 NAMESPACE = "REACTIVE_ARM_NAMESPACE"  # environment variable: the ROS namespace of an arm
+SECURITY = "ROS_SECURITY_ENABLE"
+"""Environment variable of ROS 2: whether DDS is secured."""
+STRATEGY, ENFORCE = "ROS_SECURITY_STRATEGY", "Enforce"
+"""Environment variable of ROS 2, and the value with which nothing joins without keys."""
+KEYSTORE = "ROS_SECURITY_KEYSTORE"
+"""Environment variable of ROS 2: the folder of the keystore."""
+OVERRIDE = "ROS_SECURITY_ENCLAVE_OVERRIDE"
+"""Environment variable of ROS 2: the enclave of all processes."""
 ADOPTED = (
     "RUNTIME",
     "PYTHONPATH",
@@ -44,8 +52,11 @@ def set_middleware(environment: MutableMapping[str, str]) -> None:
     environment.setdefault("FASTRTPS_DEFAULT_PROFILES_FILE", str(FASTDDS_PROFILES))
     # In LOCALHOST, rmw_fastrtps_cpp always adds shared memory; there, the profile keeps messages out of it.
     environment.setdefault("FASTDDS_BUILTIN_TRANSPORTS", "UDPv4")
-    if environment.get(rclpy_choice.RUNTIME) and namespace_of(environment) != "/":
-        environment.setdefault(CYCLONEDDS, tagged(environment))
+    if environment.get(SECURITY) == "true":
+        environment.setdefault(STRATEGY, ENFORCE)
+    elif environment.get(rclpy_choice.RUNTIME) and namespace_of(environment) != "/":
+        environment.setdefault(CYCLONEDDS, tagged(environment))  # version 0.10 does not know these settings
+    environment.pop(OVERRIDE, None)  # it is for `ros2` in the same shell: processes of an arm name theirs
 
 
 def tagged(environment: Mapping[str, str]) -> str:

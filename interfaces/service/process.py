@@ -21,13 +21,15 @@ import rclpy
 from rclpy.exceptions import NameValidationException, ParameterException
 from rclpy.executors import ExternalShutdownException
 
-from interfaces.service import instance, middleware, overrides
+from interfaces.service import enclave, instance, middleware, overrides
 from interfaces.service.errors import UserError
 from interfaces.service.node import ServiceNode
 from reactive_node.executor import create_executor
 
 NAMESPACE = "REACTIVE_ARM_NAMESPACE"
 """Environment variable: the default namespace of every service; ``--ros-args -r __ns:=…`` wins."""
+SUPERVISED = "SUPERVISOR_PROCESS_NAME"
+"""Environment variable: the name that supervisord gives to a program."""
 USER_ERRORS = (NameValidationException, ParameterException, UserError)
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 _SHUTDOWN_TIMEOUT = 0.8  # [s], of the second that a service has to end
@@ -56,7 +58,7 @@ def refuse(name: str, reason: str) -> NoReturn:
 def _run(name: str, wire: Callable[[ServiceNode], None]) -> int:
     try:
         with middleware.without_shared_memory():
-            rclpy.init()
+            rclpy.init(args=[*sys.argv, *_enclave(name)])
             node = ServiceNode(name, namespace=os.environ.get(NAMESPACE, ""))
     except (*USER_ERRORS, RuntimeError) as error:  # RuntimeError: of domain, discovery or DDS
         rclpy.try_shutdown()
@@ -70,6 +72,13 @@ def _run(name: str, wire: Callable[[ServiceNode], None]) -> int:
     finally:
         node.destroy_node()
         rclpy.try_shutdown()
+
+
+def _enclave(name: str) -> list[str]:
+    """Return the arguments that choose the enclave: that of the supervised program, unless it is given."""
+    if {"-e", "--enclave"} & {*sys.argv}:
+        return []
+    return enclave.arguments(os.environ.get(SUPERVISED, name), os.environ.get(NAMESPACE, ""))
 
 
 def _spin(node: ServiceNode, wire: Callable[[ServiceNode], None]) -> int:

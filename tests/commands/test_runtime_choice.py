@@ -22,6 +22,7 @@ from importlib.util import find_spec
 specs = {{name: find_spec(name) for name in {PACKAGES}}}
 print(*(name for name, spec in specs.items() if spec and spec.origin.startswith({FOLDERS})))
 """
+SECURE = {"ROS_SECURITY_ENABLE": "true"}
 CYCLONE = {"RMW_IMPLEMENTATION": "rmw_cyclonedds_cpp"}
 ROS = "/opt/ros/jazzy/lib/python3.12/site-packages/rclpy/__init__.py"
 
@@ -85,6 +86,14 @@ def test_rclpy_in_pythonpath_is_a_sourced_ros(tmp_path: Path, monkeypatch: pytes
             "x86_64",
             "RMW_IMPLEMENTATION=rmw_cyclonedds_cpp: PyPI has",
         ),
+        (
+            SECURE,
+            "",
+            "x86_64",
+            "without DDS security: use RUNTIME=embedded with `apt-get install libddsc0debian`, or source an",
+        ),
+        ({"RUNTIME": "embedded"} | SECURE, "", "x86_64", ""),
+        (SECURE, ROS, "x86_64", ""),
         ({"RUNTIME": "", "RMW_IMPLEMENTATION": "rmw_fastrtps_cpp"}, "", "x86_64", ""),
         ({"RUNTIME": "embedded"} | CYCLONE, "", "aarch64", ""),
         (CYCLONE, ROS, "aarch64", ""),

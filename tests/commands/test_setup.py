@@ -129,10 +129,13 @@ def test_a_quote_in_a_variable_of_make_is_no_shell_syntax(checkout: Path) -> Non
     [
         (
             "run SCENRIO=demo",
-            "run has no variable SCENRIO; it has PYTHON RUNTIME SCENARIO PARAMETERS MANIFEST WEB",
+            "run has no variable SCENRIO; it has PYTHON RUNTIME SCENARIO PARAMETERS MANIFEST WEB SECURE",
         ),
         ("SCENARIO=demo", "help has no variable SCENARIO; it has PYTHON RUNTIME"),
-        ("chaos MINUTES=1 HOURS=1", "chaos has no variable HOURS; it has PYTHON RUNTIME MINUTES SEED CHAOS"),
+        (
+            "chaos MINUTES=1 HOURS=1",
+            "chaos has no variable HOURS; it has PYTHON RUNTIME MINUTES SEED CHAOS SECURE",
+        ),
         ("help PYTHON=python3 ROS_DOMAIN_ID=1", ""),
         ("stop SCENRIO=demo", ""),
     ],

@@ -23,10 +23,10 @@ from rclpy.serialization import serialize_message
 from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import Bool, Float64, Header, String
 
-from deploy.promises.marks import GARBAGE, TEXT, nan
+from deploy.promises.marks import BABBLER, GARBAGE, TEXT, nan
 from deploy.running.environment import namespace_of
 from interfaces import topics
-from interfaces.service import middleware
+from interfaces.service import enclave, middleware
 
 RATES = {"flood": 10_000.0, "babble": 200.0, "pretend": 2.0}  # Hz; of babble, over all topics
 PRETENDED_AGE = 1.2  # s of a presence: too old for `turn_on`, young enough to leave the engines on
@@ -97,10 +97,11 @@ def _ticks(rate: float) -> Iterator[None]:
 def run(mode: str, rate: float) -> None:
     """Flood, babble or pretend at a rate [Hz] until killed."""
     with middleware.without_shared_memory():
+        namespace = namespace_of(os.environ)
         rclpy.init(
-            args=[], signal_handler_options=SignalHandlerOptions.NO
+            args=enclave.arguments(BABBLER, namespace), signal_handler_options=SignalHandlerOptions.NO
         )  # a signal ends it without clean-up
-        node = Node(f"babbler_{os.getpid()}", namespace=namespace_of(os.environ))
+        node = Node(f"{BABBLER}_{os.getpid()}", namespace=namespace)
     {"flood": flood, "babble": babble, "pretend": pretend}[mode](node, rate)
 
 

@@ -31,8 +31,10 @@ from deploy.promises.marks import is_babble
 from deploy.promises.observations import FAULTS, PROCESSES
 from deploy.running.recorder import Recorder, clocks, record
 from deploy.trials.chaos.process_monitor import SCAN_PERIOD, ProcessMonitor, Rounds
-from interfaces.service import middleware
+from interfaces.service import enclave, middleware
 from reactive_node import ReactiveNode
+
+OBSERVER = "observer"
 
 
 @contextmanager
@@ -63,8 +65,13 @@ def _recording(
     """
     context = Context()
     with middleware.without_shared_memory():
-        rclpy.init(args=[], context=context, domain_id=domain, signal_handler_options=SignalHandlerOptions.NO)
-        node = ReactiveNode(f"observer_{os.getpid()}", context=context, namespace=namespace)
+        rclpy.init(
+            args=enclave.arguments(OBSERVER, namespace),
+            context=context,
+            domain_id=domain,
+            signal_handler_options=SignalHandlerOptions.NO,
+        )
+        node = ReactiveNode(f"{OBSERVER}_{os.getpid()}", context=context, namespace=namespace)
     executor = SingleThreadedExecutor(context=context)
     executor.add_node(node)
     record(node, recorder, _report_first, lost, is_babble)

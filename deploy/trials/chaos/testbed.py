@@ -38,16 +38,21 @@ from deploy.promises.history import (
     InjectedFault,
     target_name,
 )
-from deploy.running import interruption, processes
-from deploy.running.environment import NAMESPACE
+from deploy.promises.marks import BABBLER
+from deploy.running import interruption, manifest, processes
+from deploy.running.environment import KEYSTORE, NAMESPACE, SECURITY
 from deploy.running.errors import DeploymentError
 from deploy.running.run_directory import scenario_parameters, with_parameters
 from deploy.running.system import System
+from deploy.security import rights
+from deploy.security.keystore import Keystore
 from deploy.trials.chaos import clock
 from deploy.trials.chaos.arm import RealArm, file_suffix
 from deploy.trials.chaos.faults import FAULT_KINDS, INJECTED, Undo
+from deploy.trials.chaos.observer import OBSERVER
 from deploy.trials.chaos.schedule import AWAKE, DAY, FIRST_FAULT, PlannedFault, Schedule
 from interfaces import topics
+from interfaces.service import enclave
 from reactive_node.domains import reserved_domain
 
 Action = Callable[[], tuple[float, Undo] | None]
@@ -124,6 +129,7 @@ class Testbed:
                 arm.domain = stack.enter_context(reserved_domain())
                 stack.callback(arm.system.stop)  # after the end of the record, which shows no stopping arm
             environment = {"ROS_AUTOMATIC_DISCOVERY_RANGE": self.discovery_range, **_cyclone(self._loss)}
+            environment |= self._keys()
             lines = self._start_observer(stack, environment)
             parameters = self._parameters()
             path = [str(INJECTED), *filter(None, [os.environ.get("PYTHONPATH")])]
@@ -146,6 +152,19 @@ class Testbed:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._stack.close()
+
+    def _keys(self) -> dict[str, str]:
+        """Write keys for the arms and for those that watch and disturb them, if security is wanted."""
+        if os.environ.get(SECURITY) != "true":
+            return {}
+        keystore = Keystore(self._directory.resolve() / "keystore")
+        keys: dict[str, rights.Rights] = {}
+        for arm in self.arms:
+            keys |= rights.of_arm(arm.namespace, [program.name for program in manifest.programs()])
+            keys[enclave.path(OBSERVER, arm.namespace)] = rights.observer(arm.namespace, OBSERVER)
+            keys[enclave.path(BABBLER, arm.namespace)] = rights.babbler(arm.namespace, BABBLER)
+        keystore.write(keys, [arm.domain for arm in self.arms])
+        return {KEYSTORE: str(keystore.folder)}
 
     def prepare(self, stack: ExitStack) -> None:
         """Prepare the hosts of the arms."""

@@ -1,0 +1,38 @@
+"""`make keystore`: writes the keys of an arm, and copies those of one host."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from deploy.running import manifest
+from deploy.running.environment import KEYSTORE, namespace_of
+from deploy.running.errors import DeploymentError
+from deploy.security import rights
+from deploy.security.keystore import Keystore
+from interfaces.service.enclave import path
+
+
+def write(export: str, names: str) -> None:
+    """
+    Write an enclave for each program of the manifest, and for terminal, recorder and tools.
+
+    :param export: a new folder for the keys of one host, '' for none.
+    :param names: of the enclaves of that host, with spaces between.
+    :raises DeploymentError: if that fails.
+    """
+    if not os.environ.get(KEYSTORE):
+        raise DeploymentError(f"{KEYSTORE} is not set: it names the folder of the keystore")
+    if bool(export) != bool(names.split()):
+        raise DeploymentError(
+            'An export needs both: make keystore EXPORT=folder ENCLAVES="terminal sentinel"'
+        )
+    keystore = Keystore(Path(os.environ[KEYSTORE]))
+    namespace, domain = namespace_of(os.environ), int(os.environ.get("ROS_DOMAIN_ID") or 0)
+    arm = rights.of_arm(namespace, [program.name for program in manifest.programs()])
+    keystore.write(arm, [domain])
+    print(f"{keystore.folder}: {len(arm)} enclaves for ROS domain {domain}, namespace {namespace}")
+    if export:
+        enclaves = [path(name, namespace) for name in names.split()]
+        keystore.export(Path(export), enclaves)
+        print(f"{export}: {', '.join(enclaves)}; copy this folder to their host")
