@@ -10,6 +10,7 @@ EMBEDDED_ONLY = (
     "deploy/simulation_kit",
     "tests/commands/test_fleet.py",
     "tests/mutants",
+    "tests/security/attacks",
     "tests/trials/replay",
     "tests/trials/simulation",
 )

@@ -12,7 +12,10 @@ import pytest
 from deploy.commands import test as command
 
 HERE = command.Part("", "", ["tests/system", "-x"])
-EMBEDDED = "tests/commands/test_fleet.py tests/mutants tests/trials/replay tests/trials/simulation"
+EMBEDDED = (
+    "tests/commands/test_fleet.py tests/mutants tests/security/attacks tests/trials/replay"
+    " tests/trials/simulation"
+)
 IGNORED = "--ignore=tests/mutants"
 ONE = "tests/trials/simulation/test_experiment.py::test"
 

@@ -1,0 +1,114 @@
+"""Keys, a whole arm that joins with them, and peers with other keys or none."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, closing
+from typing import Any
+
+import pytest
+from rclpy._dds import security
+
+from deploy.running import manifest
+from deploy.security import rights
+from deploy.security.keystore import Keystore
+from tests.environment import user_environment
+from tests.system.sites import LIMIT, ROOT, Site
+
+PROGRAMS = [program.name for program in manifest.programs(manifest.PATH)]
+
+
+class Refused(Exception):
+    """What a peer says of an error."""
+
+
+class Peer:
+    """A process with a node, see peer.py."""
+
+    def __init__(self, node: str, environment: dict[str, str], *arguments: str) -> None:
+        command = [sys.executable, "-m", "tests.security.attacks.peer", node, *arguments]
+        self._process = subprocess.Popen(
+            command, cwd=ROOT, env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        )
+
+    def joined(self) -> Peer:
+        """Return this peer when it has joined; raises Refused if it cannot."""
+        self._answer()
+        return self
+
+    def __call__(self, method: str, *arguments: Any) -> Any:
+        assert self._process.stdin is not None
+        self._process.stdin.write(json.dumps([method, *arguments]) + "\n")
+        self._process.stdin.flush()
+        return self._answer()
+
+    def _answer(self) -> Any:
+        assert self._process.stdout is not None
+        answer = json.loads(self._process.stdout.readline())
+        if isinstance(answer, dict):
+            raise Refused(answer["error"])
+        return answer
+
+    def close(self) -> None:
+        if self._process.poll() is None:
+            self._process.communicate(timeout=LIMIT)
+
+
+MakePeer = Callable[..., Peer]
+
+
+@pytest.fixture
+def make_peer(secure_site: SecureSite) -> Iterator[MakePeer]:
+    """Make a peer that has joined, in the arm's environment with changes; ``None`` removes a variable."""
+    with ExitStack() as stack:
+
+        def make(node: str, enclave: str = "", **changes: str | None) -> Peer:
+            environment = {**secure_site.environment, **changes}
+            arguments = ["--ros-args", "--enclave", f"/{enclave or node}"]
+            given = {name: value for name, value in environment.items() if value is not None}
+            return stack.enter_context(closing(Peer(node, given, *arguments))).joined()
+
+        yield make
+
+
+def until(condition: Callable[[], object], seconds: float = LIMIT) -> None:
+    deadline = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < deadline, f"not within {seconds} s"
+        time.sleep(0.05)
+
+
+class SecureSite(Site):
+    """A site whose system joins with keys, on the embedded rclpy."""
+
+    @property
+    def keystore(self) -> Keystore:
+        return Keystore(self.run.parent / "keystore")
+
+    @property
+    def environment(self) -> dict[str, str]:
+        return super().environment | {
+            "RUNTIME": "embedded",
+            "ROS_SECURITY_ENABLE": "true",
+            "ROS_SECURITY_STRATEGY": "Enforce",
+            "ROS_SECURITY_KEYSTORE": str(self.keystore.folder),
+            "_ROS_WHEELS_BOOTSTRAP_COMPLETE": "1",
+            "WEB": "off",
+        }
+
+
+@pytest.fixture(scope="module")
+def secure_site(tmp_path_factory: pytest.TempPathFactory, module_domain_id: int) -> Iterator[SecureSite]:
+    """A running arm without a scenario: nobody holds its switch."""
+    if security.library(user_environment() | os.environ) is None:
+        pytest.skip("no Cyclone DDS with security: apt-get install libddsc0debian")
+    with closing(SecureSite(tmp_path_factory.mktemp("secure") / "run", module_domain_id)) as site:
+        site.keystore.write(rights.of_arm("/", PROGRAMS), [site.domain])
+        code, output = site.do("start", "none")
+        assert code == 0, output
+        yield site

@@ -1,0 +1,255 @@
+"""Who cannot move the engines of an arm that joins with keys; the rows of A2 in deploy/SAFETY.md."""
+
+from __future__ import annotations
+
+import shutil
+import socket
+import subprocess
+import time
+from collections.abc import Callable, Iterator
+from contextlib import closing, suppress
+from pathlib import Path
+
+import pytest
+from rclpy._dds import security
+
+from deploy.security import rights
+from deploy.security.keystore import Keystore
+from tests.security.attacks.conftest import MakePeer, Peer, Refused, SecureSite, until
+
+ATTEMPTS = 3.0  # s for which a stranger tries
+HEARTBEAT, ENGINES, STATE = "operator_heartbeat", "engines", "engines/state"
+
+
+@pytest.fixture
+def watcher(make_peer: MakePeer) -> Peer:
+    """A peer with the recorder's keys that hears the state of the engines."""
+    watcher = make_peer("recorder_1", "recorder")
+    watcher("read", STATE)
+    until(lambda: "off" in watcher("heard", STATE))
+    return watcher
+
+
+def hold_switch_and_turn_on(peer: Peer, watcher: Peer, seconds: float = ATTEMPTS) -> list[str]:
+    """Send heartbeats and `turn_on`; return the states of the engines meanwhile."""
+    for name in (HEARTBEAT, ENGINES):
+        peer("advertise", name)
+    states: list[str] = []
+    deadline = time.monotonic() + seconds
+    while time.monotonic() < deadline and "on" not in states:
+        peer("publish", HEARTBEAT, True)
+        peer("publish", ENGINES, "turn_on")
+        states += watcher("heard", STATE)
+        time.sleep(0.05)
+    return states
+
+
+def test_the_operator_with_keys_turns_the_engines_on(make_peer: MakePeer, watcher: Peer) -> None:
+    operator = make_peer("terminal_1", "terminal")
+    assert "on" in hold_switch_and_turn_on(operator, watcher, 30.0)
+    operator("publish", ENGINES, "turn_off")
+    until(lambda: watcher("heard", STATE)[-1:] == ["off"])
+
+
+@pytest.fixture(params=["no keys", "keys of another CA"])
+def stranger(
+    request: pytest.FixtureRequest, secure_site: SecureSite, make_peer: MakePeer, tmp_path: Path
+) -> Peer:
+    """A peer in the arm's domain with keys that are not the arm's."""
+    if request.param == "no keys":
+        return make_peer("terminal_2", "terminal", ROS_SECURITY_ENABLE=None)
+    other = Keystore(tmp_path / "other")
+    other.write(rights.of_arm("/", ["dead_mans_switch"]), [secure_site.domain])
+    return make_peer("terminal_2", "terminal", ROS_SECURITY_KEYSTORE=str(other.folder))
+
+
+def test_a_stranger_moves_nothing_and_hears_nothing(stranger: Peer, watcher: Peer) -> None:
+    stranger("read", STATE)
+    states = hold_switch_and_turn_on(stranger, watcher)
+    assert states
+    assert set(states) == {"off"}
+    assert not stranger("set_parameter", "dead_mans_switch", "pressed", True, ATTEMPTS)
+    assert set(watcher("heard", STATE)) == {"off"}
+    assert stranger("nodes") == ["terminal_2"]
+    assert stranger("writers", STATE) == 0
+    assert stranger("publish", ENGINES, "turn_on") == 0
+    assert stranger("heard", STATE) == []
+    assert "terminal_2" not in watcher("nodes")
+
+
+@pytest.mark.parametrize("topic", [HEARTBEAT, "operator_presence", ENGINES, STATE])
+def test_a_valid_enclave_is_refused_on_a_topic_of_others(make_peer: MakePeer, topic: str) -> None:
+    velocity = make_peer("velocity")
+    with pytest.raises(Refused, match="Not Allowed By Security"):
+        velocity("advertise", topic)
+
+
+@pytest.fixture(scope="module")
+def unchecked(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """A Cyclone DDS whose access control does not check its own process."""
+    if not shutil.which("cc") or not Path("/usr/include/dds/security/dds_security_api.h").exists():
+        pytest.skip("apt-get install gcc libc6-dev cyclonedds-dev")
+    library = security.library({})
+    plugins = security._plugins(library) if library else None
+    assert library is not None
+    assert plugins is not None
+    folder = tmp_path_factory.mktemp("unchecked")
+    for path in (library, plugins / "libdds_security_auth.so", plugins / "libdds_security_crypto.so"):
+        (folder / path.name).symlink_to(path)
+    own = f'-DPLUGIN="{plugins / "libdds_security_ac.so"}"'
+    source = Path(__file__).with_name("no_own_checks.c")
+    output = folder / "libdds_security_ac.so"
+    subprocess.run(["cc", "-shared", "-fPIC", own, "-o", str(output), str(source), "-ldl"], check=True)
+    return str(folder / library.name)
+
+
+def test_others_refuse_a_valid_enclave_that_skips_its_own_checks(
+    make_peer: MakePeer, watcher: Peer, unchecked: str
+) -> None:
+    velocity = make_peer("velocity", CYCLONEDDS_LIBRARY=unchecked)
+    states = hold_switch_and_turn_on(velocity, watcher)
+    assert set(states) == {"off"}
+    assert velocity("publish", ENGINES, "turn_on") == 0
+    until(lambda: "kinematics" in velocity("nodes"))  # it has joined, with valid keys
+    velocity("read", "effector/position")
+    until(lambda: velocity("writers", "effector/position") == 1)
+
+
+@pytest.fixture
+def copy(secure_site: SecureSite, tmp_path: Path) -> Keystore:
+    """A copy of the keys, to be damaged."""
+    folder = tmp_path / "copy"
+    shutil.copytree(secure_site.keystore.folder, folder, symlinks=True)
+    return Keystore(folder)
+
+
+def test_tampered_permissions_do_not_join(make_peer: MakePeer, copy: Keystore) -> None:
+    path = copy.folder / "enclaves" / "velocity" / "permissions.p7s"
+    path.write_text(path.read_text().replace("rt/effector/speed", "rt/engines"))
+    with pytest.raises(Refused, match="cannot join DDS domain"):
+        make_peer("velocity", ROS_SECURITY_KEYSTORE=str(copy.folder))
+
+
+def test_permissions_of_another_enclave_do_not_join(make_peer: MakePeer, copy: Keystore) -> None:
+    enclaves = copy.folder / "enclaves"
+    shutil.copy(enclaves / "terminal" / "permissions.p7s", enclaves / "velocity" / "permissions.p7s")
+    with pytest.raises(Refused, match="cannot join DDS domain"):
+        make_peer("velocity", ROS_SECURITY_KEYSTORE=str(copy.folder))
+
+
+def test_an_expired_certificate_does_not_join(make_peer: MakePeer, copy: Keystore, tmp_path: Path) -> None:
+    folder = copy.folder / "enclaves" / "velocity"
+    request = tmp_path / "request.pem"
+    ca, key = copy.folder / "public" / "ca.cert.pem", copy.folder / "private" / "ca.key.pem"
+    openssl = ["openssl", "x509", "-x509toreq", "-in", str(folder / "cert.pem")]
+    subprocess.run([*openssl, "-signkey", str(folder / "key.pem"), "-out", str(request)], check=True)
+    renew = [
+        "openssl",
+        "x509",
+        "-req",
+        "-in",
+        str(request),
+        "-CA",
+        str(ca),
+        "-CAkey",
+        str(key),
+        "-days",
+        "-1",
+    ]
+    subprocess.run([*renew, "-set_serial", "7", "-out", str(folder / "cert.pem")], check=True)
+    with pytest.raises(Refused, match=r"cannot join DDS domain [^\n]* expired"):
+        make_peer("velocity", ROS_SECURITY_KEYSTORE=str(copy.folder))
+
+
+def test_no_keys_at_all_do_not_join(make_peer: MakePeer) -> None:
+    with pytest.raises(Refused, match=r"^ROS_SECURITY_ENABLE is true, but there is no [^\n]*nobody/[^\n]*$"):
+        make_peer("nobody")
+
+
+class Wire:
+    """The RTPS packets on loopback: recorded, and sent again as they were."""
+
+    def __init__(self) -> None:
+        try:
+            self._socket = socket.socket(socket.AF_PACKET, socket.SOCK_DGRAM, socket.htons(0x0003))
+            self._sender = socket.socket(socket.AF_INET, socket.SOCK_RAW, socket.IPPROTO_RAW)
+        except PermissionError:
+            pytest.skip("platform: this user may not record packets")
+        self._socket.bind(("lo", 0))
+        self._socket.settimeout(0.1)
+        self.packets: list[bytes] = []
+
+    def record(self, during: Callable[[], object], seconds: float) -> None:
+        """Record while a function is called again and again."""
+        deadline = time.monotonic() + seconds
+        while time.monotonic() < deadline:
+            during()
+            with suppress(TimeoutError):
+                while time.monotonic() < deadline:
+                    packet, (_, _, kind, *_) = self._socket.recvfrom(65536)
+                    if kind == socket.PACKET_OUTGOING and b"RTPS" in packet:
+                        self.packets.append(packet)
+
+    def repeat(self) -> None:
+        for packet in self.packets:
+            self._sender.sendto(_without_checksum(packet), ("127.0.0.1", 0))
+
+    def close(self) -> None:
+        self._socket.close()
+        self._sender.close()
+
+
+def _without_checksum(packet: bytes) -> bytes:
+    """Return a packet of UDP without its checksum, which the kernel does not complete on loopback."""
+    at = 4 * (packet[0] & 15) + 6  # after the header of IPv4
+    return packet[:at] + bytes(2) + packet[at + 2 :]
+
+
+@pytest.fixture
+def wire() -> Iterator[Wire]:
+    with closing(Wire()) as wire:
+        yield wire
+
+
+def test_packets_of_the_wire_arrive_again(wire: Wire) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
+        receiver.bind(("127.0.0.1", 0))
+        receiver.settimeout(5.0)
+        wire.record(lambda: receiver.sendto(b"RTPS?", receiver.getsockname()), 0.3)
+        wire.packets = wire.packets[:1]
+        receiver.setblocking(False)
+        with suppress(BlockingIOError):
+            while receiver.recv(10):
+                pass
+        receiver.settimeout(5.0)
+        wire.repeat()
+        assert receiver.recv(10) == b"RTPS?"
+
+
+def test_repeated_packets_move_nothing(make_peer: MakePeer, watcher: Peer, wire: Wire) -> None:
+    for name in (HEARTBEAT, ENGINES):
+        watcher("read", name)
+    until(lambda: watcher("writers", HEARTBEAT) == 2)  # the virtual switch and the page
+    operator = make_peer("terminal_3", "terminal")
+    assert "on" in hold_switch_and_turn_on(operator, watcher, 30.0)
+
+    def hold() -> None:
+        operator("publish", HEARTBEAT, True)
+        operator("publish", ENGINES, "turn_on")
+
+    wire.record(hold, 2.0)
+    assert len(wire.packets) > 100
+    operator("publish", ENGINES, "turn_off")
+    until(lambda: watcher("heard", STATE)[-1:] == ["off"])
+    for writer_is_gone in (False, True):
+        if writer_is_gone:
+            operator.close()
+            until(lambda: watcher("writers", HEARTBEAT) == 2)
+        for name in (HEARTBEAT, ENGINES, STATE):
+            watcher("heard", name)
+        for _ in range(3):
+            wire.repeat()
+            time.sleep(0.5)
+        assert set(watcher("heard", STATE)) == {"off"}
+        assert watcher("heard", ENGINES) == []
+        assert True not in watcher("heard", HEARTBEAT)
