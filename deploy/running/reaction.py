@@ -41,7 +41,7 @@ class Reaction(NamedTuple):
     @property
     def longest_restart(self) -> float:
         """How long the watchdog may be away while the engines stay on."""
-        return self.controller.presence_timeout - self.watchdog.lifespan - self.watchdog.sampling
+        return round(self.controller.presence_timeout - self.watchdog.lifespan - self.watchdog.sampling, 3)
 
     @property
     def words(self) -> str:

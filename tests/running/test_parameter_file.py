@@ -106,7 +106,7 @@ def test_all_errors_of_a_file_are_reported_a_line_for_each(tmp_path: Path) -> No
             "sampling: must be less than silence, 3 s, not 3",
         ),
         (
-            "operator_watchdog: {ros__parameters: {silence: 1.0, strikes: 1}}",
+            "operator_watchdog: {ros__parameters: {silence: 1.0004, strikes: 1}}",
             "max_presence_age must be at most 0.45 s, not 1: "
             "a turn_on after the last strike would turn the engines on without an operator",
         ),

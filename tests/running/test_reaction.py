@@ -39,5 +39,13 @@ def test_bounds_follow_from_the_parameters(
     )
 
 
-def test_parameters_of_the_thesis_do_not_contradict_each_other() -> None:
-    reaction({}).check()
+@pytest.mark.parametrize(
+    "given",
+    [
+        {},  # the thesis
+        of_watchdog(silence=1.55, strikes=1),  # max_presence_age is just short enough
+        {"engine_controller": {"presence_timeout": 2.2}},
+    ],
+)
+def test_parameters_that_allow_just_enough_time_are_taken(given: dict[str, dict[str, Any]]) -> None:
+    reaction(given).check()
