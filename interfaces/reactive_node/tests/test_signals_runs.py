@@ -185,8 +185,10 @@ def test_state_that_was_not_settled_survives_a_set_clock(delay: float) -> None:
     clock = _Clock()
     state = Subject[Any]()
     found: list[Any] = []
+    refused: list[Refused] = []
     signal = lift(lambda *parts: parts)(
-        hold(state, lateness=LATENESS), linear(state, lateness=LATENESS, gap=GAP, silence=Unchanged())
+        hold(state, lateness=LATENESS),
+        linear(state, lateness=LATENESS, gap=GAP, silence=Unchanged(), refused=refused.append),
     )
     signal.sample(0.1).subscribe(found.append, scheduler=clock)
     state.on_next(stamped("old", 0))
@@ -195,6 +197,7 @@ def test_state_that_was_not_settled_survives_a_set_clock(delay: float) -> None:
     for clock.time in (5.0, 6.0):
         state.on_next(stamped("older", -1))
     assert found[-1] == Answer(5800 * MS, ("new", "new"))
+    assert {each.taken for each in refused} == {None}
 
     for clock.time in (7.0, 8.0):
         state.on_next(stamped("late", 5500 * MS))

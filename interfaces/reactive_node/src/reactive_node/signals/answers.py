@@ -40,4 +40,7 @@ class Refused(NamedTuple):
     taken: int | None = None
     """The time from which its value holds instead [ns]; ``None`` if it was dropped."""
     is_first: bool = False
-    """Whether it was the first to arrive. A late reader gets the last value of a state, however old it is."""
+    """
+    Whether it was the first to arrive, or comes right after that one. A late reader gets the last value of a
+    state, however old it is.
+    """

@@ -214,14 +214,15 @@ class _Interpolated(_Held):
         self._silence = silence
         self._late: Refused | None = None
         """The newest sample, which came too late, until it is known that the state rests."""
-        self._shifted: int | None = None
-        """The time from which the last late value counts [ns]."""
+        self._shifted: tuple[int, bool] | None = None
+        """The time from which the last late value counts [ns], and whether it was the first sample."""
         self.wait += self._gap
 
     def take(self, time: int, value: Any) -> None:
         self._drop_late()
-        if self._shifted is not None and time <= self._shifted + self._gap:
-            self.take_late(Refused(time, value, "it comes right after a late one"))
+        shifted, is_first = self._shifted or (None, False)
+        if shifted is not None and time <= shifted + self._gap:
+            self.take_late(Refused(time, value, "it comes right after a late one", is_first=is_first))
         else:
             super().take(time, value)
 
@@ -238,10 +239,9 @@ class _Interpolated(_Held):
         if self._late is not None:
             rest = max([settled, *(last + 2 * self._gap for last in self._times[-1:])])
             if self.settled >= rest:
-                self._shifted = rest + 1
-                super().take(self._shifted, self._late.value)
-                self.refuse(self._late._replace(taken=self._shifted))
-                self._late = None
+                super().take(rest + 1, self._late.value)
+                self.refuse(self._late._replace(taken=rest + 1))
+                self._late, self._shifted = None, (rest + 1, self._late.is_first)
 
     def _drop_late(self) -> None:
         """Drop the late value: there is a newer one."""
