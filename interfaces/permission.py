@@ -20,6 +20,11 @@ class EngineState(NamedTuple):
     at: datetime  # of the arrival, on the Rx clock, which is never set
     age: float  # of the source time at arrival [s]
 
+    @property
+    def young_until(self) -> datetime:
+        """Until when an ``on`` is accepted, on the Rx clock."""
+        return self.at + timedelta(seconds=DRIVE_TIMEOUT - max(self.age, 0.0))
+
 
 def permissions(states: Observable[EngineState]) -> Observable[bool]:
     """Emit whether a drive may move: with each state, and ``False`` as soon as an ``on`` is no longer young.
@@ -31,8 +36,7 @@ def permissions(states: Observable[EngineState]) -> Observable[bool]:
         return state.name == ON and state.age < DRIVE_TIMEOUT
 
     def end(state: EngineState) -> Observable[bool]:
-        due = state.at + timedelta(seconds=DRIVE_TIMEOUT - max(state.age, 0.0))
-        return rx.timer(due).map(lambda _: False) if is_young(state) else rx.never()
+        return rx.timer(state.young_until).map(lambda _: False) if is_young(state) else rx.never()
 
     def permitted(states: Observable[EngineState]) -> Observable[bool]:
         ends = states.switch_map(end).take_until(states.last_or_default(None))
@@ -41,10 +45,13 @@ def permissions(states: Observable[EngineState]) -> Observable[bool]:
     return states.publish(permitted)
 
 
-def observe(node: ServiceNode) -> Observable[bool]:
-    """Return the permissions of the arm of a node."""
+def engine_states(node: ServiceNode) -> Observable[EngineState]:
+    """Return the states of the engines of the arm of a node."""
     # The arrival before the age: a pause in between must make a state older, not younger.
     states = node.observe(ENGINES_STATE, timestamped=True).timestamp()
-    return permissions(
-        states.map(lambda it: EngineState(it.value.value, it.timestamp, node.age(it.value.timestamp)))
-    )
+    return states.map(lambda it: EngineState(it.value.value, it.timestamp, node.age(it.value.timestamp)))
+
+
+def observe(node: ServiceNode) -> Observable[bool]:
+    """Return the permissions of the arm of a node."""
+    return permissions(engine_states(node))

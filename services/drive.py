@@ -9,30 +9,22 @@ restart moves no joint.
 
 from __future__ import annotations
 
-from datetime import UTC, datetime, timedelta
+from datetime import UTC, datetime
 from functools import partial
-from typing import NamedTuple
 
 import reactivex as rx
 from reactivex import Observable
 
 from interfaces import service
+from interfaces.permission import EngineState, engine_states
 from interfaces.service import ServiceNode
 from interfaces.service.epoch import Epoch
 from interfaces.sources.player import Player
 from interfaces.sources.settings import Settings
-from interfaces.topics import DRIVE_TIMEOUT, DRIVEN_TIME, ENGINES_STATE, ON
+from interfaces.topics import DRIVEN_TIME, ON
 
 NEVER = datetime.min.replace(tzinfo=UTC)
 LONGEST_STEP = 2  # periods: after a pause, the joints do not jump
-
-
-class EngineState(NamedTuple):
-    """A state of the engines as it arrived."""
-
-    name: str
-    at: datetime  # of the arrival, on the Rx clock, which is never set
-    age: float  # of the source time at arrival [s]
 
 
 def driven_time(states: Observable[EngineState], begin: float, period: float) -> Observable[float]:
@@ -42,9 +34,7 @@ def driven_time(states: Observable[EngineState], begin: float, period: float) ->
     """
 
     def accepted_until(state: EngineState) -> datetime:
-        return (
-            state.at + timedelta(seconds=DRIVE_TIMEOUT - max(state.age, 0.0)) if state.name == ON else NEVER
-        )
+        return state.young_until if state.name == ON else NEVER
 
     def step(time: float, tick: tuple[tuple[datetime, float], datetime]) -> float:
         (now, passed), until = tick
@@ -61,10 +51,7 @@ def wire(node: ServiceNode) -> None:
     rate = player.scenario.drive
     if rate is None:
         return
-    # The arrival before the age: a pause in between must make a state older, not younger.
-    states = node.observe(ENGINES_STATE, timestamped=True).timestamp()
-    heard = states.map(lambda it: EngineState(it.value.value, it.timestamp, node.age(it.value.timestamp)))
-    times = driven_time(heard, settings.recall("time", 0.0), 1.0 / rate)
+    times = driven_time(engine_states(node), settings.recall("time", 0.0), 1.0 / rate)
     # Kept before it is published: after a restart, the joints do not move back.
     kept = times.do_action(partial(settings.remember, "time"))
     node.publish(DRIVEN_TIME, epoch.start(kept))

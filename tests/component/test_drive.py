@@ -14,11 +14,12 @@ from rclpy.parameter import Parameter
 from reactivex.testing import ReactiveTest
 from std_msgs.msg import Float64, String
 
+from interfaces.permission import EngineState
 from interfaces.topics import DRIVEN_TIME, ENGINES_STATE, OFF, ON, THETA1
 from reactive_node import stamps
 from reactive_node.testing import MakeNode, SpinUntil, VirtualTime
 from services import config_publisher, drive
-from services.drive import EngineState, driven_time
+from services.drive import driven_time
 from tests.component.wiring import Wired
 
 on_next = ReactiveTest.on_next
