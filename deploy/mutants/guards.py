@@ -29,6 +29,11 @@ GUARDS: dict[str, tuple[str, ...]] = {
         "tests/running/test_reaction.py",
         "tests/running/test_parameter_file.py",
     ),
+    "interfaces/permission.py": (
+        "tests/component/test_permission.py",
+        "tests/component/test_twist_gate.py",
+        "tests/component/test_drive.py",
+    ),
     "interfaces/topics.py": (
         "tests/component/test_topics.py",
         "tests/component/test_readme.py",
