@@ -191,9 +191,8 @@ def test_state_that_was_not_settled_survives_a_set_clock(delay: float) -> None:
         linear(state, lateness=LATENESS, gap=GAP, silence=Unchanged(), refused=refused.append),
     )
     signal.sample(0.1).subscribe(found.append, scheduler=clock)
-    state.on_next(stamped("old", 0))
-    clock.time = 10.0
-    state.on_next(stamped("new", round((clock.time - delay) * SECOND)))
+    for clock.time, value, late in ((9.8, "old", 0.0), (10.0, "new", delay)):
+        state.on_next(stamped(value, round((clock.time - late) * SECOND)))
     for clock.time in (5.0, 6.0):
         state.on_next(stamped("older", -1))
     assert found[-1] == Answer(5800 * MS, ("new", "new"))
@@ -295,6 +294,17 @@ def test_event_is_answered_at_the_very_time_when_it_is_known(scheduler: VirtualT
     recording = scheduler.record(signal.snapshot(events, lateness=LATENESS), until=2.0)
 
     assert [at for at, _ in recording.items] == [pytest.approx(0.1 + LATENESS, abs=2e-7)]
+
+
+def test_event_in_a_movement_does_not_wait_for_the_gap(scheduler: VirtualTime) -> None:
+    events = arriving(scheduler, [Arrival(100 * MS, "a", 0)])
+    signal = linear(
+        arriving(scheduler, [Arrival(k * 40 * MS, 1.0, 0) for k in range(20)]), lateness=LATENESS, gap=GAP
+    )
+
+    recording = scheduler.record(signal.snapshot(events, lateness=LATENESS), until=2.0)
+
+    assert [at for at, _ in recording.items] == [pytest.approx(0.24)]  # the first arrival after 0.12 + 0.1
 
 
 def test_nothing_is_looked_at_again_before_its_time() -> None:
