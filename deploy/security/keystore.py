@@ -15,7 +15,7 @@ import shutil
 import subprocess
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
-from datetime import datetime
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -24,8 +24,28 @@ from deploy.security import documents
 from deploy.security.rights import Rights
 
 CA = "sros2CA"  # the name that SROS2 gives it
-DAYS = 3650  # of validity, as in SROS2
-_REQUEST = "[req]\nprompt = no\ndistinguished_name = name\n[name]\nCN = {}\n"
+BEFORE, AFTER = timedelta(days=1), timedelta(days=3650)
+"""From when to when keys are valid, as in SROS2: a host whose clock is behind must be able to join."""
+_SETTINGS = """\
+[req]
+prompt = no
+distinguished_name = name
+[name]
+CN = {name}
+[ca]
+default_ca = own
+[own]
+database = {folder}/index
+new_certs_dir = {folder}
+rand_serial = yes
+default_md = sha256
+policy = policy
+x509_extensions = extensions
+[policy]
+commonName = supplied
+[extensions]
+basicConstraints = {constraints}
+"""
 _LINKED_TO_CA = ("identity_ca", "permissions_ca")
 
 
@@ -92,42 +112,35 @@ class Keystore:
         folder.mkdir(parents=True, exist_ok=True)
         certificate, key = folder / "cert.pem", folder / "key.pem"
         if not certificate.exists():
-            issuer = ["-CA", str(self._ca), "-CAkey", str(self._ca_key)]
-            self._certify(enclave, certificate, key, "CA:false", issuer)
+            self._certify(enclave, certificate, key, "CA:false")
         for name in _LINKED_TO_CA:
             _link(folder / f"{name}.cert.pem", self._ca.with_name(f"{name}.cert.pem"))
         _link(folder / "governance.p7s", self._enclaves / "governance.p7s")
         text = documents.permissions(enclave, rights, domains, _validity(certificate))
         self._sign(folder / "permissions", text)
 
-    def _certify(
-        self, name: str, certificate: Path, key: Path, constraints: str, issuer: Collection[str] = ()
-    ) -> None:
+    def _certify(self, name: str, certificate: Path, key: Path, constraints: str) -> None:
         """Make a key on P-256 and its certificate, which comes last: without it, both are made again."""
         with TemporaryDirectory() as folder:
-            request, made = Path(folder, "request"), Path(folder, "made")
-            request.write_text(_REQUEST.format(name))
+            settings, request, made = (Path(folder, name) for name in ("settings", "request", "made"))
+            settings.write_text(_SETTINGS.format(name=name, folder=folder, constraints=constraints))
+            Path(folder, "index").touch()
+            curve = ("-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes", "-sha256")
+            _openssl("req", "-config", settings, "-new", *curve, "-keyout", key, "-out", request)
+            now = datetime.now(UTC)
+            times = (
+                "-startdate",
+                f"{now - BEFORE:%Y%m%d%H%M%SZ}",
+                "-enddate",
+                f"{now + AFTER:%Y%m%d%H%M%SZ}",
+            )
+            signer = (
+                ("-cert", self._ca, "-keyfile", self._ca_key)
+                if name != CA
+                else ("-selfsign", "-keyfile", key)
+            )
             _openssl(
-                *(
-                    "req",
-                    "-x509",
-                    "-config",
-                    str(request),
-                    "-newkey",
-                    "ec",
-                    "-pkeyopt",
-                    "ec_paramgen_curve:P-256",
-                ),
-                *(
-                    "-nodes",
-                    "-sha256",
-                    "-days",
-                    str(DAYS),
-                    "-addext",
-                    f"basicConstraints={constraints}",
-                    *issuer,
-                ),
-                *("-keyout", str(key), "-out", str(made)),
+                "ca", "-config", settings, "-batch", "-notext", *times, *signer, "-in", request, "-out", made
             )
             shutil.move(made, certificate)
 
@@ -136,14 +149,14 @@ class Keystore:
         plain, signed = document.with_suffix(".xml"), document.with_suffix(".p7s")
         new = document.with_suffix(".new")
         plain.write_text(text)
-        signer = ["-signer", str(self._ca), "-inkey", str(self._ca_key)]
-        _openssl("smime", "-sign", "-text", "-in", str(plain), "-out", str(new), *signer)
+        signer = ("-signer", self._ca, "-inkey", self._ca_key)
+        _openssl("smime", "-sign", "-text", "-in", plain, "-out", new, *signer)
         os.replace(new, signed)
 
 
 def _validity(certificate: Path) -> tuple[datetime, datetime]:
     """Return from when to when a certificate is valid."""
-    text = _openssl("x509", "-in", str(certificate), "-noout", "-startdate", "-enddate")
+    text = _openssl("x509", "-in", certificate, "-noout", "-startdate", "-enddate")
     begin, end = (
         datetime.strptime(line.partition("=")[2], "%b %d %H:%M:%S %Y GMT") for line in text.splitlines()
     )
@@ -155,7 +168,7 @@ def _link(link: Path, target: Path) -> None:
         link.symlink_to(os.path.relpath(target, link.parent))
 
 
-def _openssl(*arguments: str) -> str:
+def _openssl(*arguments: str | Path) -> str:
     try:
         done = subprocess.run(["openssl", *arguments], capture_output=True, text=True)
     except FileNotFoundError:

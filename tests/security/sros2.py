@@ -24,7 +24,8 @@ ENCLAVE = {
 }
 CA_SUBJECT = "CN = sros2CA"
 SUBJECT = "CN = /talker"
-DAYS = 3650
+DAYS_BEFORE, DAYS_AFTER = 1, 3650
+"""The validity of a certificate, from its making."""
 SIGNED = (
     "MIME-Version: 1.0",
     'Content-Type: multipart/signed; protocol="application/x-pkcs7-signature"; micalg="sha-256"',

@@ -6,7 +6,7 @@ import shutil
 import stat
 import subprocess
 from collections.abc import Iterator
-from datetime import datetime
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -77,7 +77,8 @@ def test_certificates_are_those_of_sros2(made: Keystore) -> None:
         assert "ASN1 OID: prime256v1" in text
         dates = openssl("x509", "-in", certificate, "-noout", "-dates").splitlines()
         begin, end = (datetime.strptime(date.split("=")[1], "%b %d %H:%M:%S %Y GMT") for date in dates)
-        assert (end - begin).days == sros2.DAYS
+        assert (end - begin).days == sros2.DAYS_BEFORE + sros2.DAYS_AFTER
+        assert abs(datetime.now(UTC).replace(tzinfo=None) - begin - timedelta(days=1)) < timedelta(hours=1)
     assert openssl("verify", "-CAfile", ca, own).strip().endswith("OK")
     key = own.with_name("key.pem")
     assert key.read_text().startswith("-----BEGIN PRIVATE KEY-----\n")  # PKCS #8

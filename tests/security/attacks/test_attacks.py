@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import shutil
+import signal
 import socket
 import subprocess
+import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import closing, suppress
@@ -15,7 +17,7 @@ from rclpy._dds import security
 
 from deploy.security import rights
 from deploy.security.keystore import Keystore
-from tests.security.attacks.conftest import MakePeer, Peer, Refused, SecureSite, until
+from tests.security.attacks.conftest import PROGRAMS, MakePeer, Peer, Refused, SecureSite, until
 
 ATTEMPTS = 3.0  # s for which a stranger tries
 HEARTBEAT, ENGINES, STATE = "operator_heartbeat", "engines", "engines/state"
@@ -49,6 +51,34 @@ def test_the_operator_with_keys_turns_the_engines_on(make_peer: MakePeer, watche
     assert "on" in hold_switch_and_turn_on(operator, watcher, 30.0)
     operator("publish", ENGINES, "turn_off")
     until(lambda: watcher("heard", STATE)[-1:] == ["off"])
+
+
+def test_commands_join_with_their_own_keys(secure_site: SecureSite) -> None:
+    code, shown = secure_site.do("status")
+    assert code == 0, shown
+    assert shown.count(" ok") == len(PROGRAMS), shown
+    record = secure_site.begin("record")
+    record.await_line("Recording to")
+    until(lambda: next((secure_site.run / "records").glob("*.mcap")).stat().st_size > 10_000)
+    record.signal(signal.SIGINT)
+    assert record.wait() == 0
+    assert record.await_line(r"(\d+) messages")[1] != "0"
+
+
+def test_ros2_reads_as_a_tool_and_commands_as_the_terminal(secure_site: SecureSite, watcher: Peer) -> None:
+    def ros2(*words: str, enclave: str) -> subprocess.CompletedProcess[str]:
+        environment = secure_site.environment | {"ROS_SECURITY_ENCLAVE_OVERRIDE": enclave}
+        command = [sys.executable, "-c", "import sys; from ros2cli.cli import main; sys.exit(main())", *words]
+        return subprocess.run(command, env=environment, capture_output=True, text=True, timeout=60)
+
+    assert ros2("topic", "echo", "--once", "/engines/state", enclave="/tools").stdout == "data: 'off'\n---\n"
+    turn_off = ("topic", "pub", "--once", "/engines", "std_msgs/msg/String", "{data: turn_off}")
+    refused = ros2(*turn_off, enclave="/tools")
+    assert refused.returncode != 0
+    assert "Not Allowed By Security" in refused.stderr
+    watcher("read", ENGINES)
+    assert ros2(*turn_off, enclave="/terminal").returncode == 0
+    until(lambda: watcher("heard", ENGINES) == ["turn_off"])
 
 
 @pytest.fixture(params=["no keys", "keys of another CA"])
