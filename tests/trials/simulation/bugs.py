@@ -68,7 +68,9 @@ BUGS: dict[str, Bug] = {
     ),
     "turn_on needs no presence": Bug(CONTROLLER, "if unseen >= given.max_presence_age:", "if unseen < 0.0:"),
     "the controller does not notice its pause": Bug(CONTROLLER, "(paused or unseen", "(unseen"),
-    "the drive ignores the 400 ms": Bug(DRIVE, "seconds=DRIVE_TIMEOUT - ", "seconds=3600.0 - "),
+    "the drive ignores the 400 ms": Bug(
+        DRIVE, "return state.young_until if", "return state.young_until.replace(year=9999) if"
+    ),
 }
 """The first four are hidden by the other fail-safes unless one of them stands alone."""
 
