@@ -42,7 +42,8 @@ def test_a_start_by_hand_serves_the_commands_of_make(checkout: Checkout) -> None
     terminal.await_line("Received signal from operator")  # the demo has begun
     code, table = checkout.do("status")
     assert code == 0
-    assert len(table.splitlines()) == len(checkout.programs) + 2  # a line of the system, and one of titles
+    lines = len(table.splitlines())
+    assert lines == 3 + len(checkout.programs)  # the system, its bounds, and titles
     code, printed = checkout.do_command("supervisord", *CONF)
     assert code == 1
     assert printed.startswith("Already running: supervisord has pid ")
