@@ -7,23 +7,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping
-from contextlib import suppress
 from typing import Any, NamedTuple
 
 import reactivex as rx
 from reactivex import Observable
 
+from deploy.running.reaction import reaction
 from deploy.running.sentinel import reported
 from interfaces.service.health import Health, healths, reported_parameters
 from interfaces.topics import ALIVE, DIAGNOSTICS, ENGINES_STATE, OPERATOR_ACTIVITY, Topic
-from services import engine_controller
 
 HEADER = ("ARM", "DOMAIN", "HOST", "OPERATOR", "ENGINES", "HEALTH", "BOUND")
 SILENT, UNKNOWN = "silent", "-"
 LONGEST_SILENCE = (
     2.7  # s between two states of the engines, two conclusions `alive`, or two reports of health
 )
-DRIVE = 0.5  # s from the presence timeout until the drive has stopped the engines at the latest (S1)
 
 Seen = Callable[[Topic], Observable[Any]]
 """Gives the values of a topic of an arm."""
@@ -49,7 +47,8 @@ class Arm(NamedTuple):
     """The latest report of each program."""
     states: Mapping[str, str] = {}
     """The state of each process, as the sentinel sees it."""
-    presence_timeout: float = engine_controller.DEFAULTS.presence_timeout
+    parameters: Mapping[str, Mapping[str, Any]] = {}
+    """By program, those whose value is not the default."""
 
 
 Change = Callable[[Arm], Arm]
@@ -81,16 +80,17 @@ def _health(message: Any) -> Change:
     def change(arm: Arm) -> Arm:
         namespace = arm.name.rstrip("/")
         states = {program.name: program.state for program in reported(message, namespace)}
-        timeout = arm.presence_timeout
-        for status in message.status:
-            if status.name == f"{namespace}/engine_controller":
-                default = engine_controller.DEFAULTS.presence_timeout
-                with suppress(ValueError):  # not a report of ours
-                    timeout = reported_parameters(status).get("presence_timeout", default)
+        news = healths(message, namespace)
+        parameters = {
+            program: reported_parameters(status)
+            for status in message.status
+            for program in news
+            if status.name == f"{namespace}/{program}"
+        }
         return arm._replace(
-            healths={**arm.healths, **healths(message, namespace)},
+            healths={**arm.healths, **news},
             states={**arm.states, **states},
-            presence_timeout=timeout,
+            parameters={**arm.parameters, **parameters},
         )
 
     return change
@@ -114,7 +114,7 @@ def row(arm: Arm, now: float) -> tuple[str, ...]:
         operator or UNKNOWN,
         engines,
         _in_words(arm, now),
-        f"{arm.presence_timeout + DRIVE:g} s" if arm.healths else UNKNOWN,
+        f"{reaction(arm.parameters).off_within:g} s" if arm.healths else UNKNOWN,
     )
 
 
