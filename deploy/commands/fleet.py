@@ -26,7 +26,7 @@ from deploy.operator.fleet import HEADER, Arm, Seen, fleet, row, watched
 from deploy.operator.output import say
 from deploy.running import interruption, processes
 from deploy.running.columns import table
-from deploy.running.environment import CYCLONEDDS, NAMESPACE, namespace_of, set_middleware, tagged
+from deploy.running.environment import CYCLONEDDS, NAMESPACE, RANGE, namespace_of, set_middleware, tagged
 from deploy.running.errors import DeploymentError
 from interfaces.topics import DIAGNOSTICS, ENGINES_STATE, Topic
 from reactive_node import ReactiveNode
@@ -34,7 +34,7 @@ from reactive_node import ReactiveNode
 PERIOD = 1.0  # s between two looks at the engines, and between two tables
 FIRST = 2.5  # s until the first table: each service reports its health once a second
 BEST_EFFORT = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
-DDS = ("ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_STATIC_PEERS", "ROS_LOCALHOST_ONLY", CYCLONEDDS)
+DDS = (RANGE, "ROS_STATIC_PEERS", "ROS_LOCALHOST_ONLY", CYCLONEDDS)
 """The variables by which this process meets the nodes of an arm."""
 
 

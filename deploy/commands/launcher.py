@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, NoReturn
 from deploy.commands.stop import stop
 from deploy.operator.output import say
 from deploy.running import interruption, manifest, messages, rclpy_choice
-from deploy.running.environment import ADOPTED, NAMESPACE, namespace_of, set_middleware
+from deploy.running.environment import ADOPTED, NAMESPACE, RANGE, namespace_of, set_middleware
 from deploy.running.errors import DeploymentError
 from deploy.running.machine import LOOPBACK_DOWN, loopback_is_up
 from deploy.running.run_directory import ALL, KEY, LEAD, MANIFEST, RUN
@@ -44,7 +44,7 @@ def place(environment: Mapping[str, str]) -> str:
     words = [f"ROS domain {environment.get('ROS_DOMAIN_ID') or 0}"]
     if namespace := environment.get(NAMESPACE):
         words.append(f"namespace {namespace}")
-    if (reach := environment.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")) != "LOCALHOST":
+    if (reach := environment.get(RANGE, "LOCALHOST")) != "LOCALHOST":
         words.append(f"discovery range {reach}")
     return ", ".join(words)
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +12,7 @@ from rclpy.validate_namespace import validate_namespace
 
 from deploy.operator.page.address import DEFAULT_PORT, host_names, tls
 from deploy.running import manifest, parameter_file, processes
-from deploy.running.environment import ENFORCE, KEYSTORE, NAMESPACE, SECURITY, STRATEGY, namespace_of
+from deploy.running.environment import ENFORCE, KEYSTORE, NAMESPACE, RANGE, SECURITY, STRATEGY, namespace_of
 from deploy.running.errors import DeploymentError
 from deploy.running.processes import ROOT
 from deploy.running.run_directory import ALL, KEY, NOT_YET, scenario_parameters
@@ -26,7 +25,6 @@ from interfaces.sources import scenario_file
 SCENARIOS = ROOT / "deploy" / "scenarios"
 NONE = "none"
 """The scenario without virtual joints, drive and operator."""
-DISCOVERY_RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"  # environment variable
 LIMITS = {"operator_watchdog": ("silence", "strikes"), "engine_controller": ("presence_timeout",)}
 """The parameters of other services that the page shows."""
 WEB = "WEB"  # environment variable: the port of the page, or off
@@ -116,9 +114,9 @@ def check_environment(system: System) -> None:
     except InvalidNamespaceException as error:
         reason = str(error).splitlines()[0].rstrip(":")
         raise DeploymentError(f"{NAMESPACE}={namespace} is no namespace such as /arm1: {reason}") from None
-    reach = os.environ.get(DISCOVERY_RANGE, "")
+    reach = os.environ.get(RANGE, "")
     if reach.strip().upper() == "OFF":
-        raise DeploymentError(f"{DISCOVERY_RANGE}={reach} keeps the services apart: set LOCALHOST or SUBNET")
+        raise DeploymentError(f"{RANGE}={reach} keeps the services apart: set LOCALHOST or SUBNET")
     _check_keys(namespace)
     if not system.members():  # the start reports a running system, and replaces orphans
         for program in manifest.programs():
@@ -135,9 +133,8 @@ def _check_keys(namespace: str) -> None:
         raise DeploymentError(f"{SECURITY}=true needs {KEYSTORE}: the folder that make keystore wrote")
     keystore = Keystore(Path(os.environ[KEYSTORE]).absolute())
     os.environ[KEYSTORE] = str(keystore.folder)  # the services work in the run directory
-    needed = {
-        enclave.path(name, namespace) for name in (*map(attrgetter("name"), manifest.programs()), TERMINAL)
-    }
+    names = [TERMINAL, *(program.name for program in manifest.programs())]
+    needed = {enclave.path(name, namespace) for name in names}
     if missing := sorted(needed - {*keystore.enclaves()}):
         others = f" and {len(missing) - 1} others" if missing[1:] else ""
         raise DeploymentError(f"{keystore.folder} has no keys for {missing[0]}{others}: make keystore")
