@@ -70,8 +70,7 @@ DEFAULTS = Parameters()
 def step(
     latch: Latch, event: Event, given: Parameters = DEFAULTS, drive_timeout: float = topics.DRIVE_TIMEOUT
 ) -> Latch:
-    """
-    Return the latch after an event.
+    """Return the latch after an event.
 
     :param drive_timeout: the drive stops the engines if ``on`` is not repeated within this time [s].
     """

@@ -60,8 +60,7 @@ def place(environment: Mapping[str, str]) -> Place:
 
 
 def places(named: Iterable[str]) -> set[Place]:
-    """
-    Return where the arms of this host are heard, and those that the user names.
+    """Return where the arms of this host are heard, and those that the user names.
 
     :raises DeploymentError: if a name is no namespace with a domain.
     """
@@ -82,8 +81,7 @@ def _places_of(name: str) -> list[Place]:
 
 @contextmanager
 def _joined(domain: Domain, number: int) -> Iterator[ReactiveNode]:
-    """
-    Join a domain.
+    """Join a domain.
 
     :param number: of the domain within this process: arms of several tags share a ROS domain.
     """
@@ -164,8 +162,7 @@ def watch(found: Collection[Place], more: Callable[[], bool]) -> None:
 
 
 def run(named: Sequence[str]) -> None:
-    """
-    Watch the arms until the user ends it; an arm that has ended stays in the table.
+    """Watch the arms until the user ends it; an arm that has ended stays in the table.
 
     :raises DeploymentError: for a wrong name, or if there is no arm.
     """

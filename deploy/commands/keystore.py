@@ -14,8 +14,7 @@ from interfaces.service.enclave import path
 
 
 def write(export: str, names: str) -> None:
-    """
-    Write an enclave for each program of the manifest, and for terminal, recorder and tools.
+    """Write an enclave for each program of the manifest, and for terminal, recorder and tools.
 
     :param export: a new folder for the keys of one host, '' for none.
     :param names: of the enclaves of that host, with spaces between.

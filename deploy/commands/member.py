@@ -27,8 +27,7 @@ class Member:
     """In a `with`, this process takes part in the system's communication; it handles no signals."""
 
     def __init__(self, name: str = TERMINAL) -> None:
-        """
-        Join. Raises DeploymentError if the environment does not allow it.
+        """Join. Raises DeploymentError if the environment does not allow it.
 
         :param name: of the enclave, and with the pid of the node.
         """

@@ -97,8 +97,7 @@ def _health(message: Any) -> Change:
 
 
 def row(arm: Arm, now: float) -> tuple[str, ...]:
-    """
-    Return the cells of an arm; what is old is not shown as fresh.
+    """Return the cells of an arm; what is old is not shown as fresh.
 
     :param now: on the monotonic clock [s].
     """

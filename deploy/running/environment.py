@@ -60,8 +60,7 @@ def set_middleware(environment: MutableMapping[str, str]) -> None:
 
 
 def tagged(environment: Mapping[str, str]) -> str:
-    """
-    Return the settings of Cyclone DDS with which an arm meets no process of another arm in its domain.
+    """Return the settings of Cyclone DDS with which an arm meets no process of another arm in its domain.
 
     In a domain of many processes, each answers all others, and a busy machine repeats what is not answered.
     """

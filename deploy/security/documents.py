@@ -42,8 +42,7 @@ def governance(domains: Iterable[int]) -> str:
 def permissions(
     enclave: str, rights: Rights, domains: Collection[int], validity: tuple[datetime, datetime]
 ) -> str:
-    """
-    Return what an enclave may do.
+    """Return what an enclave may do.
 
     :param validity: from when to when, in UTC.
     """

@@ -78,8 +78,7 @@ class Keystore:
         return sorted(f"/{path.parent.relative_to(self._enclaves).as_posix()}" for path in found)
 
     def export(self, folder: Path, enclaves: Collection[str]) -> None:
-        """
-        Copy what the host of these enclaves needs: no key of the CA, and none of another enclave.
+        """Copy what the host of these enclaves needs: no key of the CA, and none of another enclave.
 
         :raises DeploymentError: if the folder exists, or an enclave does not.
         """

@@ -1,6 +1,6 @@
 """What each process of an arm may do in DDS: the rights of its enclave follow from the contract.
 
-Names are those of DDS (``rt/engines``); ``*`` stands for any characters, also for ``/``.
+Names are those of DDS (``rt/engines``). ``*`` stands for any characters, ``/`` included.
 """
 
 from __future__ import annotations
@@ -45,8 +45,7 @@ Rights = tuple[Rule, ...]
 
 
 def of_arm(namespace: str, programs: Collection[str]) -> dict[str, Rights]:
-    """
-    Return the rights by enclave: one for each program, and those of terminal, recorder and tools.
+    """Return the rights by enclave: one for each program, and those of terminal, recorder and tools.
 
     :param programs: the names of ours, and of the user's own.
     """
@@ -110,8 +109,7 @@ def _node(
 
 
 def _guest(programs: Iterable[str], free: Collection[topics.Topic]) -> Rights:
-    """
-    A guest reads all topics and parameters, and uses all topics and services that are no arm's.
+    """A guest reads all topics and parameters, and uses all topics and services that are no arm's.
 
     :param programs: those for which it must not answer, and whose parameters it must not set.
     :param free: the topics of the arm that it may publish.

@@ -31,8 +31,7 @@ LIFE_PERIOD = 0.5  # s between two looks for the publishers
 
 
 def observe_state(node: ServiceNode, topic: Topic, gap: float = GAP) -> Signal[float]:
-    """
-    Return the value of a topic at every time; samples that are too late are reported.
+    """Return the value of a topic at every time; samples that are too late are reported.
 
     :param gap: the longest time between two samples of a movement [s].
     """
@@ -58,8 +57,7 @@ def state(
     gap: float = GAP,
     refused: Callable[[Refused], None] | None = None,
 ) -> Signal[float]:
-    """
-    Return the value of a state, certain only while its publisher lives.
+    """Return the value of a state, certain only while its publisher lives.
 
     :param alive: whether there is a publisher.
     :param gap: see :func:`observe_state`.

@@ -102,8 +102,7 @@ class Participant:
     """A participant of this process in a DDS domain."""
 
     def __init__(self, domain_id: int, enclave: str) -> None:
-        """
-        Join a domain.
+        """Join a domain.
 
         :param enclave: its keys are used where the environment asks for security.
         :raises RCLError: if the environment or its keys do not allow it.
@@ -138,8 +137,7 @@ class Participant:
         return checked(handle, f"cannot create topic {name} of type {type_name}")
 
     def _find_sertype(self) -> int:
-        """
-        Return a type for the samples of all writers. Version 0.10 of Cyclone has no function for it.
+        """Return a type for the samples of all writers. Version 0.10 of Cyclone has no function for it.
 
         It is in a sample that is written and taken here. The topic, which keeps it, is one that each enclave
         may use. Nobody else has its type, so nothing is sent.

@@ -18,8 +18,7 @@ _REASON = re.compile(rb"^\S+ \[\d+\] +\S+: (.*)\n", re.MULTILINE)
 
 @contextmanager
 def kept() -> Iterator[Callable[[], str]]:
-    """
-    Keep standard error within the ``with``; at its end, what others have written is written.
+    """Keep standard error within the ``with``; at its end, what others have written is written.
 
     It yields a function that returns why the process cannot join.
     """

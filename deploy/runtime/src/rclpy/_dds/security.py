@@ -56,8 +56,7 @@ def check(environment: Mapping[str, str]) -> None:
 
 
 def properties(enclave: str, environment: Mapping[str, str]) -> dict[str, str]:
-    """
-    Return the DDS properties of a participant; none if the environment asks for no security.
+    """Return the DDS properties of a participant; none if the environment asks for no security.
 
     :param enclave: its name, from the command line.
     :raises RCLError: if the library or a file of the enclave is missing.

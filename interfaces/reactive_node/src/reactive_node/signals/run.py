@@ -151,8 +151,7 @@ class Run:
 def evaluation(
     signal: Any, ask: Callable[[Run, Node], Questions], *, before: int = 0, steady: bool = False
 ) -> Callable[[abc.ObserverBase[Any], abc.SchedulerBase | None], abc.DisposableBase]:
-    """
-    Return how to subscribe to the answers of a signal.
+    """Return how to subscribe to the answers of a signal.
 
     :param before: how far before its time an answer needs values [ns].
     :param steady: whether each answer comes when it is known at the latest.

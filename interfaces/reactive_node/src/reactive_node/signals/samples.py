@@ -40,8 +40,7 @@ class Nothing(Silence):
 
 @dataclass(frozen=True)
 class Unchanged(Silence):
-    """
-    The last value holds: the topic of a state is silent while nothing changes.
+    """The last value holds: the topic of a state is silent while nothing changes.
 
     It is held in the first gap of the silence, in which a change may still go on, and in the last one before
     the next sample, in which the next change began. In between it is certain. So a publisher that changes
@@ -65,8 +64,7 @@ class Extrapolated(Silence):
 def hold(
     samples: Observable[Timestamp[T]], *, lateness: float, refused: OnRefused | None = None
 ) -> Signal[T]:
-    """
-    Return the last value: ``hold(samples)(t) = a``.
+    """Return the last value: ``hold(samples)(t) = a``.
 
     It is certain as soon as a sample at t would be late: silence means that nothing has changed.
 
@@ -88,8 +86,7 @@ def linear(
     silence: Silence = Nothing(),
     refused: OnRefused | None = None,
 ) -> Signal[T]:
-    """
-    Return straight lines: ``linear(samples)(t) = a + (b - a) · (t - tₐ) / (t_b - tₐ)``.
+    """Return straight lines: ``linear(samples)(t) = a + (b - a) · (t - tₐ) / (t_b - tₐ)``.
 
     Values are numbers, tuples of such values, or have ``+``, ``-`` and ``*``. See :func:`interpolate`.
     """
@@ -104,8 +101,7 @@ def slerp(
     silence: Silence = Nothing(),
     refused: OnRefused | None = None,
 ) -> Signal[tuple[float, float, float, float]]:
-    """
-    Return rotations at constant speed, the short way: ``a · (a⁻¹ · b)^((t - tₐ) / (t_b - tₐ))``.
+    """Return rotations at constant speed, the short way: ``a · (a⁻¹ · b)^((t - tₐ) / (t_b - tₐ))``.
 
     Values are unit quaternions x, y, z, w. See :func:`interpolate`.
     """
@@ -123,8 +119,7 @@ def interpolate(
     silence: Silence = Nothing(),
     refused: OnRefused | None = None,
 ) -> Signal[T]:
-    """
-    Return the values between the samples: ``between(a, b, (t - tₐ) / (t_b - tₐ))``.
+    """Return the values between the samples: ``between(a, b, (t - tₐ) / (t_b - tₐ))``.
 
     This holds where b comes at most a gap after a; the ``silence`` says what holds elsewhere. A value is
     known ``lateness`` after t_b, when no sample can come before b; in silence ``lateness + gap`` after t.

@@ -27,8 +27,7 @@ E = TypeVar("E")
 
 
 class Signal(Generic[T]):
-    """
-    A value at every time (the thesis' *behaviour*, 2.3.1).
+    """A value at every time (the thesis' *behaviour*, 2.3.1).
 
     A signal is a description, like a cold observable: nothing happens before a subscription to what
     :meth:`sample`, :meth:`snapshot` or :meth:`when` return. Each subscription has its own memory. It needs a
@@ -41,8 +40,7 @@ class Signal(Generic[T]):
     # Questions
 
     def sample(self, period: float, *, steady: bool = False) -> Observable[Answer[T]]:
-        """
-        Emit the values at all multiples of a period [s]: ``[(t, s(t)) for t = k · period]``.
+        """Emit the values at all multiples of a period [s]: ``[(t, s(t)) for t = k · period]``.
 
         The first one follows the subscription. Answers come in the order of time, as soon as they are known.
 
@@ -63,8 +61,7 @@ class Signal(Generic[T]):
         lateness: float,
         refused: Callable[[Refused], None] | None = None,
     ) -> Observable[tuple[E, Answer[T]]]:
-        """
-        Emit events with the values at their times: ``[(e, s(t)) for (t, e) in events]``, ordered by time.
+        """Emit events with the values at their times: ``[(e, s(t)) for (t, e) in events]``, ordered by time.
 
         :param lateness: how long after its time an event may arrive [s]; a later one is dropped.
         :param refused: called with each event that was dropped.
@@ -81,8 +78,7 @@ class Signal(Generic[T]):
         return Observable(evaluation(self, ask))
 
     def when(self, predicate: Callable[[T], bool], *, resolution: float) -> Observable[Timestamp[bool]]:
-        """
-        Emit ``p(s(t))`` with the time t of each change, between the samples, to the nanosecond.
+        """Emit ``p(s(t))`` with the time t of each change, between the samples, to the nanosecond.
 
         It is false in the beginning. Two changes within the resolution may pass unseen. Only certain values
         count.
@@ -103,8 +99,7 @@ class Signal(Generic[T]):
         return Signal(lambda run: _Delayed(run.node(self), round(seconds * SECOND)))
 
     def derivative(self, over: float) -> Signal[T]:
-        """
-        Return the mean rate of change: ``t ↦ (s(t + over/2) - s(t - over/2)) / over`` [1/s].
+        """Return the mean rate of change: ``t ↦ (s(t + over/2) - s(t - over/2)) / over`` [1/s].
 
         At the time of a sample, where lines of two slopes meet, it is the mean of both. The longer the time
         [s], the less noise, and the later the answer. If it is not longer than the gap of the samples, no
@@ -183,8 +178,7 @@ def constant(value: T) -> Signal[T]:
 
 
 def lift(function: Callable[..., R]) -> Callable[..., Signal[R]]:
-    """
-    Return a function of signals: ``lift(f)(a, b, …)(t) = f(a(t), b(t), …)``.
+    """Return a function of signals: ``lift(f)(a, b, …)(t) = f(a(t), b(t), …)``.
 
     Arguments that are no signals are constants.
     """
@@ -197,8 +191,7 @@ def lift(function: Callable[..., R]) -> Callable[..., Signal[R]]:
 
 
 def switch(key: Signal[K], choices: Mapping[K, Signal[T]]) -> Signal[T]:
-    """
-    Return ``t ↦ choices[key(t)](t)``.
+    """Return ``t ↦ choices[key(t)](t)``.
 
     Events choose if the key is made with ``hold``. All choices are evaluated from the beginning on, so the
     time at which an event arrives changes nothing. A key without a choice is unknown.

@@ -52,8 +52,7 @@ class Source(Memory):
         lateness: int,
         refused: Callable[[Refused], None] | None,
     ) -> None:
-        """
-        Wait for samples.
+        """Wait for samples.
 
         :param now: returns the time by the clock of the stamps [ns].
         :param advance: called when something may have become known.
