@@ -146,7 +146,7 @@ def _of_silence(history: History) -> Iterator[Effect]:
         times = (sample.sent for sample in history.output(source))
         for last, following in names.gaps(times, -math.inf, math.inf):
             if following - last > FLOWING:
-                yield Effect(waiting, last + FLOWING, following, WAITING, history)
+                yield Effect(waiting, last, following, WAITING, history)
 
 
 def _from(time: float) -> float:

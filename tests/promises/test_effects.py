@@ -162,7 +162,7 @@ def test_silent_source_keeps_a_new_program_waiting() -> None:
     found = [each for each in effects(history) if each.why == WAITING and each.end < 9.0]
     assert [(each.begin, each.end) for each in found] == [
         (-math.inf, 1.0),
-        pytest.approx((3.325, 4.0)),
+        (2.125, 4.0),
         *[(-math.inf, 0.0)] * 3,
     ]
     assert {*found[1].programs} == {KINEMATICS, ROBOT_STATE}

@@ -820,6 +820,15 @@ def test_l4_is_unknown_if_the_sentinel_was_hit_meanwhile(other: list[InjectedFau
     assert (found.cases, found.unknown) == (1 - unknown, unknown)
 
 
+@pytest.mark.parametrize(("silent", "unknown"), [(15.5, 0), (14.5, 1)])
+def test_l4_is_unknown_if_the_successor_waits_for_a_source(silent: float, unknown: int) -> None:
+    sources = {name: back() for name in LINKS} | {"l2": back((silent, 3.0))}
+    found = CHECKERS["L4"](
+        history(**sources, positions=back((10.0, 8.0)), faults=[stopped(KINEMATICS, 10.0, 20.0)])
+    )
+    assert (found.cases, found.unknown, len(found.evidence)) == (1 - unknown, unknown, 1 - unknown)
+
+
 @pytest.mark.parametrize(("began", "unknown"), [(9.0, 0), (9.5, 1), (11.5, 1), (12.0, 0)])
 def test_l4_is_unknown_if_the_sentinel_is_new_meanwhile(began: float, unknown: int) -> None:
     lives = two_lives("sentinel", began)
