@@ -29,8 +29,9 @@ def write(export: str, names: str) -> None:
     keystore = Keystore(Path(os.environ[KEYSTORE]))
     namespace, domain = namespace_of(os.environ), int(os.environ.get("ROS_DOMAIN_ID") or 0)
     arm = rights.of_arm(namespace, [program.name for program in manifest.programs()])
-    keystore.write(arm, [domain])
-    print(f"{keystore.folder}: {len(arm)} enclaves for ROS domain {domain}, namespace {namespace}")
+    end = keystore.write(arm, [domain])
+    until = f"valid until {end:%Y-%m-%d}"
+    print(f"{keystore.folder}: {len(arm)} enclaves for ROS domain {domain}, namespace {namespace}, {until}")
     if export:
         enclaves = [path(name, namespace) for name in names.split()]
         keystore.export(Path(export), enclaves)

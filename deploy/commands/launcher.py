@@ -120,9 +120,13 @@ def status(system: System) -> None:
         print(f"loopback: {LOOPBACK_DOWN}")
         print(of_services(programs, {}))
         return
-    with Member() as member, heard_healths(member.node) as health:
-        _listen(member, running, health, STATUS_LIMIT)
-        print(of_services(programs, health))
+    try:
+        with Member() as member, heard_healths(member.node) as health:
+            _listen(member, running, health, STATUS_LIMIT)
+    except DeploymentError:  # for example, its keys have ended; supervisord tells its part
+        print(of_services(programs, {}))
+        raise
+    print(of_services(programs, health))
 
 
 def logs(system: System) -> None:

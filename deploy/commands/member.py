@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import time
+from datetime import UTC, datetime
 from types import TracebackType
 
 import rclpy
@@ -16,7 +17,7 @@ from deploy.running import interruption, manifest
 from deploy.running.environment import namespace_of
 from deploy.running.errors import DeploymentError
 from deploy.security.rights import TERMINAL
-from interfaces.service import enclave, middleware
+from interfaces.service import UserError, enclave, middleware
 from reactive_node import ReactiveNode
 from reactive_node.executor import create_executor
 
@@ -32,26 +33,36 @@ class Member:
         :param name: of the enclave, and with the pid of the node.
         """
         namespace = namespace_of(os.environ)
-        arguments = enclave.arguments(name, namespace)
+        self._keys = enclave.keys(enclave.path(name, namespace))
         try:
+            arguments = enclave.arguments(name, namespace)
             with middleware.without_shared_memory():
                 rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
                 self.node = ReactiveNode(f"{name}_{os.getpid()}", namespace=namespace)
-        except RuntimeError as error:
+        except (RuntimeError, UserError) as error:
             rclpy.try_shutdown()
             raise DeploymentError(f"Cannot join the ROS graph: {error}") from None
         self._executor = create_executor()
         self._executor.add_node(self.node)
 
     def spin_once(self) -> None:
-        """Run one callback; waits at most 0.1 s for it. Raises Interrupted after a signal."""
-        interruption.check()
+        """Run one callback; waits at most 0.1 s for it.
+
+        :raises Interrupted: after a signal.
+        :raises DeploymentError: when its keys have ended.
+        """
+        self._check()
         self._executor.spin_once(timeout_sec=0.1)
 
     def spin_some(self) -> None:
-        """Run the callbacks of what has come, for ``SPIN_TIME``. Raises Interrupted after a signal."""
-        interruption.check()
+        """Run the callbacks of what has come, for ``SPIN_TIME``; raises as :meth:`spin_once`."""
+        self._check()
         self._executor.spin_until_future_complete(Future(), timeout_sec=SPIN_TIME)
+
+    def _check(self) -> None:
+        interruption.check()
+        if self._keys and (now := datetime.now(UTC)) >= self._keys.end:  # it hears nobody any longer
+            raise DeploymentError(self._keys.problem(now))
 
     def set_everywhere(self, name: str, value: object, limit: float) -> None:
         """Set a parameter on all services that have it; wait at most `limit` [s] for their answers."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -124,7 +125,7 @@ def check_environment(system: System) -> None:
 
 
 def _check_keys(namespace: str) -> None:
-    """Raise DeploymentError if security is wanted, but not for every process, or without its keys."""
+    """Raise DeploymentError if security is wanted, but not for every process, or without valid keys."""
     if os.environ.get(SECURITY) != "true":
         return
     if (strategy := os.environ.get(STRATEGY)) != ENFORCE:
@@ -138,6 +139,9 @@ def _check_keys(namespace: str) -> None:
     if missing := sorted(needed - {*keystore.enclaves()}):
         others = f" and {len(missing) - 1} others" if missing[1:] else ""
         raise DeploymentError(f"{keystore.folder} has no keys for {missing[0]}{others}: make keystore")
+    for each in map(enclave.keys, sorted(needed)):
+        if each and (problem := each.problem(datetime.now(UTC))):
+            raise DeploymentError(problem)
 
 
 def _check_claim(node: str, domain: int, namespace: str) -> None:

@@ -48,7 +48,7 @@ def permissions(
     """
     root = _root("permissions")
     grant = SubElement(SubElement(root, "permissions"), "grant", name=enclave)
-    begin, end = (time.isoformat() for time in validity)
+    begin, end = (time.replace(tzinfo=None).isoformat() for time in validity)
     _add(grant, {"subject_name": f"CN={enclave}"})
     _add(SubElement(grant, "validity"), {"not_before": begin, "not_after": end})
     for rule in (*rights, Rule(frozenset({GRAPH}), frozenset({GRAPH}))):

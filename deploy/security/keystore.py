@@ -22,6 +22,7 @@ from tempfile import TemporaryDirectory
 from deploy.running.errors import DeploymentError
 from deploy.security import documents
 from deploy.security.rights import Rights
+from interfaces.service.enclave import SOON
 
 CA = "sros2CA"  # the name that SROS2 gives it
 BEFORE, AFTER = timedelta(days=1), timedelta(days=3650)
@@ -45,6 +46,8 @@ x509_extensions = extensions
 commonName = supplied
 [extensions]
 basicConstraints = {constraints}
+subjectKeyIdentifier = none
+authorityKeyIdentifier = none
 """
 _LINKED_TO_CA = ("identity_ca", "permissions_ca")
 
@@ -58,19 +61,19 @@ class Keystore:
         self._ca = folder / "public" / "ca.cert.pem"
         self._ca_key = folder / "private" / "ca.key.pem"
 
-    def write(self, rights: Mapping[str, Rights], domains: Collection[int]) -> None:
+    def write(self, rights: Mapping[str, Rights], domains: Collection[int]) -> datetime:
         """
-        Write governance and enclaves. Keys and certificates that exist stay, permissions are written again.
+        Write governance and enclaves. Keys stay; certificates that end soon and permissions are made again.
 
         :param rights: those of each enclave, such as ``/kinematics``.
         :param domains: the ROS domains in which they join.
+        :return: when the first of these enclaves ends, in UTC.
         :raises DeploymentError: if openssl is missing or fails, or if this is an export, which has no CA key.
         """
         with _private():
             self._write_ca()
             self._sign(self._enclaves / "governance", documents.governance(domains))
-            for enclave, each in rights.items():
-                self._write_enclave(enclave, each, domains)
+            return min(self._write_enclave(enclave, each, domains) for enclave, each in rights.items())
 
     def enclaves(self) -> list[str]:
         """Return the enclaves that exist, sorted."""
@@ -97,42 +100,44 @@ class Keystore:
 
     def _write_ca(self) -> None:
         if self._ca.exists() and not self._ca_key.exists():
-            raise DeploymentError(f"{self.folder} has no key of its CA: add enclaves where it was made")
-        if not self._ca.exists():
-            for folder in (self._ca.parent, self._ca_key.parent, self._enclaves):
-                folder.mkdir(parents=True, exist_ok=True)
+            raise DeploymentError(
+                f"{self.folder} has no key of its CA: add and renew enclaves where it was made"
+            )
+        for folder in (self._ca.parent, self._ca_key.parent, self._enclaves):
+            folder.mkdir(parents=True, exist_ok=True)
+        if not _lasts(self._ca):
             self._certify(CA, self._ca, self._ca_key, "critical,CA:true,pathlen:1")
         for name in _LINKED_TO_CA:
             _link(self._ca.with_name(f"{name}.cert.pem"), self._ca)
             _link(self._ca_key.with_name(f"{name}.key.pem"), self._ca_key)
 
-    def _write_enclave(self, enclave: str, rights: Rights, domains: Collection[int]) -> None:
+    def _write_enclave(self, enclave: str, rights: Rights, domains: Collection[int]) -> datetime:
+        """Write an enclave, and return when it ends."""
         folder = self._enclaves / enclave.lstrip("/")
         folder.mkdir(parents=True, exist_ok=True)
         certificate, key = folder / "cert.pem", folder / "key.pem"
-        if not certificate.exists():
+        if not (key.exists() and _lasts(certificate)):
             self._certify(enclave, certificate, key, "CA:false")
         for name in _LINKED_TO_CA:
             _link(folder / f"{name}.cert.pem", self._ca.with_name(f"{name}.cert.pem"))
         _link(folder / "governance.p7s", self._enclaves / "governance.p7s")
-        text = documents.permissions(enclave, rights, domains, _validity(certificate))
-        self._sign(folder / "permissions", text)
+        begin, end = _validity(certificate)
+        self._sign(folder / "permissions", documents.permissions(enclave, rights, domains, (begin, end)))
+        return end
 
     def _certify(self, name: str, certificate: Path, key: Path, constraints: str) -> None:
-        """Make a key on P-256 and its certificate, which comes last: without it, both are made again."""
+        """Make a certificate, and a key on P-256 if there are not both yet: a key alone may be incomplete."""
         with TemporaryDirectory() as folder:
-            settings, request, made = (Path(folder, name) for name in ("settings", "request", "made"))
+            settings, request = (Path(folder, name) for name in ("settings", "request"))
+            made = certificate.with_suffix(".new")
             settings.write_text(_SETTINGS.format(name=name, folder=folder, constraints=constraints))
             Path(folder, "index").touch()
-            curve = ("-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes", "-sha256")
-            _openssl("req", "-config", settings, "-new", *curve, "-keyout", key, "-out", request)
+            new_key = ("-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes", "-keyout", key)
+            its_key = ("-key", key) if certificate.exists() and key.exists() else new_key
+            _openssl("req", "-config", settings, "-new", "-sha256", *its_key, "-out", request)
             now = datetime.now(UTC)
-            times = (
-                "-startdate",
-                f"{now - BEFORE:%Y%m%d%H%M%SZ}",
-                "-enddate",
-                f"{now + AFTER:%Y%m%d%H%M%SZ}",
-            )
+            end = now + AFTER if name == CA else min(now + AFTER, _validity(self._ca)[1])
+            times = ("-startdate", f"{now - BEFORE:%Y%m%d%H%M%SZ}", "-enddate", f"{end:%Y%m%d%H%M%SZ}")
             signer = (
                 ("-cert", self._ca, "-keyfile", self._ca_key)
                 if name != CA
@@ -141,7 +146,7 @@ class Keystore:
             _openssl(
                 "ca", "-config", settings, "-batch", "-notext", *times, *signer, "-in", request, "-out", made
             )
-            shutil.move(made, certificate)
+        os.replace(made, certificate)
 
     def _sign(self, document: Path, text: str) -> None:
         """Write NAME.xml and, signed, NAME.p7s. A process that starts reads the old or the new one."""
@@ -153,11 +158,17 @@ class Keystore:
         os.replace(new, signed)
 
 
+def _lasts(certificate: Path) -> bool:
+    """Whether there is a certificate that does not end soon."""
+    return certificate.exists() and _validity(certificate)[1] > datetime.now(UTC) + SOON
+
+
 def _validity(certificate: Path) -> tuple[datetime, datetime]:
-    """Return from when to when a certificate is valid."""
+    """Return from when to when a certificate is valid, in UTC."""
     text = _openssl("x509", "-in", certificate, "-noout", "-startdate", "-enddate")
     begin, end = (
-        datetime.strptime(line.partition("=")[2], "%b %d %H:%M:%S %Y GMT") for line in text.splitlines()
+        datetime.strptime(line.partition("=")[2], "%b %d %H:%M:%S %Y GMT").replace(tzinfo=UTC)
+        for line in text.splitlines()
     )
     return begin, end
 

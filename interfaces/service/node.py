@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from datetime import datetime
+from datetime import UTC, datetime
 from typing import Any, TypeVar
 
 from rcl_interfaces.msg import (
@@ -17,6 +17,8 @@ from rclpy.parameter import Parameter
 from rclpy.serialization import deserialize_message
 from reactivex import Observable
 
+from interfaces.service.enclave import Keys
+from interfaces.service.errors import UserError
 from interfaces.service.health import HealthReporter
 from interfaces.service.parameters import Declaration, declarations
 from interfaces.topics import ENGINES, TURN_OFF, Topic
@@ -44,7 +46,9 @@ class ServiceNode(ReactiveNode):
         """Create the node of a service; the options are those of :class:`rclpy.node.Node`."""
         super().__init__(node_name, **options)
         self._observed: dict[str, Topic] = {}  # by its resolved name
-        self.health = HealthReporter(self, before_report=self._remark_other_types)
+        self.keys: Keys | None = None
+        """Those with which it has joined; ``None`` without security."""
+        self.health = HealthReporter(self, before_report=self._look)
         self.add_on_set_parameters_callback(_only_finite)
 
     def declare(self, parameters: type[T]) -> T:
@@ -179,6 +183,18 @@ class ServiceNode(ReactiveNode):
 
     def remark(self, subject: str, reason: str) -> None:
         self.health.remark(subject, reason)
+
+    def _look(self) -> None:
+        self._remark_other_types()
+        if self.keys:
+            self._check_keys(self.keys, datetime.now(UTC))
+
+    def _check_keys(self, keys: Keys, now: datetime) -> None:
+        """Warn of the end of the keys; end the service with them, for no other hears it any longer."""
+        if now >= keys.end:
+            raise UserError(keys.problem(now))
+        if warning := keys.warning(now):
+            self.remark("keys", warning)
 
     def _remark_other_types(self) -> None:
         """Remark publishers that use an observed topic with another type: nothing arrives from them."""

@@ -13,8 +13,10 @@ from xml.etree import ElementTree
 import pytest
 
 from deploy.running.errors import DeploymentError
+from deploy.security import keystore as keystores
 from deploy.security.keystore import Keystore
 from deploy.security.rights import Rule
+from interfaces.service.enclave import SOON
 from tests.security import sros2
 
 TALKER = {"/talker": (Rule(frozenset({"rt/rosout", "rt/chatter"}), frozenset({"rt/clock"})),)}
@@ -73,11 +75,13 @@ def test_certificates_are_those_of_sros2(made: Keystore) -> None:
         assert f"Issuer: {sros2.CA_SUBJECT}\n" in text
         assert f"Subject: {subject}\n" in text
         assert constraints in text
+        assert text.count("X509v3 ") == 2  # the heading, and this extension
         assert "Signature Algorithm: ecdsa-with-SHA256" in text
         assert "ASN1 OID: prime256v1" in text
         dates = openssl("x509", "-in", certificate, "-noout", "-dates").splitlines()
         begin, end = (datetime.strptime(date.split("=")[1], "%b %d %H:%M:%S %Y GMT") for date in dates)
-        assert (end - begin).days == sros2.DAYS_BEFORE + sros2.DAYS_AFTER
+        length = timedelta(days=sros2.DAYS_BEFORE + sros2.DAYS_AFTER)  # the CA's, which was made before
+        assert timedelta() <= length - (end - begin) < timedelta(minutes=1)
         assert abs(datetime.now(UTC).replace(tzinfo=None) - begin - timedelta(days=1)) < timedelta(hours=1)
     assert openssl("verify", "-CAfile", ca, own).strip().endswith("OK")
     key = own.with_name("key.pem")
@@ -141,14 +145,47 @@ def test_writing_again_keeps_keys_and_renews_permissions(tmp_path: Path) -> None
     assert "<id>8</id>" in text
 
 
-def test_an_interrupted_key_is_made_again(tmp_path: Path) -> None:
+@pytest.mark.parametrize("lost", ["cert.pem", "key.pem"])
+def test_a_key_that_is_interrupted_or_lost_is_made_again(lost: str, tmp_path: Path) -> None:
     keystore = Keystore(tmp_path / "keystore")
     keystore.write(TALKER, [7])
     certificate = keystore.folder / "enclaves/talker/cert.pem"
-    certificate.unlink()
+    certificate.with_name(lost).unlink()
     keystore.write(TALKER, [7])
     of_key = openssl("pkey", "-in", certificate.with_name("key.pem"), "-pubout")
     assert of_key == openssl("x509", "-in", certificate, "-noout", "-pubkey")
+
+
+def test_writing_again_renews_what_ends_soon(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    keystore = Keystore(tmp_path / "keystore")
+    monkeypatch.setattr(keystores, "AFTER", SOON - timedelta(hours=1))
+    first = keystore.write(TALKER | OTHER, [7])
+    keys = {path: path.read_bytes() for path in keystore.folder.rglob("*key.pem")}
+    old = tmp_path / "old.pem"
+    shutil.copy(keystore.folder / "enclaves/talker/cert.pem", old)
+    monkeypatch.undo()
+
+    renewed = keystore.write(TALKER | OTHER, [7])
+
+    assert renewed - first > timedelta(days=3600)
+    assert {path: path.read_bytes() for path in keys} == keys
+    ca = keystore.folder / "public" / "ca.cert.pem"
+    for certificate in (old, *keystore.folder.glob("enclaves/**/cert.pem")):  # they meet until the restart
+        assert openssl("verify", "-CAfile", ca, certificate).strip().endswith("OK")
+    for enclave in ("talker", "arm1/other"):
+        signed = keystore.folder / "enclaves" / enclave / "permissions.p7s"
+        text = openssl("smime", "-verify", "-text", "-in", signed, "-CAfile", ca)
+        assert f"<not_after>{renewed.replace(tzinfo=None).isoformat()}</not_after>" in text
+
+
+def test_no_certificate_outlives_its_ca(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    keystore = Keystore(tmp_path / "keystore")
+    monkeypatch.setattr(keystores, "AFTER", timedelta(days=100))
+    end = keystore.write(TALKER, [7])
+    monkeypatch.undo()
+    assert keystore.write(TALKER | OTHER, [7]) == end
+    dates = openssl("x509", "-in", keystore.folder / "enclaves/arm1/other/cert.pem", "-noout", "-enddate")
+    assert datetime.strptime(dates.strip(), "notAfter=%b %d %H:%M:%S %Y GMT").replace(tzinfo=UTC) == end
 
 
 def test_an_export_has_its_own_keys_and_no_key_of_the_ca(made: Keystore, tmp_path: Path) -> None:
@@ -159,7 +196,7 @@ def test_an_export_has_its_own_keys_and_no_key_of_the_ca(made: Keystore, tmp_pat
     ]
     assert all(path.exists() for path in folder.rglob("*"))
     assert Keystore(folder).enclaves() == ["/arm1/other"]
-    with pytest.raises(DeploymentError, match="has no key of its CA"):
+    with pytest.raises(DeploymentError, match="has no key of its CA: add and renew"):
         Keystore(folder).write(TALKER, [7])
 
 

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
 
 from deploy.commands import parameters
+from deploy.commands.member import Member
 from deploy.running import manifest
 from deploy.running.environment import of_supervisord
 from deploy.running.errors import DeploymentError
 from deploy.running.system import System
 from deploy.security.keystore import Keystore
 from interfaces.service import enclave
+from interfaces.service.enclave import Keys
 from tests.system.sites import ROOT, Site
 
 PROGRAMS = [program.name for program in manifest.programs(manifest.PATH)]
@@ -51,6 +55,24 @@ def test_all_keys_are_there(keystore: Path, tmp_path: Path) -> None:
 def test_a_process_without_keys_is_named(name: str, keystore: Path, tmp_path: Path) -> None:
     (keystore / "enclaves" / name / "cert.pem").unlink()
     assert check(tmp_path) == f"{keystore} has no keys for /{name}: make keystore"
+
+
+def test_keys_that_have_ended_start_nothing(keystore: Path, tmp_path: Path) -> None:
+    permissions = keystore / "enclaves" / "velocity" / "permissions.p7s"
+    permissions.write_text("<not_before>2025-01-01</not_before><not_after>2026-01-01</not_after>")
+    assert check(tmp_path) == (
+        "the keys of /velocity have ended at 2026-01-01 00:00 UTC: make keystore, then make stop and start"
+    )
+
+
+def test_terminal_ends_with_its_keys(domain_id: int) -> None:
+    with Member() as member:
+        member.spin_once()
+        now = datetime.now(UTC)
+        member._keys = Keys("/terminal", now - timedelta(days=1), now)
+        for spin in (member.spin_once, member.spin_some):
+            with pytest.raises(DeploymentError, match=r"^the keys of /terminal have ended at "):
+                spin()
 
 
 def test_keys_of_another_namespace_do_not_count(
@@ -133,10 +155,13 @@ def test_make_keystore_writes_an_arm_and_exports_a_host(tmp_path: Path, domain_i
     code, printed = site.do("keystore", str(export), "terminal sentinel")
     assert code == 0, printed
     count = len(PROGRAMS) + 3
-    assert printed.splitlines() == [
-        f"{tmp_path}/keys: {count} enclaves for ROS domain {domain_id}, namespace /arm1",
-        f"{export}: /arm1/terminal, /arm1/sentinel; copy this folder to their host",
-    ]
+    first, *others = printed.splitlines()
+    assert re.fullmatch(
+        f"{tmp_path}/keys: {count} enclaves for ROS domain {domain_id}, namespace /arm1,"
+        r" valid until \d{4}-\d{2}-\d{2}",
+        first,
+    )
+    assert others == [f"{export}: /arm1/terminal, /arm1/sentinel; copy this folder to their host"]
     assert len(Keystore(tmp_path / "keys").enclaves()) == count
     assert Keystore(export).enclaves() == ["/arm1/sentinel", "/arm1/terminal"]
     code, printed = site.do("keystore", str(tmp_path / "other"))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import shutil
 import signal
@@ -11,12 +12,14 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import closing, suppress
+from datetime import timedelta
 from pathlib import Path
 
 import pytest
 from rclpy._dds import security
 
 from deploy.running.manifest import VIRTUAL_JOINTS
+from deploy.security import keystore as keystores
 from deploy.security import rights
 from deploy.security.keystore import Keystore
 from tests.security.attacks.conftest import PROGRAMS, MakePeer, Peer, Refused, SecureSite, until
@@ -191,6 +194,37 @@ def test_an_expired_certificate_does_not_join(make_peer: MakePeer, copy: Keystor
     subprocess.run([*renew, "-set_serial", "7", "-out", str(folder / "cert.pem")], check=True)
     with pytest.raises(Refused, match=r"cannot join DDS domain [^\n]* expired"):
         make_peer("velocity", ROS_SECURITY_KEYSTORE=str(copy.folder))
+
+
+def test_keys_that_end_stop_their_own_service_until_they_are_renewed(
+    secure_site: SecureSite, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    name = "velocity"
+    keystore, before = secure_site.keystore, secure_site.members
+    own = {f"/{name}": rights.of_arm("/", PROGRAMS)[f"/{name}"]}
+    (keystore.folder / "enclaves" / name / "cert.pem").unlink()
+    with monkeypatch.context() as patch:
+        patch.setattr(keystores, "AFTER", timedelta(seconds=10))
+        keystore.write(own, [secure_site.domain])
+    os.kill(before[name], signal.SIGKILL)
+
+    log = secure_site.run / "logs" / f"{name}.log"
+    until(lambda: f"{name}: the keys of /{name} have ended at " in log.read_text())
+    keystore.write(own, [secure_site.domain])
+
+    until(lambda: re.search(rf"{name} +RUNNING .*(?:ago|never)", secure_site.do("status")[1]))
+    assert secure_site.members.items() - before.items() == {(name, secure_site.members[name])}
+
+
+def test_status_shows_the_processes_though_its_keys_have_ended(secure_site: SecureSite) -> None:
+    permissions = secure_site.keystore.folder / "enclaves" / "terminal" / "permissions.p7s"
+    whole = permissions.read_bytes()
+    permissions.write_bytes(re.sub(rb"<not_after>\d+", b"<not_after>2001", whole))
+    code, shown = secure_site.do("status")
+    permissions.write_bytes(whole)
+    assert code == 1
+    assert re.search("^kinematics +RUNNING .* no report$", shown, re.MULTILINE), shown
+    assert re.search("^Cannot join the ROS graph: the keys of /terminal have ended", shown, re.MULTILINE)
 
 
 def test_no_keys_at_all_do_not_join(make_peer: MakePeer) -> None:
