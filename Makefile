@@ -34,7 +34,7 @@ export PYTHON SCENARIO PARAMETERS MANIFEST WEB RUNTIME
 USED_BY_run := SCENARIO PARAMETERS MANIFEST WEB SECURE
 USED_BY_start := $(USED_BY_run)
 USED_BY_unit := $(USED_BY_run)
-USED_BY_fleet := ARMS
+USED_BY_fleet := ARMS SECURE
 USED_BY_chaos := MINUTES SEED CHAOS SECURE
 USED_BY_simulate := HOURS SEED SCHEDULE SIMULATE
 USED_BY_replay := RECORD REPLAY
@@ -73,7 +73,7 @@ help:
 	@echo "make status   its rclpy, page and services: state, pid, uptime, restarts, last output, health"
 	@echo "make logs     follow their logs"
 	@echo "make record   record its messages until Ctrl-C     (MCAP for Foxglove and ros2 bag, in .run/records)"
-	@echo "make fleet    watch all arms of this host, one line each  (ARMS=\"/arm1 /arm2=5\" for those of other hosts)"
+	@echo "make fleet    watch all arms of this host, one line each  (ARMS=\"/arm1 /arm2=5\" for other hosts; SECURE=yes)"
 	@echo "make stop     stop it"
 	@echo "make keystore write the keys with which only this arm's processes meet  (EXPORT=folder ENCLAVES=\"names\" for a host)"
 	@echo "make chaos    break a system on purpose and check its promises  (MINUTES=5 SEED= CHAOS=--help for more)"

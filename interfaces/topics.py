@@ -203,6 +203,8 @@ _EVENTS = _qos(10)
 
 OPERATOR_NODES = ("terminal", "operator_page")
 """The nodes that show the arm to its operator."""
+FLEET = "fleet"
+"""The node of `make fleet`, which shows many arms."""
 _VIEWERS = ("RViz", "Foxglove")
 _CONFIGURED = ("kinematics", "motion", "robot_state", *OPERATOR_NODES)
 EVERY_SERVICE = "every service"
@@ -334,7 +336,7 @@ OPERATOR_ACTIVITY = Topic(
     _EVENTS,
     "",
     ("operator_watchdog",),
-    OPERATOR_NODES,
+    (*OPERATOR_NODES, FLEET),
     f"`{ALIVE}`, `{MISSED}`, `{INCAPACITATED}`: the watchdog's conclusions, for display only",
     _not_one_of(ALIVE, MISSED, INCAPACITATED),
     longest_gap=math.inf,
@@ -356,7 +358,7 @@ ENGINES_STATE = Topic(
     _qos(1, latched=True, lifespan=DRIVE_TIMEOUT),
     "",
     ("engine_controller",),
-    ("drive", "dead_mans_switch", *OPERATOR_NODES),
+    ("drive", "dead_mans_switch", *OPERATOR_NODES, FLEET),
     f"`{ON}` or `{OFF}`, on every change and at 10 Hz by default: the drive accepts an `{ON}` for "
     f"{1000 * DRIVE_TIMEOUT:.0f} ms",
     _not_one_of(ON, OFF),
@@ -367,7 +369,7 @@ DIAGNOSTICS = Topic(
     _EVENTS,
     "",
     (EVERY_SERVICE,),
-    ("sentinel", *OPERATOR_NODES),
+    ("sentinel", *OPERATOR_NODES, FLEET),
     "health, at 1 Hz, and at once to a new subscriber",
     longest_gap=1.0,
 )
@@ -429,7 +431,7 @@ def mermaid() -> str:
     lines = ["flowchart LR"]
     for topic in CONTRACT:
         if topic is not DIAGNOSTICS:
-            readers = [node for node in topic.subscribers if node not in OPERATOR_NODES]
+            readers = [node for node in topic.subscribers if node not in (*OPERATOR_NODES, FLEET)]
             ends = (" & ".join(topic.publishers), " & ".join(readers or topic.subscribers))
             lines.append(f"    {ends[0]} -- {topic.name} --> {ends[1]}")
     return "\n".join(lines) + "\n"

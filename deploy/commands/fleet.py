@@ -1,7 +1,8 @@
 """`make fleet`: one process watches many arms, and shows a line for each.
 
 It shows the arms of this host that run now, and those that the user names for other hosts: `/arm1` in the
-ROS domain of this shell, `/arm1=5` in domain 5. It runs on the embedded rclpy, which sees arms of both.
+ROS domain of this shell, `/arm1=5` in domain 5. It runs on the embedded rclpy, which sees arms of both. With
+SECURE=yes, it shows the arms that have keys, by the enclave /fleet of their keystores, else those without.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import sys
 import time
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
+from itertools import count
 from typing import Any, NamedTuple
 
 import rclpy
@@ -26,15 +28,25 @@ from deploy.operator.fleet import HEADER, Arm, Seen, fleet, row, watched
 from deploy.operator.output import say
 from deploy.running import interruption, processes
 from deploy.running.columns import table
-from deploy.running.environment import CYCLONEDDS, NAMESPACE, RANGE, namespace_of, set_middleware, tagged
+from deploy.running.environment import (
+    CYCLONEDDS,
+    KEYSTORE,
+    NAMESPACE,
+    RANGE,
+    SECURITY,
+    namespace_of,
+    set_middleware,
+    tagged,
+)
 from deploy.running.errors import DeploymentError
-from interfaces.topics import DIAGNOSTICS, ENGINES_STATE, Topic
+from interfaces.service import UserError, enclave
+from interfaces.topics import DIAGNOSTICS, ENGINES_STATE, FLEET, Topic
 from reactive_node import ReactiveNode
 
 PERIOD = 1.0  # s between two looks at the engines, and between two tables
 FIRST = 2.5  # s until the first table: each service reports its health once a second
 BEST_EFFORT = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
-DDS = (RANGE, "ROS_STATIC_PEERS", "ROS_LOCALHOST_ONLY", CYCLONEDDS)
+DDS = (RANGE, "ROS_STATIC_PEERS", "ROS_LOCALHOST_ONLY", CYCLONEDDS, SECURITY, KEYSTORE)
 """The variables by which this process meets the nodes of an arm."""
 
 
@@ -64,26 +76,61 @@ def places(named: Iterable[str]) -> set[Place]:
 
     :raises DeploymentError: if a name is no namespace with a domain.
     """
-    here = {place(environment) for environment in processes.systems().values()}
-    return here.union(*map(_places_of, named))
+    return _of_this_host(secured=_is_secured(os.environ)).union(*map(_places_of, named))
+
+
+def _of_this_host(*, secured: bool) -> set[Place]:
+    """Return the places of the arms of this host that have keys, or have none."""
+    systems = processes.systems().values()
+    return {place(environment) for environment in systems if _is_secured(environment) == secured}
+
+
+def _hidden() -> str:
+    """Name the arms of this host that this command does not show, and the one that does."""
+    secured = not _is_secured(os.environ)
+    names = ", ".join(sorted(each.namespace for each in _of_this_host(secured=secured)))
+    how = "with keys: make fleet SECURE=yes" if secured else "without keys: make fleet"
+    return f"{names}, {how}" if names else ""
+
+
+def _is_secured(environment: Mapping[str, str]) -> bool:
+    return environment.get(SECURITY) == "true"
 
 
 def _places_of(name: str) -> list[Place]:
-    """Return where an arm of another host may be heard: on the embedded rclpy it has a tag, else none."""
+    """Return where an arm of another host may be heard.
+
+    On the embedded rclpy without keys it has a tag, else none.
+    """
     namespace, _, domain = name.partition("=")
     domain = domain or os.environ.get("ROS_DOMAIN_ID") or "0"
     if not namespace.startswith("/") or not domain.isdecimal():
         raise DeploymentError(f"ARMS: {name} is no arm such as /arm1, or /arm1=5 in ROS domain 5")
     environment = {**os.environ, NAMESPACE: namespace, "ROS_DOMAIN_ID": domain}
-    tags = ["", tagged(environment)] if namespace != "/" else [""]
+    may_be_tagged = namespace != "/" and not _is_secured(environment)
+    tags = ["", tagged(environment)] if may_be_tagged else [""]
     return [place(environment | {CYCLONEDDS: tag}) for tag in tags]
+
+
+def _numbers(domains: Iterable[Domain]) -> dict[Domain, int]:
+    """Number the domains within this process: Cyclone DDS compares this number with that of the permissions.
+
+    Arms of several tags share a ROS domain: all but the first get a number that is free.
+    """
+    ordered = sorted({*domains})
+    free = (number for number in count() if number not in {domain.number for domain in ordered})
+    numbers: dict[Domain, int] = {}
+    for domain in ordered:
+        is_taken = domain.number in numbers.values()
+        numbers[domain] = next(free) if is_taken else domain.number
+    return numbers
 
 
 @contextmanager
 def _joined(domain: Domain, number: int) -> Iterator[ReactiveNode]:
     """Join a domain.
 
-    :param number: of the domain within this process: arms of several tags share a ROS domain.
+    :param number: of the domain within this process, see :func:`_numbers`.
     """
     outside = f"<Discovery><ExternalDomainId>{domain.number}</ExternalDomainId></Discovery>"
     settings = dict.fromkeys(DDS, "") | dict(domain.variables)
@@ -93,9 +140,12 @@ def _joined(domain: Domain, number: int) -> Iterator[ReactiveNode]:
     os.environ |= settings
     context = Context()
     try:
-        rclpy.init(args=[], context=context, domain_id=number, signal_handler_options=SignalHandlerOptions.NO)
-        node = ReactiveNode(f"fleet_{os.getpid()}", context=context)
-    except RuntimeError as error:
+        keys = enclave.arguments(FLEET, "/")
+        rclpy.init(
+            args=keys, context=context, domain_id=number, signal_handler_options=SignalHandlerOptions.NO
+        )
+        node = ReactiveNode(f"{FLEET}_{os.getpid()}", context=context)
+    except (RuntimeError, UserError) as error:
         raise DeploymentError(f"Cannot join ROS domain {domain.number}: {error}") from None
     finally:
         os.environ.clear()
@@ -105,6 +155,24 @@ def _joined(domain: Domain, number: int) -> Iterator[ReactiveNode]:
     finally:
         node.destroy_node()
         rclpy.try_shutdown(context=context)
+
+
+def _nodes(stack: ExitStack, domains: Iterable[Domain]) -> dict[Domain, ReactiveNode]:
+    """Join those domains that let this process join, and tell why another does not.
+
+    :raises DeploymentError: if none does.
+    """
+    nodes, refusals = {}, []
+    for domain, number in _numbers(domains).items():
+        try:
+            nodes[domain] = stack.enter_context(_joined(domain, number))
+        except DeploymentError as error:
+            refusals.append(error)
+    if not nodes:
+        raise refusals[-1]
+    for refusal in refusals:
+        say(str(refusal))
+    return nodes
 
 
 def _observe(node: ReactiveNode, topic: Topic, name: str) -> Observable[Any]:
@@ -136,12 +204,11 @@ def watch(found: Collection[Place], more: Callable[[], bool]) -> None:
         arms[arm.name, arm.domain] = arm
 
     with ExitStack() as stack:
-        domains = enumerate(sorted({domain for _, domain in found}))
-        nodes = {domain: stack.enter_context(_joined(domain, number)) for number, domain in domains}
+        nodes = _nodes(stack, (domain for _, domain in found))
         health = {node: _observe(node, DIAGNOSTICS, DIAGNOSTICS.name) for node in nodes.values()}
 
         def arm_of(key: tuple[str, int]) -> Observable[Arm]:
-            heard_by = [nodes[domain] for name, domain in found if (name, domain.number) == key]
+            heard_by = [nodes[each] for name, each in found if (name, each.number) == key and each in nodes]
             return watched(arms[key], _seen(key[0], heard_by, health), time.monotonic)
 
         first, *_ = nodes.values()
@@ -167,6 +234,8 @@ def run(named: Sequence[str]) -> None:
     :raises DeploymentError: for a wrong name, or if there is no arm.
     """
     found: set[Place] = set()
+    if hidden := _hidden():
+        say(f"Not shown: {hidden}")
 
     def more() -> bool:
         return not found >= places(named)
@@ -174,7 +243,8 @@ def run(named: Sequence[str]) -> None:
     while more():
         found |= places(named)
         watch(found, more)
-    raise DeploymentError("No arm runs on this host. ARMS=/arm1 names an arm of another host.")
+    other = " other" if hidden else ""
+    raise DeploymentError(f"No{other} arm runs on this host. ARMS=/arm1 names an arm of another host.")
 
 
 def main(arguments: Sequence[str]) -> int:

@@ -14,10 +14,10 @@ from interfaces.service.enclave import path
 
 
 def write(export: str, names: str) -> None:
-    """Write an enclave for each program of the manifest, and for terminal, recorder and tools.
+    """Write an enclave for each program of the manifest, and for terminal, recorder, tools and fleet.
 
     :param export: a new folder for the keys of one host, '' for none.
-    :param names: of the enclaves of that host, with spaces between.
+    :param names: of the enclaves of that host, with spaces between; `/fleet` is in no namespace.
     :raises DeploymentError: if that fails.
     """
     if not os.environ.get(KEYSTORE):
@@ -33,6 +33,6 @@ def write(export: str, names: str) -> None:
     until = f"valid until {end:%Y-%m-%d}"
     print(f"{keystore.folder}: {len(arm)} enclaves for ROS domain {domain}, namespace {namespace}, {until}")
     if export:
-        enclaves = [path(name, namespace) for name in names.split()]
+        enclaves = [name if name.startswith("/") else path(name, namespace) for name in names.split()]
         keystore.export(Path(export), enclaves)
         print(f"{export}: {', '.join(enclaves)}; copy this folder to their host")

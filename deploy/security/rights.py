@@ -45,7 +45,7 @@ Rights = tuple[Rule, ...]
 
 
 def of_arm(namespace: str, programs: Collection[str]) -> dict[str, Rights]:
-    """Return the rights by enclave: one for each program, and those of terminal, recorder and tools.
+    """Return the rights by enclave: one for each program, and those of terminal, recorder, tools and fleet.
 
     :param programs: the names of ours, and of the user's own.
     """
@@ -59,7 +59,9 @@ def of_arm(namespace: str, programs: Collection[str]) -> dict[str, Rights]:
     rights[TERMINAL] = _terminal(namespace, programs)
     rights[RECORDER] = observer(namespace, RECORDER)
     rights[TOOLS] = _guest(programs, [topics.TF])
-    return {path(name, namespace): each for name, each in rights.items()}
+    return {path(name, namespace): each for name, each in rights.items()} | {
+        path(topics.FLEET, "/"): _fleet()
+    }
 
 
 def observer(namespace: str, name: str) -> Rights:
@@ -85,6 +87,13 @@ def _terminal(namespace: str, programs: Iterable[str]) -> Rights:
     read = [topic for topic in topics.ROWS if TERMINAL in topic.subscribers]
     rights = _node(namespace, f"{TERMINAL}_*", published, read, _servers(TERMINAL, programs))
     return rights + _node("", "_ros2cli*", (), ())
+
+
+def _fleet() -> Rights:
+    """The fleet watches all arms of a keystore, in each namespace; its nodes are fleet_*."""
+    (rule,) = _node("", f"{topics.FLEET}_*", (), ())
+    shown = _topics("*", (topic for topic in topics.ROWS if topics.FLEET in topic.subscribers))
+    return (rule._replace(subscribe=rule.subscribe | shown),)
 
 
 def _servers(name: str, programs: Iterable[str]) -> Iterable[str]:

@@ -56,6 +56,56 @@ def test_processes_of_one_arm_meet_and_those_of_another_do_not(reach: str, domai
         assert len(readers) == 3
 
 
+@pytest.fixture
+def two_arms(monkeypatch: pytest.MonkeyPatch) -> None:
+    """This host has /arm1, without keys, and /arm2, with keys."""
+    arms = [surroundings("/arm1", 7), surroundings("/arm2", 7, ROS_SECURITY_ENABLE="true")]
+    arms[1]["ROS_SECURITY_KEYSTORE"] = "/keys"
+    monkeypatch.setattr(processes, "systems", lambda: dict(enumerate(arms)))
+
+
+@pytest.mark.usefixtures("two_arms")
+@pytest.mark.parametrize(
+    ("secured", "shown", "hidden"),
+    [
+        ("", "/arm1", "/arm2, with keys: make fleet SECURE=yes"),
+        ("true", "/arm2", "/arm1, without keys: make fleet"),
+    ],
+)
+def test_arms_with_keys_and_without_them_are_shown_apart(
+    secured: str, shown: str, hidden: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("ROS_SECURITY_ENABLE", secured)
+    (found,) = places([])
+    assert found.namespace == shown
+    assert dict(found.domain.variables).get("ROS_SECURITY_KEYSTORE") == ("/keys" if secured else None)
+    assert fleet._hidden() == hidden
+
+
+def test_named_arm_with_keys_has_no_tag(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(processes, "systems", dict)
+    monkeypatch.setenv("ROS_SECURITY_ENABLE", "true")
+    monkeypatch.setenv("ROS_SECURITY_KEYSTORE", "keys")
+    (found,) = places(["/arm2=5"])
+    assert CYCLONEDDS not in dict(found.domain.variables)
+
+
+def test_domains_keep_their_number_within_the_process() -> None:
+    domains = [Domain(0, ()), Domain(0, (("x", "tag"),)), Domain(1, ()), Domain(5, ())]
+    assert [fleet._numbers(domains)[domain] for domain in domains] == [0, 2, 1, 5]
+
+
+def test_domain_that_cannot_be_joined_hides_no_other(domain: int, capfd: pytest.CaptureFixture[str]) -> None:
+    good, bad = (
+        Domain(domain, (("ROS_AUTOMATIC_DISCOVERY_RANGE", reach),)) for reach in ("LOCALHOST", "NOWHERE")
+    )
+    with ExitStack() as stack:
+        assert [*fleet._nodes(stack, [good, bad])] == [good]
+        assert "NOWHERE" in capfd.readouterr().out
+        with pytest.raises(DeploymentError, match=f"^Cannot join ROS domain {domain}: .*NOWHERE"):
+            fleet._nodes(stack, [bad])
+
+
 def test_arms_of_this_host_and_named_ones_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
     here = surroundings("/arm1", 7)
     monkeypatch.setattr(processes, "systems", lambda: {Path("/run"): here, Path("/same"): here})

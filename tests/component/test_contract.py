@@ -94,5 +94,13 @@ def test_terminal_reads_and_publishes_what_the_contract_says(
 
 
 def test_contract_names_only_programs_of_the_arm() -> None:
-    known = {*PROGRAMS, *topics.OPERATOR_NODES, "RViz", "Foxglove", "sensor", topics.EVERY_SERVICE}
+    known = {
+        *PROGRAMS,
+        *topics.OPERATOR_NODES,
+        topics.FLEET,
+        "RViz",
+        "Foxglove",
+        "sensor",
+        topics.EVERY_SERVICE,
+    }
     assert {name for topic in topics.CONTRACT for name in (*topic.publishers, *topic.subscribers)} <= known

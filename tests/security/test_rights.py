@@ -27,9 +27,9 @@ def those_who(way: str, topic: str) -> set[str]:
 
 def test_each_program_and_each_tool_has_an_enclave() -> None:
     tools = {"terminal", "recorder", "tools"}
-    assert {path.removeprefix("/arm1/") for path in ARM} == {*PROGRAMS, "my_gripper", *tools}
-    assert all(path.startswith("/arm1/") for path in ARM)
-    assert [*rights.of_arm("/", ["kinematics"])] == ["/kinematics", "/terminal", "/recorder", "/tools"]
+    assert {path.removeprefix("/arm1/") for path in ARM} == {*PROGRAMS, "my_gripper", *tools, "/fleet"}
+    own = ["/kinematics", "/terminal", "/recorder", "/tools"]
+    assert [*rights.of_arm("/", ["kinematics"])] == [*own, "/fleet"]
 
 
 @pytest.mark.parametrize("topic", topics.ROWS, ids=lambda topic: topic.name)
@@ -44,7 +44,26 @@ def test_a_topic_is_published_and_read_as_the_contract_says(topic: topics.Topic)
         guests = {"my_gripper"}
     assert those_who("publish", name) == publishers | guests
     readers = {*topic.subscribers} & nodes
+    if topics.FLEET in topic.subscribers:
+        readers.add("/fleet")
     assert those_who("subscribe", name) == readers | {"recorder", "my_gripper", "tools"}
+
+
+def test_the_fleet_reads_what_it_shows_of_each_arm_and_nothing_else() -> None:
+    fleet = ARM["/fleet"]
+    assert fleet == rights.of_arm("/arm2", [])["/fleet"]
+    own = {f"rq/fleet_*/{service}Request" for service in rights._SERVICES}
+    assert {name for rule in fleet for name in rule.subscribe} - own == {
+        "rt*/engines/state",
+        "rt*/operator_activity",
+        "rt/diagnostics",
+        "rt/clock",
+        "rt/parameter_events",
+    }
+    assert {name for rule in fleet for name in rule.publish} - {"rt/rosout", "rt/parameter_events"} == {
+        f"rr/fleet_*/{service}Reply" for service in rights._SERVICES
+    }
+    assert all(may(fleet, "subscribe", f"rt{arm}/engines/state") for arm in ("", "/arm1", "/site/arm2"))
 
 
 @pytest.mark.parametrize("name", SAFETY)

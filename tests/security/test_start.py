@@ -152,18 +152,18 @@ class KeyedSite(Site):
 def test_make_keystore_writes_an_arm_and_exports_a_host(tmp_path: Path, domain_id: int) -> None:
     site = KeyedSite(tmp_path / "run", domain_id, "/arm1")
     export = tmp_path / "host"
-    code, printed = site.do("keystore", str(export), "terminal sentinel")
+    code, printed = site.do("keystore", str(export), "terminal sentinel /fleet")
     assert code == 0, printed
-    count = len(PROGRAMS) + 3
+    count = len(PROGRAMS) + 4
     first, *others = printed.splitlines()
     assert re.fullmatch(
         f"{tmp_path}/keys: {count} enclaves for ROS domain {domain_id}, namespace /arm1,"
         r" valid until \d{4}-\d{2}-\d{2}",
         first,
     )
-    assert others == [f"{export}: /arm1/terminal, /arm1/sentinel; copy this folder to their host"]
+    assert others == [f"{export}: /arm1/terminal, /arm1/sentinel, /fleet; copy this folder to their host"]
     assert len(Keystore(tmp_path / "keys").enclaves()) == count
-    assert Keystore(export).enclaves() == ["/arm1/sentinel", "/arm1/terminal"]
+    assert Keystore(export).enclaves() == ["/arm1/sentinel", "/arm1/terminal", "/fleet"]
     code, printed = site.do("keystore", str(tmp_path / "other"))
     assert (code, printed.count("\n")) == (1, 0)
     assert "An export needs both" in printed

@@ -70,6 +70,23 @@ def test_commands_join_with_their_own_keys(secure_site: SecureSite) -> None:
     assert record.await_line(r"(\d+) messages")[1] != "0"
 
 
+def test_the_fleet_sees_an_arm_with_an_enclave_of_its_own(
+    secure_site: SecureSite, make_peer: MakePeer
+) -> None:
+    operator = make_peer("terminal_4", "terminal")
+    operator("advertise", HEARTBEAT)
+    fleet = secure_site.begin_command(sys.executable, "-m", "deploy.commands.fleet")
+    line = re.compile(rf"/ +{secure_site.domain} +[^- ]\S* +alive +off ")
+
+    def shown() -> bool:
+        operator("publish", HEARTBEAT, True)
+        return any(line.match(text) for _, text in fleet.lines)
+
+    until(shown)
+    fleet.signal(signal.SIGINT)
+    assert fleet.wait() == 0
+
+
 def test_ros2_reads_as_a_tool_and_commands_as_the_terminal(secure_site: SecureSite, watcher: Peer) -> None:
     def ros2(*words: str, enclave: str) -> subprocess.CompletedProcess[str]:
         environment = secure_site.environment | {"ROS_SECURITY_ENCLAVE_OVERRIDE": enclave}
