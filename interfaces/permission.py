@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from datetime import datetime, timedelta
+from datetime import UTC, datetime, timedelta
 from typing import NamedTuple
 
 import reactivex as rx
@@ -10,7 +10,9 @@ from reactivex import Observable
 from reactivex.scheduler import ImmediateScheduler
 
 from interfaces.service import ServiceNode
-from interfaces.topics import DRIVE_TIMEOUT, ENGINES_STATE, ON
+from interfaces.topics import DRIVE_TIMEOUT, ENGINES_STATE, OFF, ON
+
+NEVER = datetime.min.replace(tzinfo=UTC)
 
 
 class EngineState(NamedTuple):
@@ -19,6 +21,7 @@ class EngineState(NamedTuple):
     name: str
     at: datetime  # of the arrival, on the Rx clock, which is never set
     age: float  # of the source time at arrival [s]
+    off: datetime = NEVER  # arrival of the last `off` before it
 
     @property
     def young_until(self) -> datetime:
@@ -26,10 +29,26 @@ class EngineState(NamedTuple):
         return self.at + timedelta(seconds=DRIVE_TIMEOUT - max(self.age, 0.0))
 
 
+def unopposed(states: Observable[EngineState]) -> Observable[EngineState]:
+    """Emit the states, but no ``on`` that comes within 400 ms of an ``off``.
+
+    So, of two controllers, none moves a drive against the other.
+    """
+
+    def step(before: EngineState, state: EngineState) -> EngineState:
+        return state._replace(off=before.at if before.name == OFF else before.off)
+
+    def counts(state: EngineState) -> bool:
+        return state.name == OFF or state.at >= state.off + timedelta(seconds=DRIVE_TIMEOUT)
+
+    return states.scan(step).filter(counts)
+
+
 def permissions(states: Observable[EngineState]) -> Observable[bool]:
     """Emit whether a drive may move: with each state, and ``False`` as soon as an ``on`` is no longer young.
 
-    An ``on`` is accepted for 400 ms from its source time. It begins with ``False``, and ends with the states.
+    An unopposed ``on`` is accepted for 400 ms from its source time. It begins with ``False``, and ends
+    with the states.
     """
 
     def is_young(state: EngineState) -> bool:
@@ -42,7 +61,7 @@ def permissions(states: Observable[EngineState]) -> Observable[bool]:
         ends = states.switch_map(end).take_until(states.last_or_default(None))
         return rx.merge(rx.just(False, ImmediateScheduler.singleton()), states.map(is_young), ends)
 
-    return states.publish(permitted)
+    return unopposed(states).publish(permitted)
 
 
 def engine_states(node: ServiceNode) -> Observable[EngineState]:

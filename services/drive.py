@@ -4,31 +4,31 @@ User story (ours): as a robot operator, I see the arm stand still when the engin
 there when I turn them on again.
 
 In a scenario with a drive, the joints play their tracks by the driven time. It is kept as settings are, so a
-restart moves no joint.
+restart moves no joint. An `on` counts only if no `off` came within 400 ms before it: of two controllers (two
+hosts that were cut from each other), none moves the joints against the other.
 """
 
 from __future__ import annotations
 
-from datetime import UTC, datetime
+from datetime import datetime
 from functools import partial
 
 import reactivex as rx
 from reactivex import Observable
 
 from interfaces import service
-from interfaces.permission import EngineState, engine_states
+from interfaces.permission import NEVER, EngineState, engine_states, unopposed
 from interfaces.service import ServiceNode
 from interfaces.service.epoch import Epoch
 from interfaces.sources.player import Player
 from interfaces.sources.settings import Settings
 from interfaces.topics import DRIVEN_TIME, ON
 
-NEVER = datetime.min.replace(tzinfo=UTC)
 LONGEST_STEP = 2  # periods: after a pause, the joints do not jump
 
 
 def driven_time(states: Observable[EngineState], begin: float, period: float) -> Observable[float]:
-    """Emit every ``period`` [s] the driven time [s]: it passes while the last state is an accepted ``on``.
+    """Emit every ``period`` [s] the driven time [s]: it passes while an unopposed ``on`` counts.
 
     :param begin: the driven time at the beginning.
     """
@@ -42,7 +42,7 @@ def driven_time(states: Observable[EngineState], begin: float, period: float) ->
 
     ticks = rx.interval(period).time_interval().timestamp()
     passing = ticks.map(lambda it: (it.timestamp, it.value.interval.total_seconds()))
-    return passing.with_latest_from(states.map(accepted_until).start_with(NEVER)).scan(step, begin)
+    return passing.with_latest_from(unopposed(states).map(accepted_until).start_with(NEVER)).scan(step, begin)
 
 
 def wire(node: ServiceNode) -> None:

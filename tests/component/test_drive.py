@@ -74,6 +74,15 @@ def test_on_is_accepted_for_400_ms_from_its_source_time(age: float, last: float)
     assert max(moved, default=0.0) == last
 
 
+def test_of_two_controllers_none_moves_the_joints_against_the_other() -> None:
+    other = [(2.06 + 0.1 * n, OFF, 0.0) for n in range(10)]  # until 2.96
+    times = [(1.0, 0.0), *driven(sorted([*on(1.01, 4.0), *other]), 4.0)]
+
+    moved = [at for (_, before), (at, after) in itertools.pairwise(times) if after > before]
+    assert [at for at in moved if 2.0 < at < 3.6] == [3.5]
+    assert {at for at in moved if at <= 2.0} == {at for at, _ in times if 1.0 < at <= 2.0}
+
+
 def test_restarted_drive_goes_on_where_it_stopped() -> None:
     assert driven([], 1.2, begin=7.5) == [(1.125, 7.5)]
 
@@ -100,6 +109,7 @@ def test_no_state_moves_a_joint_for_longer_than_400_ms(states: list[tuple[float,
             _, name, age = [state for state in heard if state[0] <= at][-1]
             arrived = max(state[0] for state in heard if state[0] <= at)
             assert name == ON
+            assert not [state for state in heard if state[1] == OFF and at - 0.4 + 1e-5 < state[0] <= at]
             assert at <= arrived + 0.4 - max(age, 0.0) + 1e-5
 
 

@@ -88,11 +88,14 @@ def test_file_follows_the_engines_and_is_off_at_the_end(
     pin.write_text("1\n")
     wired = start(make_node, spin_until, file=str(pin))
     spin_until(lambda: pin.read_text() == "0\n")
-    wired.publish(ENGINES_STATE, String(data=ON))
-    spin_until(lambda: pin.read_text() == "1\n")
+
+    def turned_on() -> bool:
+        wired.publish(ENGINES_STATE, String(data=ON))
+        return pin.read_text() == "1\n"
+
+    spin_until(turned_on)
     spin_until(lambda: pin.read_text() == "0\n")  # nobody repeats the `on`
-    wired.publish(ENGINES_STATE, String(data=ON))
-    spin_until(lambda: pin.read_text() == "1\n")
+    spin_until(turned_on)
     wired.service.destroy_node()
 
     assert pin.read_text() == "0\n"
@@ -113,7 +116,7 @@ def test_service_follows_the_engines_and_is_off_at_the_end(
     wired = start(make_node, spin_until, service="motor")
     spin_until(lambda: asked[-1:] == [False])
 
-    def turned_on() -> bool:  # on a busy machine, a single `on` may be too old when it comes
+    def turned_on() -> bool:
         wired.publish(ENGINES_STATE, String(data=ON))
         return asked[-1]
 

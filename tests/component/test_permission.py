@@ -31,6 +31,23 @@ def test_off_ends_the_permission_at_once() -> None:
     assert permitted((1.0, ON, 0.0), (1.2, OFF, 9.0)) == [(0.0, False), (1.0, True), (1.2, False)]
 
 
+def test_on_has_to_wait_until_an_off_does_not_count_any_more() -> None:
+    states = [(1.0, OFF, 9.0), *((1.05 + 0.1 * n, ON, 0.0) for n in range(6))]
+    assert permitted(*states) == [(0.0, False), (1.45, True), (1.95, False)]
+
+
+def test_single_on_that_comes_too_soon_after_an_off_permits_nothing() -> None:
+    assert permitted((1.0, OFF, 9.0), (1.399, ON, 0.0)) == [(0.0, False)]
+    assert permitted((1.0, OFF, 9.0), (1.4, ON, 0.0)) == [(0.0, False), (1.4, True), (1.8, False)]
+
+
+def test_of_two_controllers_none_permits_against_the_other() -> None:
+    one = [(1.0 + 0.1 * n, ON, 0.0) for n in range(20)]
+    other = [(1.55 + 0.1 * n, OFF, 0.0) for n in range(5)]
+    found = permitted(*sorted([*one, *other]))
+    assert found == [(0.0, False), (1.0, True), (1.55, False), (2.4, True)]
+
+
 @pytest.mark.parametrize(("age", "end"), [(0.0, 1.4), (0.1, 1.3), (-5.0, 1.4)])
 def test_on_permits_for_400_ms_from_its_source_time(age: float, end: float) -> None:
     assert permitted((1.0, ON, age)) == [(0.0, False), (1.0, True), (end, False)]
@@ -64,3 +81,5 @@ def test_no_permission_outlives_the_on_that_gave_it(states: list[tuple[float, st
             before = [state for state in ordered if state[0] <= end]
             until = [at + 0.4 - max(age, 0.0) for at, name, age in before if name == ON and age < 0.4]
             assert begin <= end <= max(until) + 0.02
+            offs = [at for at, name, _ in ordered if name == OFF]
+            assert not [at for at in offs if begin - 0.38 < at < end - 0.02]
