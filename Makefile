@@ -21,6 +21,7 @@ ARMS ?=
 SECURE ?=
 EXPORT ?=
 ENCLAVES ?=
+HOST := # only of the command line: some shells have a variable of this name
 SHELL := /bin/sh
 MAKEFLAGS += --no-print-directory
 PY := deploy/commands/venv.sh
@@ -28,10 +29,13 @@ RUNTIME ?=
 STAMP := .venv/made-from
 # A Python that is still starting answers Ctrl-C with a traceback: SIGINT waits until the command is ready for it.
 HOLD := $(shell env --block-signal=INT echo env --block-signal=INT 2>/dev/null)
+ifneq ($(HOST),)
+export REACTIVE_ARM_HOST := $(HOST)
+endif
 export PYTHON SCENARIO PARAMETERS MANIFEST WEB RUNTIME
 
 # The variables of each command. Others on the command line are refused, except by `make stop`: it must not fail.
-USED_BY_run := SCENARIO PARAMETERS MANIFEST WEB SECURE
+USED_BY_run := SCENARIO PARAMETERS MANIFEST WEB HOST SECURE
 USED_BY_start := $(USED_BY_run)
 USED_BY_unit := $(USED_BY_run)
 USED_BY_fleet := ARMS SECURE
@@ -67,7 +71,8 @@ help:
 	@echo "make start    start it in the background          (run, start: SCENARIO=demo, listing_5_9, none or a file)"
 	@echo "                                                  (PARAMETERS=file; WEB=off for no page, or its port;"
 	@echo "                                                  SECURE=yes: only with the keys of make keystore;"
-	@echo "                                                  MANIFEST=file with programs of your own)"
+	@echo "                                                  MANIFEST=file with programs of your own;"
+	@echo "                                                  HOST=robot or operator for one of two hosts)"
 	@echo "make unit     write a systemd unit that starts it at each boot    (the same variables)"
 	@echo "make terminal attach this terminal to it"
 	@echo "make status   its rclpy, page and services: state, pid, uptime, restarts, last output, health"

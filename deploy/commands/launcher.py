@@ -44,6 +44,8 @@ def place(environment: Mapping[str, str]) -> str:
     words = [f"ROS domain {environment.get('ROS_DOMAIN_ID') or 0}"]
     if namespace := environment.get(NAMESPACE):
         words.append(f"namespace {namespace}")
+    if host := environment.get(manifest.HOST):
+        words.append(f"host {host}")
     if (reach := environment.get(RANGE, "LOCALHOST")) != "LOCALHOST":
         words.append(f"discovery range {reach}")
     return ", ".join(words)
@@ -106,6 +108,7 @@ def status(system: System) -> None:
     if not _adopt_environment(system):
         print("Nothing runs.")
         return
+    from deploy.commands import hosts
     from deploy.commands.member import Member
     from deploy.commands.status import of_services
     from interfaces.service.health import heard_healths
@@ -120,13 +123,20 @@ def status(system: System) -> None:
         print(f"loopback: {LOOPBACK_DOWN}")
         print(of_services(programs, {}))
         return
+    host_of = {each.name: each.host for each in manifest.everywhere()}
+    elsewhere = host_of.keys() - {program.name for program in programs}
     try:
-        with Member() as member, heard_healths(member.node) as health:
+        with Member() as member, heard_healths(member.node) as health, hosts.heard(member.node) as others:
+            deadline = time.monotonic() + STATUS_LIMIT
             _listen(member, running, health, STATUS_LIMIT)
+            while not elsewhere <= health.keys() & others.processes.keys() and time.monotonic() < deadline:
+                member.spin_once()
     except DeploymentError:  # for example, its keys have ended; supervisord tells its part
         print(of_services(programs, {}))
         raise
-    print(of_services(programs, health))
+    print(others.clocks(), end="")
+    programs += [others.processes[name] for name in host_of if name in elsewhere & others.processes.keys()]
+    print(of_services(programs, health, host_of if elsewhere else {}))
 
 
 def logs(system: System) -> None:
@@ -172,14 +182,14 @@ def _chosen(scenario: str) -> AbstractContextManager[None]:
     from deploy.commands.parameters import NONE
 
     without = manifest.VIRTUAL_JOINTS if scenario == NONE else ()
-    return manifest.chosen(os.environ.get("MANIFEST", ""), without)
+    return manifest.chosen(os.environ.get("MANIFEST", ""), without, os.environ.get(manifest.HOST, ""))
 
 
 @contextmanager
 def _started(system: System, scenario: str, parameter_file: str) -> Iterator[Member]:
     """Start the system and its scenario; stop it when that fails, or the block."""
     began = time.monotonic()
-    from deploy.commands import parameters
+    from deploy.commands import hosts, parameters
     from deploy.commands.member import Member
 
     with ExitStack() as stack:
@@ -187,6 +197,7 @@ def _started(system: System, scenario: str, parameter_file: str) -> Iterator[Mem
         parameters.check_environment(system)
         given = parameters.of_system(scenario, parameter_file)
         member = stack.enter_context(Member())
+        hosts.check(member, system)
         log_sizes = {path.stem: path.stat().st_size for path in system.logs.glob("*.log")}
         interruption.check()  # the last time before there is anything to stop
         system.start(given)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 
 from deploy.running.columns import table
 from deploy.running.supervisord import Program
@@ -12,9 +12,19 @@ from interfaces.service.health import Health
 HEADER = ("SERVICE", "STATE", "PID", "UPTIME", "RESTARTS", "LAST OUTPUT", "HEALTH")
 
 
-def of_services(programs: Iterable[Program], health: Mapping[str, Health]) -> str:
-    """The services, one per line, with the latest health of each."""
-    return table([HEADER, *(_row(program, health.get(program.name)) for program in programs)])
+def of_services(
+    programs: Sequence[Program], health: Mapping[str, Health], hosts: Mapping[str, str] | None = None
+) -> str:
+    """
+    Return the services, one per line, with the latest health of each.
+
+    :param hosts: the host of each program, if there is more than one.
+    """
+    rows = [HEADER, *(_row(program, health.get(program.name)) for program in programs)]
+    if hosts:
+        column = ["HOST", *(hosts[program.name] for program in programs)]
+        rows = [(host, *row) for host, row in zip(column, rows, strict=True)]
+    return table(rows)
 
 
 def _row(program: Program, health: Health | None) -> tuple[str, ...]:

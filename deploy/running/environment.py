@@ -30,6 +30,7 @@ ADOPTED = (
     "FASTDDS_",
     NAMESPACE,
     manifest.VARIABLE,
+    manifest.HOST,
 )
 """The beginnings of the variables that belong to an arm: other commands for it take them over."""
 FASTDDS_PROFILES = Path(__file__).resolve().parents[1] / "fastdds.xml"

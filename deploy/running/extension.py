@@ -27,8 +27,7 @@ from supervisor import events, loggers
 from supervisor.loggers import RotatingFileHandler
 from supervisor.states import ProcessStates, SupervisorStates, getProcessStateDescription
 
-from deploy.running import prefork
-from deploy.running.manifest import SENTINEL
+from deploy.running import manifest, prefork
 from deploy.running.run_directory import PARAMETERS
 
 LONGEST_WAIT = 0.1  # s, while the state of a program changes with time
@@ -115,7 +114,7 @@ class ArmInterface:
 
     def watch(self) -> str:
         """The same for the sentinel; each call is its sign of life."""
-        self._guarded = (self._processes()[SENTINEL].pid, self._clock + SENTINEL_TIMEOUT)
+        self._guarded = (self._processes()[manifest.sentinel()].pid, self._clock + SENTINEL_TIMEOUT)
         return self.programs()
 
     def _processes(self) -> dict[str, Any]:
@@ -124,7 +123,7 @@ class ArmInterface:
 
     def _guard(self) -> None:
         """Kill the sentinel if it hangs; as its parent, supervisord cannot mistake its pid."""
-        sentinel = self._processes().get(SENTINEL)
+        sentinel = self._processes().get(manifest.sentinel())
         if sentinel is None or sentinel.get_state() not in (ProcessStates.STARTING, ProcessStates.RUNNING):
             return
         pid, deadline = self._guarded

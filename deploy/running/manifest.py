@@ -5,6 +5,9 @@ A user's file (``MANIFEST=robot.conf make run``) has a section for each program,
     [program:joint_source]
     command = python3 -m services.examples.joint_source
 
+A program runs on the host `robot`, unless its section has ``host = operator``. `make start HOST=operator`
+starts the programs of that host alone. Each host has a sentinel with a name of its own.
+
 Each program is a service (:func:`interfaces.service.run`). Its node gets the program's name and the parameter
 file of the arm, the section gets the settings of our programs where it has none. Modules beside the file are
 found.
@@ -18,7 +21,7 @@ import os
 import re
 import shlex
 import sys
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
@@ -30,14 +33,19 @@ from deploy.running.errors import DeploymentError
 PATH = Path(__file__).resolve().parents[1] / "supervisord.conf"
 VARIABLE = "REACTIVE_ARM_MANIFEST"
 """Environment variable: the manifest of a system, if that is not ours."""
+HOST = "REACTIVE_ARM_HOST"
+"""Environment variable: the host whose programs run here; '' where one host runs all."""
+ROBOT = "robot"
+"""The host of the programs that name none."""
 GROUP = "arm"
 """The supervisor group of all programs."""
 SENTINEL = "sentinel"
-"""The program that supervises the others together with supervisord."""
+"""The program that supervises the others together with supervisord, where one host runs all."""
 PAGE = "operator_page"
 """The program that serves the operator's page."""
 VIRTUAL_JOINTS = ("config_theta1", "config_theta2", "drive")
 """The programs that real joints with a real drive replace."""
+_ELSEWHERE = "elsewhere:"  # begins the sections of programs of other hosts; supervisor ignores them
 _ARGUMENTS = "--ros-args -r __node:={name} --params-file parameters.yaml"
 
 
@@ -47,6 +55,8 @@ class Program(NamedTuple):
     module: str
     arguments: tuple[str, ...]
     """The arguments before ``--ros-args``."""
+    host: str = ROBOT
+    """The host that runs it, if there is more than one."""
 
 
 def path() -> Path:
@@ -57,7 +67,22 @@ def path() -> Path:
 def programs(path_: Path | None = None) -> tuple[Program, ...]:
     """Return the programs in the order of the group."""
     manifest = _read(path_ or path())
-    return tuple(_program(name, manifest[f"program:{name}"]["command"]) for name in _names(manifest))
+    return tuple(_program(name, manifest[f"program:{name}"]) for name in _names(manifest))
+
+
+def everywhere() -> tuple[Program, ...]:
+    """Return the programs of all hosts, those of this host first."""
+    manifest = _read(path())
+    others = [section for section in manifest.sections() if section.startswith(_ELSEWHERE)]
+    return programs() + tuple(
+        _program(section.removeprefix(_ELSEWHERE), manifest[section]) for section in others
+    )
+
+
+def sentinel(host: str | None = None) -> str:
+    """Return the name of the sentinel of a host, by default of this one."""
+    host = os.environ.get(HOST, "") if host is None else host
+    return f"{SENTINEL}_{host}" if host else SENTINEL
 
 
 @cache
@@ -67,14 +92,15 @@ def start_retries(program: str) -> int:
 
 
 @contextmanager
-def chosen(own: str, without: Collection[str] = ()) -> Iterator[None]:
+def chosen(own: str, without: Collection[str] = (), host: str = "") -> Iterator[None]:
     """Let :func:`path` be a manifest with the programs of a user's file, while a system starts.
 
     :param own: the user's file, '' for none.
     :param without: the programs of ours that do not run.
-    :raises DeploymentError: for an error in the file.
+    :param host: whose programs run here, '' for all.
+    :raises DeploymentError: for an error in the file, or a host without programs.
     """
-    if not own and not without:
+    if not own and not without and not host:
         yield
         return
     manifest = _read(PATH)
@@ -83,6 +109,8 @@ def chosen(own: str, without: Collection[str] = ()) -> Iterator[None]:
     names = [name for name in _names(manifest) if name not in without]
     if own:
         names += _add(manifest, Path(own))
+    if host:
+        names = _part(manifest, names, host)
     manifest[f"group:{GROUP}"]["programs"] = ", ".join(names)
     handle, name = mkstemp(".conf")
     os.environ[VARIABLE] = name
@@ -93,6 +121,28 @@ def chosen(own: str, without: Collection[str] = ()) -> Iterator[None]:
     finally:
         with suppress(FileNotFoundError):  # the system has moved it to its run directory
             os.unlink(name)
+
+
+def _part(manifest: configparser.RawConfigParser, names: Sequence[str], host: str) -> list[str]:
+    """Mark the programs of other hosts, and return the names of those of a host."""
+    hosts = sorted({_host(manifest[f"program:{name}"]) for name in names})
+    if host not in hosts:
+        raise DeploymentError(f"HOST={host} has no programs; the hosts are {', '.join(hosts)}")
+    here = []
+    for name in names:
+        section = dict(manifest[f"program:{name}"])
+        manifest.remove_section(f"program:{name}")
+        for each in hosts if name == SENTINEL else [_host(section)]:
+            own = sentinel(each) if name == SENTINEL else name
+            renamed = f" -r __node:={own}" if name == SENTINEL else ""
+            kind = "program:" if each == host else _ELSEWHERE
+            manifest[kind + own] = section | {"host": each, "command": section["command"] + renamed}
+            here += [own] if each == host else []
+    return here
+
+
+def _host(section: Mapping[str, str]) -> str:
+    return section.get("host", ROBOT)
 
 
 def _add(manifest: configparser.RawConfigParser, path: Path) -> list[str]:
@@ -135,7 +185,7 @@ def _problem(kind: str, name: str, command: str, ours: Collection[str]) -> str:
     if name in ours:
         return "has the name of a program of the arm: take another name"
     try:
-        module = _program(name, command).module
+        module = _program(name, {"command": command}).module
     except (ValueError, IndexError):
         return f"has no command such as python3 -m MODULE: {command!r}"
     with suppress(ImportError, ValueError):
@@ -154,9 +204,9 @@ def _read(path: Path) -> configparser.RawConfigParser:
     return manifest
 
 
-def _program(name: str, command: str) -> Program:
-    words = shlex.split(command)
+def _program(name: str, section: Mapping[str, str]) -> Program:
+    words = shlex.split(section["command"])
     if "--ros-args" in words:
         words = words[: words.index("--ros-args")]
     module = words.index("-m") + 1
-    return Program(name, words[module], tuple(words[module + 1 :]))
+    return Program(name, words[module], tuple(words[module + 1 :]), _host(section))

@@ -48,7 +48,7 @@ def reaction_to(document: Mapping[str, Any], namespace: str) -> Reaction:
 
 def declared() -> dict[str, dict[str, Declaration]]:
     """Return the parameters that a user may set, by program of the manifest and by name."""
-    return {program.name: _declared_by(program) for program in manifest.programs()}
+    return {program.name: _declared_by(program) for program in manifest.everywhere()}
 
 
 def _declared_by(program: manifest.Program) -> dict[str, Declaration]:

@@ -7,8 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
-from deploy.running import processes
-from deploy.running.manifest import SENTINEL
+from deploy.running import manifest, processes
 from deploy.running.supervisord import Program
 
 RECENT = 60.0  # s for which a restart counts as recent
@@ -149,7 +148,7 @@ class Policy:
             if silence >= (start if reported is None else self._timeouts.health):
                 silent.append(Action("kill", program.name, pid, f"no health for {silence:.1f} s"))
         self.kill_inhibited_by = ""
-        itself = [action for action in silent if action.program == SENTINEL]
+        itself = [action for action in silent if action.program == manifest.sentinel()]
         self.hears_itself = not itself
         if itself:
             self.kill_inhibited_by = "the sentinel does not hear itself"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import socket
 import time
 from collections.abc import Mapping
 from pathlib import Path
@@ -33,7 +34,8 @@ class Probe:
 
     def hear(self, reports: Mapping[str, Health]) -> None:
         for program, health in reports.items():
-            self._last_health[program, health.pid] = health.heard
+            if is_here(health.host):
+                self._last_health[program, health.pid] = health.heard
 
     def observe(self) -> Observation:
         """Return an observation. Raises DeploymentError where supervisord is gone or does not answer.
@@ -73,6 +75,11 @@ class Probe:
             if supervised.get(process.program, process.pid) != process.pid
             and _state_of(process.pid)[1] not in (0, self._supervisord.pid, *supervised.values())
         )
+
+
+def is_here(host: str) -> bool:
+    """Whether a report comes from this host: processes of two hosts may have the same pid."""
+    return host == socket.gethostname()
 
 
 def _state_of(pid: int) -> tuple[str, int]:

@@ -16,6 +16,7 @@ observes them and hears itself: systemd restarts an arm whose supervisord hangs.
 from __future__ import annotations
 
 import os
+import re
 import signal
 import socket
 from collections.abc import Iterable, Mapping
@@ -26,17 +27,17 @@ from pathlib import Path
 import reactivex as rx
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
-from deploy.running import processes
+from deploy.running import manifest, processes
 from deploy.running.errors import DeploymentError
 from deploy.running.machine import Machine, figures
 from deploy.running.manifest import SENTINEL
 from deploy.running.policy import Action, Observation, Policy, Timeouts
-from deploy.running.probe import Probe
+from deploy.running.probe import Probe, is_here
 from deploy.running.service_manager import ALIVE, READY, notify
 from deploy.running.supervisord import Program, Supervisord
 from interfaces import service
 from interfaces.service import ServiceNode, parameter
-from interfaces.service.health import healths
+from interfaces.service.health import Health, healths
 from interfaces.topics import DIAGNOSTICS
 
 MANY_RESTARTS = 3  # within a minute: a warning
@@ -53,12 +54,13 @@ def states(
 
 
 def reported(message: DiagnosticArray, namespace: str) -> list[Program]:
-    """Return the states in a message that the sentinel of a namespace has published, without errors."""
-    node = f"{namespace}/{SENTINEL}: "
+    """Return the states in a message that a sentinel of a namespace has published, without errors."""
+    node = re.compile(rf"{re.escape(namespace)}/{SENTINEL}(_\w+)?")
     found = []
     for status in message.status:
         values = {pair.key: pair.value for pair in status.values}
-        if status.name == node + values.get("process", ""):
+        name, _, process = status.name.partition(": ")
+        if process == values.get("process") and node.fullmatch(name):
             with suppress(KeyError, ValueError):  # not a report of ours
                 found.append(_program(values))
     return found
@@ -130,8 +132,14 @@ def wire(node: ServiceNode) -> None:
     timeouts = Timeouts(parameters.period, parameters.health_timeout, parameters.start_timeout)
     run, supervisord = Path(os.environ[processes.MARK]), Supervisord(os.getppid())
     probe, policy, machine = Probe(run, supervisord), Policy(timeouts), Machine(run, timeouts.period)
-    own_name = node.get_fully_qualified_name()
+    own_name, ours = node.get_fully_qualified_name(), {program.name for program in manifest.programs()}
     namespace = node.get_namespace().rstrip("/")
+
+    def hear(reports: Mapping[str, Health]) -> None:
+        probe.hear(reports)
+        for program, health in reports.items():
+            if program in ours and not is_here(health.host):
+                node.remark(program, f"it runs on host {health.host} as well")
 
     def observe(_: int) -> Observation | None:
         node.health.standing = machine.warnings(figures(run))
@@ -168,7 +176,7 @@ def wire(node: ServiceNode) -> None:
     ready = observations.filter(lambda observation: observation.is_complete).take(1)
     alive = fresh.filter(lambda _: policy.hears_itself)
 
-    reports.subscribe(probe.hear, scheduler=node.scheduler)
+    reports.subscribe(hear, scheduler=node.scheduler)
     observations.map(policy.decide).subscribe(act, scheduler=node.scheduler)
     ready.subscribe(lambda _: notify(READY), scheduler=node.scheduler)
     alive.subscribe(lambda _: notify(ALIVE), scheduler=node.scheduler)

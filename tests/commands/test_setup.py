@@ -129,7 +129,7 @@ def test_a_quote_in_a_variable_of_make_is_no_shell_syntax(checkout: Path) -> Non
     [
         (
             "run SCENRIO=demo",
-            "run has no variable SCENRIO; it has PYTHON RUNTIME SCENARIO PARAMETERS MANIFEST WEB SECURE",
+            "run has no variable SCENRIO; it has PYTHON RUNTIME SCENARIO PARAMETERS MANIFEST WEB HOST SECURE",
         ),
         ("SCENARIO=demo", "help has no variable SCENARIO; it has PYTHON RUNTIME"),
         (

@@ -34,3 +34,10 @@ def test_the_table_shows_each_service(monkeypatch: pytest.MonkeyPatch) -> None:
         "operator_watchdog  RUNNING  103  0:00:01  1         -            no report",
         "engine_controller  BACKOFF  -    -        7         -            -",
     ]
+
+
+def test_the_table_names_the_hosts_if_there_are_two() -> None:
+    programs = [Program("drive", "RUNNING", 7, 1.0, 0, "", ""), Program("page", "RUNNING", 7, 1.0, 0, "", "")]
+    head, *rows = of_services(programs, {}, {"drive": "robot", "page": "operator"}).splitlines()
+    assert head.split()[:2] == ["HOST", "SERVICE"]
+    assert [row.split()[:2] for row in rows] == [["robot", "drive"], ["operator", "page"]]

@@ -24,8 +24,8 @@ def test_all_programs_stop_at_the_same_time_as_one_group() -> None:
 
 def test_a_program_has_its_module_and_arguments() -> None:
     first, *_, last = manifest.programs()
-    assert first == ("config_l1", "services.config_publisher", ("l1",))
-    assert last == ("sentinel", "deploy.running.sentinel", ())
+    assert first == ("config_l1", "services.config_publisher", ("l1",), manifest.ROBOT)
+    assert last == ("sentinel", "deploy.running.sentinel", (), manifest.ROBOT)
 
 
 @pytest.mark.parametrize("name", SECTIONS)
@@ -40,6 +40,7 @@ def test_a_program_is_a_module_and_no_shell_stands_before_it(name: str) -> None:
 def test_a_program_restarts_ends_quickly_and_has_a_small_log(name: str) -> None:
     settings = dict(SECTIONS[name])
     settings.pop("command")
+    assert settings.pop("host", "operator") == "operator"
     assert settings == {
         "redirect_stderr": "true",
         "stdout_logfile": "logs/%(program_name)s.log",

@@ -37,7 +37,7 @@ def test_without_a_file_the_manifest_is_ours() -> None:
 def test_own_programs_join_ours_with_the_same_settings(own: Path) -> None:
     own.write_text(GUARD + "startsecs = 3  ; mine\nstopwaitsecs = 2\n")
     with manifest.chosen(str(own)):
-        assert manifest.programs() == (*OURS, ("guard", "services.examples.speed_guard", ()))
+        assert manifest.programs() == (*OURS, ("guard", "services.examples.speed_guard", (), manifest.ROBOT))
         conf = configparser.RawConfigParser()
         conf.read(manifest.path())
     ours, guard = dict(conf["program:kinematics"]), dict(conf["program:guard"])
@@ -64,7 +64,7 @@ def test_modules_beside_the_file_are_found(own: Path) -> None:
     (own.parent / "my_own_guard.py").touch()
     own.write_text("[program:guard]\ncommand = python3 -m my_own_guard fast --ros-args -r a:=b\n")
     with manifest.chosen(str(own)):
-        assert manifest.programs()[-1] == ("guard", "my_own_guard", ("fast",))
+        assert manifest.programs()[-1] == ("guard", "my_own_guard", ("fast",), manifest.ROBOT)
         assert os.environ["PYTHONPATH"].split(os.pathsep)[-1] == str(own.parent)
 
 

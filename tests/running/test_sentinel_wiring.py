@@ -16,7 +16,7 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.time import Time
 
-from deploy.running import processes, sentinel
+from deploy.running import manifest, processes, sentinel
 from deploy.running.errors import DeploymentError
 from deploy.running.machine import Figures
 from deploy.running.manifest import SENTINEL
@@ -177,6 +177,16 @@ def test_health_reports_of_the_namespace_reach_the_probe(
     watching.remarks()
     spin_until(lambda: "service" in watching.probe.heard)
     assert watching.probe.heard["service"].pid == os.getpid()
+
+
+def test_program_that_another_host_runs_as_well_is_reported(
+    wired: Any, spin_until: SpinUntil, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(manifest, "programs", lambda: (manifest.Program("service", "services.drive", ()),))
+    monkeypatch.setattr(sentinel, "is_here", lambda host: False)
+    watching = wired()
+    expected = f"service: it runs on host {socket.gethostname()} as well"
+    spin_until(lambda: any(remark.startswith(expected) for remark in watching.remarks()))
 
 
 def test_actions_are_carried_out_and_reported(wired: Any, spin_until: SpinUntil, tmp_path: Path) -> None:

@@ -64,7 +64,7 @@ class Process(NamedTuple):
 Message = Hello | Press | Beat | Release | Engines | Set | FollowScenario | Process
 
 
-PROGRAMS = tuple(program.name for program in manifest.programs())
+PROGRAMS = tuple(program.name for program in manifest.everywhere())
 
 
 def _limits() -> dict[str, tuple[float, float]]:

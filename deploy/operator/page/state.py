@@ -21,7 +21,7 @@ from reactive_node import stamps
 from reactive_node.stamps import Timestamp
 from services import engine_controller, operator_watchdog
 
-PROGRAMS = tuple(program.name for program in manifest.programs())
+PROGRAMS = tuple(program.name for program in manifest.everywhere())
 ENGINE_CONTROLLER = "engine_controller"
 WATCHDOG = "operator_watchdog"
 ECHO = 0.15  # s after a beat of a page for which a heartbeat on the topic is taken for that beat

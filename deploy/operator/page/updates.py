@@ -77,7 +77,7 @@ def _why(state: PageState, now: float) -> str:
 
 def _row(name: str, program: Program, now: float, loopback_is_up: bool) -> dict[str, Any]:
     # The health of the sentinel, which tells that the loopback interface is down, cannot be heard then.
-    problem = f"loopback: {LOOPBACK_DOWN}" if name == manifest.SENTINEL and not loopback_is_up else ""
+    problem = f"loopback: {LOOPBACK_DOWN}" if name == manifest.sentinel() and not loopback_is_up else ""
     silence = now - program.heard
     since_output = program.since_output
     if silence > HEALTH_TIMEOUT and since_output is not None:

@@ -17,7 +17,7 @@ from rclpy_simulation import Network, Process, Simulation
 from rclpy_simulation.process import running_process
 
 from deploy.running import machine as running_machine
-from deploy.running import processes
+from deploy.running import probe, processes
 from deploy.running.errors import DeploymentError
 from deploy.running.processes import MARK
 from deploy.running.supervisord import Supervisord
@@ -66,6 +66,7 @@ class Machine:
                 open_handles=self._open_handles,
                 close=lambda handles: None,
             ),
+            mock.patch.object(probe, "is_here", return_value=True),
             mock.patch.multiple(
                 running_machine,
                 loopback_is_up=lambda: True,

@@ -1,0 +1,105 @@
+"""The other hosts of an arm: which programs they run, and by how much their clocks differ from ours."""
+
+from __future__ import annotations
+
+import os
+import socket
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any
+
+from rclpy.node import Node
+
+from deploy.commands.member import Member
+from deploy.running import manifest
+from deploy.running.environment import NAMESPACE, RANGE
+from deploy.running.errors import DeploymentError
+from deploy.running.sentinel import reported
+from deploy.running.supervisord import Program
+from deploy.running.system import System
+from interfaces.service.health import Health, healths
+from interfaces.topics import DIAGNOSTICS
+from reactive_node import stamps
+from services.engine_controller import CLOCK_TOLERANCE
+
+LOOK = 2.0  # s before a start: each service reports its health once a second
+
+
+class Hosts:
+    """What the services of an arm have reported."""
+
+    def __init__(self, namespace: str) -> None:
+        """:param namespace: that of the arm."""
+        self._namespace = namespace.rstrip("/")
+        self.healths: dict[tuple[str, str], Health] = {}
+        """The latest health, by host and program."""
+        self.processes: dict[str, Program] = {}
+        """The processes as the sentinels see them, by program."""
+        self.ages: dict[str, float] = {}
+        """The least age of a report of each host at its arrival [s]: how far its clock is behind ours."""
+
+    def hear(self, message: Any) -> None:
+        age = (stamps.now() - stamps.from_message(message.header.stamp)).total_seconds()
+        for program, health in healths(message, self._namespace).items():
+            self.healths[health.host, program] = health
+            self.ages[health.host] = min(age, self.ages.get(health.host, age))
+        self.processes |= {program.name: program for program in reported(message, self._namespace)}
+
+    def clocks(self) -> str:
+        """Return a line for each other host with the difference of its clock."""
+        return "".join(
+            f"Host {host}: its clock is {_difference(age)} ours\n"
+            for host, age in sorted(self.ages.items())
+            if host != socket.gethostname()
+        )
+
+    def check(self, ours: Mapping[int, str]) -> None:
+        """
+        Refuse a start beside these hosts.
+
+        :param ours: the orphans of the last start, which this start replaces: their programs by pid.
+        :raises DeploymentError: if another host runs one of our programs, or its clock is wrong.
+        """
+        here = {program.name for program in manifest.programs()}
+        for (host, program), health in sorted(self.healths.items()):
+            is_own = host == socket.gethostname() and ours.get(health.pid) == program
+            if program in here and not is_own:
+                raise DeploymentError(
+                    f"{program} runs on host {host} already, and a program runs on one host only: start the"
+                    f" parts by HOST=robot and HOST=operator, or give this arm another {NAMESPACE}"
+                )
+        for host, age in sorted(self.ages.items()):
+            if abs(age) > CLOCK_TOLERANCE:
+                raise DeploymentError(
+                    f"The clock of host {host} is {_difference(age)} ours: synchronise both (NTP or PTP)"
+                )
+
+
+def _difference(age: float) -> str:
+    amount = f"{abs(age):.1f} s" if abs(age) >= 1.0 else f"{1000 * abs(age):.0f} ms"
+    return f"{amount} {'behind' if age > 0 else 'ahead of'}"
+
+
+@contextmanager
+def heard(node: Node) -> Iterator[Hosts]:
+    """Listen to what the services of the arm of a node report."""
+    hosts = Hosts(node.get_namespace())
+    subscription = node.create_subscription(DIAGNOSTICS.type, DIAGNOSTICS.name, hosts.hear, DIAGNOSTICS.qos)
+    try:
+        yield hosts
+    finally:
+        node.destroy_subscription(subscription)
+
+
+def check(member: Member, system: System) -> None:
+    """Look for other hosts of the arm before a start. Raises DeploymentError if it must not start."""
+    if os.environ.get(RANGE) == "LOCALHOST" and not os.environ.get("ROS_STATIC_PEERS"):
+        return  # nothing of another host is heard
+    ours = {process.pid: process.program for process in system.members()}
+    with heard(member.node) as hosts:
+        deadline = time.monotonic() + LOOK
+        while time.monotonic() < deadline:
+            member.spin_once()
+    hosts.check(ours)
+    print(hosts.clocks(), end="")

@@ -1,0 +1,69 @@
+"""What a start finds out about other hosts of its arm: their programs and their clocks."""
+
+from __future__ import annotations
+
+import socket
+from datetime import timedelta
+
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+
+from deploy.commands.hosts import Hosts
+from deploy.running.errors import DeploymentError
+from reactive_node import stamps
+
+HERE = socket.gethostname()
+
+
+def report(program: str, host: str, pid: int = 7, age: float = 0.002) -> DiagnosticArray:
+    values = {"pid": str(pid), "published": "1"}
+    status = DiagnosticStatus(
+        name=program, hardware_id=host, values=[KeyValue(key=key, value=it) for key, it in values.items()]
+    )
+    message = DiagnosticArray(status=[status])
+    message.header.stamp = stamps.to_message(stamps.now() - timedelta(seconds=age))
+    return message
+
+
+def heard(*reports: DiagnosticArray, namespace: str = "/") -> Hosts:
+    hosts = Hosts(namespace)
+    for each in reports:
+        hosts.hear(each)
+    return hosts
+
+
+def test_program_of_another_host_is_not_started_again() -> None:
+    hosts = heard(report("/engine_controller", "robot1"))
+    words = r"^engine_controller runs on host robot1 already, and a program runs on one host only: .*$"
+    with pytest.raises(DeploymentError, match=words):
+        hosts.check({})
+
+
+def test_programs_of_other_hosts_and_other_arms_are_no_obstacle() -> None:
+    heard(report("/sentinel_robot", "robot1"), report("/arm2/engine_controller", "robot2")).check({})
+    heard(report("/engine_controller", "robot1"), namespace="/arm2").check({})
+
+
+def test_orphan_of_this_host_is_replaced_and_a_stranger_is_not() -> None:
+    hosts = heard(report("/velocity", HERE, pid=41))
+    hosts.check({41: "velocity"})
+    with pytest.raises(DeploymentError, match=r"^velocity runs on host"):
+        hosts.check({41: "kinematics"})
+
+
+@pytest.mark.parametrize(
+    ("age", "words"), [(60.0, r"60\.0 s behind"), (-60.0, r"60\.0 s ahead of"), (0.08, "8. ms behind")]
+)
+def test_host_with_a_wrong_clock_is_refused(age: float, words: str) -> None:
+    with pytest.raises(DeploymentError, match=f"^The clock of host desk is {words} ours: synchronise both"):
+        heard(report("/sentinel_operator", "desk", age=age)).check({})
+
+
+def test_least_age_of_a_report_tells_the_clock() -> None:
+    hosts = heard(*(report("/sentinel_operator", "desk", age=age) for age in (0.3, 0.001, 0.2)))
+    hosts.check({})
+    assert hosts.clocks() in [f"Host desk: its clock is {ms} ms behind ours\n" for ms in range(1, 20)]
+
+
+def test_own_clock_is_not_shown() -> None:
+    assert heard(report("/velocity", HERE)).clocks() == ""
