@@ -55,8 +55,7 @@ class Hosts:
         )
 
     def check(self, ours: Mapping[int, str]) -> None:
-        """
-        Refuse a start beside these hosts.
+        """Refuse a start beside these hosts.
 
         :param ours: the orphans of the last start, which this start replaces: their programs by pid.
         :raises DeploymentError: if another host runs one of our programs, or its clock is wrong.

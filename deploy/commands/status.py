@@ -15,8 +15,7 @@ HEADER = ("SERVICE", "STATE", "PID", "UPTIME", "RESTARTS", "LAST OUTPUT", "HEALT
 def of_services(
     programs: Sequence[Program], health: Mapping[str, Health], hosts: Mapping[str, str] | None = None
 ) -> str:
-    """
-    Return the services, one per line, with the latest health of each.
+    """Return the services, one per line, with the latest health of each.
 
     :param hosts: the host of each program, if there is more than one.
     """
