@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import os
 import re
 import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing
@@ -14,9 +12,6 @@ from pathlib import Path
 import pytest
 
 from deploy.running import manifest
-from deploy.running.environment import set_middleware
-from deploy.running.processes import ROOT
-from deploy.running.rclpy_choice import sourced_rclpy
 from deploy.trials.chaos.partition import BRIDGE, CONTROL, NETWORK, ROBOT, missing, namespaces
 from tests.system.sites import LIMIT, Command, Site
 
@@ -60,14 +55,15 @@ class Arm:
     def turn_on(self) -> None:
         """Hold the switch at the operator's terminal, and turn the engines on."""
         deadline = time.monotonic() + LIMIT
-        while self.engines() != "on":
+        while not self.is_on:
             assert time.monotonic() < deadline, self.terminal.output
             self.terminal.type("press\nturn_on\n")
             time.sleep(1.0)
 
-    def engines(self) -> str:
-        """Return the state of the engines that the terminal has shown last."""
-        return re.findall(r"Engines are (\w+)", self.terminal.output)[-1]
+    @property
+    def is_on(self) -> bool:
+        """Whether the engines are on, as the terminal has shown last."""
+        return re.findall(r"Engines are (\w+)", self.terminal.output)[-1:] == ["on"]
 
 
 @pytest.fixture(scope="module")
@@ -138,7 +134,7 @@ def test_short_cut_keeps_the_engines_on_and_a_release_stops_them(arm: Arm) -> No
     time.sleep(0.2)
     arm.cut("up")
     time.sleep(2.0)
-    assert arm.engines() == "on"
+    assert arm.is_on
     arm.terminal.type("release\n")
     arm.terminal.await_line("Engines are off", OFF_WITHIN, shown)
 
@@ -153,59 +149,3 @@ def test_operator_who_is_heard_no_more_stops_the_engines(arm: Arm) -> None:
     finally:
         arm.operator.ip("route", "del", "blackhole", f"{NETWORK}.1")
     arm.turn_on()
-
-
-# Hosts whose network has no multicast
-
-NODE = """
-import sys, threading
-import rclpy
-from interfaces.service import middleware
-from rclpy.node import Node
-from std_msgs.msg import String
-
-name = sys.argv[1]
-with middleware.without_shared_memory():
-    rclpy.init(args=[])
-    node = Node(name)
-publisher = node.create_publisher(String, "names", 10)
-node.create_timer(0.1, lambda: publisher.publish(String(data=name)))
-node.create_subscription(String, "names", lambda m: m.data != name and print(m.data, flush=True), 10)
-while True:
-    rclpy.spin_once(node, timeout_sec=0.1)
-"""
-SERVER = ROOT / ".venv" / "bin" / "fast-discovery-server"
-PORT = 11811
-WAYS = {
-    "peers": {
-        ROBOT: {"ROS_STATIC_PEERS": f"{NETWORK}.2"},
-        CONTROL: {"ROS_STATIC_PEERS": f"{NETWORK}.1"},
-    },
-    "discovery server": {host: {"ROS_DISCOVERY_SERVER": f"{NETWORK}.1:{PORT}"} for host in (ROBOT, CONTROL)},
-}
-OF_THIS_RCLPY = ["peers"] if os.environ.get("RUNTIME") or sourced_rclpy() else [*WAYS]
-
-
-@pytest.mark.parametrize("way", OF_THIS_RCLPY)
-def test_hosts_meet_without_multicast(way: str, tmp_path: Path, domain_id: int) -> None:
-    if reason := missing():
-        pytest.skip(reason)
-    with namespaces() as full, closing(Site(tmp_path / "run", domain_id)) as site:
-        for host in (ROBOT, CONTROL):
-            port = ["dev", host, "type", "bridge_slave", "mcast_flood", "off"]
-            subprocess.run(["ip", "-n", full(BRIDGE), "link", "set", *port], check=True)
-        environment = site.environment | {"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}
-        set_middleware(environment)
-        if way == "discovery server":
-            server = [str(SERVER), "-i", "0", "-l", f"{NETWORK}.1", "-p", str(PORT)]
-            begun = site.begin_alone(["ip", "netns", "exec", full(ROBOT), *server], environment)
-            begun.await_line("Server is running")
-        nodes = {
-            host: site.begin_alone(
-                ["ip", "netns", "exec", full(host), sys.executable, "-c", NODE, host],
-                environment | WAYS[way][host] | {"PYTHONPATH": os.pathsep.join([str(ROOT), *sys.path])},
-            )
-            for host in (ROBOT, CONTROL)
-        }
-        nodes[ROBOT].await_line(f"^{CONTROL}$")
-        nodes[CONTROL].await_line(f"^{ROBOT}$")
