@@ -14,7 +14,7 @@ from interfaces.service.enclave import path
 
 
 def write(export: str, names: str) -> None:
-    """Write an enclave for each program of the manifest, and for terminal, recorder, tools and fleet.
+    """Write an enclave for each program, for the sentinels of two hosts, terminal, recorder, tools and fleet.
 
     :param export: a new folder for the keys of one host, '' for none.
     :param names: of the enclaves of that host, with spaces between; `/fleet` is in no namespace.
@@ -28,7 +28,8 @@ def write(export: str, names: str) -> None:
         )
     keystore = Keystore(Path(os.environ[KEYSTORE]))
     namespace, domain = namespace_of(os.environ), int(os.environ.get("ROS_DOMAIN_ID") or 0)
-    arm = rights.of_arm(namespace, [program.name for program in manifest.programs()])
+    programs = [*(program.name for program in manifest.programs()), *manifest.sentinels()]
+    arm = rights.of_arm(namespace, programs)
     end = keystore.write(arm, [domain])
     until = f"valid until {end:%Y-%m-%d}"
     print(f"{keystore.folder}: {len(arm)} enclaves for ROS domain {domain}, namespace {namespace}, {until}")

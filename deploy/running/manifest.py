@@ -85,6 +85,11 @@ def sentinel(host: str | None = None) -> str:
     return f"{SENTINEL}_{host}" if host else SENTINEL
 
 
+def sentinels() -> tuple[str, ...]:
+    """Return the names of the sentinels of all hosts, where there is more than one."""
+    return tuple(sentinel(host) for host in sorted({program.host for program in programs(PATH)}))
+
+
 @cache
 def start_retries(program: str) -> int:
     """Return after how many early ends supervisord gives a program up."""

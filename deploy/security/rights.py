@@ -52,7 +52,7 @@ def of_arm(namespace: str, programs: Collection[str]) -> dict[str, Rights]:
     ours = {program.name for program in manifest.programs(manifest.PATH)}
     rights: dict[str, Rights] = {}
     for name in programs:
-        if name in ours:
+        if name in ours or name in manifest.sentinels():
             rights[name] = _service(namespace, name, programs)
         else:
             rights[name] = _guest([each for each in programs if each != name], _OF_OWN_PROGRAMS)
@@ -76,8 +76,9 @@ def babbler(namespace: str, name: str) -> Rights:
 
 def _service(namespace: str, name: str, programs: Iterable[str]) -> Rights:
     """A service of ours does what the contract says of its node."""
-    published = [topic for topic in topics.ROWS if {name, topics.EVERY_SERVICE} & {*topic.publishers}]
-    read = [topic for topic in topics.ROWS if name in topic.subscribers]
+    node = manifest.SENTINEL if name in manifest.sentinels() else name
+    published = [topic for topic in topics.ROWS if {node, topics.EVERY_SERVICE} & {*topic.publishers}]
+    read = [topic for topic in topics.ROWS if node in topic.subscribers]
     return _node(namespace, name, published, read, _servers(name, programs))
 
 

@@ -118,3 +118,14 @@ def test_guests_use_what_is_not_the_arms() -> None:
     assert those_who("publish", "rt/cmd_vel_in") == {"my_gripper", "tools"}
     assert those_who("subscribe", "rt/cmd_vel") == {"my_gripper", "tools"}
     assert those_who("publish", "rq/ur/motorRequest") == {"my_gripper", "tools"}
+
+
+def test_sentinel_of_each_of_two_hosts_has_the_rights_of_one() -> None:
+    both = rights.of_arm("/", [*PROGRAMS, *manifest.sentinels()])
+    for name in ("sentinel_operator", "sentinel_robot"):
+        each = both[f"/{name}"]
+        assert may(each, "subscribe", "rt/diagnostics")
+        assert may(each, "publish", "rt/diagnostics")
+        assert may(each, "subscribe", f"rq/{name}/set_parametersRequest")
+        assert not may(each, "publish", "rt/engines")
+        assert may(both["/terminal"], "publish", f"rq/{name}/set_parametersRequest")

@@ -154,7 +154,7 @@ def test_make_keystore_writes_an_arm_and_exports_a_host(tmp_path: Path, domain_i
     export = tmp_path / "host"
     code, printed = site.do("keystore", str(export), "terminal sentinel /fleet")
     assert code == 0, printed
-    count = len(PROGRAMS) + 4
+    count = len(PROGRAMS) + len(manifest.sentinels()) + 4
     first, *others = printed.splitlines()
     assert re.fullmatch(
         f"{tmp_path}/keys: {count} enclaves for ROS domain {domain_id}, namespace /arm1,"
