@@ -118,13 +118,13 @@ def check_environment(system: System) -> None:
     reach = os.environ.get(RANGE, "")
     if reach.strip().upper() == "OFF":
         raise DeploymentError(f"{RANGE}={reach} keeps the services apart: set LOCALHOST or SUBNET")
-    _check_keys(namespace)
+    _check_keys(namespace, int(domain))
     if not system.members():  # the start reports a running system, and replaces orphans
         for program in manifest.programs():
             _check_claim(f"{namespace.rstrip('/')}/{program.name}", int(domain), namespace)
 
 
-def _check_keys(namespace: str) -> None:
+def _check_keys(namespace: str, domain: int) -> None:
     """Raise DeploymentError if security is wanted, but not for every process, or without valid keys."""
     if os.environ.get(SECURITY) != "true":
         return
@@ -135,11 +135,9 @@ def _check_keys(namespace: str) -> None:
     keystore = Keystore(Path(os.environ[KEYSTORE]).absolute())
     os.environ[KEYSTORE] = str(keystore.folder)  # the services work in the run directory
     names = [TERMINAL, *(program.name for program in manifest.programs())]
-    needed = {enclave.path(name, namespace) for name in names}
-    if missing := sorted(needed - {*keystore.enclaves()}):
-        others = f" and {len(missing) - 1} others" if missing[1:] else ""
-        raise DeploymentError(f"{keystore.folder} has no keys for {missing[0]}{others}: make keystore")
-    for each in map(enclave.keys, sorted(needed)):
+    needed = sorted(enclave.path(name, namespace) for name in names)
+    keystore.check(needed, domain)
+    for each in map(enclave.keys, needed):
         if each and (problem := each.problem(datetime.now(UTC))):
             raise DeploymentError(problem)
 

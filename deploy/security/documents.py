@@ -39,6 +39,14 @@ def governance(domains: Iterable[int]) -> str:
     return _text(root)
 
 
+def domains(text: str) -> set[int]:
+    """Return the ROS domains that a governance names. Raises ValueError if it is none."""
+    try:
+        return {int(each.text or "") for each in ElementTree.fromstring(text).iterfind(".//domains/id")}
+    except ElementTree.ParseError as error:
+        raise ValueError(str(error)) from None
+
+
 def permissions(
     enclave: str, rights: Rights, domains: Collection[int], validity: tuple[datetime, datetime]
 ) -> str:

@@ -80,6 +80,26 @@ class Keystore:
         found = self._enclaves.glob("**/cert.pem")
         return sorted(f"/{path.parent.relative_to(self._enclaves).as_posix()}" for path in found)
 
+    def check(self, enclaves: Collection[str], domain: int) -> None:
+        """Raise DeploymentError unless this user can join a ROS domain by each of these enclaves."""
+        governance = self._enclaves / "governance.xml"
+        try:
+            domains = documents.domains(governance.read_text())
+        except PermissionError:
+            raise _unreadable(governance) from None
+        except (OSError, ValueError):
+            raise DeploymentError(f"{self.folder} is no keystore: make keystore") from None
+        if domains and domain not in domains:  # SROS2 may name ranges
+            known = ", ".join(map(str, sorted(domains)))
+            raise DeploymentError(f"{self.folder} is for ROS domain {known}, not {domain}: make keystore")
+        if missing := sorted({*enclaves} - {*self.enclaves()}):
+            others = f" and {len(missing) - 1} others" if missing[1:] else ""
+            raise DeploymentError(f"{self.folder} has no keys for {missing[0]}{others}: make keystore")
+        for enclave in enclaves:
+            key = self._enclaves / enclave.lstrip("/") / "key.pem"
+            if key.exists() and not os.access(key, os.R_OK):
+                raise _unreadable(key)
+
     def export(self, folder: Path, enclaves: Collection[str]) -> None:
         """Copy what the host of these enclaves needs: no key of the CA, and none of another enclave.
 
@@ -156,6 +176,10 @@ class Keystore:
         signer = ("-signer", self._ca, "-inkey", self._ca_key)
         _openssl("smime", "-sign", "-text", "-in", plain, "-out", new, *signer)
         os.replace(new, signed)
+
+
+def _unreadable(path: Path) -> DeploymentError:
+    return DeploymentError(f"{path} belongs to another user: an arm starts with keys that its user can read")
 
 
 def _lasts(certificate: Path) -> bool:

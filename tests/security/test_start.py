@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import shutil
 import subprocess
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -16,6 +17,7 @@ from deploy.running import manifest
 from deploy.running.environment import of_supervisord
 from deploy.running.errors import DeploymentError
 from deploy.running.system import System
+from deploy.security import documents
 from deploy.security.keystore import Keystore
 from interfaces.service import enclave
 from interfaces.service.enclave import Keys
@@ -30,7 +32,9 @@ def keystore(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, domain_id: int) ->
     folder = tmp_path / "keystore"
     for name in (*PROGRAMS, "terminal"):
         (folder / "enclaves" / name).mkdir(parents=True)
-        (folder / "enclaves" / name / "cert.pem").touch()
+        for file in ("cert.pem", "key.pem"):
+            (folder / "enclaves" / name / file).touch()
+    (folder / "enclaves" / "governance.xml").write_text(documents.governance([domain_id]))
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("ROS_SECURITY_ENABLE", "true")
     monkeypatch.setenv("ROS_SECURITY_STRATEGY", "Enforce")
@@ -73,6 +77,39 @@ def test_terminal_ends_with_its_keys(domain_id: int) -> None:
         for spin in (member.spin_once, member.spin_some):
             with pytest.raises(DeploymentError, match=r"^the keys of /terminal have ended at "):
                 spin()
+
+
+@pytest.mark.parametrize("kind", ["nothing", "a file", "an empty folder", "another governance"])
+def test_what_is_no_keystore_is_told(kind: str, keystore: Path, tmp_path: Path) -> None:
+    if kind == "another governance":
+        (keystore / "enclaves" / "governance.xml").write_text("<dds")
+    else:
+        shutil.rmtree(keystore)
+    if kind == "a file":
+        keystore.touch()
+    elif kind == "an empty folder":
+        keystore.mkdir()
+    assert check(tmp_path) == f"{keystore} is no keystore: make keystore"
+
+
+def test_keys_are_for_their_ros_domain(keystore: Path, tmp_path: Path, domain_id: int) -> None:
+    (keystore / "enclaves" / "governance.xml").write_text(documents.governance([200, 107]))
+    assert check(tmp_path) == f"{keystore} is for ROS domain 107, 200, not {domain_id}: make keystore"
+
+
+def test_keys_of_another_user_are_told(
+    keystore: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whose = "belongs to another user: an arm starts with keys that its user can read"
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "access", lambda path, _: "velocity" not in str(path))
+        assert check(tmp_path) == f"{keystore}/enclaves/velocity/key.pem {whose}"
+
+    def refuse(_: Path) -> str:
+        raise PermissionError
+
+    monkeypatch.setattr(Path, "read_text", refuse)  # root may read all files
+    assert check(tmp_path) == f"{keystore}/enclaves/governance.xml {whose}"
 
 
 def test_keys_of_another_namespace_do_not_count(

@@ -98,7 +98,6 @@ class SecureSite(Site):
             "ROS_SECURITY_STRATEGY": "Enforce",
             "ROS_SECURITY_KEYSTORE": str(self.keystore.folder),
             "_ROS_WHEELS_BOOTSTRAP_COMPLETE": "1",
-            "WEB": "off",
         }
 
 

@@ -19,9 +19,11 @@ import pytest
 from rclpy._dds import security
 
 from deploy.running.manifest import VIRTUAL_JOINTS
+from deploy.running.system import System
 from deploy.security import keystore as keystores
 from deploy.security import rights
 from deploy.security.keystore import Keystore
+from tests.operator.page.clients import Hand
 from tests.security.attacks.conftest import PROGRAMS, MakePeer, Peer, Refused, SecureSite, until
 
 ATTEMPTS = 3.0  # s for which a stranger tries
@@ -68,6 +70,24 @@ def test_commands_join_with_their_own_keys(secure_site: SecureSite) -> None:
     record.signal(signal.SIGINT)
     assert record.wait() == 0
     assert record.await_line(r"(\d+) messages")[1] != "0"
+
+
+def test_the_page_holds_the_switch_and_sets_the_arm(secure_site: SecureSite, watcher: Peer) -> None:
+    watcher("read", "l1")
+    with closing(Hand(System(secure_site.run).page)) as hand:
+
+        def shown() -> bool:
+            if hand.shown.get("switch", {}).get("by") != "this_page":
+                hand.press()
+            hand.say("engines", command="turn_on")
+            hand.say("set", name="l1", value=1.25)
+            time.sleep(0.5)
+            return "on" in watcher("heard", STATE) and 1.25 in watcher("heard", "l1")
+
+        until(lambda: "processes" in hand.shown)
+        until(shown)
+        hand.say("engines", command="turn_off")
+        until(lambda: watcher("heard", STATE)[-1:] == ["off"])
 
 
 def test_the_fleet_sees_an_arm_with_an_enclave_of_its_own(

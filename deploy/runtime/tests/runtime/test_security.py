@@ -102,6 +102,12 @@ def test_each_file_of_an_enclave_is_needed(missing: str, secured: dict[str, str]
         security.properties("/arm1/talker", secured)
 
 
+@pytest.mark.parametrize("enclave", ["/", ""])
+def test_a_process_without_an_enclave_learns_how_to_name_one(enclave: str, secured: dict[str, str]) -> None:
+    with pytest.raises(RCLError, match=r"/enclaves/identity_ca.cert.pem: name an enclave in ROS_SECURITY_E"):
+        security.properties(enclave, secured)
+
+
 def test_a_keystore_is_needed(secured: dict[str, str]) -> None:
     del secured["ROS_SECURITY_KEYSTORE"]
     with pytest.raises(RCLError, match=r"ROS_SECURITY_KEYSTORE names no keystore$"):
@@ -109,7 +115,7 @@ def test_a_keystore_is_needed(secured: dict[str, str]) -> None:
 
 
 HEARD = "1.5 [7] dq.builtin: Remote secure participant 1:2:3:1c1 not allowed\n"
-REFUSED = "1.5 [7]     python: Could not find domain 7\n"
+REFUSED = "1.5 [7]     python: Could not find domain 7\n(code: 141)\n"
 
 
 def test_reasons_of_a_failure_are_told_once(capfd: pytest.CaptureFixture[str]) -> None:

@@ -13,7 +13,7 @@ from contextlib import contextmanager
 
 _STANDARD_ERROR = 2
 _HEARD = re.compile(rb"^\S+ \[\d+\] +dq\.builtin: .*\n", re.MULTILINE)
-_REASON = re.compile(rb"^\S+ \[\d+\] +\S+: (.*)\n", re.MULTILINE)
+_REASON = re.compile(rb"^\S+ \[\d+\] +\S+: (.*)\n(?:\(code: \d+\)\n)?", re.MULTILINE)
 
 
 @contextmanager

@@ -72,7 +72,8 @@ def properties(enclave: str, environment: Mapping[str, str]) -> dict[str, str]:
     result = {}
     for name, file in _FILES.items():
         if not (folder / file).is_file():
-            raise RCLError(f"{ENABLE} is true, but there is no {folder / file}")
+            hint = f": name an enclave in {OVERRIDE}" if folder.name == "enclaves" else ""
+            raise RCLError(f"{ENABLE} is true, but there is no {folder / file}{hint}")
         result[f"dds.sec.{name}"] = f"file:{folder / file}"
     for kind, (file, functions) in _PLUGINS.items():
         result[f"dds.sec.{kind}.library.path"] = str(plugins / file)
