@@ -16,10 +16,10 @@ from deploy.promises.effects import (
     LONGEST_PAUSE,
     MISSED,
     OVERLOADED,
+    REFUSING,
     REPLACED,
     SAME,
     SILENT,
-    STARTING,
     SUSPENDED,
     TRANSPORT,
     UNDISCOVERED,
@@ -169,7 +169,7 @@ def valid_speeds_and_positions(history: History) -> Finding:
 def single_instances(history: History) -> Finding:
     """S5: never two live instances of one service."""
     found = effects(history)
-    evidence, unknown, cases = [], 0, 0
+    evidence, unknown = [], 0
     for second, life in _reports_beside_another(history):
         if life.ended is not None and not undisturbed(found, ALL, second.sent, life.ended, *MISSED):
             unknown += 1  # the observer may have noted the end too late
@@ -177,12 +177,8 @@ def single_instances(history: History) -> Finding:
             name, pid, *_ = second.value
             together = f"process {pid} runs {name} while process {life.pid} lives"
             evidence.append(Evidence(second.sent, together))
-    for program in {life.program for life in history.lives}:
-        lives = sorted(
-            (life for life in history.lives if life.program == program), key=lambda life: life.began
-        )
-        cases += len(lives) - 1
-        evidence += [_two(a, b) for a, b in _overlapping(history, found, lives)]
+    evidence += _supervisors_beside_another(history)
+    cases = len(history.lives) - len({life.program for life in history.lives})
     return Finding("S5", cases, f"restarts and duplicates: {cases}", sorted(evidence), unknown)
 
 
@@ -312,27 +308,21 @@ def _abandoned(history: History, found: Sequence[Effect], off: Sample) -> bool:
     return silent or bool(deaf)
 
 
-def _overlapping(
-    history: History, found: Sequence[Effect], lives: Sequence[Life]
-) -> Iterator[tuple[Life, Life]]:
-    """Yield two processes that live together for longer than one of them may need to start.
-
-    After each overload of the machine, it may need as long again. A process that reports has started.
-    """
-    overloads = sorted(effect.end for effect in found if effect.why == OVERLOADED)
+def _supervisors_beside_another(history: History) -> Iterator[Evidence]:
+    """Yield each supervisord that does not end although another one lives; it reports nothing."""
+    lives = sorted((life for life in history.lives if not life.program), key=lambda life: life.began)
     for one, two in itertools.combinations(lives, 2):
         last = min(history.end if life.ended is None else life.ended for life in (one, two))
-        together = gaps(overloads, max(one.began, two.began), last)
-        if any(end - begin > STARTING for begin, end in together):
-            yield one, two
-
-
-def _two(one: Life, two: Life) -> Evidence:
-    return Evidence(two.began, f"processes {one.pid} and {two.pid} are both {one.program or 'supervisord'}")
+        if last - two.began > REFUSING:
+            yield Evidence(two.began, f"processes {one.pid} and {two.pid} are both supervisord")
 
 
 def _reports_beside_another(history: History) -> Iterator[tuple[Sample, Life]]:
-    """Yield the first health report of a process if another one that has reported before still lives."""
+    """Yield the first health report of a process if another one that has reported before still lives.
+
+    A process that is not the first claims the name of its service in vain, and then reports nothing. How
+    soon it ends depends on the machine.
+    """
     lives = {(life.program, life.pid): life for life in history.lives}
     instances: dict[str, set[int]] = {}
     for sample in history.stream(topics.DIAGNOSTICS):

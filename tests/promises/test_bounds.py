@@ -88,9 +88,9 @@ def position_of_a_length_replaced_before(age: float) -> History:
     return with_position_of_a_replaced_length(good(), AT, age)
 
 
-def duplicate_for(duration: float) -> History:
+def second_supervisord_for(duration: float) -> History:
     history = good()
-    return replace(history, lives=[*history.lives, Life("kinematics", 777, AT, AT + duration)])
+    return replace(history, lives=[*history.lives, Life("", 777, AT, AT + duration)])
 
 
 def back_after(times: int) -> Callable[[float], History]:
@@ -145,7 +145,7 @@ BOUNDS: list[tuple[str, Callable[[float], History], float, float]] = [
     ("S3", turned_on_after_a_command_before, 1.14, 1.16),
     ("S3", turned_on_after_a_heartbeat_before, 1.14, 1.16),
     ("S4", position_of_a_length_replaced_before, 19.99, 20.01),
-    ("S5", duplicate_for, 3.99, 4.01),
+    ("S5", second_supervisord_for, 3.99, 4.01),
     ("L1", back_after(times=3), 0.99, 1.01),  # the median
     ("L1", back_after(times=1), 1.99, 2.01),
     ("L1", silent_after_a_fault_for, 9.99, 10.01),

@@ -453,22 +453,22 @@ def test_s4_names_wrong_speeds_and_positions() -> None:
 # S5
 
 
-def test_s5_names_the_processes_in_the_order_of_their_start() -> None:
+def test_s5_names_each_pair_of_supervisords_in_the_order_of_their_start() -> None:
     lives = [
-        Life("velocity", 5, 10.0, 20.0),
-        Life("velocity", 9, 0.0, None),
+        Life("", 5, 10.0, 20.0),
         Life("", 2, 5.0, 9.5),
         Life("", 1, 0.0, None),
+        Life("", 3, 21.0, 25.0),  # refuses within four seconds
         Life(KINEMATICS, 7, 0.0, 8.0),
-        Life(KINEMATICS, 8, 4.0, None),  # starts for four seconds
+        Life(KINEMATICS, 8, 4.0, None),  # neither reports
     ]
     assert CHECKERS["S5"](history(lives=lives)) == Finding(
         "S5",
-        3,
-        "restarts and duplicates: 3",
+        4,
+        "restarts and duplicates: 4",
         [
             Evidence(5.0, "processes 1 and 2 are both supervisord"),
-            Evidence(10.0, "processes 9 and 5 are both velocity"),
+            Evidence(10.0, "processes 1 and 5 are both supervisord"),
         ],
     )
 

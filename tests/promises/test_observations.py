@@ -86,7 +86,7 @@ def test_ctrl_c_ends_the_judgement(tmp_path: Path) -> None:
     assert (end.returncode, end.stdout) == (130, "Interrupted: all processes have been stopped.\n")
 
 
-ONE, OTHER = Life("velocity", 7, 0.0, None), Life("velocity", 8, 5.0, 12.0)
+ONE = Life("velocity", 7, 0.0, None)
 
 
 def test_ros_tools_read_a_record(tmp_path: Path) -> None:
@@ -195,13 +195,13 @@ def test_observer_that_received_nothing_for_a_while_blames_nobody(tmp_path: Path
 
 def test_violation_is_reported_with_evidence_and_exit_code_1(tmp_path: Path) -> None:
     path = tmp_path / "record.mcap"
-    recorded(path, ONE, OTHER)
+    recorded(path, Life("", 7, 0.0, None), Life("", 8, 5.0, 12.0))
     done = replay(path)
     assert done.returncode == 1
-    assert "S5 is violated:\n  at 5.00 s: processes 7 and 8 are both velocity" in done.stdout
+    assert "S5 is violated:\n  at 5.00 s: processes 7 and 8 are both supervisord" in done.stdout
     page = (tmp_path / "replay.html").read_text(encoding="utf-8")
     assert "<h1 class=violated>S5 violated</h1>" in page
-    assert "processes 7 and 8 are both velocity" in page
+    assert "processes 7 and 8 are both supervisord" in page
 
 
 @pytest.mark.parametrize(

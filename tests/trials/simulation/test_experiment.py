@@ -7,6 +7,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Callable, Sequence
+from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
@@ -24,6 +25,7 @@ from deploy.trials.simulation import arm, people, plan
 from deploy.trials.simulation.faults import BAD_LINE, FAULT_KINDS
 from deploy.trials.simulation.outcome import Outcome, simulate
 from interfaces import topics
+from interfaces.service import instance
 from services.examples import speed_guard
 
 LENGTH = 30.0  # s: four faults, and the time in which the arm recovers from the last one
@@ -128,6 +130,13 @@ def test_a_bug_of_a_service_violates_a_promise(monkeypatch: pytest.MonkeyPatch) 
     with_a_bug(monkeypatch)
     kills = [PlannedFault(ASLEEP + 1.0 + n, "kill", "operator_watchdog") for n in range(11)]
     assert "S1" in violations(simulate(Experiment("bug", ASLEEP + 12.0, BRIEF, kills)))
+
+
+def test_a_second_instance_that_does_not_refuse_violates_s5(monkeypatch: pytest.MonkeyPatch) -> None:
+    double = Experiment("double", 8.0, BRIEF, [PlannedFault(3.0, "double", "kinematics", 4.0)])
+    assert "S5" not in violations(simulate(double))
+    monkeypatch.setattr(instance, "claim", lambda node: nullcontext())
+    assert "S5" in violations(simulate(double))
 
 
 def test_the_example_of_a_service_violates_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
