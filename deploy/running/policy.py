@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 from deploy.running import manifest, processes
 from deploy.running.supervisord import Program
+from interfaces.service.health import PERIOD
 
 RECENT = 60.0  # s for which a restart counts as recent
 
@@ -74,6 +75,8 @@ class Policy:
         # Of each program: pid, time of its first observation, and how long its first health may take.
         self._first_seen: dict[str, tuple[int, float, float]] = {}
         self._deaf_since = math.inf
+        # Processes that have been silent since most services were, and when that was last so.
+        self._silent_with_most: dict[int, float] = {}
         self._stopped_since: dict[int, float] = {}
         self._duplicate_since: dict[int, float] = {}
         self._revivals: dict[str, tuple[float, float]] = {}  # delay of the next, and when it is due
@@ -135,6 +138,7 @@ class Policy:
     def _kill_silent(self, observation: Observation, running: list[Program]) -> list[Action]:
         silent = []
         expected = 0  # services whose health is due
+        late = 0  # those of them that are silent now, or will be within the period of reports
         for program in running:
             pid, since, start = self._first_seen.get(program.name, (0, 0.0, 0.0))
             if pid != program.pid:
@@ -143,9 +147,12 @@ class Policy:
                 pid, since = program.pid, observation.time
                 self._first_seen[program.name] = (pid, since, start)
             reported = observation.last_health.get((program.name, pid))
-            expected += reported is not None or observation.time - since >= start
             silence = observation.time - (since if reported is None else reported)
-            if silence >= (start if reported is None else self._timeouts.health):
+            timeout = start if reported is None else self._timeouts.health
+            is_expected = reported is not None or silence >= start
+            expected += is_expected
+            late += is_expected and silence >= timeout - PERIOD
+            if silence >= timeout:
                 silent.append(Action("kill", program.name, pid, f"no health for {silence:.1f} s"))
         self.kill_inhibited_by = ""
         itself = [action for action in silent if action.program == manifest.sentinel()]
@@ -156,9 +163,17 @@ class Policy:
             # A deaf sentinel is useless; its successor may hear.
             return itself if observation.time - self._deaf_since >= self._timeouts.start else []
         self._deaf_since = math.inf
-        if len(silent) > 1 and 2 * len(silent) > expected:
-            self.kill_inhibited_by = f"{len(silent)} of {expected} services are silent at once"
-        return [] if self.kill_inhibited_by else silent
+        if silent and late > 1 and 2 * late > expected:
+            self.kill_inhibited_by = f"{late} of {expected} services are silent at once"
+            self._silent_with_most |= {action.pid: observation.time for action in silent}
+        # After a failure of the network, processes have to discover each other again, as new ones do.
+        known = self._silent_with_most
+        self._silent_with_most = {action.pid: known.get(action.pid, -math.inf) for action in silent}
+        return [
+            action
+            for action in silent
+            if observation.time - self._silent_with_most[action.pid] >= self._timeouts.start
+        ]
 
     def _kill_duplicates(self, observation: Observation) -> list[Action]:
         now = observation.time

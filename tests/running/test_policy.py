@@ -130,6 +130,41 @@ def test_more_than_half_of_the_services_are_spared() -> None:
     assert run.policy.kill_inhibited_by == "2 of 3 services are silent at once"
 
 
+def test_services_that_fall_silent_one_after_the_other_within_a_period_are_spared() -> None:
+    run = Run(*(program(name) for name in "abcd"))
+    for name in "abcd":  # the last reports before the network fails
+        run.now += 0.25
+        run.hear(name)
+        assert run.decide() == []
+
+    assert run.first(30.0)[1] == []
+    assert run.policy.kill_inhibited_by == "4 of 4 services are silent at once"
+
+
+def test_service_that_does_not_return_with_most_has_the_start_timeout() -> None:
+    run = Run(*(program(name) for name in "abcde"))
+    run.hear("abcde")
+    assert run.first(20.0)[1] == []
+    returned = run.now
+
+    assert run.first(returned + 9.0, healthy="abc")[1] == []
+    assert run.policy.kill_inhibited_by == ""
+    assert run.first(60.0, healthy="abcd") == (
+        returned - 0.25 + 10.0,  # from the last time that most were silent
+        [silence_of(returned - 0.25 + 10.0, "e")],
+    )
+
+
+def test_service_that_has_returned_with_most_is_killed_at_the_timeout() -> None:
+    run = Run(*(program(name) for name in "abc"))
+    run.hear("abc")
+    assert run.first(20.0)[1] == []
+    run.hear("abc")
+    returned = run.now
+
+    assert run.first(40.0, healthy="ab") == (returned + 2.5, [silence_of(2.5, "c")])
+
+
 def test_service_whose_first_health_is_not_due_is_not_expected() -> None:
     run = Run(*(program(name) for name in "abc"))
     run.now = 20.0
