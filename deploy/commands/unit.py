@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from deploy.commands.parameters import WEB
-from deploy.running.environment import ADOPTED, KEYSTORE, namespace_of
+from deploy.running.environment import ADOPTED, KEYSTORE, NAMESPACE, namespace_of
 from deploy.running.errors import DeploymentError
 from deploy.running.extension import SENTINEL_START_TIMEOUT
 from deploy.running.processes import ROOT, RUN_DIRECTORY
@@ -71,11 +71,20 @@ def write(content: str, environment: Mapping[str, str]) -> Path:
     name = f"reactive-arm{namespace_of(environment).rstrip('/').replace('/', '-')}.service"
     path = Path(home).expanduser() / "systemd" / "user" / name
     try:
+        if path.exists() and _arm(path.read_text(errors="replace")) != _arm(content):
+            another = f"{path} is the unit of another arm: give this one a namespace"
+            raise DeploymentError(f"{another} ({NAMESPACE}=/arm2), or remove the file")
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(content, encoding="utf-8")
     except OSError as error:
         raise DeploymentError(f"{path}: {error.strerror}") from None
     return path
+
+
+def _arm(unit: str) -> list[str]:
+    """Return the lines that tell whose unit it is: the checkout and the run directory."""
+    of_arm = ("# Written by", f'Environment="{RUN_DIRECTORY}=')
+    return [line for line in unit.splitlines() if line.startswith(of_arm)]
 
 
 def _quoted(word: str) -> str:

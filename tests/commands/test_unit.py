@@ -54,6 +54,26 @@ def test_each_arm_has_a_unit_of_its_own(tmp_path: Path, environment: Mapping[str
     assert path.read_text() == "[Unit]\n"
 
 
+def test_a_unit_replaces_that_of_the_same_arm_only(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    environment = {"XDG_CONFIG_HOME": str(tmp_path)}
+    ours = {"REACTIVE_ARM_RUN_DIR": str(tmp_path / "arm1")}
+
+    def write(scenario: str, given: Mapping[str, str] = ours) -> Path:
+        return unit.write(unit.text(scenario, "", given), environment)
+
+    write("demo")
+    content = write("listing_5_9").read_text()
+    assert "listing_5_9" in content
+    refused = r"reactive-arm.service is the unit of another arm: .*\(REACTIVE_ARM_NAMESPACE=/arm2\)"
+    for of_another in ({}, {"REACTIVE_ARM_RUN_DIR": str(tmp_path / "arm2")}):
+        with pytest.raises(DeploymentError, match=refused):
+            write("demo", of_another)
+    monkeypatch.setattr(unit, "ROOT", tmp_path / "another checkout")
+    with pytest.raises(DeploymentError, match=refused):
+        write("demo")
+    assert (tmp_path / "systemd" / "user" / "reactive-arm.service").read_text() == content
+
+
 def test_a_unit_that_cannot_be_written_is_one_line(tmp_path: Path) -> None:
     (tmp_path / "systemd").touch()
     with pytest.raises(DeploymentError, match=r"/reactive-arm.service: Not a directory$"):
