@@ -3,7 +3,7 @@
 It needs only the library ``mcap``, so it works with any rclpy.
 """
 
-from mcap_files.reader import McapFile, UnreadableError
+from mcap_files.reader import McapFile, UnreadableError, is_cut
 from mcap_files.writer import SAVE_PERIOD, FileWriter
 
-__all__ = ["FileWriter", "McapFile", "SAVE_PERIOD", "UnreadableError"]
+__all__ = ["FileWriter", "McapFile", "SAVE_PERIOD", "UnreadableError", "is_cut"]

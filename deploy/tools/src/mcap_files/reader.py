@@ -159,14 +159,9 @@ class McapFile:
         try:
             yield from StreamReader(whole, validate_crcs=True).records
         except Exception:  # of any type, by the parser or a decompressor
-            if self._has_end():
+            if _has_end(self._file):
                 raise
             self.is_complete = False
-
-    def _has_end(self) -> bool:
-        self._file.seek(-len(MCAP0_MAGIC), os.SEEK_END)
-        is_only_the_beginning = self._file.tell() == 0
-        return self._file.read() == MCAP0_MAGIC and not is_only_the_beginning
 
     @contextmanager
     def _errors(self) -> Iterator[None]:
@@ -177,6 +172,21 @@ class McapFile:
         except Exception as error:  # of any type, by the parser or a decompressor
             reason = " ".join(str(error).split()) or type(error).__name__
             raise UnreadableError(f"{self.path} is damaged: {reason}") from None
+
+
+def is_cut(path: Path) -> bool:
+    """Return whether a file has no end, by a look at its last bytes; not known of a compressed one.
+
+    :raises OSError: if it cannot be read.
+    """
+    with path.open("rb") as file:
+        return file.read(len(MCAP0_MAGIC)) == MCAP0_MAGIC and not _has_end(file)
+
+
+def _has_end(file: IO[bytes]) -> bool:
+    file.seek(-len(MCAP0_MAGIC), os.SEEK_END)
+    is_only_the_beginning = file.tell() == 0
+    return file.read() == MCAP0_MAGIC and not is_only_the_beginning
 
 
 def _is_complete(summary: Summary) -> bool:

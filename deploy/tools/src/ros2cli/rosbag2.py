@@ -109,23 +109,34 @@ def write(metadata: Metadata) -> None:
 
 def read(path: Path) -> Metadata:
     """Read the metadata of a bag, or of a single MCAP file. Raises ClickException if it is neither."""
-    if path.is_file():
+    from mcap_files import is_cut
+
+    if not path.is_dir():
         return _of_files(path.parent, [path])
-    if not (path / METADATA_FILE).exists() and (files := sorted(path.glob("*.mcap*"))):
-        return _of_files(path, files)  # the recorder did not end in order
+    files = sorted(path.glob("*.mcap*"))
+    file = path / METADATA_FILE
     try:
-        document = yaml.safe_load((path / METADATA_FILE).read_text())["rosbag2_bagfile_information"]
-        metadata = _from_dict(path, document)
+        metadata = _from_dict(path, yaml.safe_load(file.read_text())["rosbag2_bagfile_information"])
     except FileNotFoundError:
+        if files:
+            return _of_files(path, files)  # the recorder did not end in order
         raise click.ClickException(f"'{path}' is no bag: it has no {METADATA_FILE}") from None
-    except (yaml.YAMLError, LookupError, TypeError, ValueError) as error:
-        raise click.ClickException(f"'{path / METADATA_FILE}' is damaged: {error!r}") from None
+    except (yaml.YAMLError, LookupError, TypeError, ValueError):
+        if not files:
+            raise click.ClickException(f"{file} is damaged") from None
+        metadata = _of_files(path, files)
+        metadata.remarks.insert(0, f"{file} is damaged: the messages are read without it")
+        return metadata
     if metadata.storage != "mcap":
         raise click.ClickException(
             f"'{path}' is stored as {metadata.storage}, but only mcap is supported: convert it on ROS 2"
             " with `ros2 bag convert`"
         )
-    return metadata
+    if not any(is_cut(each) for each in metadata.paths() if each.exists()):
+        return metadata
+    found = _of_files(path, metadata.paths())
+    found.ros_distro, found.custom_data = metadata.ros_distro, metadata.custom_data
+    return found
 
 
 def _from_dict(directory: Path, document: dict[str, Any]) -> Metadata:
@@ -167,6 +178,8 @@ def _of_files(directory: Path, paths: list[Path]) -> Metadata:
                     topic.type_hash = channel.metadata.get("topic_type_hash", "")
                     topic.encoding = channel.message_encoding
                     topic.count += file.counts[number]
+        except OSError as error:
+            raise click.ClickException(f"{path}: {error.strerror}") from None
         except UnreadableError as error:
             raise click.ClickException(str(error)) from None
         except (AttributeError, LookupError, TypeError, ValueError, yaml.YAMLError) as error:

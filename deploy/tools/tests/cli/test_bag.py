@@ -24,6 +24,9 @@ from geometry_msgs.msg import PointStamped
 from mcap_files import FileWriter, McapFile
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import serialize_message
+from ros2cli import rosbag2
+from ros2cli.bag_writer import BagWriter
+from ros2cli.commands.bag_info import info
 from ros2cli.commands.bag_play import play
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import String
@@ -264,6 +267,55 @@ def test_bad_message_does_not_end_a_play(
 def test_options_outside_of_the_bag_play_nothing(ros2: Any, tmp_path: Path, options: str) -> None:
     done = ros2("bag", "play", str(played(GOOD, tmp_path / "bag.mcap")), *options.split())
     assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.fixture
+def whole(tmp_path: Path) -> Path:
+    """A bag of five messages in one file."""
+    writer = BagWriter(tmp_path / "whole", "fastwrite", {"robot": "arm7"})
+    write = writer.add_topic(rosbag2.Topic("/good", "std_msgs/msg/String"))
+    for _, _, data in GOOD:
+        write(data, T0, T0)
+    writer.close()
+    return tmp_path / "whole"
+
+
+def cut_file(bag: Path) -> str:
+    file = bag / "whole_0.mcap"
+    file.write_bytes(file.read_bytes()[:-200])
+    return f"{file} has no end: its 5 whole messages of 0.0 s are read\n"
+
+
+def cut_metadata(bag: Path) -> str:
+    file = bag / "metadata.yaml"
+    file.write_bytes(file.read_bytes()[:300])
+    return f"{file} is damaged: the messages are read without it\n"
+
+
+def empty_metadata(bag: Path) -> str:
+    (bag / "metadata.yaml").write_text("")
+    return f"{bag / 'metadata.yaml'} is damaged: the messages are read without it\n"
+
+
+@pytest.mark.parametrize("damage", [cut_file, cut_metadata, empty_metadata])
+def test_what_is_whole_in_a_damaged_bag_is_read(whole: Path, damage: Callable[[Path], str]) -> None:
+    remark = damage(whole)
+    done = CliRunner().invoke(info, [str(whole)])
+    assert (done.exit_code, done.stderr) == (0, remark)
+    assert "Topic: /good | Type: std_msgs/msg/String | Count: 5 |" in done.stdout
+
+
+def test_bag_with_a_folder_or_without_its_file_is_one_line(whole: Path, tmp_path: Path) -> None:
+    (tmp_path / "folder" / "x.mcap").mkdir(parents=True)
+    (whole / "whole_0.mcap").unlink()
+    (whole / "metadata.yaml").write_text("")
+    for bag, reason in (
+        (tmp_path / "folder", f"{tmp_path}/folder/x.mcap: Is a directory"),
+        (whole, f"{whole}/metadata.yaml is damaged"),
+        (Path("/dev/null"), "/dev/null is no MCAP file"),
+    ):
+        done = CliRunner().invoke(info, [str(bag)])
+        assert (done.exit_code, done.output) == (1, f"Error: {reason}\n")
 
 
 @pytest.mark.parametrize("option", ["--start-offset", "--playback-duration", "--rate", "--clock", "--delay"])
