@@ -16,10 +16,10 @@ from deploy.operator.output import say
 from deploy.running import interruption, manifest, messages, rclpy_choice
 from deploy.running.environment import ADOPTED, NAMESPACE, RANGE, namespace_of, set_middleware
 from deploy.running.errors import DeploymentError
-from deploy.running.machine import LOOPBACK_DOWN, loopback_is_up
 from deploy.running.run_directory import ALL, KEY, LEAD, MANIFEST, RUN
 from deploy.running.supervisord import Program
 from deploy.running.system import System
+from interfaces.loopback import LOOPBACK_DOWN, loopback_is_up
 
 if TYPE_CHECKING:
     from deploy.commands.member import Member

@@ -24,9 +24,9 @@ from deploy.operator.page.site import Site
 from deploy.operator.remote import parameter_changes
 from deploy.operator.switch import VIRTUAL_SWITCH, Switch
 from deploy.running import manifest
-from deploy.running.machine import loopback_is_up
 from deploy.running.reaction import reaction
 from interfaces import service, topics
+from interfaces.loopback import loopback_is_up
 from interfaces.service import ServiceNode, UserError, parameter
 from interfaces.service.epoch import Epoch
 from interfaces.topics import TURN_OFF

@@ -2,26 +2,21 @@
 
 from __future__ import annotations
 
-import fcntl
 import math
 import shutil
-import socket
-import struct
 import time
 from collections import deque
 from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
+from interfaces.loopback import LOOPBACK_DOWN, loopback_is_up
+
 LOW_DISK, ENOUGH_DISK = 200e6, 300e6  # free bytes: a warning begins below the first and ends at the second
 CLOCK_STEP = 0.05  # s; clocks may differ by as much (A3 in SAFETY.md)
 STEP_SHOWN = 60.0  # s for which a step of the clock is a warning
 LATE = 0.05  # s; half of the delay that the safety case allows (A4 in SAFETY.md)
 LATE_LOOKS, LATE_WINDOW = 3, 10.0  # so many late looks within so many seconds are an overload; none ends it
-
-LOOPBACK_DOWN = "the network interface lo is down, and services do not hear each other: ip link set lo up"
-
-_SIOCGIFFLAGS, _IFF_UP = 0x8913, 1  # netdevice(7)
 
 
 class Figures(NamedTuple):
@@ -44,15 +39,6 @@ def figures(run: Path) -> Figures:
     with suppress(OSError):
         disk_free = shutil.disk_usage(run).free
     return Figures(disk_free, loopback_is_up(), time.monotonic(), time.time(), time.monotonic())
-
-
-def loopback_is_up() -> bool:
-    """Whether there is a network interface lo, and it is up."""
-    request = struct.pack("16sH22x", b"lo", 0)
-    with suppress(OSError), socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as any_socket:
-        answer = fcntl.ioctl(any_socket, _SIOCGIFFLAGS, request)
-        return bool(struct.unpack("16xH22x", answer)[0] & _IFF_UP)
-    return False
 
 
 class Machine:

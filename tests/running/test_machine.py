@@ -9,7 +9,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from deploy.running.machine import LOOPBACK_DOWN, Figures, Machine, figures
+from deploy.running.machine import Figures, Machine, figures
+from interfaces.loopback import LOOPBACK_DOWN
 
 PERIOD = 0.5
 DISK = "less than 200 MB are free for /run: a full disk loses logs, records and settings"
@@ -116,7 +117,7 @@ def test_a_run_directory_that_is_gone_has_no_full_disk(tmp_path: Path) -> None:
 
 
 def test_a_new_network_namespace_has_its_loopback_down() -> None:
-    code = "from deploy.running.machine import loopback_is_up; print(loopback_is_up())"
+    code = "from interfaces.loopback import loopback_is_up; print(loopback_is_up())"
     unshare = ["unshare", "--net", "--map-root-user", sys.executable, "-c", code]
     done = subprocess.run(unshare, cwd=Path(__file__).parents[2], capture_output=True, text=True, check=False)
     if done.stderr.startswith("unshare:"):

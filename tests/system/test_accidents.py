@@ -8,7 +8,7 @@ import signal
 
 import pytest
 
-from deploy.running.machine import LOOPBACK_DOWN
+from interfaces.loopback import LOOPBACK_DOWN
 from tests.system.sites import STEADY, Site
 
 

@@ -8,8 +8,8 @@ from typing import Any
 from deploy.operator.page.protocol import LIMITS
 from deploy.operator.page.state import BEAT, PROGRAMS, RENEWED, Clock, PageState, Program
 from deploy.running import manifest, sentinel
-from deploy.running.machine import LOOPBACK_DOWN
 from interfaces import topics
+from interfaces.loopback import LOOPBACK_DOWN
 from interfaces.topics import OFF, ON
 from services import engine_controller
 

@@ -22,9 +22,9 @@ from deploy.operator.hand import Hand
 from deploy.operator.page.server import UPDATE_PERIOD
 from deploy.operator.page.state import RESTARTED
 from deploy.operator.switch import ECHO
-from deploy.running.machine import LOOPBACK_DOWN
 from deploy.running.run_directory import PAGE_FILE
 from interfaces import topics
+from interfaces.loopback import LOOPBACK_DOWN
 from interfaces.service import ServiceNode
 from interfaces.topics import CONFIGURATION
 from reactive_node import ReactiveNode

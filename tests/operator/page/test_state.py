@@ -15,8 +15,8 @@ from deploy.operator.page import state
 from deploy.operator.page.history import History
 from deploy.operator.page.state import Arm, Clock, Engines, Operator, PageState, Recent
 from deploy.operator.page.updates import SILENT_CONTROLLER, Updates, lasting, view
-from deploy.running.machine import LOOPBACK_DOWN
 from interfaces import topics
+from interfaces.loopback import LOOPBACK_DOWN
 from interfaces.topics import ALIVE, INCAPACITATED, MISSED, OFF, ON, TURN_OFF
 from reactive_node import stamps
 from reactive_node.stamps import Timestamp
