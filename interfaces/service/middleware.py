@@ -9,6 +9,8 @@ from pathlib import Path
 
 from rclpy.utilities import get_rmw_implementation_identifier
 
+from interfaces.loopback import LOOPBACK_DOWN, loopback_is_up
+
 RANGE, PEERS = "ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_STATIC_PEERS"
 PROFILES = "FASTRTPS_DEFAULT_PROFILES_FILE"
 
@@ -30,13 +32,15 @@ def settings() -> dict[str, str]:
 
     The settings are in ``NAME.localhost.xml`` next to ``NAME.xml``, the profiles file of the environment;
     without that file, nothing changes.
+
+    :raises RuntimeError: if there is no way to other processes: Fast DDS would join and hear nobody.
     """
     wants_localhost = os.environ.get(RANGE, "").upper() == "LOCALHOST" and not os.environ.get(PEERS)
+    if not wants_localhost or get_rmw_implementation_identifier() != "rmw_fastrtps_cpp":
+        return {}
+    if not loopback_is_up():
+        raise RuntimeError(LOOPBACK_DOWN)
     local = f"{os.environ.get(PROFILES, '').removesuffix('.xml').removesuffix('.localhost')}.localhost.xml"
-    if (
-        wants_localhost
-        and Path(local).is_file()
-        and get_rmw_implementation_identifier() == "rmw_fastrtps_cpp"
-    ):
-        return {RANGE: "SYSTEM_DEFAULT", PROFILES: local}  # the range is in the profile
-    return {}
+    if not Path(local).is_file():
+        return {}
+    return {RANGE: "SYSTEM_DEFAULT", PROFILES: local}  # the range is in the profile

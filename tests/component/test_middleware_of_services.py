@@ -9,12 +9,14 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable
+from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
 from rclpy.node import Node
 from std_msgs.msg import Float64
 
+from interfaces.loopback import LOOPBACK_DOWN
 from interfaces.service import middleware
 
 BURST = 1000  # packets; a socket holds 280 of them by default
@@ -71,6 +73,26 @@ def test_other_middleware_keeps_the_range(monkeypatch: pytest.MonkeyPatch) -> No
     monkeypatch.setattr(middleware, "get_rmw_implementation_identifier", lambda: "rmw_cyclonedds_cpp")
     with middleware.without_shared_memory():
         assert os.environ[middleware.RANGE] == "LOCALHOST"
+
+
+@pytest.mark.parametrize(
+    ("rmw", "reach", "is_refused"),
+    [
+        ("rmw_fastrtps_cpp", "LOCALHOST", True),
+        ("rmw_fastrtps_cpp", "SUBNET", False),
+        ("rmw_cyclonedds_cpp", "LOCALHOST", False),  # it tells by itself
+    ],
+)
+def test_fast_dds_does_not_join_without_the_loopback_interface(
+    monkeypatch: pytest.MonkeyPatch, rmw: str, reach: str, is_refused: bool
+) -> None:
+    monkeypatch.setenv(middleware.RANGE, reach)
+    monkeypatch.delenv(middleware.PEERS, raising=False)
+    monkeypatch.setattr(middleware, "get_rmw_implementation_identifier", lambda: rmw)
+    monkeypatch.setattr(middleware, "loopback_is_up", lambda: False)
+    outcome = pytest.raises(RuntimeError, match=LOOPBACK_DOWN) if is_refused else nullcontext()
+    with outcome, middleware.without_shared_memory():
+        pass
 
 
 @pytest.mark.skipif(LARGEST_BUFFER < 10**6, reason=f"platform: net.core.rmem_max is only {LARGEST_BUFFER}")

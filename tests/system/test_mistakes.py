@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 import time
 from pathlib import Path
@@ -95,6 +96,16 @@ def test_a_discovery_range_without_other_processes_is_refused(
     complaint = "ROS_AUTOMATIC_DISCOVERY_RANGE=OFF keeps the services apart: set LOCALHOST or SUBNET"
     assert site.do("start", STEADY) == (1, complaint)
     assert not site.run.exists()
+
+
+def test_a_loopback_that_is_down_is_reported(site: Site) -> None:
+    launcher = [sys.executable, "-m", "deploy.commands.launcher", "start", STEADY]
+    code, printed = site.do_command("unshare", "--net", "--map-root-user", *launcher)
+    if printed.startswith("unshare:"):
+        pytest.skip(f"platform: {printed}")
+    assert code == 1
+    assert re.fullmatch("Cannot join the ROS graph: the .* is down.*ip link set lo up.?", printed)
+    assert site.members == {}
 
 
 def test_an_impossible_namespace_is_reported(site: Site) -> None:
