@@ -64,14 +64,17 @@ def _recording(
     :param overload: receives begin and end of each time in which the thread was not scheduled.
     """
     context = Context()
-    with middleware.without_shared_memory():
-        rclpy.init(
-            args=enclave.arguments(OBSERVER, namespace),
-            context=context,
-            domain_id=domain,
-            signal_handler_options=SignalHandlerOptions.NO,
-        )
-        node = ReactiveNode(f"{OBSERVER}_{os.getpid()}", context=context, namespace=namespace)
+    try:
+        with middleware.without_shared_memory():
+            rclpy.init(
+                args=enclave.arguments(OBSERVER, namespace),
+                context=context,
+                domain_id=domain,
+                signal_handler_options=SignalHandlerOptions.NO,
+            )
+            node = ReactiveNode(f"{OBSERVER}_{os.getpid()}", context=context, namespace=namespace)
+    except RuntimeError as error:  # of the domain, discovery or DDS
+        sys.exit(f"The observer cannot join the ROS graph: {error}")
     executor = SingleThreadedExecutor(context=context)
     executor.add_node(node)
     record(node, recorder, _report_first, lost, is_babble)

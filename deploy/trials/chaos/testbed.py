@@ -235,7 +235,7 @@ class Testbed:
         self.epoch = time.monotonic() + self.lead
         return scenario_parameters(scenario, round(self.epoch, 3))
 
-    def _start_observer(self, stack: ExitStack, environment: Mapping[str, str]) -> queue.Queue[str]:
+    def _start_observer(self, stack: ExitStack, environment: Mapping[str, str]) -> queue.Queue[str | None]:
         """Start the observer; return the lines that it prints from now on."""
         arms = [f"{arm.namespace}={arm.domain}={arm.system.run}" for arm in self.arms]
         command = [
@@ -253,7 +253,7 @@ class Testbed:
         return lines
 
     def await_messages(
-        self, arms: Sequence[RealArm], awaited: Sequence[topics.Topic], lines: queue.Queue[str]
+        self, arms: Sequence[RealArm], awaited: Sequence[topics.Topic], lines: queue.Queue[str | None]
     ) -> None:
         """Wait until the observer has seen a message on each topic of each arm; most follow the scenario."""
         names = {topic.full_name(arm.namespace) for arm in arms for topic in awaited}
@@ -262,11 +262,13 @@ class Testbed:
             line = self._next(lines, deadline, _no_message(sorted(missing), len(arms)))
             self._seen.add(line.removeprefix("seen "))
 
-    def _next(self, lines: queue.Queue[str], deadline: float, error: str) -> str:
+    def _next(self, lines: queue.Queue[str | None], deadline: float, error: str) -> str:
         while time.monotonic() < deadline:
             interruption.check()
             with suppress(queue.Empty):
-                return lines.get(timeout=0.1)
+                if (line := lines.get(timeout=0.1)) is None:
+                    raise DeploymentError("The observer has ended")
+                return line
         raise DeploymentError(error)
 
 
@@ -315,8 +317,9 @@ def _observer(command: Sequence[str], environment: Mapping[str, str]) -> Iterato
         process.wait()
 
 
-def _lines(process: subprocess.Popen[str]) -> queue.Queue[str]:
-    lines: queue.Queue[str] = queue.Queue()
+def _lines(process: subprocess.Popen[str]) -> queue.Queue[str | None]:
+    """Return the lines that a process prints; ``None`` when it has ended."""
+    lines: queue.Queue[str | None] = queue.Queue()
     assert process.stdout is not None
     stream = os.fdopen(os.dup(process.stdout.fileno()), "r")
 
@@ -324,6 +327,7 @@ def _lines(process: subprocess.Popen[str]) -> queue.Queue[str]:
         with stream, suppress(ValueError):
             for line in stream:
                 lines.put(line.strip())
+        lines.put(None)
 
     threading.Thread(target=read, daemon=True).start()
     return lines

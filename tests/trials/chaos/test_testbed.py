@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import queue
+import re
+import subprocess
+import sys
 import time
 from pathlib import Path
 from typing import Any
@@ -66,3 +70,18 @@ def test_topics_that_were_seen_before_are_not_awaited(fleet: Any, monkeypatch: p
     fleet.await_messages(fleet.arms[:1], list(OUTPUTS.values()), observer)
     fleet.await_messages(fleet.arms[:1], list(OUTPUTS.values()), observer)
     assert observer.now < 10.0
+
+
+def test_observer_that_cannot_join_is_reported(tmp_path: Path) -> None:
+    done = subprocess.run(
+        ["unshare", "--net", "--map-root-user", sys.executable, "-m", "deploy.trials.chaos"],
+        env={**os.environ, "REACTIVE_ARM_RUN_DIR": str(tmp_path / "run")},
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    if done.stderr.startswith("unshare:"):
+        pytest.skip(f"platform: {done.stderr}")
+    assert done.returncode == 1
+    reason = r"The observer cannot join the ROS graph: .* is down.*\nThe observer has ended\n"
+    assert re.fullmatch(reason, done.stderr)
