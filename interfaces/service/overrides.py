@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from itertools import pairwise
 
 from rclpy.node import Node
+from rclpy.parameter import parameter_dict_from_yaml_file
 from rclpy.utilities import remove_ros_args
 
 from interfaces.service.errors import UserError
@@ -13,14 +16,14 @@ from interfaces.service.errors import UserError
 def check(node: Node, arguments: Sequence[str]) -> None:
     """Check a command line, without the program, against the parameters that a node has declared.
 
-    A parameter file is not checked here: its ``/**`` may name parameters of other services.
+    Of a parameter file, only the section of this node is checked: ``/**`` may name parameters of others.
 
     :raises UserError: for parameters that this node does not have, and for options outside of ``--ros-args``.
     """
-    if options := [word for word in remove_ros_args(arguments) if word.startswith("-")]:
+    if options := [word for word in remove_ros_args(arguments) if word.startswith("-") or ":=" in word]:
         raise UserError(f"{' '.join(options)}: no such option; those of ROS follow after --ros-args")
-    given = [*_parameters(arguments)]
     own = node.get_fully_qualified_name()
+    given = [*_parameters(arguments), *_parameters_in_files(arguments, own)]
     if others := [f"{other}:{name}" for other, name in given if other and f"/{other}" != own]:
         raise UserError(f"{', '.join(others)}: this node is {own}; leave the name of the node out")
     if unknown := [name for _, name in given if not node.has_parameter(name)]:
@@ -38,3 +41,14 @@ def _parameters(arguments: Sequence[str]) -> Iterator[tuple[str, str]]:
         elif is_ros and word in ("-p", "--param"):
             node, _, name = next(words).partition(":=")[0].rpartition(":")
             yield node, name
+
+
+def _parameters_in_files(arguments: Sequence[str], own: str) -> Iterator[tuple[str, str]]:
+    """Yield '' and the name of each parameter in the section of a node, of the files on a command line."""
+    for option, path in pairwise(arguments):
+        if option == "--params-file":
+            for node in (own, own[1:]):
+                with suppress(RuntimeError):  # the file has no section of this node
+                    yield from (
+                        ("", name) for name in parameter_dict_from_yaml_file(path, target_nodes=[node])
+                    )

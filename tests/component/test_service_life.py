@@ -275,6 +275,10 @@ def test_killed_instance_frees_its_name_at_once(start: Start) -> None:
             ["services.kinematics", "--rate=3"],
             "kinematics: --rate=3: no such option; those of ROS follow after --ros-args",
         ),
+        (
+            ["services.kinematics", "rate:=3"],
+            "kinematics: rate:=3: no such option; those of ROS follow after --ros-args",
+        ),
     ],
 )
 def test_user_error_is_one_line_and_exit_code_2(start: Start, arguments: list[str], reason: str) -> None:
@@ -283,6 +287,17 @@ def test_user_error_is_one_line_and_exit_code_2(start: Start, arguments: list[st
     assert code == 2
     assert errors.count("\n") == 1
     assert re.match(reason, errors)
+
+
+@pytest.mark.parametrize("node", ["robot_state", "/robot_state"])
+def test_mistyped_name_in_the_section_of_a_service_is_refused(
+    start: Start, tmp_path: Path, node: str
+) -> None:
+    file = tmp_path / "parameters.yaml"
+    file.write_text(f"{node}: {{ros__parameters: {{raet: 30.0}}}}\n/other: {{ros__parameters: {{x: 1}}}}")
+    code, errors = start("-m", "services.robot_state", "--ros-args", "--params-file", str(file)).end()
+    assert code == 2
+    assert errors.startswith("robot_state: raet: no such parameter; the parameters are ")
 
 
 def test_parameter_file_may_name_parameters_of_other_services(start: Start, tmp_path: Path) -> None:
