@@ -63,9 +63,25 @@ class Scenario:
 
 
 def load(path: str | Path) -> Scenario:
-    """Read a scenario from a file. Raises UserError: one line with file, key and reason."""
+    """Read a scenario from a file.
+
+    :raises UserError: a line for each key of the scenario that is wrong, with file, key and reason.
+    """
     document = yaml_file.load(path)
-    root = _Item({} if document is None else document, str(path), "")
+    try:
+        return _scenario({} if document is None else document, path)
+    except UserError as error:
+        found = {str(error): None}
+        for key, value in document.items() if isinstance(document, dict) else ():
+            try:
+                _scenario({key: value}, path)
+            except UserError as another:
+                found[str(another)] = None
+        raise UserError("\n".join(found)) from None
+
+
+def _scenario(document: Any, path: str | Path) -> Scenario:
+    root = _Item(document, str(path), "")
     root.require(optional={*topics.CONFIGURATION, "operator", "engines", "drive", "repeat"})
     repeat = root["repeat"].number(SHORTEST) if "repeat" in root else None
     configuration = {

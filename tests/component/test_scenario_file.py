@@ -145,6 +145,13 @@ def test_error_is_one_line_with_file_key_and_reason(tmp_path: Path, text: str, r
     assert "\n" not in message
 
 
+def test_each_wrong_key_of_a_scenario_is_told(tmp_path: Path) -> None:
+    with pytest.raises(UserError) as raised:
+        loaded(tmp_path, "{l1: -1, l3: 0, l2: 1, drive: 5, repeat: 1, engines: [{at: 2, command: turn_on}]}")
+    keys = [line.split(": ")[1] for line in str(raised.value).splitlines()]
+    assert keys == ["scenario", "l1", "drive"]
+
+
 def test_error_names_a_missing_file() -> None:
     with pytest.raises(UserError, match=r"^nowhere\.yaml: No such file or directory$"):
         load("nowhere.yaml")
