@@ -20,10 +20,13 @@ from deploy.runtime.tests.host import RANGE, TIMEOUT
 PROGRAM = Path(__file__).with_name("peer.py")
 PAIRS = [("embedded", "jazzy"), ("jazzy", "embedded")]
 """The embedded rclpy, and ROS 2's own in the same environment."""
+PROFILES = "FASTRTPS_DEFAULT_PROFILES_FILE"
+"""Environment variable of Fast DDS 2; ROS 2 Kilted has Fast DDS 3, with other names of settings."""
+DEPLOY = Path(__file__).parents[3]
 WITHOUT_SHARED_MEMORY = {
     "jazzy": {
         RANGE: "SYSTEM_DEFAULT",  # the profile keeps to loopback; the range would add shared memory
-        "FASTRTPS_DEFAULT_PROFILES_FILE": str(Path(__file__).parents[3] / "fastdds.localhost.xml"),
+        PROFILES: str(DEPLOY / "fastdds.localhost.xml"),
     }
 }
 """For peers that are killed: the environment in which they leave no files in /dev/shm."""
@@ -46,12 +49,12 @@ def python(rclpy: str) -> str:
 
 
 def environment(rclpy: str) -> dict[str, str]:
+    """Return the environment of a node on an rclpy. It does not depend on the rclpy of the tests."""
     # A wheel starts its interpreter again with the libraries of its own environment, but only once.
-    not_inherited = ["LD_LIBRARY_PATH", "_ROS_WHEELS_BOOTSTRAP_COMPLETE"]
-    if rclpy == "kilted":  # Fast DDS 3 has other names of settings
-        not_inherited.append("FASTRTPS_DEFAULT_PROFILES_FILE")
-    inherited = {name: value for name, value in os.environ.items() if name not in not_inherited}
-    return inherited | {"RUNTIME": "embedded" if rclpy == "embedded" else ""}
+    not_inherited = ("LD_LIBRARY_PATH", "_ROS_WHEELS_BOOTSTRAP_COMPLETE", PROFILES)
+    result = {name: value for name, value in os.environ.items() if name not in not_inherited}
+    result |= {"RUNTIME": "embedded" if rclpy == "embedded" else "", RANGE: "LOCALHOST"}
+    return result | ({PROFILES: str(DEPLOY / "fastdds.xml")} if rclpy == "jazzy" else {})
 
 
 class PeerProcess:
