@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 import subprocess
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from deploy.benchmarks.link import HEARTBEATS, Job
 from deploy.running.processes import run_directory
@@ -26,15 +27,17 @@ def build() -> str:
     directory.mkdir(parents=True, exist_ok=True)
     for name in (PIPELINE, SERVICES):
         sources = [str(_SOURCES / f"{name}.c"), str(_SOURCES / "process.c"), f"{name}.c"]
-        for command in (
-            ["idlc", str(_SOURCES / f"{name}.idl")],
-            ["cc", "-O2", "-I.", f"-I{_SOURCES}", "-o", name, *sources, "-lddsc", "-lm"],
-        ):
-            done = subprocess.run(
-                command, cwd=directory, capture_output=True, text=True, start_new_session=True
-            )
-            if done.returncode:
-                return (done.stderr.strip().splitlines() or [f"{command[0]} failed"])[0]
+        with TemporaryDirectory(dir=directory) as build:  # another process may build or run them now
+            for command in (
+                ["idlc", str(_SOURCES / f"{name}.idl")],
+                ["cc", "-O2", "-I.", f"-I{_SOURCES}", "-o", name, *sources, "-lddsc", "-lm"],
+            ):
+                done = subprocess.run(
+                    command, cwd=build, capture_output=True, text=True, start_new_session=True
+                )
+                if done.returncode:
+                    return (done.stderr.strip().splitlines() or [f"{command[0]} failed"])[0]
+            (Path(build) / name).replace(directory / name)
     return ""
 
 

@@ -15,6 +15,7 @@ from deploy.benchmarks import alternatives, c_program, measurement, table
 from deploy.benchmarks.alternatives import Alternative
 from deploy.benchmarks.link import LAST, MIDDLE, SINK, SOURCE, Job
 from deploy.benchmarks.measurement import MeasurementFailed, Scenario
+from deploy.running.processes import RUN_DIRECTORY
 from deploy.running.rclpy_choice import sourced_rclpy
 
 
@@ -184,7 +185,15 @@ def test_missing_compiler_is_named_with_its_packages(monkeypatch: pytest.MonkeyP
     assert c_program.build() == "apt-get install gcc libc6-dev cyclonedds-tools cyclonedds-dev"
 
 
-@pytest.fixture
+def test_programs_are_built_apart_from_other_builds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(RUN_DIRECTORY, str(tmp_path))
+    if reason := c_program.build():
+        pytest.skip(reason)
+    built = {path.name for path in (tmp_path / "bench" / "c").iterdir()}
+    assert built == {c_program.PIPELINE, c_program.SERVICES}
+
+
+@pytest.fixture(scope="module")
 def in_c() -> Callable[[str], Alternative]:
     if reason := c_program.build():
         pytest.skip(reason)
