@@ -96,27 +96,34 @@ class Robot:
         self._moved = now
 
 
-@pytest.fixture
-def pin(tmp_path: Path) -> Path:
+@pytest.fixture(scope="module")
+def pin(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The file that turns the drive on."""
-    pin = tmp_path / "value"
+    pin = tmp_path_factory.mktemp("pin") / "value"
     pin.write_text("0\n")
     return pin
 
 
-@pytest.fixture
-def robot(site: Site, pin: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Robot]:
+@pytest.fixture(scope="module")
+def running(module_site: Site, pin: Path) -> Iterator[Robot]:
     """A robot under a running system without virtual sources."""
-    (tmp_path / "guard.py").write_text(GUARD)
-    (tmp_path / "robot.conf").write_text(MANIFEST)
-    (tmp_path / "robot.yaml").write_text(PARAMETERS.format(pin=pin))
-    monkeypatch.setenv("MANIFEST", str(tmp_path / "robot.conf"))
-    monkeypatch.setenv("WEB", "off")
-    code, printed = site.do("start", "none", str(tmp_path / "robot.yaml"))
-    assert code == 0, printed
-    monkeypatch.delenv("MANIFEST")  # as in another terminal
-    with closing(Peer(site.domain)) as peer:
+    (pin.parent / "guard.py").write_text(GUARD)
+    (pin.parent / "robot.conf").write_text(MANIFEST)
+    (pin.parent / "robot.yaml").write_text(PARAMETERS.format(pin=pin))
+    with pytest.MonkeyPatch.context() as environment:
+        environment.setenv("MANIFEST", str(pin.parent / "robot.conf"))
+        environment.setenv("WEB", "off")
+        code, printed = module_site.do("start", "none", str(pin.parent / "robot.yaml"))
+    assert code == 0, printed  # other commands have another environment, as in another terminal
+    with closing(Peer(module_site.domain)) as peer:
         yield Robot(peer)
+
+
+@pytest.fixture
+def robot(running: Robot) -> Robot:
+    """The robot with nobody at its switch."""
+    running.holds, running.angle = False, 0.5
+    return running
 
 
 def test_base_moves_only_while_a_hand_holds_the_switch(robot: Robot, pin: Path) -> None:
@@ -137,14 +144,14 @@ def test_base_moves_only_while_a_hand_holds_the_switch(robot: Robot, pin: Path) 
     assert pin.read_text() == "0\n"
 
 
-def test_own_programs_are_supervised_and_are_the_only_joints(robot: Robot, site: Site) -> None:
+def test_own_programs_are_supervised_and_are_the_only_joints(robot: Robot, module_site: Site) -> None:
     angles = robot.peer.collect(THETA1)
     robot.spin(1.5)
     assert {angle.data for angle in angles} == {0.5}
     publishers = robot.peer.node.get_publishers_info_by_topic("/theta1")
     assert [each.node_name for each in publishers] == ["joint_source"]
 
-    status = site.begin("status")
+    status = module_site.begin("status")
     while status.is_alive:
         robot.spin(0.1)
     assert status.wait() == 0
@@ -153,9 +160,9 @@ def test_own_programs_are_supervised_and_are_the_only_joints(robot: Robot, site:
     assert {"joint_source", "drive_adapter", "twist_gate", "own_guard", "config_l1"} <= rows.keys()
     assert not {"config_theta1", "config_theta2", "drive"} & rows.keys()
 
-    killed = site.members["own_guard"]
+    killed = module_site.members["own_guard"]
     os.kill(killed, signal.SIGKILL)
-    site.await_members(lambda members: members.get("own_guard", killed) != killed)
+    module_site.await_members(lambda members: members.get("own_guard", killed) != killed)
     robot.turn_on()
     robot.angle = 2.5  # the guard turns the engines off again
     robot.spin(1.5)
@@ -164,7 +171,7 @@ def test_own_programs_are_supervised_and_are_the_only_joints(robot: Robot, site:
     assert robot.x == stood
 
 
-def test_drive_is_off_after_the_end(robot: Robot, site: Site, pin: Path) -> None:
+def test_drive_is_off_after_the_end(robot: Robot, module_site: Site, pin: Path) -> None:
     robot.turn_on()
-    assert site.do("stop")[0] == 0
+    assert module_site.do("stop")[0] == 0
     assert pin.read_text() == "0\n"
