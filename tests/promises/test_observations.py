@@ -5,8 +5,9 @@ import os
 import re
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -20,6 +21,7 @@ from deploy.promises.marks import STEP
 from deploy.promises.observations import FAULTS, PROCESSES, load, values
 from deploy.running import processes
 from deploy.running.recorder import Recorder, qos_profiles
+from deploy.trials.chaos import __main__ as chaos
 from interfaces import topics
 
 
@@ -39,10 +41,21 @@ def recorded(path: Path, *lives: Life, seconds: int = 20) -> bytes:
     return path.read_bytes()
 
 
-def replay(record: Path) -> subprocess.CompletedProcess[str]:
-    """Judge a record in a subprocess, because it handles signals."""
-    command = [sys.executable, "-m", "deploy.trials.chaos", "--replay", str(record)]
-    return subprocess.run(command, cwd=processes.ROOT, capture_output=True, text=True, timeout=60)
+class Judged(NamedTuple):
+    code: int
+    output: str
+    errors: str
+
+
+Judge = Callable[[Path], Judged]
+
+
+@pytest.fixture
+def judge(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Judge:
+    """Judges a record as the command does, in the process of the test."""
+    monkeypatch.setattr(chaos.interruption, "install", lambda: None)
+    monkeypatch.setattr(chaos, "set_middleware", lambda environment: None)
+    return lambda record: Judged(chaos.main(["--replay", str(record)]), *capsys.readouterr())
 
 
 @pytest.mark.parametrize("pid", ["none", "", "1" * 5000])
@@ -165,7 +178,7 @@ def test_late_reception_by_discovery_or_network_is_no_overload(
     assert len(overloads_of(tmp_path / "record.mcap", 0.5, event)) == number
 
 
-def test_observer_that_received_nothing_for_a_while_blames_nobody(tmp_path: Path) -> None:
+def test_observer_that_received_nothing_for_a_while_blames_nobody(tmp_path: Path, judge: Judge) -> None:
     path = tmp_path / "record.mcap"
     recorder = Recorder(path, 0, 10**18)
 
@@ -183,22 +196,22 @@ def test_observer_that_received_nothing_for_a_while_blames_nobody(tmp_path: Path
             record(topics.ENGINES_STATE, String(data=topics.ON), now, now + 0.001)
         record(topics.EFFECTOR_SPEED, Float64(data=1.0), now, 3.8 if is_deaf else now + 0.001)
     recorder.close()
-    done = replay(path)
-    assert done.returncode == 0
-    assert done.stdout.startswith(
+    judged = judge(path)
+    assert judged.code == 0
+    assert judged.output.startswith(
         "\n1 overload of the machine or the observer, 0.8 s in all; weakened verdicts: S3\n\n"
     )
-    (row,) = (line for line in done.stdout.splitlines() if line.startswith("S3"))
+    (row,) = (line for line in judged.output.splitlines() if line.startswith("S3"))
     assert re.search(r"holds +1 +1 ", row)
     assert "weakened verdicts: S3" in (tmp_path / "replay.html").read_text(encoding="utf-8")
 
 
-def test_violation_is_reported_with_evidence_and_exit_code_1(tmp_path: Path) -> None:
+def test_violation_is_reported_with_evidence_and_exit_code_1(tmp_path: Path, judge: Judge) -> None:
     path = tmp_path / "record.mcap"
     recorded(path, Life("", 7, 0.0, None), Life("", 8, 5.0, 12.0))
-    done = replay(path)
-    assert done.returncode == 1
-    assert "S5 is violated:\n  at 5.00 s: processes 7 and 8 are both supervisord" in done.stdout
+    judged = judge(path)
+    assert judged.code == 1
+    assert "S5 is violated:\n  at 5.00 s: processes 7 and 8 are both supervisord" in judged.output
     page = (tmp_path / "replay.html").read_text(encoding="utf-8")
     assert "<h1 class=violated>S5 violated</h1>" in page
     assert "processes 7 and 8 are both supervisord" in page
@@ -209,41 +222,43 @@ def test_violation_is_reported_with_evidence_and_exit_code_1(tmp_path: Path) -> 
     [(20, 0, "All exercised promises hold"), (0, 1, "No promise was exercised")],
 )
 def test_exit_code_is_0_if_promises_are_known_to_hold(
-    seconds: int, code: int, verdict: str, tmp_path: Path
+    seconds: int, code: int, verdict: str, tmp_path: Path, judge: Judge
 ) -> None:
     path = tmp_path / "record.mcap"
     recorded(path, ONE, seconds=seconds)
-    done = replay(path)
-    assert done.returncode == code
-    assert f"\n{verdict}\nReport: " in done.stdout
+    judged = judge(path)
+    assert judged.code == code
+    assert f"\n{verdict}\nReport: " in judged.output
 
 
 @pytest.mark.parametrize(
     ("kept", "reason"), [(0, "is no MCAP file"), (5, "is no MCAP file"), (200, "contains no arm")]
 )
-def test_beginning_of_a_record_is_refused_in_one_line(kept: int, reason: str, tmp_path: Path) -> None:
+def test_beginning_of_a_record_is_refused_in_one_line(
+    kept: int, reason: str, tmp_path: Path, judge: Judge
+) -> None:
     record = tmp_path / "record.mcap"
     record.write_bytes(recorded(tmp_path / "whole.mcap", ONE)[:kept])
-    done = replay(record)
-    assert (done.returncode, done.stderr) == (1, f"{record} {reason}\n")
+    judged = judge(record)
+    assert (judged.code, judged.errors) == (1, f"{record} {reason}\n")
 
 
-def test_whole_part_of_a_record_without_an_end_is_judged(tmp_path: Path) -> None:
+def test_whole_part_of_a_record_without_an_end_is_judged(tmp_path: Path, judge: Judge) -> None:
     record = tmp_path / "record.mcap"
     record.write_bytes(recorded(tmp_path / "whole.mcap", ONE)[:-10])
-    done = replay(record)
-    assert done.returncode == 0, done.stderr
-    assert done.stdout.startswith(f"{record} has no end: its 21 whole messages of 19.0 s are read\n")
+    judged = judge(record)
+    assert judged.code == 0, judged.errors
+    assert judged.output.startswith(f"{record} has no end: its 21 whole messages of 19.0 s are read\n")
 
 
-def test_other_file_is_refused_in_one_line(tmp_path: Path) -> None:
+def test_other_file_is_refused_in_one_line(tmp_path: Path, judge: Judge) -> None:
     record = tmp_path / "letter.txt"
     record.write_text("Dear monkey,\nplease stop.\n")
-    done = replay(record)
-    assert (done.returncode, done.stderr) == (1, f"{record} is no MCAP file\n")
+    judged = judge(record)
+    assert (judged.code, judged.errors) == (1, f"{record} is no MCAP file\n")
 
 
-def test_missing_file_is_refused_in_one_line(tmp_path: Path) -> None:
-    done = replay(tmp_path / "nix")
+def test_missing_file_is_refused_in_one_line(tmp_path: Path, judge: Judge) -> None:
+    judged = judge(tmp_path / "nix")
     expected = f"Record {tmp_path / 'nix'}: No such file or directory\n"
-    assert (done.returncode, done.stderr) == (1, expected)
+    assert (judged.code, judged.errors) == (1, expected)
