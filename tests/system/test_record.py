@@ -78,7 +78,7 @@ def test_killed_recorder_loses_at_most_a_second(small_site: Site) -> None:
     random = Random(7)
     for _ in range(3):
         command = record(small_site)
-        time.sleep(random.uniform(2.0, 4.0))
+        time.sleep(random.uniform(2.0, 3.0))  # any moment between two writes is a good one
         killed = time.time_ns()
         command.signal(signal.SIGKILL)
         command.wait()
@@ -86,7 +86,6 @@ def test_killed_recorder_loses_at_most_a_second(small_site: Site) -> None:
         with McapFile(path) as file:
             assert not file.is_complete
             assert killed - file.end < 10**9
-        time.sleep(1.0)  # the name of a record is the second of its begin
 
 
 def test_full_disk_ends_a_record_in_one_line(small_site: Site) -> None:
