@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 from hypothesis import Phase, settings
 
+from tests import order
 from tests.runtimes import left_out_here
 
 collect_ignore = [*left_out_here()]  # `make test` runs these with RUNTIME=embedded
@@ -64,6 +65,10 @@ def pytest_collection() -> Generator[None, object, object]:
     finally:
         gc.freeze()
         gc.enable()
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    items.sort(key=lambda item: order.place(item.nodeid))
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:

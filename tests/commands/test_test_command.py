@@ -9,6 +9,9 @@ from pathlib import Path
 import pytest
 
 from deploy.commands import test as command
+from tests import order
+
+ROOT = Path(__file__).parents[2]
 
 HERE = command.Part("", "", ["tests/system", "-x"])
 EMBEDDED = (
@@ -127,6 +130,12 @@ def test_a_missing_path_is_named_and_nothing_runs(
     assert command.main(words.split()) == (4 if missing else 0)
     assert bool(commands) != bool(missing)
     assert capsys.readouterr().err == (f"TESTS: {missing}: no such file or directory\n" if missing else "")
+
+
+def test_longest_files_begin_first_and_exist() -> None:
+    assert [path for path in order.LONGEST if not (ROOT / path).exists()] == []
+    tests = ["tests/a.py::test_2", "tests/a.py::test_1", *(f"{path}::test" for path in order.LONGEST[::-1])]
+    assert sorted(tests, key=order.place) == [*tests[:1:-1], *tests[:2]]
 
 
 NOTHING = command.Results(set(), set(), set())
