@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import re
 import subprocess
 from pathlib import Path
 
@@ -130,6 +131,19 @@ def test_a_missing_path_is_named_and_nothing_runs(
     assert command.main(words.split()) == (4 if missing else 0)
     assert bool(commands) != bool(missing)
     assert capsys.readouterr().err == (f"TESTS: {missing}: no such file or directory\n" if missing else "")
+
+
+def test_ci_runs_what_make_test_leaves_out() -> None:
+    left_out = re.search(r"(?m)^LEFT_OUT := (.*)$", (ROOT / "Makefile").read_text())
+    runs = re.findall(r'make test TESTS="([^"]+)"', (ROOT / ".ci/run").read_text())
+    assert left_out
+    for path in left_out[1].split():
+        assert (ROOT / path).exists()
+        assert any(
+            path not in command.ignored(words.split())
+            and any(Path(path).is_relative_to(folder) for folder in command.paths(words.split()))
+            for words in runs
+        )
 
 
 def test_longest_files_begin_first_and_exist() -> None:
