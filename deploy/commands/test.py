@@ -22,7 +22,8 @@ from tests.runtimes import left_out_here
 
 PASSED, FAILED, WRONG_USE, NO_TESTS = 0, 1, 4, 5  # exit codes of pytest
 PROCESSORS = os.cpu_count() or 1
-PHASES = {"not timed and not alone": 2 * PROCESSORS, "timed": PROCESSORS, "alone": 1}  # and their workers
+PHASES = {"not timed and not alone": 3 * PROCESSORS, "timed": PROCESSORS, "alone": 1}
+"""The tests of each phase by their marks, and its workers: most tests of the first one wait for processes."""
 IGNORE = "--ignore="
 
 
