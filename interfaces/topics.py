@@ -33,6 +33,7 @@ TURN_ON, TURN_OFF = "turn_on", "turn_off"
 ON, OFF = "on", "off"
 ALIVE, MISSED, INCAPACITATED = "alive", "missed", "incapacitated"
 DRIVE_TIMEOUT = 0.4  # s for which the engines' drive accepts an `on`
+CLOCK_TOLERANCE = 0.05  # s between the clocks of two hosts (deploy/SAFETY.md, A3)
 FRAME = "base"
 
 Conversion = Callable[[Any], Any]
@@ -370,7 +371,7 @@ DIAGNOSTICS = Topic(
     _EVENTS,
     "",
     (EVERY_SERVICE,),
-    ("sentinel", *OPERATOR_NODES, FLEET),
+    ("engine_controller", "sentinel", *OPERATOR_NODES, FLEET),
     "health, at 1 Hz, and at once to a new subscriber",
     longest_gap=1.0,
 )

@@ -15,10 +15,9 @@ from reactivex import Observable
 from reactivex.scheduler import ImmediateScheduler
 
 from interfaces import service, topics
-from interfaces.service import Rejected, ServiceNode, parameter
-from interfaces.topics import OFF, ON
+from interfaces.service import Rejected, ServiceNode, clocks, parameter
+from interfaces.topics import CLOCK_TOLERANCE, OFF, ON
 
-CLOCK_TOLERANCE = 0.05  # s between the clocks of two hosts (deploy/SAFETY.md, A3)
 NEVER = datetime.min.replace(tzinfo=UTC)
 
 
@@ -41,6 +40,7 @@ class Command(NamedTuple):
     at: datetime  # of the arrival, on the Rx clock
     age: float  # of the source time at arrival [s]
     name: str
+    clocks: str = ""  # which clock of another host is wrong
 
 
 Event = Tick | Presence | Command
@@ -91,6 +91,8 @@ def step(
             after = reject(topics.OPERATOR_PRESENCE, reason)
         case Presence(age=age):
             after = after._replace(seen=max(latch.seen, event.at - timedelta(seconds=max(age, 0.0))))
+        case Command(name=topics.TURN_ON, clocks=problem) if problem:
+            after = reject(topics.ENGINES, f"turn_on refused: {problem}")
         case Command(age=age, name=topics.TURN_ON) if abs(age) >= given.max_presence_age:
             after = reject(topics.ENGINES, f"turn_on refused: {age:.3f} s old")
         case Command(name=topics.TURN_ON) if unseen >= given.max_presence_age:
@@ -122,8 +124,11 @@ def wire(node: ServiceNode) -> None:
     # The arrival before the age: a pause in between must make a presence older, not younger.
     commands = node.observe(topics.ENGINES, timestamped=True).timestamp()
     presences = node.observe(topics.OPERATOR_PRESENCE).timestamp()
+    hosts = clocks.observe(node)
     states = engine_state(
-        commands.map(lambda it: Command(it.timestamp, node.age(it.value.timestamp), it.value.value)),
+        commands.map(
+            lambda it: Command(it.timestamp, node.age(it.value.timestamp), it.value.value, hosts.problem())
+        ),
         presences.map(lambda it: Presence(it.timestamp, node.age(it.value))),
         node.declare(Parameters),
     )

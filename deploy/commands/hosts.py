@@ -18,10 +18,9 @@ from deploy.running.errors import DeploymentError
 from deploy.running.sentinel import reported
 from deploy.running.supervisord import Program
 from deploy.running.system import System
+from interfaces.service.clocks import Clocks, difference
 from interfaces.service.health import Health, healths
 from interfaces.topics import DIAGNOSTICS
-from reactive_node import stamps
-from services.engine_controller import CLOCK_TOLERANCE
 
 LOOK = 2.0  # s before a start: each service reports its health once a second
 
@@ -32,27 +31,21 @@ class Hosts:
     def __init__(self, namespace: str) -> None:
         """:param namespace: that of the arm."""
         self._namespace = namespace.rstrip("/")
+        self._clocks = Clocks(namespace)
         self.healths: dict[tuple[str, str], Health] = {}
         """The latest health, by host and program."""
         self.processes: dict[str, Program] = {}
         """The processes as the sentinels see them, by program."""
-        self.ages: dict[str, float] = {}
-        """The least age of a report of each host at its arrival [s]: how far its clock is behind ours."""
 
     def hear(self, message: Any) -> None:
-        age = (stamps.now() - stamps.from_message(message.header.stamp)).total_seconds()
+        self._clocks.hear(message)
         for program, health in healths(message, self._namespace).items():
             self.healths[health.host, program] = health
-            self.ages[health.host] = min(age, self.ages.get(health.host, age))
         self.processes |= {program.name: program for program in reported(message, self._namespace)}
 
     def clocks(self) -> str:
         """Return a line for each other host with the difference of its clock."""
-        return "".join(
-            f"Host {host}: its clock is {_difference(age)} ours\n"
-            for host, age in sorted(self.ages.items())
-            if host != socket.gethostname()
-        )
+        return "".join(f"Clocks: {difference(*it)}\n" for it in self._clocks.behind().items())
 
     def check(self, ours: Mapping[int, str]) -> None:
         """Refuse a start beside these hosts.
@@ -68,16 +61,8 @@ class Hosts:
                     f"{program} runs on host {host} already, and a program runs on one host only: start the"
                     f" parts by HOST=robot and HOST=operator, or give this arm another {NAMESPACE}"
                 )
-        for host, age in sorted(self.ages.items()):
-            if abs(age) > CLOCK_TOLERANCE:
-                raise DeploymentError(
-                    f"The clock of host {host} is {_difference(age)} ours: synchronise both (NTP or PTP)"
-                )
-
-
-def _difference(age: float) -> str:
-    amount = f"{abs(age):.1f} s" if abs(age) >= 1.0 else f"{1000 * abs(age):.0f} ms"
-    return f"{amount} {'behind' if age > 0 else 'ahead of'}"
+        for host, behind in self._clocks.wrong().items():
+            raise DeploymentError(f"Clocks: {difference(host, behind)}; synchronise both (NTP or PTP)")
 
 
 @contextmanager

@@ -12,6 +12,8 @@ from reactivex import Observable
 
 from deploy.running.sentinel import reported
 from interfaces import topics
+from interfaces.service.clocks import difference
+from interfaces.service.clocks import reported as reported_clocks
 from interfaces.service.health import healths
 from reactive_node.stamps import Timestamp
 
@@ -94,6 +96,15 @@ class Lives(NamedTuple):
     """What was new in the latest message of ``/diagnostics``."""
 
 
+class Differences(NamedTuple):
+    """The clocks of other hosts."""
+
+    told: dict[str, int]
+    """By host, whether its clock was told to be right (0), behind (1) or ahead (-1)."""
+    new: list[Line]
+    """What was new in the latest message of ``/diagnostics``."""
+
+
 def line_batches(
     seen: Seen, own_turn_offs: Observable[Span], ticks: Observable[Any], namespace: str = "/"
 ) -> Observable[list[Line]]:
@@ -103,7 +114,7 @@ def line_batches(
     :param namespace: that of the arm; ``/diagnostics`` carries the health of all arms.
     """
     commands = engines(seen, own_turn_offs)
-    health = rx.merge(services(seen, namespace), deaths(seen, namespace), senders(seen, namespace))
+    health = rx.merge(*(told(seen, namespace) for told in (services, deaths, senders, clocks)))
     lines = rx.merge(measurements(seen), operator(seen), commands, health)
     batches: Observable[list[Line]] = lines.buffer(ticks).filter(bool)
     return batches.scan(next_batch, Batch(None, [])).map(lambda batch: batch.lines).filter(bool)
@@ -229,6 +240,23 @@ def deaths(seen: Seen, namespace: str) -> Observable[Line]:
 
     lives = seen(topics.DIAGNOSTICS).scan(compare, Lives({}, {}, {}, []))
     return lives.flat_map(lambda it: rx.from_iterable(it.new))
+
+
+def clocks(seen: Seen, namespace: str) -> Observable[Line]:
+    """By how much two clocks differ: when that is known, and when it begins or ends to matter."""
+
+    def compare(before: Differences, diagnostics: Timestamp[Any]) -> Differences:
+        told, new = dict(before.told), []
+        for host, (behind, other) in reported_clocks(diagnostics.value, namespace.rstrip("/")).items():
+            way = (behind > topics.CLOCK_TOLERANCE) - (behind < -topics.CLOCK_TOLERANCE)
+            if told.get(host) != way:
+                told[host] = way
+                text = difference(host, behind, f"that of {other}")
+                new.append(Line(diagnostics.timestamp, Kind.SERVICE, text))
+        return Differences(told, new)
+
+    differences = seen(topics.DIAGNOSTICS).scan(compare, Differences({}, []))
+    return differences.flat_map(lambda it: rx.from_iterable(it.new))
 
 
 def thinned(items: Observable[Timestamp[Any]], burst: int = BURST) -> Observable[Timestamp[Any]]:

@@ -7,9 +7,8 @@ from dataclasses import fields, replace
 from typing import Any, NamedTuple
 
 from interfaces.service import UserError
-from interfaces.topics import DRIVE_TIMEOUT
+from interfaces.topics import CLOCK_TOLERANCE, DRIVE_TIMEOUT
 from services import engine_controller, operator_watchdog
-from services.engine_controller import CLOCK_TOLERANCE
 
 DELAY = 0.05  # s of scheduling and transport on the way to the drive
 BEAT = 0.05  # s between two heartbeats of a switch

@@ -44,6 +44,8 @@ class HealthReporter:
         self._last_turn_off: float | None = None
         self.standing: Mapping[str, str] = {}
         """What each report warns of until it is changed: the reason by subject."""
+        self.facts: Mapping[str, str] = {}
+        """What each report tells besides until it is changed, by name."""
         self._remarks: dict[str, Counter[str]] = {}  # since the last report: subject, reason, how often
         self._logged: set[str] = set()  # the remarks of the last report
         self._parameters: dict[str, str] = {}
@@ -115,6 +117,7 @@ class HealthReporter:
             "dropped": self.dropped,
             _SINCE_OUTPUT: "" if self._last_output is None else f"{now - self._last_output:.3f}",
             **({} if self._last_turn_off is None else {_SINCE_TURN_OFF: f"{now - self._last_turn_off:.3f}"}),
+            **self.facts,
             **self._counts,
             **{f"{_REFUSED}{subject}": json.dumps(samples) for subject, samples in refused.items()},
             **self._parameters,

@@ -14,6 +14,7 @@ from sensor_msgs.msg import JointState
 
 from interfaces import service, topics
 from interfaces.service import Rejected, UserError
+from interfaces.topics import CLOCK_TOLERANCE
 from reactive_node import stamps
 
 # Remap this name to that of the robot's driver.
@@ -26,7 +27,6 @@ ROBOT_JOINTS = topics.Topic(
     ("joint_source",),
     "angles of its joints",
 )
-CLOCK_TOLERANCE = 0.05  # s that the clock of the driver's host may be ahead (deploy/SAFETY.md, A3)
 SILENCE = 1.0  # s without an angle, after which health tells so
 
 

@@ -55,14 +55,18 @@ def test_orphan_of_this_host_is_replaced_and_a_stranger_is_not() -> None:
     ("age", "words"), [(60.0, r"60\.0 s behind"), (-60.0, r"60\.0 s ahead of"), (0.08, "8. ms behind")]
 )
 def test_host_with_a_wrong_clock_is_refused(age: float, words: str) -> None:
-    with pytest.raises(DeploymentError, match=f"^The clock of host desk is {words} ours: synchronise both"):
-        heard(report("/sentinel_operator", "desk", age=age)).check({})
+    with pytest.raises(
+        DeploymentError, match=f"^Clocks: the clock of host desk is {words} ours; synchronise both"
+    ):
+        heard(*3 * [report("/sentinel_operator", "desk", age=age)]).check({})
 
 
 def test_least_age_of_a_report_tells_the_clock() -> None:
     hosts = heard(*(report("/sentinel_operator", "desk", age=age) for age in (0.3, 0.001, 0.2)))
     hosts.check({})
-    assert hosts.clocks() in [f"Host desk: its clock is {ms} ms behind ours\n" for ms in range(1, 20)]
+    assert hosts.clocks() in [
+        f"Clocks: the clock of host desk is {ms} ms behind ours\n" for ms in range(1, 20)
+    ]
 
 
 def test_own_clock_is_not_shown() -> None:

@@ -59,6 +59,7 @@ def test_service_reads_and_publishes_what_the_contract_says(
     monkeypatch.setattr(service, "run", run)
     monkeypatch.setattr(sys, "argv", [program.module, *program.arguments])
     monkeypatch.setenv(processes.MARK, str(tmp_path))
+    monkeypatch.setenv(manifest.HOST, manifest.ROBOT)  # of two hosts, each has a clock
     with pytest.raises(Started):
         runpy.run_path(importlib.import_module(program.module).__file__ or "", run_name="__main__")
     scenario = tmp_path / "scenario.yaml"

@@ -9,10 +9,9 @@ from hypothesis import strategies as st
 from reactivex.testing import ReactiveTest, TestScheduler
 
 from interfaces.service import Rejected
-from interfaces.topics import DRIVE_TIMEOUT, OFF, ON, TURN_OFF, TURN_ON
+from interfaces.topics import CLOCK_TOLERANCE, DRIVE_TIMEOUT, OFF, ON, TURN_OFF, TURN_ON
 from reactive_node.stamps import Timestamp
 from services.engine_controller import (
-    CLOCK_TOLERANCE,
     NEVER,
     Command,
     Event,
@@ -39,8 +38,8 @@ def presence(age: float) -> Presence:
     return Presence(at_time(NOW), age)
 
 
-def command(name: str, age: float = 0.0) -> Command:
-    return Command(at_time(NOW), age, name)
+def command(name: str, age: float = 0.0, clocks: str = "") -> Command:
+    return Command(at_time(NOW), age, name, clocks)
 
 
 NOW = 100.0
@@ -55,6 +54,7 @@ TICK = Tick(at_time(NOW))
         (OFF_AND_SEEN, TICK, latch(OFF, 99.5, NOW, OFF)),
         (ON_AND_SEEN, TICK, latch(ON, 99.5, NOW, ON)),
         (ON_AND_SEEN, command(TURN_OFF), latch(OFF, 99.5, NOW, OFF)),
+        (ON_AND_SEEN, command(TURN_OFF, clocks="one is wrong"), latch(OFF, 99.5, NOW, OFF)),
         (ON_AND_SEEN, command(TURN_OFF, 99.0), latch(OFF, 99.5, NOW, OFF)),
         (OFF_AND_SEEN, command(TURN_ON), latch(ON, 99.5, NOW, ON)),
         (OFF_AND_SEEN, command(TURN_OFF), OFF_AND_SEEN),
@@ -82,6 +82,7 @@ def test_step(before: Latch, event: Event, after: Latch) -> None:
     [
         (OFF_AND_SEEN, command(TURN_ON, 1.0), "engines", "turn_on refused: 1.000 s old"),
         (OFF_AND_SEEN, command(TURN_ON, -1.0), "engines", "turn_on refused: -1.000 s old"),
+        (OFF_AND_SEEN, command(TURN_ON, -1.0, "one is wrong"), "engines", "turn_on refused: one is wrong"),
         (latch(OFF, None, 99.9), command(TURN_ON), "engines", "turn_on refused: no operator seen yet"),
         (
             latch(OFF, 99.0, 99.9),

@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 from std_msgs.msg import Header, String
 
+from interfaces.service.clocks import Clocks
 from interfaces.topics import ENGINES, ENGINES_STATE, OFF, ON, OPERATOR_PRESENCE, TURN_OFF, TURN_ON
 from reactive_node import stamps
 from reactive_node.testing import MakeNode, SpinUntil
@@ -103,6 +104,17 @@ def test_engines_turn_off_after_the_timeout_of_the_parameter(wired: Any) -> None
     controller.spin_until(lambda: controller.states[-1:] == [OFF], 5.0)
 
     assert controller.remarks() == []
+
+
+def test_turn_on_is_refused_while_the_clock_of_another_host_is_wrong(
+    wired: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    controller = wired()
+    controller.see()
+    monkeypatch.setattr(Clocks, "problem", lambda _: "the clock of host desk is wrong")
+    controller.command(TURN_ON)
+
+    assert controller.await_rejection() == "engines: turn_on refused: the clock of host desk is wrong"
 
 
 def test_turn_on_that_waited_is_refused(wired: Any, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -247,6 +247,30 @@ def test_new_complaint_of_a_service_is_shown_once(play: Play) -> None:
     assert texts(play(script)) == ["velocity: bad", "velocity: worse", "velocity: worse"]
 
 
+def test_clock_of_another_host_is_shown_when_it_is_known_and_when_that_matters(play: Play) -> None:
+    def clocks(time: float, behind: str, name: str = "/engine_controller") -> Message:
+        values = [KeyValue(key="clock of host desk", value=behind)]
+        status = DiagnosticStatus(name=name, hardware_id="robot1", values=values)
+        return time, topics.DIAGNOSTICS, DiagnosticArray(status=[status])
+
+    script = [
+        clocks(1.0, "9.0", name="/arm2/engine_controller"),
+        clocks(2.0, "0.003"),
+        clocks(3.0, "0.01"),
+        clocks(4.0, "-0.06"),
+        clocks(5.0, "-60.0"),
+        clocks(6.0, "?"),
+        clocks(7.0, "60.0"),
+        clocks(8.0, "0.0"),
+    ]
+    assert [(line.time.timestamp(), line.text) for line in play(script)] == [
+        (2.0, "the clock of host desk is 3 ms behind that of robot1"),
+        (4.0, "the clock of host desk is 60 ms ahead of that of robot1"),
+        (7.0, "the clock of host desk is 60.0 s behind that of robot1"),
+        (8.0, "the clock of host desk is 0 ms ahead of that of robot1"),
+    ]
+
+
 def processes(time: float, restarts: int, pid: int, age: float = 0.25) -> Message:
     """What the sentinel tells; the process is `age` old, and there was none for 0.05 s before."""
     state = "RUNNING" if pid else "BACKOFF"

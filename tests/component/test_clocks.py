@@ -1,0 +1,100 @@
+"""The clocks of other hosts, by the health reports of their services."""
+
+from __future__ import annotations
+
+import socket
+from datetime import timedelta
+from typing import Any
+
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+
+from interfaces.service import ServiceNode, clocks
+from interfaces.service.clocks import Clocks
+from interfaces.topics import DIAGNOSTICS
+from reactive_node import stamps
+from reactive_node.testing import MakeNode, SpinUntil
+
+
+def report(age: float, host: str = "desk", name: str = "/dead_mans_switch") -> DiagnosticArray:
+    """Return a health report that was sent ``age`` seconds ago."""
+    values = [KeyValue(key=key, value="1") for key in ("pid", "published")]
+    message = DiagnosticArray(status=[DiagnosticStatus(name=name, hardware_id=host, values=values)])
+    message.header.stamp = stamps.to_message(stamps.now() - timedelta(seconds=age))
+    return message
+
+
+def heard(*reports: DiagnosticArray) -> Clocks:
+    found = Clocks("/")
+    for each in reports:
+        found.hear(each)
+    return found
+
+
+def test_least_age_of_three_reports_tells_the_clock() -> None:
+    assert heard(report(9.0), report(7.0)).behind() == {}
+    assert heard(report(9.0), report(7.0), report(8.0)).behind() == {"desk": pytest.approx(7.0, abs=0.5)}
+
+
+@pytest.mark.parametrize("others", [{"host": socket.gethostname()}, {"host": ""}, {"name": "/arm2/velocity"}])
+def test_this_host_and_those_of_other_arms_are_no_other_hosts(others: dict[str, str]) -> None:
+    assert heard(*(report(9.0, **others) for _ in range(3))).behind() == {}
+
+
+def test_host_that_has_not_reported_for_three_seconds_has_no_clock(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = heard(*(report(9.0) for _ in range(3)))
+    now = clocks.time.monotonic()
+    monkeypatch.setattr(clocks.time, "monotonic", lambda: now + 2.9)
+    assert found.behind()
+    monkeypatch.setattr(clocks.time, "monotonic", lambda: now + 3.1)
+    assert found.behind() == {}
+
+
+@pytest.mark.parametrize(
+    ("age", "words"),
+    [
+        (9.0, "the clock of host desk is more than 50 ms behind ours"),
+        (-9.0, "the clock of host desk is more than 50 ms ahead of ours"),
+        (0.0, ""),
+    ],
+)
+def test_clock_that_differs_by_more_than_the_tolerance_is_a_problem(age: float, words: str) -> None:
+    assert heard(*(report(age) for _ in range(3))).problem() == words
+
+
+@pytest.mark.parametrize(
+    ("behind", "words"), [(0.003, "3 ms behind"), (-0.08, "80 ms ahead of"), (60.0, "60.0 s behind")]
+)
+def test_difference_is_told_in_words(behind: float, words: str) -> None:
+    assert clocks.difference("desk", behind) == f"the clock of host desk is {words} ours"
+
+
+@pytest.mark.parametrize(("age", "problem"), [(9.0, "clocks: the clock of host desk is"), (0.0, "")])
+def test_service_reports_the_clocks(
+    make_node: MakeNode, spin_until: SpinUntil, monkeypatch: pytest.MonkeyPatch, age: float, problem: str
+) -> None:
+    monkeypatch.setenv(clocks.HOST, "robot")
+    node: ServiceNode = make_node("service", kind=ServiceNode)
+    found = clocks.observe(node)
+    published: list[Any] = []
+    publisher = make_node("desk").create_publisher(DIAGNOSTICS.type, DIAGNOSTICS.name, DIAGNOSTICS.qos)
+
+    def is_known() -> bool:
+        publisher.publish(report(age))
+        return bool(found.behind())
+
+    spin_until(is_known)
+    monkeypatch.setattr(node.health._publisher, "publish", published.append)
+    node.health.report()
+    assert published[0].status[0].message.startswith(problem or "running")
+    assert clocks.reported(published[0], "") == {"desk": (pytest.approx(age, abs=1.0), socket.gethostname())}
+    assert clocks.reported(published[0], "/arm2") == {}
+
+
+def test_service_of_a_single_host_hears_no_reports(
+    make_node: MakeNode, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv(clocks.HOST, raising=False)
+    node: ServiceNode = make_node("service", kind=ServiceNode)
+    clocks.observe(node)
+    assert DIAGNOSTICS.name not in [each.topic_name for each in node.subscriptions]
