@@ -1,55 +1,111 @@
-"""An arm on two hosts: network namespaces with host names of their own, and a line between them."""
+"""An arm on two hosts: network namespaces with host names of their own, and a line between them.
+
+On the embedded rclpy, its processes have keys, if there is a Cyclone DDS with security.
+"""
 
 from __future__ import annotations
 
+import os
+import platform
 import re
+import shutil
+import signal
 import subprocess
+import sys
 import time
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, closing
+from collections.abc import Iterator
+from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 
 import pytest
 
 from deploy.running import manifest
+from deploy.trials.chaos import clock
+from deploy.trials.chaos.faults import INJECTED
 from deploy.trials.chaos.partition import BRIDGE, CONTROL, NETWORK, ROBOT, missing, namespaces
-from tests.system.sites import LIMIT, Command, Site
+from tests.system.sites import LIMIT, ROOT, Command, Site
 
-OFF_WITHIN = 15.0  # s: S1's 10.5 s, and the way to the terminal of a busy machine
+TABLET = "tablet"
+SECURITY = Path(f"/usr/lib/{platform.machine()}-linux-gnu/libddsc.so.0debian")
+KEYS = {"ROS_SECURITY_ENABLE": "true"} if os.environ.get("RUNTIME") and SECURITY.exists() else {}
+OPERATORS_KEYS = "dead_mans_switch operator_page sentinel_operator terminal"  # as deploy/README.md has it
+ADDRESSES = {host: f"{NETWORK}.{number}" for number, host in enumerate((ROBOT, CONTROL, TABLET), start=1)}
+PARAMETERS = f"""
+operator_watchdog: {{ros__parameters: {{silence: 1.5, strikes: 1}}}}
+engine_controller: {{ros__parameters: {{presence_timeout: 5.0, max_presence_age: 0.9}}}}
+operator_page:
+  ros__parameters: {{address: 0.0.0.0, names: {ADDRESSES[CONTROL]}, certificate: page.pem, key: page.key}}
+"""
+OFF_WITHIN = 15.0  # s: these parameters allow less than 6 s; the rest is for a busy machine
 AS_HOST = 'hostname "$0" && exec "$@"'
+HOLD_ON_PAGE = """
+import ssl, sys, time
+from tests.operator.page.clients import Hand
+
+hand = Hand(sys.argv[1], ssl.create_default_context(cafile=sys.argv[2]))
+while True:
+    if hand.shown.get("switch", {}).get("by") != "this_page":
+        hand.press()
+    hand.say("engines", command="turn_on")
+    time.sleep(1.0)
+"""
 
 
 class Host:
-    """One of the two hosts."""
+    """One of the hosts."""
 
     def __init__(self, name: str, namespace: str, site: Site) -> None:
         self.name = name
         self.site = site
+        self.keys = site.run.parent / f"keys_{name}"
         self._within = ["ip", "netns", "exec", namespace]
 
     def begin(self, *arguments: str, **environment: str) -> Command:
         """Begin a command of `make` on this host."""
+        return self.begin_command(*self.site._command(arguments), **environment)
+
+    def begin_command(self, *command: str, **environment: str) -> Command:
         within = [*self._within, "unshare", "--uts", "sh", "-c", AS_HOST, f"{self.name}-host"]
-        own = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET", manifest.HOST: self.name}
-        command = [*within, *self.site._command(arguments)]
-        return self.site.begin_alone(command, self.site.environment | own | environment)
+        own = KEYS | {
+            "ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET",
+            "ROS_SECURITY_KEYSTORE": str(self.keys),
+            manifest.HOST: self.name,
+        }
+        return self.site.begin_alone([*within, *command], self.site.environment | own | environment)
 
     def do(self, *arguments: str, **environment: str) -> str:
         command = self.begin(*arguments, **environment)
         assert command.wait() == 0, command.output
         return command.output
 
-    def ip(self, *arguments: str) -> None:
-        subprocess.run([*self._within, "ip", *arguments], check=True)
+    def beside(self, run: Path) -> Host:
+        """Return the same host with another run directory."""
+        return Host(self.name, self._within[-1], Site(run, self.site.domain))
+
+    def die(self) -> None:
+        """Kill all processes of the arm on this host."""
+        self.site._commands.close()
+        while members := self.site.members:
+            for pid in members.values():
+                os.kill(pid, signal.SIGKILL)
 
 
 class Arm:
-    """The arm on both hosts, with its operator's terminal."""
+    """The arm on both hosts, with a terminal on each."""
 
-    def __init__(self, robot: Host, operator: Host, cut: Callable[[str], None]) -> None:
-        self.robot, self.operator, self.cut = robot, operator, cut
-        self.started = robot.do("start", "demo")
-        self.terminal = operator.begin("run", "demo")
+    def __init__(self, hosts: dict[str, Host], bridge: str, parameters: Path) -> None:
+        self.robot, self.operator, self.tablet = hosts.values()
+        self.parameters = parameters
+        self._bridge = bridge
+        if KEYS:
+            self.robot.do("keystore", str(self.operator.keys), OPERATORS_KEYS)
+        self.robot.do("start", "demo", str(parameters))
+        self.view = self.robot.begin("terminal")
+        self.start_operator()
+
+    def start_operator(self, **environment: str) -> None:
+        """Start the operator's side, with its terminal."""
+        self.terminal = self.operator.begin("run", "demo", str(self.parameters), **environment)
         self.terminal.await_line("Lines that come too fast", 2 * LIMIT)
 
     def turn_on(self) -> None:
@@ -59,30 +115,56 @@ class Arm:
             assert time.monotonic() < deadline, self.terminal.output
             self.terminal.type("press\nturn_on\n")
             time.sleep(1.0)
+        self._shown = len(self.view.lines)
 
     @property
     def is_on(self) -> bool:
-        """Whether the engines are on, as the terminal has shown last."""
-        return re.findall(r"Engines are (\w+)", self.terminal.output)[-1:] == ["on"]
+        """Whether the engines are on, as the robot's terminal has shown last."""
+        return re.findall(r"Engines are (\w+)", self.view.output)[-1:] == ["on"]
+
+    def await_off(self) -> None:
+        """Wait until the engines have gone off after :meth:`turn_on`."""
+        self.view.await_line("Engines are off", OFF_WITHIN, self._shown)
+
+    @contextmanager
+    def cut(self) -> Iterator[None]:
+        """Cut the operator's host off."""
+        link = ["ip", "-n", self._bridge, "link", "set", CONTROL]
+        subprocess.run([*link, "down"], check=True)
+        try:
+            yield
+        finally:
+            subprocess.run([*link, "up"], check=True)
+
+    @contextmanager
+    def cut_to(self, host: str) -> Iterator[None]:
+        """Lose what is sent to a host, and nothing else: its port of the bridge has a queue of no length."""
+        queue = ["tc", "-n", self._bridge, "qdisc"]
+        subprocess.run([*queue, "replace", "dev", host, "root", "pfifo", "limit", "0"], check=True)
+        try:
+            yield
+        finally:
+            subprocess.run([*queue, "delete", "dev", host, "root"], check=True)
 
 
 @pytest.fixture(scope="module")
 def arm(tmp_path_factory: pytest.TempPathFactory, module_domain_id: int) -> Iterator[Arm]:
-    if reason := missing():
-        pytest.skip(reason)
+    if reason := missing() or ("" if shutil.which("openssl") else "there is no openssl for a certificate"):
+        pytest.skip(f"platform: {reason}")
     base = tmp_path_factory.mktemp("hosts")
+    parameters = base / "parameters.yaml"
+    parameters.write_text(PARAMETERS)
+    kind = ["-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes", "-days", "2"]
+    subject = ["-subj", "/CN=arm", "-addext", f"subjectAltName=IP:{ADDRESSES[CONTROL]}"]
+    files = ["-out", "page.pem", "-keyout", "page.key"]
+    subprocess.run(["openssl", "req", *kind, *subject, *files], check=True, capture_output=True, cwd=base)
     with ExitStack() as stack:
-        full = stack.enter_context(namespaces())
-        hosts = [
-            Host(name, full(name), stack.enter_context(closing(Site(base / name, module_domain_id))))
-            for name in (ROBOT, CONTROL)
-        ]
-
-        def cut(state: str) -> None:
-            link = ["ip", "-n", full(BRIDGE), "link", "set", CONTROL, state]
-            subprocess.run(link, check=True)
-
-        yield Arm(hosts[0], hosts[1], cut)
+        full = stack.enter_context(namespaces(ROBOT, CONTROL, TABLET))
+        hosts = {
+            name: Host(name, full(name), stack.enter_context(closing(Site(base / name, module_domain_id))))
+            for name in ADDRESSES
+        }
+        yield Arm(hosts, full(BRIDGE), parameters)
 
 
 def test_each_host_runs_its_programs_and_a_sentinel(arm: Arm) -> None:
@@ -92,7 +174,7 @@ def test_each_host_runs_its_programs_and_a_sentinel(arm: Arm) -> None:
 
 
 def test_second_start_tells_the_difference_of_the_clocks(arm: Arm) -> None:
-    shown = arm.terminal.await_line(r"^Host robot-host: its clock is (\d+) ms (behind|ahead of) ours$")
+    shown = arm.terminal.await_line(r"^Clocks: the clock of host robot-host is (\d+) ms \w.* ours$")
     assert int(shown[1]) <= 50
 
 
@@ -113,39 +195,117 @@ def test_status_of_each_host_shows_both(arm: Arm, name: str) -> None:
         (CONTROL, "sentinel_operator"),
     }
     other = {ROBOT: CONTROL, CONTROL: ROBOT}[name]
-    assert re.search(rf"^Host {other}-host: its clock is \d+ ms ", printed, re.MULTILINE), printed
+    assert re.search(rf"^Clocks: the clock of host {other}-host is \d+ ms ", printed, re.MULTILINE), printed
 
 
-@pytest.mark.parametrize("part", ["", ROBOT])
-def test_program_is_not_started_on_a_second_host(arm: Arm, part: str, tmp_path: Path) -> None:
-    with closing(Site(tmp_path / "run", arm.robot.site.domain)) as site:
-        # Another network namespace has other claims of its own.
-        third = Host(CONTROL, arm.operator._within[-1], site)
-        command = third.begin("start", "demo", **{manifest.HOST: part})
+@pytest.mark.parametrize(
+    ("part", "words"),
+    [("", r"^ROS domain \d+ is in use"), (CONTROL, "^dead_mans_switch runs on host operator-host already")],
+)
+def test_program_is_not_started_on_a_second_host(arm: Arm, part: str, words: str) -> None:
+    second = arm.robot.beside(arm.robot.site.run.with_name("second"))
+    with closing(second.site):
+        command = second.begin("start", "demo", **{manifest.HOST: part})
         assert command.wait() == 1
-        assert site.members == {}
-    assert re.search(r"^\w+ (runs on host \w+-host already|already runs)|is in use", command.output, re.M)
+        assert second.site.members == {}
+    assert re.search(words, command.output, re.MULTILINE)
 
 
 def test_short_cut_keeps_the_engines_on_and_a_release_stops_them(arm: Arm) -> None:
     arm.turn_on()
-    shown = len(arm.terminal.lines)
-    arm.cut("down")
-    time.sleep(0.2)
-    arm.cut("up")
+    with arm.cut():
+        time.sleep(0.2)
     time.sleep(2.0)
     assert arm.is_on
     arm.terminal.type("release\n")
-    arm.terminal.await_line("Engines are off", OFF_WITHIN, shown)
+    arm.await_off()
 
 
 def test_operator_who_is_heard_no_more_stops_the_engines(arm: Arm) -> None:
     arm.turn_on()
-    shown = len(arm.terminal.lines)
-    # Only the way from the operator to the robot is cut: the terminal still shows the robot.
-    arm.operator.ip("route", "add", "blackhole", f"{NETWORK}.1")
-    try:
-        arm.terminal.await_line("Engines are off", OFF_WITHIN, shown)
-    finally:
-        arm.operator.ip("route", "del", "blackhole", f"{NETWORK}.1")
+    with arm.cut_to(ROBOT):
+        arm.await_off()
+
+
+def test_operator_who_hears_nothing_stops_the_engines_by_a_release(arm: Arm) -> None:
+    arm.turn_on()
+    with arm.cut_to(CONTROL):
+        arm.terminal.type("release\n")
+        arm.await_off()
+
+
+def test_long_cut_stops_the_engines_until_they_are_turned_on(arm: Arm) -> None:
+    arm.turn_on()
+    with arm.cut():
+        time.sleep(11.0)
+        arm.await_off()
+    time.sleep(2.0)
+    assert not arm.is_on
+    arm.turn_on()
+
+
+def test_page_on_a_third_host_holds_the_switch_by_tls(arm: Arm) -> None:
+    arm.turn_on()
+    arm.terminal.type("release\n")
+    arm.await_off()
+    shown = len(arm.view.lines)
+    line = next(text for _, text in arm.terminal.lines if text.startswith("The page: "))
+    assert line.startswith(f"The page: https://{ADDRESSES[CONTROL]}:")
+    command = [sys.executable, "-c", HOLD_ON_PAGE, line, str(arm.parameters.parent / "page.pem")]
+    tablet = arm.tablet.begin_command(*command, PYTHONPATH=os.pathsep.join([str(ROOT), *sys.path]))
+    arm.view.await_line("Engines are on", LIMIT, shown)
+    shown = len(arm.view.lines)
+    tablet.close()
+    arm.view.await_line("Engines are off", OFF_WITHIN, shown)
+
+
+def test_host_that_dies_stops_the_engines(arm: Arm) -> None:
+    arm.turn_on()
+    arm.operator.die()
+    arm.await_off()
+
+
+# A wrong clock
+
+
+def set_clock(host: Host, ahead: float) -> None:
+    """Set the time of day of a host that has been started with :func:`faked` [s]."""
+    file = host.site.run.parent / "ahead"
+    new = file.with_suffix(".new")
+    new.write_text(f"{ahead:+.3f}\n")
+    new.replace(file)
+
+
+@pytest.fixture
+def faked(arm: Arm) -> Iterator[dict[str, str]]:
+    """The environment of processes of the operator's host whose clock can be set."""
+    if reason := clock.missing():
+        pytest.skip(f"platform: {reason}")
+    with clock.faked() as environment:
+        yield environment | {
+            "FAKETIME_TIMESTAMP_FILE": str(arm.operator.site.run.parent / "ahead"),
+            "PYTHONPATH": str(INJECTED),
+        }
+
+
+def test_host_with_a_wrong_clock_moves_nothing(arm: Arm, faked: dict[str, str]) -> None:
+    arm.operator.die()
+    set_clock(arm.operator, 60.0)
+    refused = arm.operator.begin("start", "demo", str(arm.parameters), **faked)
+    assert refused.wait() == 1
+    assert re.search(
+        r"^Clocks: the clock of host robot-host is [56].\.\d s behind ours;", refused.output, re.M
+    )
+
+    set_clock(arm.operator, 0.0)
+    arm.start_operator(**faked)
+    arm.turn_on()
+    set_clock(arm.operator, 60.0)
+    arm.await_off()
+    set_clock(arm.operator, -0.2)
+    arm.view.await_line(r"the clock of host operator-host is 2\d\d ms behind that of robot-host")
+    words = "turn_on refused: the clock of host operator-host is more than 50 ms behind ours"
+    arm.terminal.insist("press\nturn_on\n", words)
+    assert not arm.is_on
+    set_clock(arm.operator, 0.0)
     arm.turn_on()

@@ -59,23 +59,25 @@ def missing(scenario: str = "partition") -> str:
 
 
 @contextmanager
-def namespaces() -> Iterator[Callable[[str], str]]:
-    """Create the hosts and the bridge; give a function that returns the full name of each.
+def namespaces(*hosts: str) -> Iterator[Callable[[str], str]]:
+    """Create hosts, by default the two, and the bridge; give a function that returns the full name of each.
 
     Namespaces that a killed chaos monkey left behind are deleted first.
     """
+
+    hosts = hosts or (ROBOT, CONTROL)
 
     def full(name: str) -> str:
         return f"arm{os.getpid()}-{name}"
 
     _delete_abandoned()
     with ExitStack() as stack:
-        for name in (BRIDGE, ROBOT, CONTROL):
+        for name in (BRIDGE, *hosts):
             _ip("netns", "add", full(name))
             stack.callback(_ip, "netns", "delete", full(name))
         _ip("-n", full(BRIDGE), "link", "add", "bridge", "type", "bridge")
         _ip("-n", full(BRIDGE), "link", "set", "bridge", "up")
-        for number, name in enumerate((ROBOT, CONTROL), start=1):
+        for number, name in enumerate(hosts, start=1):
             pair = ("link", "add", "eth0", "type", "veth", "peer", "name", name, "netns", full(BRIDGE))
             _ip("-n", full(name), *pair)
             _ip("-n", full(name), "address", "add", f"{NETWORK}.{number}/24", "dev", "eth0")

@@ -187,9 +187,9 @@ class Link:
 class Hand:
     """A page whose button a thread holds, without the safeguards of the real page."""
 
-    def __init__(self, line: str, link: Link | None = None) -> None:
+    def __init__(self, line: str, tls: ssl.SSLContext | None = None, *, link: Link | None = None) -> None:
         """:param line: the line that tells the address of the page."""
-        host, _, token = line.removeprefix("The page: http://").partition("/#")
+        origin, _, token = line.removeprefix("The page: ").partition("/#")
         self.shown: dict[str, Any] = {}
         self.refused: list[Any] = []
         self.is_connected = True
@@ -197,7 +197,11 @@ class Hand:
         self._nonce = ""
         self._holds = False
         self._connection = connect(
-            f"ws://{host}/socket", origin=Origin(f"http://{host}"), compression=None, sock=link and link.end
+            f"{origin.replace('http', 'ws', 1)}/socket",
+            origin=Origin(origin),
+            compression=None,
+            sock=link and link.end,
+            ssl=tls,
         )
         self._connection.__enter__()
         self._connection.send(json.dumps({"type": "hello", "token": token}))

@@ -213,7 +213,7 @@ def test_paused_page_program_holds_nothing_when_it_goes_on(
 
 def test_beats_behind_a_stalled_link_count_for_nothing(observer: Observer, address: str) -> None:
     link = Link(int(address.partition("127.0.0.1:")[2].partition("/")[0]))
-    with closing(Hand(address, link)) as hand:
+    with closing(Hand(address, link=link)) as hand:
         observer.until(lambda: "processes" in hand.shown)
         hold(hand, observer)
         link.stall()
