@@ -103,6 +103,14 @@ def test_s1_operator_who_is_never_silent_is_no_case() -> None:
     assert found == Finding("S1", 0, "off within 0.25 s, allowed 10.5 s", [], worst=0.25)
 
 
+def test_s1_tells_the_longest_time_with_and_without_faults() -> None:
+    heartbeats = [*steps(1, 2), *steps(15, 16), (36.0, True)]
+    states = engines((1.0, ON), (12.0, OFF), (15.0, ON), (25.5, OFF))
+    assert CHECKERS["S1"](history(heartbeats=heartbeats, states=states)) == Finding(
+        "S1", 2, "off within 10.00 s, allowed 10.5 s; undisturbed 10.00 s, allowed 10.05 s", [], worst=10.0
+    )
+
+
 def test_s1_evidence_has_the_moment_of_the_violation() -> None:
     states = engines((1.0, ON), (1.5, OFF), (5.0, ON), (17.0, OFF))
     assert CHECKERS["S1"](history(heartbeats=[(5.0, True)], states=states, faults=STOPPED)) == Finding(
@@ -149,6 +157,13 @@ def test_s1_silence_begins_after_an_overload_at_the_latest(
     assert all(each.time == off - lasted + 10.5 for each in found.evidence if not overloads)
     assert (found.cases, found.unknown) == ((1, 0) if is_known else (0, 1))
     assert found.worst == (lasted if is_known else 0.0)
+
+
+def test_s1_counts_each_silence_that_an_overload_leaves_unknown() -> None:
+    states = engines((2.0, ON), (13.0, OFF), (20.0, ON), (31.0, OFF))
+    faults = [overload(2.0, 2.5), overload(20.0, 20.5), *STOPPED]
+    found = CHECKERS["S1"](history(heartbeats=[(2.0, True), (20.0, True)], states=states, faults=faults))
+    assert (found.cases, found.unknown, found.evidence) == (0, 2, [])
 
 
 def test_s1_first_sign_of_life_may_have_been_missed_in_an_overload() -> None:
