@@ -6,7 +6,7 @@ import { byId, create, setAttributes, setNote, setText } from "./dom.js";
 import { duration, sentence } from "./format.js";
 
 const REMEMBERED = 20; // s for which a row tells that its process came back
-const UNSEEN = { process: null, goodUntil: null, downSince: null, back: null };
+const UNSEEN = { process: null, goodPid: null, isDown: false, backAt: null };
 const ACTIONS = {
   kill: "Kill",
   stop: "Stop",
@@ -84,12 +84,14 @@ export class Processes {
 
   _update(entry, process, time) {
     const isGood = process.ok && process.state === "RUNNING";
-    if (!isGood) entry.downSince ??= entry.goodUntil;
-    else if (entry.downSince !== null) this._healed(entry, process, time - entry.downSince, time);
-    else if (entry.goodUntil !== null && entry.process.pid !== process.pid) {
-      this._healed(entry, process, time - entry.goodUntil, time);
+    if (isGood) {
+      if (entry.goodPid !== null && (entry.isDown || entry.goodPid !== process.pid)) {
+        entry.backAt = time;
+        announce(`${process.name} is back.`);
+      }
+      entry.goodPid = process.pid;
     }
-    if (isGood) entry.goodUntil = time;
+    entry.isDown = !isGood && entry.goodPid !== null;
     if (process !== entry.process) {
       setAttributes(entry.row, { "data-ok": process.ok ? "yes" : "no", "data-state": process.state.toLowerCase() });
       setAttributes(entry.sign, { "data-sign": isGood ? "good" : process.state === "STARTING" ? "warn" : "bad" });
@@ -97,16 +99,10 @@ export class Processes {
       setText(entry.restarts, String(process.restarts));
       setText(entry.output, process.since_output === null ? "–" : `${duration(process.since_output)} ago`);
     }
-    const isBack = entry.back && time - entry.back.time < REMEMBERED;
+    const isBack = entry.backAt !== null && time - entry.backAt < REMEMBERED;
     setAttributes(entry.row, { "data-back": isBack ? "yes" : null });
-    setText(entry.health, isBack && process.ok ? `back after ${duration(entry.back.after)}` : complaint(process));
+    setText(entry.health, isBack && process.ok ? "is back" : complaint(process));
     entry.process = process;
-  }
-
-  _healed(entry, process, after, time) {
-    entry.back = { time, after };
-    entry.downSince = null;
-    announce(`${process.name} is back after ${duration(after)}.`);
   }
 
   _act(name, action) {
