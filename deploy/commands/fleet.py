@@ -14,6 +14,7 @@ import time
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from itertools import count
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import rclpy
@@ -39,6 +40,7 @@ from deploy.running.environment import (
     tagged,
 )
 from deploy.running.errors import DeploymentError
+from deploy.security.keystore import Keystore
 from interfaces.service import UserError, enclave
 from interfaces.topics import DIAGNOSTICS, ENGINES_STATE, FLEET, Topic
 from reactive_node import ReactiveNode
@@ -140,12 +142,14 @@ def _joined(domain: Domain, number: int) -> Iterator[ReactiveNode]:
     os.environ |= settings
     context = Context()
     try:
+        if settings[SECURITY]:
+            Keystore(Path(settings[KEYSTORE])).check([enclave.path(FLEET, "/")], domain.number)
         keys = enclave.arguments(FLEET, "/")
         rclpy.init(
             args=keys, context=context, domain_id=number, signal_handler_options=SignalHandlerOptions.NO
         )
         node = ReactiveNode(f"{FLEET}_{os.getpid()}", context=context)
-    except (RuntimeError, UserError) as error:
+    except (DeploymentError, RuntimeError, UserError) as error:
         raise DeploymentError(f"Cannot join ROS domain {domain.number}: {error}") from None
     finally:
         os.environ.clear()

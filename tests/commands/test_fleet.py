@@ -15,6 +15,8 @@ from deploy.commands.fleet import Domain, Place, places
 from deploy.running import processes
 from deploy.running.environment import CYCLONEDDS, set_middleware
 from deploy.running.errors import DeploymentError
+from deploy.security import rights
+from deploy.security.keystore import Keystore
 from reactive_node.domains import reserved_domain
 
 LIMIT = 30.0  # s
@@ -104,6 +106,19 @@ def test_domain_that_cannot_be_joined_hides_no_other(domain: int, capfd: pytest.
         assert "NOWHERE" in capfd.readouterr().out
         with pytest.raises(DeploymentError, match=f"^Cannot join ROS domain {domain}: .*NOWHERE"):
             fleet._nodes(stack, [bad])
+
+
+def test_arm_whose_keystore_has_no_fleet_is_told(tmp_path: Path) -> None:
+    keystore = tmp_path / "keys"
+    where = Domain(5, (("ROS_SECURITY_ENABLE", "true"), ("ROS_SECURITY_KEYSTORE", str(keystore))))
+    with ExitStack() as stack:
+        with pytest.raises(
+            DeploymentError, match=f"^Cannot join ROS domain 5: {keystore} is no keystore: make"
+        ):
+            fleet._nodes(stack, [where])
+        Keystore(keystore).write({"/terminal": rights.observer("/", "terminal")}, [5])
+        with pytest.raises(DeploymentError, match=f"{keystore} has no keys for /fleet: make keystore$"):
+            fleet._nodes(stack, [where])
 
 
 def test_arms_of_this_host_and_named_ones_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
