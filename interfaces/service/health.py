@@ -13,6 +13,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
+from datetime import UTC, datetime
 from typing import Any, NamedTuple
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -20,6 +21,7 @@ from rclpy.clock import Clock, ClockType
 from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.node import Node
 
+from interfaces.service.enclave import Keys
 from interfaces.topics import DIAGNOSTICS
 
 PERIOD = 1.0  # [s]
@@ -46,6 +48,8 @@ class HealthReporter:
         """What each report warns of until it is changed: the reason by subject."""
         self.facts: Mapping[str, str] = {}
         """What each report tells besides until it is changed, by name."""
+        self.keys: Keys | None = None
+        """Those with which the process has joined: each report warns of their end, if that is soon."""
         self._remarks: dict[str, Counter[str]] = {}  # since the last report: subject, reason, how often
         self._logged: set[str] = set()  # the remarks of the last report
         self._parameters: dict[str, str] = {}
@@ -101,9 +105,12 @@ class HealthReporter:
     def report(self) -> None:
         """Publish the health, with all remarks since the last report."""
         remarks, self._remarks = self._remarks, {}
+        standing = dict(self.standing)
+        if self.keys and (end := self.keys.warning(datetime.now(UTC))):
+            standing["keys"] = end
         counts = {
             f"{subject}: {why}": n for subject, reasons in remarks.items() for why, n in reasons.items()
-        } | {f"{subject}: {why}": 1 for subject, why in self.standing.items()}
+        } | {f"{subject}: {why}": 1 for subject, why in standing.items()}
         if counts.keys() - self._logged:
             self._node.get_logger().warning("; ".join(sorted(counts)))
         self._logged = set(counts)

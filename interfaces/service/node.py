@@ -17,7 +17,6 @@ from rclpy.parameter import Parameter
 from rclpy.serialization import deserialize_message
 from reactivex import Observable
 
-from interfaces.service.enclave import Keys
 from interfaces.service.errors import UserError
 from interfaces.service.health import HealthReporter
 from interfaces.service.parameters import Declaration, declarations
@@ -46,8 +45,6 @@ class ServiceNode(ReactiveNode):
         """Create the node of a service; the options are those of :class:`rclpy.node.Node`."""
         super().__init__(node_name, **options)
         self._observed: dict[str, Topic] = {}  # by its resolved name
-        self.keys: Keys | None = None
-        """Those with which it has joined; ``None`` without security."""
         self.health = HealthReporter(self, before_report=self._look)
         self.add_on_set_parameters_callback(_only_finite)
 
@@ -185,16 +182,10 @@ class ServiceNode(ReactiveNode):
         self.health.remark(subject, reason)
 
     def _look(self) -> None:
+        """Remark what is wrong; end the service with its keys, for no other hears it any longer."""
         self._remark_other_types()
-        if self.keys:
-            self._check_keys(self.keys, datetime.now(UTC))
-
-    def _check_keys(self, keys: Keys, now: datetime) -> None:
-        """Warn of the end of the keys; end the service with them, for no other hears it any longer."""
-        if now >= keys.end:
+        if (keys := self.health.keys) and (now := datetime.now(UTC)) >= keys.end:
             raise UserError(keys.problem(now))
-        if warning := keys.warning(now):
-            self.remark("keys", warning)
 
     def _remark_other_types(self) -> None:
         """Remark publishers that use an observed topic with another type: nothing arrives from them."""

@@ -61,7 +61,7 @@ def _run(name: str, wire: Callable[[ServiceNode], None]) -> int:
         with middleware.without_shared_memory():
             rclpy.init(args=[*sys.argv, *chosen])
             node = ServiceNode(name, namespace=os.environ.get(NAMESPACE, ""))
-        node.keys = enclave.keys(chosen[-1]) if chosen else None
+        node.health.keys = enclave.keys(chosen[-1]) if chosen else None
     except (*USER_ERRORS, RuntimeError) as error:  # RuntimeError: of domain, discovery or DDS
         rclpy.try_shutdown()
         return _refuse(name, error, 2)

@@ -71,6 +71,16 @@ def wire(node):
 service.run("speaking", wire)
 """
 
+KEYED = """
+from datetime import UTC, datetime
+from interfaces import service
+from interfaces.service import enclave
+
+enclave.arguments = lambda name, namespace: ["--ros-args", "--enclave", enclave.path(name, namespace)]
+enclave.keys = lambda name: enclave.Keys(name, datetime(2026, 1, 1, tzinfo=UTC), datetime.now(UTC))
+service.run("keyed", lambda node: None)
+"""
+
 READY = """
 from interfaces import service
 
@@ -200,6 +210,14 @@ def test_unexpected_error_is_logged_once_and_ends_the_service(start: Start, prog
     assert errors.count("Traceback") == 1
     assert errors.count(error) == 1
     assert "[failing]" in errors
+
+
+def test_service_ends_with_its_keys(start: Start) -> None:
+    code, errors = start("-c", KEYED).end()
+    assert code == 2
+    assert re.search(
+        "^keyed: the keys of /keyed have ended at [^\n]*: make keystore[^\n]*$", errors, re.MULTILINE
+    )
 
 
 def test_signal_after_the_end_does_not_change_the_exit_code(start: Start) -> None:
