@@ -401,11 +401,11 @@ def test_s3_each_start_needs_a_command_and_a_sign_of_life_of_its_own() -> None:
         (20.5, OFF),
         (25.0, ON),
         (25.25, OFF),
-        (25.5, ON),  # by the same command
+        (25.5, ON),  # by the same command, which came at the last moment
         (26.0, OFF),
         (35.0, ON),  # without a sign of life
     )
-    commands = [(at, TURN_ON) for at in (4.75, 10.0, 10.75, 20.5, 25.0, 34.5)]
+    commands = [(at, TURN_ON) for at in (4.75, 10.0, 10.75, 20.5, 25.01, 34.5)]
     heartbeats = [(4.5, True), (10.0, True), (10.75, True), *steps(20, 30)]
     assert CHECKERS["S3"](history(states=states, commands=commands, heartbeats=heartbeats)) == Finding(
         "S3",
