@@ -165,7 +165,7 @@ class Policy:
         self._deaf_since = math.inf
         if silent and late > 1 and 2 * late > expected:
             self.kill_inhibited_by = f"{late} of {expected} services are silent at once"
-            self._silent_with_most |= {action.pid: observation.time for action in silent}
+            self._silent_with_most = {action.pid: observation.time for action in silent}
         # After a failure of the network, processes have to discover each other again, as new ones do.
         known = self._silent_with_most
         self._silent_with_most = {action.pid: known.get(action.pid, -math.inf) for action in silent}

@@ -58,6 +58,7 @@ def silence_of(seconds: float, name: str) -> Action:
 def test_nothing_is_inhibited_before_and_after_a_good_observation() -> None:
     policy = Policy()
     assert policy.kill_inhibited_by == ""
+    assert policy.hears_itself is True
     assert policy.decide(Observation(0.0, [program("a")])) == []
     assert policy.kill_inhibited_by == ""
     assert policy.recent_restarts == {"a": 0}
@@ -132,10 +133,11 @@ def test_more_than_half_of_the_services_are_spared() -> None:
 
 def test_services_that_fall_silent_one_after_the_other_within_a_period_are_spared() -> None:
     run = Run(*(program(name) for name in "abcd"))
-    for name in "abcd":  # the last reports before the network fails
-        run.now += 0.25
-        run.hear(name)
+    last = {0.0: "a", 0.5: "b", 1.0: "cd"}  # the last reports before the network fails
+    while run.now <= 1.0:
+        run.hear(last.get(run.now, ""))
         assert run.decide() == []
+        run.now += TIMEOUTS.period
 
     assert run.first(30.0)[1] == []
     assert run.policy.kill_inhibited_by == "4 of 4 services are silent at once"
