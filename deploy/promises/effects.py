@@ -109,9 +109,10 @@ def _of_faults(history: History) -> Iterator[Effect]:
             yield Effect((target,), begin - SENDING, begin + SENDING, CUT_OFF, fault)
         if kind == names.BAD_LINE:
             yield Effect((ALL,), begin, end, DELAYED, fault)
-            # It may delay or lose as many heartbeats as a silence has.
-            if history.reaction.watchdog.silence < 2 * BAD_TRANSPORT:
-                yield Effect((WATCHDOG,), begin, end + SLOWEST, DEAF, fault)
+        is_short = history.reaction.watchdog.silence < 2 * BAD_TRANSPORT
+        if is_short and kind in (names.BAD_LINE, "flood", "babble"):
+            # It may delay, lose or hide as many heartbeats as a silence has.
+            yield Effect((WATCHDOG,), begin, end + SLOWEST, DEAF, fault)
         if kind == names.OVERLOAD:
             yield Effect((ALL,), begin, end, OVERLOADED, fault)
         if kind == names.LOSS:

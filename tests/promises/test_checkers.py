@@ -87,6 +87,15 @@ def test_s2_permits_a_crash_loop_of_the_watchdog_if_engines_wait_less() -> None:
     assert verdict("S2", history) == UNKNOWN
 
 
+def test_s2_permits_a_short_silence_that_seems_longer_as_nonsense_hides_heartbeats() -> None:
+    history = silent(good(), "operator_heartbeat", 30.0, 36.0)
+    history = added(with_value(history, "engines/state", OFF, 30.15), "engines", (30.19, TURN_OFF))
+    quick = ("lifespan", 0.12), ("sampling", 0.04), ("silence", 0.29), ("strikes", 1)
+    history = added(history, "/diagnostics", (6.0, ("operator_watchdog", 109, *quick)))
+    assert verdict("S2", history) == VIOLATED
+    assert verdict("S2", faulty(history, InjectedFault("babble", NO_TARGET, 29.5, 33.0))) == UNKNOWN
+
+
 def test_s1_is_judged_by_the_parameters_that_the_services_report() -> None:
     quick = (("silence", 0.6), ("strikes", 1))
     history = added(good(), "/diagnostics", (6.0, ("operator_watchdog", 109, *quick)))
