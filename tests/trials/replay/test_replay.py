@@ -371,7 +371,7 @@ def test_only_latched_messages_from_before_the_arm_are_heard() -> None:
     (_, lengths), *_ = chains.inputs(record, "/", ("kinematics",))
     assert lengths == [old]
     heard = {topic.name: messages for topic, messages in chains.inputs(record, "/", ("engine_controller",))}
-    assert heard == {"engines": commands[1:], "operator_presence": []}
+    assert heard == {"engines": commands[1:], "operator_presence": [], "/diagnostics": []}
 
 
 def transforms(at: float, *arms: str) -> Message:
