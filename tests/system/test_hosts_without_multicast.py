@@ -1,4 +1,4 @@
-"""Two hosts whose network has no multicast: they meet by the addresses of peers, or by a discovery server."""
+"""Two hosts whose network has no multicast: they meet by the names of peers, or by a discovery server."""
 
 from __future__ import annotations
 
@@ -33,12 +33,14 @@ node.create_subscription(String, "names", lambda m: m.data != name and print(m.d
 while True:
     rclpy.spin_once(node, timeout_sec=0.1)
 """
+NAMES = f"127.0.0.1 localhost\n{NETWORK}.1 {ROBOT}.example\n{NETWORK}.2 {CONTROL}.example\n"
+WITH_NAMES = ["unshare", "--mount", "sh", "-c", 'mount --bind "$0" /etc/hosts && exec "$@"']
 SERVER = ROOT / ".venv" / "bin" / "fast-discovery-server"
 PORT = 11811
 WAYS = {
     "peers": {
-        ROBOT: {"ROS_STATIC_PEERS": f"{NETWORK}.2"},
-        CONTROL: {"ROS_STATIC_PEERS": f"{NETWORK}.1"},
+        ROBOT: {"ROS_STATIC_PEERS": f"{CONTROL}.example"},
+        CONTROL: {"ROS_STATIC_PEERS": f"{ROBOT}.example"},
     },
     "discovery server": {host: {"ROS_DISCOVERY_SERVER": f"{NETWORK}.1:{PORT}"} for host in (ROBOT, CONTROL)},
 }
@@ -53,6 +55,8 @@ def test_hosts_meet_without_multicast(way: str, tmp_path: Path, domain_id: int) 
         for host in (ROBOT, CONTROL):
             port = ["dev", host, "type", "bridge_slave", "mcast_flood", "off"]
             subprocess.run(["ip", "-n", full(BRIDGE), "link", "set", *port], check=True)
+        names = tmp_path / "hosts"
+        names.write_text(NAMES)
         environment = site.environment | {"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}
         set_middleware(environment)
         if way == "discovery server":
@@ -61,7 +65,18 @@ def test_hosts_meet_without_multicast(way: str, tmp_path: Path, domain_id: int) 
             begun.await_line("Server is running")
         nodes = {
             host: site.begin_alone(
-                ["ip", "netns", "exec", full(host), sys.executable, "-c", NODE, host],
+                [
+                    "ip",
+                    "netns",
+                    "exec",
+                    full(host),
+                    *WITH_NAMES,
+                    str(names),
+                    sys.executable,
+                    "-c",
+                    NODE,
+                    host,
+                ],
                 environment | WAYS[way][host] | {"PYTHONPATH": os.pathsep.join([str(ROOT), *sys.path])},
             )
             for host in (ROBOT, CONTROL)
