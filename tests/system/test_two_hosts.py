@@ -115,7 +115,7 @@ class Arm:
             assert time.monotonic() < deadline, self.terminal.output
             self.terminal.type("press\nturn_on\n")
             time.sleep(1.0)
-        self._shown = len(self.view.lines)
+        self.shown = len(self.view.lines)
 
     @property
     def is_on(self) -> bool:
@@ -124,7 +124,7 @@ class Arm:
 
     def await_off(self) -> None:
         """Wait until the engines have gone off after :meth:`turn_on`."""
-        self.view.await_line("Engines are off", OFF_WITHIN, self._shown)
+        self.view.await_line("Engines are off", OFF_WITHIN, self.shown)
 
     @contextmanager
     def cut(self) -> Iterator[None]:
@@ -242,6 +242,20 @@ def test_long_cut_stops_the_engines_until_they_are_turned_on(arm: Arm) -> None:
     time.sleep(2.0)
     assert not arm.is_on
     arm.turn_on()
+
+
+def test_second_controller_on_the_other_host_stops_the_joints(arm: Arm) -> None:
+    arm.turn_on()
+    second = arm.operator.begin_command(sys.executable, "-m", "services.engine_controller")
+    if KEYS:  # the operator's host has none for it
+        assert second.wait() != 0, second.output
+        return
+    arm.view.await_line("engine_controller: it runs on host operator-host as well", LIMIT, arm.shown)
+    shown = len(arm.view.lines)
+    time.sleep(2.0)
+    assert not [text for _, text in arm.view.lines[shown:] if "Position" in text]
+    second.close()
+    arm.view.await_line("Position", LIMIT, len(arm.view.lines))
 
 
 def test_page_on_a_third_host_holds_the_switch_by_tls(arm: Arm) -> None:
