@@ -40,7 +40,7 @@ class Command(NamedTuple):
     at: datetime  # of the arrival, on the Rx clock
     age: float  # of the source time at arrival [s]
     name: str
-    clocks: str = ""  # which clock of another host is wrong
+    clocks: str  # which clock of another host is wrong; empty if none is
 
 
 Event = Tick | Presence | Command

@@ -155,7 +155,7 @@ class Engines:
         )
         results = self.scheduler.start(
             lambda: engine_state(
-                self.commands.map(lambda it: Command(self.scheduler.now, self._age(it), it.value)),
+                self.commands.map(lambda it: Command(self.scheduler.now, self._age(it), it.value, "")),
                 self.presences.map(lambda it: Presence(self.scheduler.now, self._age(it))),
                 Parameters(repeat=repeat),
                 drive_timeout,

@@ -110,7 +110,7 @@ class Arm:
         self.publish("operator_activity", activity.map(lambda it: it.conclusion))
         self.publish("engines", engine_commands(activity))
 
-        commands = self.topics["engines"].map(lambda it: Command(self.scheduler.now, 0.0, it))
+        commands = self.topics["engines"].map(lambda it: Command(self.scheduler.now, 0.0, it, ""))
         presences = self.topics["operator_presence"].map(
             lambda it: Presence(self.scheduler.now, self.age(it))
         )
