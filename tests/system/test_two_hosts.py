@@ -256,6 +256,10 @@ def test_second_controller_on_the_other_host_stops_the_joints(arm: Arm) -> None:
     assert not [text for _, text in arm.view.lines[shown:] if "Position" in text]
     second.close()
     arm.view.await_line("Position", LIMIT, len(arm.view.lines))
+    time.sleep(2.0)  # so many lines about the engines have come that some were left out
+    shown = len(arm.view.lines)
+    arm.terminal.type("turn_off\n")
+    arm.view.await_line("Engines are off", LIMIT, shown)
 
 
 def test_page_on_a_third_host_holds_the_switch_by_tls(arm: Arm) -> None:
