@@ -39,6 +39,11 @@ GUARDS: dict[str, tuple[str, ...]] = {
         "tests/component/test_readme.py",
         "tests/component/test_service_node.py",
     ),
+    "interfaces/service/clocks.py": (
+        "tests/component/test_clocks.py",
+        "tests/component/test_engine_controller_wiring.py",
+        "tests/commands/test_hosts.py",
+    ),
     "interfaces/service/health.py": (
         "tests/component/test_health.py",
         "tests/component/test_service_node.py",
