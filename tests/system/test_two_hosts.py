@@ -31,12 +31,12 @@ KEYS = {"ROS_SECURITY_ENABLE": "true"} if os.environ.get("RUNTIME") and SECURITY
 OPERATORS_KEYS = "dead_mans_switch operator_page sentinel_operator terminal"  # as deploy/README.md has it
 ADDRESSES = {host: f"{NETWORK}.{number}" for number, host in enumerate((ROBOT, CONTROL, TABLET), start=1)}
 PARAMETERS = f"""
-operator_watchdog: {{ros__parameters: {{silence: 1.5, strikes: 1}}}}
-engine_controller: {{ros__parameters: {{presence_timeout: 5.0, max_presence_age: 0.9}}}}
+operator_watchdog: {{ros__parameters: {{silence: 3.0, strikes: 1}}}}
+engine_controller: {{ros__parameters: {{presence_timeout: 6.0, max_presence_age: 0.9}}}}
 operator_page:
   ros__parameters: {{address: 0.0.0.0, names: {ADDRESSES[CONTROL]}, certificate: page.pem, key: page.key}}
 """
-OFF_WITHIN = 15.0  # s: these parameters allow less than 6 s; the rest is for a busy machine
+OFF_WITHIN = 15.0  # s: these parameters allow less than 7 s; the rest is for a busy machine
 AS_HOST = 'hostname "$0" && exec "$@"'
 HOLD_ON_PAGE = """
 import ssl, sys, time
@@ -75,7 +75,7 @@ class Host:
 
     def do(self, *arguments: str, **environment: str) -> str:
         command = self.begin(*arguments, **environment)
-        assert command.wait() == 0, command.output
+        assert command.wait(2 * LIMIT) == 0, command.output
         return command.output
 
     def beside(self, run: Path) -> Host:
