@@ -19,7 +19,7 @@ from interfaces import topics
 
 PROGRAMS = tuple(program.name for program in manifest.programs())
 SWITCH, WATCHDOG, CONTROLLER = "dead_mans_switch", "operator_watchdog", "engine_controller"
-KINEMATICS, ROBOT_STATE = "kinematics", "robot_state"
+KINEMATICS, VELOCITY, ROBOT_STATE = "kinematics", "velocity", "robot_state"
 DRIVE = "drive"
 SENTINEL = manifest.SENTINEL
 SOURCES = tuple(f"config_{name}" for name in topics.CONFIGURATION)

@@ -13,6 +13,7 @@ from deploy.promises.effects import (
     KILLING,
     LASTING,
     MISSED,
+    SENDING,
     SETTLED,
     SILENT,
     UNWATCHED,
@@ -30,6 +31,7 @@ from deploy.promises.history import (
     OUTPUTS,
     PROGRAMS,
     SOURCES,
+    VELOCITY,
     History,
     InjectedFault,
     between,
@@ -108,6 +110,9 @@ def other_streams_flow(history: History) -> Finding:
                 if two - one > GAP >= two - one - disturbed_for(found, ALL, one, two, *MISSED):
                     excused = 1  # the observer may have missed messages
                     continue
+                if two - one > GAP and program == VELOCITY and _stands_still(history, one, two):
+                    excused = 1  # it publishes only a speed that changes
+                    continue
                 longest = max(longest, two - one)
                 if two - one > GAP:
                     text = f"{program} is silent for {two - one:.2f} s when {fault.target} is killed"
@@ -125,6 +130,13 @@ def _intervals(history: History, program: str, begin: float, end: float) -> Iter
     last = bisect_right(output, end, key=lambda s: s.sent)
     following = output[last].sent if last < len(output) else history.end
     return itertools.pairwise([*(s.sent for s in output[first:last]), following])
+
+
+def _stands_still(history: History, begin: float, end: float) -> bool:
+    """Return whether all positions are the same until shortly before a time."""
+    return (
+        len({s.value for s in between(history.stream(topics.EFFECTOR_POSITION), begin, end - SENDING)}) <= 1
+    )
 
 
 def right_after_restart(history: History) -> Finding:

@@ -708,6 +708,19 @@ def test_l2_stream_that_another_fault_disturbs_is_no_case(other: InjectedFault, 
     assert CHECKERS["L2"](history(**messages, faults=[*kill("config_l1", 10.0), other])).cases == cases
 
 
+@pytest.mark.parametrize("moves", [False, True])
+def test_l2_speed_need_not_be_published_while_the_arm_stands_still(moves: bool) -> None:
+    speeds = back((10.0, 0.5))
+    heard = [(at, (1.0, 0.0)) for at, _ in back()]
+    if moves:
+        heard = [(at, (at, 0.0)) for at, _ in heard]
+    found = CHECKERS["L2"](
+        history(l1=back((10.0, 0.5)), positions=heard, speeds=speeds, faults=kill("config_l1", 10.0))
+    )
+    silent = [each for each in found.evidence if "velocity" in each.text]
+    assert len(silent) == moves, found
+
+
 # L3
 
 
