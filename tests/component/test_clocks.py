@@ -70,10 +70,20 @@ def test_clock_that_differs_by_more_than_the_tolerance_is_a_problem(age: float, 
 
 
 @pytest.mark.parametrize(
-    ("behind", "words"), [(0.003, "3 ms behind"), (-0.08, "80 ms ahead of"), (1.0, "1.0 s behind")]
+    ("behind", "words"), [(0.9, "900 ms behind"), (0.0, "0 ms ahead of"), (-1.0, "1.0 s ahead of")]
 )
 def test_difference_is_told_in_words(behind: float, words: str) -> None:
     assert clocks.difference("desk", behind) == f"the clock of host desk is {words} ours"
+
+
+def test_reported_clock_is_one_of_the_arm_and_a_number() -> None:
+    def told(value: str) -> DiagnosticArray:
+        values = [KeyValue(key="clock of host desk", value=value)]
+        status = DiagnosticStatus(name="/arm1/engine_controller", hardware_id="robot1", values=values)
+        return DiagnosticArray(status=[status])
+
+    assert clocks.reported(told("0.5"), "/arm1") == {"desk": (0.5, "robot1")}
+    assert clocks.reported(told("?"), "/arm1") == {}
 
 
 @pytest.mark.parametrize(("age", "problem"), [(9.0, "clocks: the clock of host desk is"), (0.0, "")])
