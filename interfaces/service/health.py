@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.clock import Clock, ClockType
 from rclpy.event_handler import PublisherEventCallbacks
+from rclpy.exceptions import InvalidHandle
 from rclpy.node import Node
 
 from interfaces.service.enclave import Keys
@@ -147,7 +148,8 @@ class HealthReporter:
     def _on_matched(self, subscribers: Any) -> None:
         # Without what comes before a report: a new process has its first output to make.
         if subscribers.current_count_change > 0:
-            self.report()
+            with suppress(InvalidHandle):  # ROS 2's rclpy may call this after the node was destroyed
+                self.report()
 
 
 def reported_parameters(status: DiagnosticStatus) -> dict[str, Any]:

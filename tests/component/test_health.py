@@ -172,3 +172,8 @@ def test_report_is_sent_when_a_subscriber_comes_not_when_one_goes(
         service.health._on_matched(SimpleNamespace(current_count_change=change))
 
     assert reports == [1, 2]
+
+
+def test_subscriber_that_comes_as_the_node_ends_is_no_error(service: ServiceNode) -> None:
+    service.destroy_node()
+    service.health._on_matched(SimpleNamespace(current_count_change=1))
