@@ -255,7 +255,9 @@ def _commanded(history: History, found: Sequence[Effect], off: Sample) -> bool:
     just_before = between(commands, off.sent - _transport(found, off.sent), off.sent + SAME)
     if not all(_is_of_watchdog(history, command) for command in just_before):
         return True
-    return bool(just_before) and _strikes(history, found, off.sent) >= history.reaction.watchdog.strikes
+    # Counted at the command: a successor of the watchdog begins to count again.
+    strikes = (_strikes(history, found, command.sent) for command in just_before)
+    return any(number >= history.reaction.watchdog.strikes for number in strikes)
 
 
 def _is_of_watchdog(history: History, command: Sample) -> bool:

@@ -320,6 +320,15 @@ def suspended_with_a_presence_at(time: float) -> dict[str, Any]:
         (COMMANDED | {"commands": [(19.75, TURN_OFF)]}, False),
         (COMMANDED | {"commands": [(19.75, TURN_OFF)], "faults": [bad_line(19.0, 19.5)]}, True),
         (COMMANDED | {"commands": [(19.5, TURN_OFF)], "faults": [bad_line(19.75, 25.0)]}, True),
+        (
+            COMMANDED
+            | {
+                "commands": [(19.75, TURN_OFF)],
+                "faults": [bad_line(19.0, 19.5)],
+                "lives": two_lives(WATCHDOG, 19.875),  # the successor counts no strikes of the first one
+            },
+            True,
+        ),
         (COMMANDED | {"commands": [(19.75, TURN_OFF)], "faults": [bad_line(19.0, 19.375)]}, False),
         (COMMANDED | {"commands": [(19.75, TURN_OFF)], "faults": [bad_line(20.25, 25.0)]}, False),
         (COMMANDED | {"commands": [(19.375, TURN_OFF)], "faults": [bad_line(19.0, 25.0)]}, False),
