@@ -46,7 +46,8 @@ def test_engines_turn_off_in_time_after_a_partition(history: History) -> None:
 
 def test_heartbeats_resume_soon_after_the_network(history: History, cut: InjectedFault) -> None:
     heartbeats = history.stream(OPERATOR_HEARTBEAT)
-    assert not between(heartbeats, cut.begin + 0.5, cut.end - 0.5)
+    # By the time of reception: the kernel may keep a packet whose address it does not know for seconds.
+    assert not [heartbeat for heartbeat in heartbeats if cut.begin + 0.5 < heartbeat.received < cut.end]
     assert between(heartbeats, cut.end, cut.end + DISCOVERY)
 
 
