@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import socket
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -15,12 +14,12 @@ from deploy.commands.member import Member
 from deploy.running import manifest
 from deploy.running.environment import NAMESPACE, RANGE
 from deploy.running.errors import DeploymentError
+from deploy.running.probe import is_here
 from deploy.running.sentinel import reported
 from deploy.running.supervisord import Program
 from deploy.running.system import System
 from interfaces.service.clocks import Clocks, difference
-from interfaces.service.health import Health, healths
-from interfaces.topics import DIAGNOSTICS
+from interfaces.service.health import Health, healths, listening
 
 LOOK = 2.0  # s before a start: each service reports its health once a second
 
@@ -55,7 +54,7 @@ class Hosts:
         """
         here = {program.name for program in manifest.programs()}
         for (host, program), health in sorted(self.healths.items()):
-            is_own = host == socket.gethostname() and ours.get(health.pid) == program
+            is_own = is_here(host) and ours.get(health.pid) == program
             if program in here and not is_own:
                 raise DeploymentError(
                     f"{program} runs on host {host} already, and a program runs on one host only: start the"
@@ -69,11 +68,8 @@ class Hosts:
 def heard(node: Node) -> Iterator[Hosts]:
     """Listen to what the services of the arm of a node report."""
     hosts = Hosts(node.get_namespace())
-    subscription = node.create_subscription(DIAGNOSTICS.type, DIAGNOSTICS.name, hosts.hear, DIAGNOSTICS.qos)
-    try:
+    with listening(node, hosts.hear):
         yield hosts
-    finally:
-        node.destroy_subscription(subscription)
 
 
 def check(member: Member, system: System) -> None:

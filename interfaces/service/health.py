@@ -190,20 +190,22 @@ class Health(NamedTuple):
 
 
 @contextmanager
+def listening(node: Node, hear: Callable[[DiagnosticArray], None]) -> Iterator[None]:
+    """Call a function with each message of /diagnostics."""
+    subscription = node.create_subscription(DIAGNOSTICS.type, DIAGNOSTICS.name, hear, DIAGNOSTICS.qos)
+    try:
+        yield
+    finally:
+        node.destroy_subscription(subscription)
+
+
+@contextmanager
 def heard_healths(node: Node) -> Iterator[dict[str, Health]]:
     """Listen to /diagnostics: the latest health of each service in the namespace of a node, by program."""
     latest: dict[str, Health] = {}
     namespace = node.get_namespace().rstrip("/")
-    subscription = node.create_subscription(
-        DIAGNOSTICS.type,
-        DIAGNOSTICS.name,
-        lambda message: latest.update(healths(message, namespace)),
-        DIAGNOSTICS.qos,
-    )
-    try:
+    with listening(node, lambda message: latest.update(healths(message, namespace))):
         yield latest
-    finally:
-        node.destroy_subscription(subscription)
 
 
 def healths(message: DiagnosticArray, namespace: str) -> dict[str, Health]:
