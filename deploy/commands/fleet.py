@@ -35,6 +35,7 @@ from deploy.running.environment import (
     NAMESPACE,
     RANGE,
     SECURITY,
+    is_secured,
     namespace_of,
     set_middleware,
     tagged,
@@ -78,25 +79,21 @@ def places(named: Iterable[str]) -> set[Place]:
 
     :raises DeploymentError: if a name is no namespace with a domain.
     """
-    return _of_this_host(secured=_is_secured(os.environ)).union(*map(_places_of, named))
+    return _of_this_host(secured=is_secured(os.environ)).union(*map(_places_of, named))
 
 
 def _of_this_host(*, secured: bool) -> set[Place]:
     """Return the places of the arms of this host that have keys, or have none."""
     systems = processes.systems().values()
-    return {place(environment) for environment in systems if _is_secured(environment) == secured}
+    return {place(environment) for environment in systems if is_secured(environment) == secured}
 
 
 def _hidden() -> str:
     """Name the arms of this host that this command does not show, and the one that does."""
-    secured = not _is_secured(os.environ)
+    secured = not is_secured(os.environ)
     names = ", ".join(sorted(each.namespace for each in _of_this_host(secured=secured)))
     how = "with keys: make fleet SECURE=yes" if secured else "without keys: make fleet"
     return f"{names}, {how}" if names else ""
-
-
-def _is_secured(environment: Mapping[str, str]) -> bool:
-    return environment.get(SECURITY) == "true"
 
 
 def _places_of(name: str) -> list[Place]:
@@ -109,7 +106,7 @@ def _places_of(name: str) -> list[Place]:
     if not namespace.startswith("/") or not domain.isdecimal():
         raise DeploymentError(f"ARMS: {name} is no arm such as /arm1, or /arm1=5 in ROS domain 5")
     environment = {**os.environ, NAMESPACE: namespace, "ROS_DOMAIN_ID": domain}
-    may_be_tagged = namespace != "/" and not _is_secured(environment)
+    may_be_tagged = namespace != "/" and not is_secured(environment)
     tags = ["", tagged(environment)] if may_be_tagged else [""]
     return [place(environment | {CYCLONEDDS: tag}) for tag in tags]
 
@@ -142,7 +139,7 @@ def _joined(domain: Domain, number: int) -> Iterator[ReactiveNode]:
     os.environ |= settings
     context = Context()
     try:
-        if settings[SECURITY]:
+        if is_secured(settings):
             Keystore(Path(settings[KEYSTORE])).check([enclave.path(FLEET, "/")], domain.number)
         keys = enclave.arguments(FLEET, "/")
         rclpy.init(

@@ -13,7 +13,16 @@ from rclpy.validate_namespace import validate_namespace
 
 from deploy.operator.page.address import DEFAULT_PORT, host_names, tls
 from deploy.running import manifest, parameter_file, processes
-from deploy.running.environment import ENFORCE, KEYSTORE, NAMESPACE, RANGE, SECURITY, STRATEGY, namespace_of
+from deploy.running.environment import (
+    ENFORCE,
+    KEYSTORE,
+    NAMESPACE,
+    RANGE,
+    SECURITY,
+    STRATEGY,
+    is_secured,
+    namespace_of,
+)
 from deploy.running.errors import DeploymentError
 from deploy.running.processes import ROOT
 from deploy.running.run_directory import ALL, KEY, NOT_YET, scenario_parameters
@@ -126,7 +135,7 @@ def check_environment(system: System) -> None:
 
 def _check_keys(namespace: str, domain: int) -> None:
     """Raise DeploymentError if security is wanted, but not for every process, or without valid keys."""
-    if os.environ.get(SECURITY) != "true":
+    if not is_secured(os.environ):
         return
     if (strategy := os.environ.get(STRATEGY)) != ENFORCE:
         raise DeploymentError(f"{STRATEGY}={strategy} lets processes join without keys: set it to {ENFORCE}")

@@ -47,13 +47,18 @@ _WITHOUT_INDEX = (
 )
 
 
+def is_secured(environment: Mapping[str, str]) -> bool:
+    """Whether DDS is secured in an environment; no other spelling counts, as in ROS 2."""
+    return environment.get(SECURITY) == "true"
+
+
 def set_middleware(environment: MutableMapping[str, str]) -> None:
     """Set what the nodes of an arm need from the middleware, where the user has not set it."""
     environment.setdefault(RANGE, "LOCALHOST")
     environment.setdefault("FASTRTPS_DEFAULT_PROFILES_FILE", str(FASTDDS_PROFILES))
     # In LOCALHOST, rmw_fastrtps_cpp always adds shared memory; there, the profile keeps messages out of it.
     environment.setdefault("FASTDDS_BUILTIN_TRANSPORTS", "UDPv4")
-    if environment.get(SECURITY) == "true":
+    if is_secured(environment):
         environment.setdefault(STRATEGY, ENFORCE)
     elif environment.get(rclpy_choice.RUNTIME) and namespace_of(environment) != "/":
         environment.setdefault(CYCLONEDDS, tagged(environment))  # version 0.10 does not know these settings

@@ -108,6 +108,12 @@ def test_domain_that_cannot_be_joined_hides_no_other(domain: int, capfd: pytest.
             fleet._nodes(stack, [bad])
 
 
+def test_arm_that_says_it_has_no_keys_needs_none(domain: int) -> None:
+    where = Domain(domain, (("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST"), ("ROS_SECURITY_ENABLE", "false")))
+    with ExitStack() as stack:
+        assert [*fleet._nodes(stack, [where])] == [where]
+
+
 def test_arm_whose_keystore_has_no_fleet_is_told(tmp_path: Path) -> None:
     keystore = tmp_path / "keys"
     where = Domain(5, (("ROS_SECURITY_ENABLE", "true"), ("ROS_SECURITY_KEYSTORE", str(keystore))))

@@ -31,7 +31,7 @@ from deploy.promises.marks import is_babble
 from deploy.promises.observations import FAULTS, PROCESSES
 from deploy.running.recorder import Recorder, clocks, record
 from deploy.trials.chaos.process_monitor import SCAN_PERIOD, ProcessMonitor, Rounds
-from interfaces.service import enclave, middleware
+from interfaces.service import UserError, enclave, middleware
 from reactive_node import ReactiveNode
 
 OBSERVER = "observer"
@@ -73,7 +73,7 @@ def _recording(
                 signal_handler_options=SignalHandlerOptions.NO,
             )
             node = ReactiveNode(f"{OBSERVER}_{os.getpid()}", context=context, namespace=namespace)
-    except RuntimeError as error:  # of the domain, discovery or DDS
+    except (RuntimeError, UserError) as error:  # of the domain, discovery, DDS or keys
         sys.exit(f"The observer cannot join the ROS graph: {error}")
     executor = SingleThreadedExecutor(context=context)
     executor.add_node(node)
