@@ -163,17 +163,14 @@ class Policy:
             # A deaf sentinel is useless; its successor may hear.
             return itself if observation.time - self._deaf_since >= self._timeouts.start else []
         self._deaf_since = math.inf
-        if silent and late > 1 and 2 * late > expected:
+        most = bool(silent) and late > 1 and 2 * late > expected
+        if most:
             self.kill_inhibited_by = f"{late} of {expected} services are silent at once"
-            self._silent_with_most = {action.pid: observation.time for action in silent}
         # After a failure of the network, processes have to discover each other again, as new ones do.
         known = self._silent_with_most
-        self._silent_with_most = {action.pid: known.get(action.pid, -math.inf) for action in silent}
-        return [
-            action
-            for action in silent
-            if observation.time - self._silent_with_most[action.pid] >= self._timeouts.start
-        ]
+        last = {it.pid: observation.time if most else known.get(it.pid, -math.inf) for it in silent}
+        self._silent_with_most = last
+        return [it for it in silent if observation.time - last[it.pid] >= self._timeouts.start]
 
     def _kill_duplicates(self, observation: Observation) -> list[Action]:
         now = observation.time
