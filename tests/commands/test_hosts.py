@@ -3,33 +3,17 @@
 from __future__ import annotations
 
 import socket
-from datetime import timedelta
+from functools import partial
 
 import pytest
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
 from deploy.commands.hosts import Hosts
 from deploy.running.errors import DeploymentError
-from reactive_node import stamps
+from tests import health_reports
+from tests.health_reports import report
 
 HERE = socket.gethostname()
-
-
-def report(program: str, host: str, pid: int = 7, age: float = 0.002) -> DiagnosticArray:
-    values = {"pid": str(pid), "published": "1"}
-    status = DiagnosticStatus(
-        name=program, hardware_id=host, values=[KeyValue(key=key, value=it) for key, it in values.items()]
-    )
-    message = DiagnosticArray(status=[status])
-    message.header.stamp = stamps.to_message(stamps.now() - timedelta(seconds=age))
-    return message
-
-
-def heard(*reports: DiagnosticArray, namespace: str = "/") -> Hosts:
-    hosts = Hosts(namespace)
-    for each in reports:
-        hosts.hear(each)
-    return hosts
+heard = partial(health_reports.heard, Hosts)
 
 
 def test_program_of_another_host_is_not_started_again() -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import socket
-from datetime import timedelta
+from functools import partial
 from typing import Any
 
 import pytest
@@ -13,23 +13,15 @@ from deploy.running import manifest
 from interfaces.service import ServiceNode, clocks
 from interfaces.service.clocks import Clocks
 from interfaces.topics import DIAGNOSTICS
-from reactive_node import stamps
 from reactive_node.testing import MakeNode, SpinUntil
+from tests import health_reports
 
 
 def report(age: float, host: str = "desk", name: str = "/dead_mans_switch") -> DiagnosticArray:
-    """Return a health report that was sent ``age`` seconds ago."""
-    values = [KeyValue(key=key, value="1") for key in ("pid", "published")]
-    message = DiagnosticArray(status=[DiagnosticStatus(name=name, hardware_id=host, values=values)])
-    message.header.stamp = stamps.to_message(stamps.now() - timedelta(seconds=age))
-    return message
+    return health_reports.report(name, host, age=age)
 
 
-def heard(*reports: DiagnosticArray, namespace: str = "/") -> Clocks:
-    found = Clocks(namespace)
-    for each in reports:
-        found.hear(each)
-    return found
+heard = partial(health_reports.heard, Clocks)
 
 
 def test_least_age_of_three_reports_tells_the_clock() -> None:

@@ -131,7 +131,7 @@ def test_more_than_half_of_the_services_are_spared() -> None:
     assert run.policy.kill_inhibited_by == "2 of 3 services are silent at once"
 
 
-def test_services_that_fall_silent_one_after_the_other_within_a_period_are_spared() -> None:
+def test_services_that_fall_silent_within_one_period_are_spared() -> None:
     run = Run(*(program(name) for name in "abcd"))
     last = {0.0: "a", 0.5: "b", 1.0: "cd"}  # the last reports before the network fails
     while run.now <= 1.0:
