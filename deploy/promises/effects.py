@@ -6,14 +6,15 @@ effect concerns programs, from one time to another, for one reason. A fault does
 
 from __future__ import annotations
 
+import itertools
 import math
 from bisect import bisect_right
 from collections.abc import Collection, Iterable, Iterator
 from typing import NamedTuple
 
 from deploy.promises import history as names
-from deploy.promises.history import ALL, CONTROLLER, SENTINEL, SOURCES, SWITCH, WATCHDOG, History
-from deploy.promises.limits import HUNG, SLOWEST
+from deploy.promises.history import ALL, CONTROLLER, SENTINEL, SOURCES, SWITCH, VELOCITY, WATCHDOG, History
+from deploy.promises.limits import GAP, HUNG, SLOWEST
 from deploy.promises.marks import SPREAD, STEP
 from interfaces import topics
 
@@ -31,6 +32,7 @@ LOST = "the network may lose its messages to the observer"
 UNDISCOVERED = "the observer may miss its messages, because it may not know their publisher yet"
 LATE_LINE = "its messages are late without an overload, because the network delays them"
 LATE_START = "its messages are late without an overload, because readers may not know it yet"
+STILL = "it has nothing to tell: the arm stands still, and it publishes only a speed that changes"
 MISSED = (OVERLOADED, LOST)
 
 # How long an effect lasts. All in seconds.
@@ -148,6 +150,12 @@ def _of_silence(history: History) -> Iterator[Effect]:
         for last, following in names.gaps(times, -math.inf, math.inf):
             if following - last > FLOWING:
                 yield Effect(waiting, last, following, WAITING, history)
+    positions = history.stream(topics.EFFECTOR_POSITION)
+    moves = (two.sent for one, two in itertools.pairwise(positions) if one.value != two.value)
+    begin = positions[0].sent if positions else history.end
+    for last, following in names.gaps(moves, begin, history.end):
+        if following - last > GAP:
+            yield Effect((VELOCITY,), last, following, STILL, history)
 
 
 def _from(time: float) -> float:

@@ -13,9 +13,9 @@ from deploy.promises.effects import (
     KILLING,
     LASTING,
     MISSED,
-    SENDING,
     SETTLED,
     SILENT,
+    STILL,
     UNWATCHED,
     WAITING,
     Effect,
@@ -31,7 +31,6 @@ from deploy.promises.history import (
     OUTPUTS,
     PROGRAMS,
     SOURCES,
-    VELOCITY,
     History,
     InjectedFault,
     between,
@@ -107,11 +106,8 @@ def other_streams_flow(history: History) -> Finding:
                 continue
             excused = 0
             for one, two in _intervals(history, program, fault.begin - GAP, end):
-                if two - one > GAP >= two - one - disturbed_for(found, ALL, one, two, *MISSED):
-                    excused = 1  # the observer may have missed messages
-                    continue
-                if two - one > GAP and program == VELOCITY and _stands_still(history, one, two):
-                    excused = 1  # it publishes only a speed that changes
+                if two - one > GAP >= two - one - disturbed_for(found, program, one, two, *MISSED, STILL):
+                    excused = 1  # the observer may have missed messages, or there was nothing to tell
                     continue
                 longest = max(longest, two - one)
                 if two - one > GAP:
@@ -130,13 +126,6 @@ def _intervals(history: History, program: str, begin: float, end: float) -> Iter
     last = bisect_right(output, end, key=lambda s: s.sent)
     following = output[last].sent if last < len(output) else history.end
     return itertools.pairwise([*(s.sent for s in output[first:last]), following])
-
-
-def _stands_still(history: History, begin: float, end: float) -> bool:
-    """Return whether all positions are the same until shortly before a time."""
-    return (
-        len({s.value for s in between(history.stream(topics.EFFECTOR_POSITION), begin, end - SENDING)}) <= 1
-    )
 
 
 def right_after_restart(history: History) -> Finding:
