@@ -107,11 +107,12 @@ def wire(node: ServiceNode) -> None:
     )
     # Silences count from the origin of the scenario: before it, no operator is expected.
     activity = epoch.start(operator_activity(heartbeats, given, resumes=epoch.is_past)).share()
-    presence, absence = activity.partition(lambda it: it.conclusion == ALIVE)
-    absence.subscribe(warn, scheduler=node.scheduler)
+    presence = activity.filter(lambda it: it.conclusion == ALIVE)
     node.publish(topics.OPERATOR_PRESENCE, presence.map(lambda it: it.seen))
     node.publish(topics.OPERATOR_ACTIVITY, activity.map(lambda it: it.conclusion))
     node.publish(topics.ENGINES, engine_commands(activity, repeat=given.repeat))
+    # A log message takes time, so it comes after the messages.
+    activity.filter(lambda it: it.conclusion != ALIVE).subscribe(warn, scheduler=node.scheduler)
 
 
 if __name__ == "__main__":

@@ -16,6 +16,7 @@ import ctypes
 import gc
 import importlib
 import importlib.util
+import inspect
 import mmap
 import os
 import pkgutil
@@ -98,6 +99,8 @@ def import_libraries() -> None:
             _use(pkgutil.resolve_name(name))
     with suppress(Exception):
         _use_names()
+    # Now it knows the files of all modules, which the first log message of each fork would ask for.
+    inspect.getmodule(import_libraries.__code__)
     for number in range(_NAMES):  # the table of names grows now: each fork would grow a copy of its own
         sys.intern(f"name {number}")
     gc.freeze()  # a collection in a fork would copy the memory that it shares

@@ -7,6 +7,7 @@ from unittest import mock
 
 import pytest
 from rclpy.parameter import Parameter
+from rclpy.publisher import Publisher
 from std_msgs.msg import Bool
 
 from interfaces.service import ServiceNode, UserError
@@ -137,6 +138,24 @@ def test_silences_are_missed_then_incapacitated_then_turn_off(
     assert logged == [f"operator {MISSED}", f"operator {MISSED}", f"operator {INCAPACITATED}"]
     assert threads == {threading.get_ident()}, "that of the executor"
     assert took >= 2 * 0.4 + 38 * repeat
+
+
+def test_turn_off_does_not_wait_for_the_log(
+    wired: Any, spin_until: SpinUntil, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    order: list[str] = []
+    publish = Publisher.publish
+
+    def note(publisher: Publisher, message: Any) -> None:
+        if publisher.topic == ENGINES.name:
+            order.append(TURN_OFF)
+        publish(publisher, message)
+
+    monkeypatch.setattr(Publisher, "publish", note)
+    monkeypatch.setattr(ServiceNode, "get_logger", lambda _: mock.Mock(warning=order.append))
+    wired(silence=0.4, sampling=0.1, strikes=1)
+    spin_until(lambda: len(order) >= 3)
+    assert order[:3] == [f"operator {MISSED}", TURN_OFF, f"operator {INCAPACITATED}"]
 
 
 @pytest.mark.parametrize(("begin", "resumes"), [(-60.0, True), (60.0, False)])

@@ -139,6 +139,13 @@ def test_numpy_is_imported_at_its_first_use(tmp_path: Path) -> None:
     assert (done.stdout, done.stderr) == ("[1]\nTrue\n", "")
 
 
+def test_log_message_looks_only_at_new_modules(tmp_path: Path) -> None:
+    """rclpy names the caller of each log message, and so asks ``inspect`` for the files of all modules."""
+    count = "import inspect, reactivex; print(reactivex.__file__ in inspect.modulesbyfile)"
+    done = run(tmp_path, f"{count}; {FORKED}", more="prefork.import_libraries()")
+    assert done.stdout == "True\nTrue\n"
+
+
 @pytest.mark.parametrize("name", prefork.libraries())
 def test_prepared_library_exists(name: str) -> None:
     importlib.import_module(name)
