@@ -13,6 +13,8 @@ from deploy.promises.effects import (
     KILLING,
     LASTING,
     MISSED,
+    RESTARTED,
+    SAME,
     SETTLED,
     SILENT,
     STILL,
@@ -43,6 +45,7 @@ SAMPLES = 3  # the least number of cases for a median
 
 STREAMS = tuple(program for program, topic in OUTPUTS.items() if topic.longest_gap <= GAP)
 MOMENTARY = ("kill", "terminate", "raise")
+HANGS = ("stop", "hang")
 
 
 def output_resumes(history: History) -> Finding:
@@ -162,7 +165,7 @@ def hung_is_replaced(history: History) -> Finding:
     evidence, unknown = [], 0
     for fault in history.faults:
         lasted = fault.end - fault.begin
-        if fault.kind not in ("stop", "hang") or fault.target not in PROGRAMS or lasted < HUNG:
+        if fault.kind not in HANGS or fault.target not in PROGRAMS or lasted < HUNG:
             continue
         time = _recovery(history, fault)
         until = fault.begin + (0.0 if time is None else min(time, HUNG))
@@ -188,7 +191,11 @@ def _recovery(history: History, fault: InjectedFault) -> float | None:
     if not _flowed(history, fault.target, fault.begin, FLOWING):
         return None
     begin = _death(history, fault)
-    following = [s.received for s in between(output, begin + 0.01, history.end)]
+    silent = begin + SAME
+    if fault.kind in HANGS and any(life.pid == fault.pid for life in history.lives_of(fault.target)):
+        # A busy machine still sends what was begun: only its successor ends the silence, or its return.
+        silent = max(silent, history.effect_end(fault) - RESTARTED)
+    following = [s.received for s in between(output, silent, history.end)]
     if following:
         return min(following) - begin
     # Silent for good, if the record is long enough to show it.

@@ -105,5 +105,12 @@ def killed(history: History, program: str, at: float, back: float) -> History:
     )
 
 
+def succeeded(history: History, program: str, at: float) -> History:
+    """Return the history in which the process of a program ends, and a successor starts."""
+    old = next(life for life in history.lives if life.program == program)
+    lives = [life._replace(ended=at) if life is old else life for life in history.lives]
+    return replace(history, lives=[*lives, Life(program, old.pid + 1000, at, None)])
+
+
 def _successor(sample: Sample, pid: int, since: float) -> Sample | None:
     return sample._replace(value=(sample.value[0], pid)) if sample.sent >= since else None

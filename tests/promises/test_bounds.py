@@ -14,7 +14,7 @@ from deploy.promises.promises import CHECKERS
 from interfaces.robot_model import forward_kinematics
 from interfaces.topics import CONFIGURATION, OFF, ON, TURN_OFF
 
-from .histories import END, added, change, faulty, good, killed, silent, with_value
+from .histories import END, added, change, faulty, good, killed, silent, succeeded, with_value
 
 AT = 20.0  # s, the moment that a bound counts from; every topic has a message then
 RARE = 7.25  # m, a length that no topic has otherwise
@@ -127,7 +127,7 @@ def last_position_of_a_length_replaced_before(age: float) -> History:
 
 
 def replaced_after(hang: float) -> History:
-    history = resumed(good(), "effector/position", hang - TRAVEL)
+    history = succeeded(resumed(good(), "effector/position", hang - TRAVEL), "kinematics", AT + hang - 0.5)
     return faulty(history, InjectedFault("stop", "kinematics", AT, AT + 15.0, 105))
 
 

@@ -26,7 +26,7 @@ from interfaces import topics
 from interfaces.robot_model import forward_kinematics
 from interfaces.topics import OFF, ON, TURN_OFF
 
-from .histories import END, added, change, faulty, good, killed, silent, value_at, with_value
+from .histories import END, added, change, faulty, good, killed, silent, succeeded, value_at, with_value
 
 
 def verdict(promise: str, history: History) -> str:
@@ -355,10 +355,17 @@ def test_l4_detects_a_late_or_missing_replacement(after: float) -> None:
     assert verdict("L4", hung(after)) == VIOLATED
 
 
+@pytest.mark.parametrize(("until", "replaced"), [(23.5, True), (60.0, False)])
+def test_l4_message_that_was_under_way_is_no_replacement(until: float, replaced: bool) -> None:
+    history = silent(good(), "effector/position", 20.05, until)
+    history = succeeded(history, "kinematics", 23.0) if replaced else history
+    finding = CHECKERS["L4"](faulty(history, InjectedFault("stop", "kinematics", 20.0, 35.0, 105)))
+    assert (finding.verdict == VIOLATED) is not replaced
+    assert finding.worst == pytest.approx(3.5 if replaced else math.inf, abs=0.1)
+
+
 def test_l4_successor_of_a_hung_sentinel_is_its_replacement() -> None:
-    history = silent(good(), "/diagnostics", 20.0, 23.5)
-    lives = [life._replace(ended=23.0) if life.program == "sentinel" else life for life in history.lives]
-    history = replace(history, lives=[*lives, Life("sentinel", 999, 23.0, None)])
+    history = succeeded(silent(good(), "/diagnostics", 20.0, 23.5), "sentinel", 23.0)
     finding = CHECKERS["L4"](faulty(history, InjectedFault("stop", "sentinel", 20.0, 35.0, 111)))
     assert (finding.cases, finding.unknown) == (1, 0)
 
