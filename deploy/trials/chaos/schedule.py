@@ -134,11 +134,11 @@ def variously() -> Schedule:
         PlannedFault(15.0, "kill", "operator_watchdog"),
         PlannedFault(18.0, "babble", NO_TARGET, 7.0),
         PlannedFault(18.5, "kill", "engine_controller"),
-        PlannedFault(20.0, "kill", "kinematics"),
         PlannedFault(20.5, "stop", "sentinel", 15.0),
         PlannedFault(22.0, "kill", "motion"),
         PlannedFault(23.0, STEP, NO_TARGET),
         PlannedFault(24.0, "kill", "drive"),
+        PlannedFault(25.2, "kill", "kinematics"),  # config_l2, for which it may wait, is back
         PlannedFault(26.0, "full_disk", NO_TARGET, 4.0),
         PlannedFault(26.5, "kill", "config_theta1"),
         PlannedFault(27.2, "kill", "operator_watchdog"),
