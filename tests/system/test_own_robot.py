@@ -156,7 +156,9 @@ def test_own_programs_are_supervised_and_are_the_only_joints(robot: Robot, modul
         robot.spin(0.1)
     assert status.wait() == 0
     rows = {line.split()[0]: line.split() for line in status.output.splitlines()[3:]}
-    assert {row[-1] for row in rows.values()} == {"ok"}
+    healths = {name: row[-1] for name, row in rows.items()}
+    del healths["sentinel"]  # it tells when the machine is busy
+    assert set(healths.values()) == {"ok"}
     assert {"joint_source", "drive_adapter", "twist_gate", "own_guard", "config_l1"} <= rows.keys()
     assert not {"config_theta1", "config_theta2", "drive"} & rows.keys()
 
