@@ -87,7 +87,7 @@ def send_signal(request: Request, programs: Mapping[str, Program]) -> Observable
     elif run is None:
         reason = "the page runs without supervisord: it knows no processes"
     elif not processes.send_signal(Path(run), name, pid, SIGNALS[action]):
-        reason = f"{name} has no process now"
+        reason = f"{name} has no process on this host now"
     else:
         return rx.empty()
     return rx.just(refuse(request.page, "process", reason))

@@ -56,4 +56,4 @@ def test_without_supervisord_there_is_nothing_to_kill(
 
 def test_process_that_has_ended_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(processes.MARK, str(tmp_path))
-    assert refusals(KILL, {}) == [("page", "process", "velocity has no process now")]
+    assert refusals(KILL, {}) == [("page", "process", "velocity has no process on this host now")]
