@@ -205,11 +205,14 @@ def test_s4_position_of_long_links_is_right_up_to_its_rounding(length: float) ->
     assert verdict("S4", published(9, wrong_by=max(1e-12, 2e-8 / length))) == VIOLATED
 
 
+def with_only_position(history: History, at: float) -> History:
+    """Return the history with one position, of no published values: to explain each of them takes long."""
+    return replace(history, streams=history.streams | {"effector/position": [Sample(at, at, (1.0, 9.0))]})
+
+
 def test_s4_is_unknown_if_a_value_may_have_been_missed() -> None:
-    history = added(killed(good(), "config_l1", 29.0, 0.5), "effector/position", (29.6, (1.0, 9.0)))
-    finding = CHECKERS["S4"](history)
-    assert finding.verdict == HOLDS
-    assert finding.unknown >= 1
+    finding = CHECKERS["S4"](with_only_position(killed(good(), "config_l1", 29.0, 0.5), 29.6))
+    assert (finding.verdict, finding.unknown) == (HOLDS, 1)
 
 
 @pytest.mark.parametrize(
@@ -217,7 +220,7 @@ def test_s4_is_unknown_if_a_value_may_have_been_missed() -> None:
 )
 def test_s4_is_unknown_until_a_killed_source_sends_again(at: float, expected: str) -> None:
     history = replace(killed(good(), "config_l1", 29.0, 0.5), lives=good().lives)
-    assert verdict("S4", added(history, "effector/position", (at, (1.0, 9.0)))) == expected
+    assert verdict("S4", with_only_position(history, at)) == expected
 
 
 def test_s4_is_unknown_on_a_lossy_network() -> None:
