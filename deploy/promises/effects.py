@@ -49,7 +49,6 @@ ORDER = 0.1  # the observer may receive a value so much later than a position th
 BEFORE = 1.0  # a fault or a missed message so long before a case may matter
 DISCOVERY = 1.0  # from the observer's first message of a publisher until every reader knows that publisher
 TRANSPORT, BAD_TRANSPORT = 0.15, 0.6  # a message may take so long on a busy machine, on a bad line
-LATE = 0.1  # a message that takes longer shows an overload
 SAME = 0.01  # what happens at once may be sent in either order
 REFUSING = 4.0  # within it, a supervisord has ended because there is another one
 KILLING = 1.0  # from the injection of a kill to the death of the process

@@ -13,7 +13,7 @@ from mcap_files import McapFile, UnreadableError
 from rclpy.serialization import deserialize_message
 from std_msgs.msg import String
 
-from deploy.promises.effects import LATE, LATE_LINE, LATE_START, Effect, effects, undisturbed
+from deploy.promises.effects import LATE_LINE, LATE_START, Effect, effects, undisturbed
 from deploy.promises.history import (
     ALL,
     NO_TARGET,
@@ -31,6 +31,7 @@ from interfaces import topics
 from interfaces.service.health import reported_parameters
 
 PROCESSES, FAULTS = "/chaos/processes", "/chaos/faults"  # topics
+LATE = 0.1  # s; a message that takes longer shows an overload
 EARLY = 0.001  # s by which a message may seem to be sent after its reception: clocks are read one by one
 
 

@@ -210,9 +210,10 @@ def with_only_position(history: History, at: float) -> History:
     return replace(history, streams=history.streams | {"effector/position": [Sample(at, at, (1.0, 9.0))]})
 
 
-def test_s4_is_unknown_if_a_value_may_have_been_missed() -> None:
-    finding = CHECKERS["S4"](with_only_position(killed(good(), "config_l1", 29.0, 0.5), 29.6))
-    assert (finding.verdict, finding.unknown) == (HOLDS, 1)
+@pytest.mark.parametrize(("at", "expected"), [(29.6, HOLDS), (30.49, HOLDS), (30.51, VIOLATED)])
+def test_s4_is_unknown_if_a_value_may_have_been_missed(at: float, expected: str) -> None:
+    finding = CHECKERS["S4"](with_only_position(killed(good(), "config_l1", 29.0, 0.5), at))
+    assert (finding.verdict, finding.unknown) == (expected, expected == HOLDS)
 
 
 @pytest.mark.parametrize(
@@ -365,6 +366,14 @@ def test_l4_message_that_was_under_way_is_no_replacement(until: float, replaced:
     finding = CHECKERS["L4"](faulty(history, InjectedFault("stop", "kinematics", 20.0, 35.0, 105)))
     assert (finding.verdict == VIOLATED) is not replaced
     assert finding.worst == pytest.approx(3.5 if replaced else math.inf, abs=0.1)
+
+
+@pytest.mark.parametrize(("sent", "worst"), [(22.97, math.inf), (22.99, 2.991), (23.01, 3.011)])
+def test_l4_process_may_be_noted_to_end_just_after_its_successor_sends(sent: float, worst: float) -> None:
+    history = added(silent(good(), "effector/position", 20.0, END), "effector/position", (sent, (1.0, 0.0)))
+    history = succeeded(history, "kinematics", 23.0)
+    finding = CHECKERS["L4"](faulty(history, InjectedFault("stop", "kinematics", 20.0, 35.0, 105)))
+    assert finding.worst == pytest.approx(worst)
 
 
 def test_l4_successor_of_a_hung_sentinel_is_its_replacement() -> None:

@@ -49,13 +49,17 @@ HEARTBEATS = {SWITCH, *DEPENDENTS[SWITCH]}
 Row = tuple[set[str], float, float, str]
 
 
-def rows(faults: Sequence[InjectedFault] = (), lives: Sequence[Life] = ()) -> list[Row]:
+def rows(
+    faults: Sequence[InjectedFault] = (), lives: Sequence[Life] = (), *parameters: tuple[str, float]
+) -> list[Row]:
+    """Return the effects of faults and starts, in an arm with these parameters."""
     values = [Sample(float(second), float(second), 0.0) for second in range(101)]
-    history = History(100.0, dict.fromkeys(topics.CONFIGURATION, values), [*lives], [*faults])
+    health = [Sample(0.0, 0.0, (program, 7, *parameters)) for program in (CONTROLLER, WATCHDOG)]
+    streams = {**dict.fromkeys(topics.CONFIGURATION, values), "/diagnostics": health}
     return [
         ({*each.programs}, round(each.begin, 6), round(each.end, 6), each.why)
-        for each in effects(history)
-        if each.cause is not history
+        for each in effects(History(100.0, streams, [*lives], [*faults]))
+        if each.cause in (*faults, *lives)
     ]
 
 
@@ -118,9 +122,34 @@ def test_effects_of_a_fault_from_10_to_14_s(kind: str, target: str, expected: li
     assert rows([InjectedFault(kind, target, 10.0, 14.0)]) == expected
 
 
-def test_loss_that_lasts_beyond_the_record_makes_messages_late() -> None:
-    planned = rows([InjectedFault("loss", NO_TARGET, 10.0, 101.0)])
-    assert ({ALL}, 10.0, 111.0, LATE_LINE) in planned
+@pytest.mark.parametrize(
+    ("kind", "target", "parameter", "ends"),
+    [
+        # the longest restart of the watchdog is a second shorter than the timeout
+        ("crash_loop", WATCHDOG, ("presence_timeout", 7.0), []),
+        ("crash_loop", WATCHDOG, ("presence_timeout", 6.875), [16.0]),
+        ("kill_supervisor", ALL, ("presence_timeout", 6.875), [16.0]),
+        ("kill", WATCHDOG, ("presence_timeout", 6.875), []),
+        ("crash_loop", CONTROLLER, ("presence_timeout", 6.875), []),
+        *(
+            each
+            for kind, target in (("flood", NO_TARGET), ("babble", NO_TARGET), ("bad_line", ALL))
+            for each in ((kind, target, ("silence", 1.2), []), (kind, target, ("silence", 1.19), [16.0]))
+        ),
+        ("loss", NO_TARGET, ("silence", 1.19), []),
+    ],
+)
+def test_fault_from_10_to_14_s_keeps_heartbeats_from_the_watchdog_of_a_quick_arm(
+    kind: str, target: str, parameter: tuple[str, float], ends: list[float]
+) -> None:
+    found = rows([InjectedFault(kind, target, 10.0, 14.0)], (), parameter)
+    assert [row for row in found if row[-1] == DEAF] == [({WATCHDOG}, 10.0, end, DEAF) for end in ends]
+
+
+@pytest.mark.parametrize(("end", "late"), [(100.0, []), (101.0, [({ALL}, 10.0, 111.0, LATE_LINE)])])
+def test_loss_that_lasts_beyond_the_record_makes_messages_late(end: float, late: list[Row]) -> None:
+    found = rows([InjectedFault("loss", NO_TARGET, 10.0, end)])
+    assert [row for row in found if row[-1] == LATE_LINE] == late
 
 
 def test_replaced_process_is_no_longer_suspended() -> None:
@@ -155,14 +184,14 @@ def test_source_without_a_message_stays_undiscovered() -> None:
 
 
 def test_silent_source_keeps_a_new_program_waiting() -> None:
-    values = [Sample(at, at, 0.0) for at in (1.0, 2.125, 4.0)]  # a shorter pause is no silence
+    values = [Sample(at, at, 0.0) for at in (0.0, 1.2, 4.0)]  # the first pause is no silence
     flowing = [Sample(float(at), float(at), 0.0) for at in range(10)]
     streams = dict.fromkeys(topics.CONFIGURATION, flowing) | {"l1": values}
     history = History(9.0, streams)
     found = [each for each in effects(history) if each.why == WAITING and each.end < 9.0]
     assert [(each.begin, each.end) for each in found] == [
-        (-math.inf, 1.0),
-        (2.125, 4.0),
+        (-math.inf, 0.0),
+        (1.2, 4.0),
         *[(-math.inf, 0.0)] * 3,
     ]
     assert {*found[1].programs} == {KINEMATICS, ROBOT_STATE}

@@ -742,12 +742,12 @@ def positions(*wrong: float) -> list[tuple[float, tuple[float, float]]]:
 def test_l3_judges_the_last_position_of_a_second() -> None:
     found = CHECKERS["L3"](
         history(
-            **LINKS | {"l1": [(0.0, 1.0), (34.5, 1.0)]},
+            **LINKS | {"l1": [(0.0, 1.0), (2.0, 1.0), (34.5, 1.0)]},
             positions=positions(6.0, 14.0, 22.0),
             speeds=back((20.0, 0.5)),
             faults=[
                 *kill(KINEMATICS, 4.0, 12.0, 20.0, 28.0),
-                *kill("config_l1", 35.0, 36.0),  # without output after, or before
+                *kill("config_l1", 1.5, 35.0, 36.0),  # without output before, after, and before
                 *kill("velocity", 20.0),
                 overload(5.875, 5.9375),
                 overload(21.875, 21.9375),

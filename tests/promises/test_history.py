@@ -9,12 +9,18 @@ import pytest
 
 from deploy.promises.history import (
     ALL,
+    BAD_LINE,
     CONDITIONS,
     DEPENDENTS,
+    DRIVE,
+    FALSE_PRESENCE,
+    HOLD,
     NO_TARGET,
     OPERATOR,
     OUTPUTS,
     PARTITION,
+    PROGRAMS,
+    STUCK_DRIVE,
     History,
     InjectedFault,
     Life,
@@ -97,7 +103,9 @@ def test_new_services_need_no_change_in_the_chaos_tools() -> None:
 def test_names_in_schedules_and_records_stay() -> None:
     assert (OPERATOR, ALL, NO_TARGET) == ("operator", "all", "nothing")
     assert CONDITIONS == ("overload", "loss", "silence")
-    assert PARTITION == "partition"
+    assert DRIVE in PROGRAMS
+    assert (PARTITION, BAD_LINE, HOLD) == ("partition", "bad_line", "hold")
+    assert (FALSE_PRESENCE, STUCK_DRIVE) == ("false_presence", "stuck_drive")
 
 
 def test_fault_hits_no_process_and_no_clock_unless_it_says_so() -> None:
