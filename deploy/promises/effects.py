@@ -10,6 +10,7 @@ import itertools
 import math
 from bisect import bisect_right
 from collections.abc import Collection, Iterable, Iterator
+from enum import StrEnum, auto
 from typing import NamedTuple
 
 from deploy.promises import history as names
@@ -18,22 +19,27 @@ from deploy.promises.limits import GAP, HUNG, SLOWEST
 from deploy.promises.marks import SPREAD, STEP
 from interfaces import topics
 
-# What an effect does to a program.
-SILENT = "its output stops until it has recovered, or is mixed with injected messages"
-WAITING = "it cannot start, because it needs the value of a silent program"
-SUSPENDED = "it does nothing"
-REPLACED = "a new process takes over, without the state of the old one"
-DEAF = "no heartbeat counts"
-UNWATCHED = "the sentinel may not notice that it hangs"
-CUT_OFF = "a value that it was sending may have reached only some readers"
-DELAYED = "its messages take longer"
-OVERLOADED = "the machine was too busy: it pauses, and the observer may miss its messages"
-LOST = "the network may lose its messages to the observer"
-UNDISCOVERED = "the observer may miss its messages, because it may not know their publisher yet"
-LATE_LINE = "its messages are late without an overload, because the network delays them"
-LATE_START = "its messages are late without an overload, because readers may not know it yet"
-STILL = "it has nothing to tell: the arm stands still, and it publishes only a speed that changes"
-MISSED = (OVERLOADED, LOST)
+
+class Why(StrEnum):
+    """What an effect does to a program."""
+
+    SILENT = auto()  # its output stops until it has recovered, or is mixed with injected messages
+    WAITING = auto()  # it cannot start, because it needs the value of a silent program
+    SUSPENDED = auto()  # it does nothing
+    REPLACED = auto()  # a new process takes over, without the state of the old one
+    DEAF = auto()  # no heartbeat counts
+    UNWATCHED = auto()  # the sentinel may not notice that it hangs
+    CUT_OFF = auto()  # a value that it was sending may have reached only some readers
+    DELAYED = auto()  # its messages take longer
+    OVERLOADED = auto()  # the machine was too busy: it pauses, and the observer may miss its messages
+    LOST = auto()  # the network may lose its messages to the observer
+    UNDISCOVERED = auto()  # the observer may miss its messages, because it may not know their publisher yet
+    LATE_LINE = auto()  # its messages are late without an overload, because the network delays them
+    LATE_START = auto()  # its messages are late without an overload, because readers may not know it yet
+    STILL = auto()  # it has nothing to tell: the arm stands still, and it publishes only a speed that changes
+
+
+MISSED = (Why.OVERLOADED, Why.LOST)
 
 # How long an effect lasts. All in seconds.
 RESTARTED = 0.02  # a process may be noted to start so long before the last message of the one before
@@ -67,7 +73,7 @@ class Effect(NamedTuple):
     begin: float
     end: float
     """[s]. Both times are excluded."""
-    why: str
+    why: Why
     cause: object
     """The fault, the process that starts, or the history."""
 
@@ -86,75 +92,75 @@ def _of_faults(history: History) -> Iterator[Effect]:
         replaced = history.effect_end(fault)  # the end, or earlier if the process was replaced
         recovery = HUNG if kind in LASTING else REDISCOVERY if kind == names.PARTITION else SLOWEST
         silent = (target, *names.DEPENDENTS.get(target, ()))
-        yield Effect(silent, _from(begin), _to(replaced + recovery), SILENT, fault)
+        yield Effect(silent, _from(begin), _to(replaced + recovery), Why.SILENT, fault)
         if kind in ("flood", "babble"):
             silent = (SWITCH, *names.DEPENDENTS[SWITCH])
-            yield Effect(silent, _from(begin), _to(end + recovery), SILENT, fault)
+            yield Effect(silent, _from(begin), _to(end + recovery), Why.SILENT, fault)
         if kind in names.SUSPENDING:
-            yield Effect((target,), begin, end, SUSPENDED, fault)
+            yield Effect((target,), begin, end, Why.SUSPENDED, fault)
             if target in (WATCHDOG, ALL):
-                yield Effect((WATCHDOG,), begin, replaced, DEAF, fault)
+                yield Effect((WATCHDOG,), begin, replaced, Why.DEAF, fault)
         if kind == names.PARTITION:
-            yield Effect((WATCHDOG,), begin, end + REDISCOVERY, DEAF, fault)
+            yield Effect((WATCHDOG,), begin, end + REDISCOVERY, Why.DEAF, fault)
         is_away = kind in ("crash_loop", "kill_supervisor") and target in (WATCHDOG, ALL)
         if is_away and end + SLOWEST - begin > history.reaction.longest_restart:
-            yield Effect((WATCHDOG,), begin, end + SLOWEST, DEAF, fault)
+            yield Effect((WATCHDOG,), begin, end + SLOWEST, Why.DEAF, fault)
         if (kind, target) == (names.HOLD, topics.OPERATOR_HEARTBEAT.name):
             # They are too old when they arrive.
-            yield Effect((WATCHDOG,), begin, end + history.reaction.watchdog.sampling, DEAF, fault)
+            yield Effect((WATCHDOG,), begin, end + history.reaction.watchdog.sampling, Why.DEAF, fault)
         if kind == STEP:  # while it spreads, clocks differ, and the age of a heartbeat is wrong
-            yield Effect((WATCHDOG,), begin, begin + SPREAD, DEAF, fault)
+            yield Effect((WATCHDOG,), begin, begin + SPREAD, Why.DEAF, fault)
         if target in (SENTINEL, ALL):
-            yield Effect((ALL,), begin - AT_ONCE, end, UNWATCHED, fault)
+            yield Effect((ALL,), begin - AT_ONCE, end, Why.UNWATCHED, fault)
         if target in SOURCES:  # it sends a value to one reader after the other
-            yield Effect((target,), begin - SENDING, begin + SENDING, CUT_OFF, fault)
+            yield Effect((target,), begin - SENDING, begin + SENDING, Why.CUT_OFF, fault)
         if kind == names.BAD_LINE:
-            yield Effect((ALL,), begin, end, DELAYED, fault)
+            yield Effect((ALL,), begin, end, Why.DELAYED, fault)
         is_short = history.reaction.watchdog.silence < 2 * BAD_TRANSPORT
         if is_short and kind in (names.BAD_LINE, "flood", "babble"):
             # It may delay, lose or hide as many heartbeats as a silence has.
-            yield Effect((WATCHDOG,), begin, end + SLOWEST, DEAF, fault)
+            yield Effect((WATCHDOG,), begin, end + SLOWEST, Why.DEAF, fault)
         if kind == names.OVERLOAD:
-            yield Effect((ALL,), begin, end, OVERLOADED, fault)
+            yield Effect((ALL,), begin, end, Why.OVERLOADED, fault)
         if kind == names.LOSS:
-            yield Effect((ALL,), begin, end, LOST, fault)
+            yield Effect((ALL,), begin, end, Why.LOST, fault)
         # A loss that lasts beyond the record was planned: DDS sends again what was lost.
         planned = kind == names.LOSS and end > history.end
         if kind in (names.PARTITION, names.BAD_LINE) or planned:
-            yield Effect((ALL,), begin, end + REDISCOVERY, LATE_LINE, fault)
+            yield Effect((ALL,), begin, end + REDISCOVERY, Why.LATE_LINE, fault)
 
 
 def _of_starts(history: History) -> Iterator[Effect]:
     for life in history.lives:
-        yield Effect((life.program,), life.began, life.began + MATCHED, LATE_START, life)
+        yield Effect((life.program,), life.began, life.began + MATCHED, Why.LATE_START, life)
         if life.program in SOURCES:
             output = history.output(life.program)
             first = bisect_right(output, life.began, key=lambda s: s.sent)
             seen = output[first].sent if first < len(output) else math.inf
-            yield Effect((life.program,), life.began, seen, UNDISCOVERED, life)
+            yield Effect((life.program,), life.began, seen, Why.UNDISCOVERED, life)
     for life in history.lives_of(SWITCH):
-        yield Effect((SWITCH,), _from(life.began), life.began + NEW_SWITCH, UNDISCOVERED, life)
+        yield Effect((SWITCH,), _from(life.began), life.began + NEW_SWITCH, Why.UNDISCOVERED, life)
     for life in history.lives_of(CONTROLLER):
-        yield Effect((CONTROLLER,), _from(life.began), life.began + RESTARTED, REPLACED, life)
+        yield Effect((CONTROLLER,), _from(life.began), life.began + RESTARTED, Why.REPLACED, life)
     for life in history.lives_of(SENTINEL):  # it does not know yet how long the others have been silent
         others = {*names.PROGRAMS} - {SENTINEL}
-        yield Effect(others, life.began, life.began, UNWATCHED, life)
+        yield Effect(others, life.began, life.began, Why.UNWATCHED, life)
 
 
 def _of_silence(history: History) -> Iterator[Effect]:
-    yield Effect(SOURCES, history.end - ORDER, math.inf, UNDISCOVERED, history)
+    yield Effect(SOURCES, history.end - ORDER, math.inf, Why.UNDISCOVERED, history)
     for source in SOURCES:
         waiting = [program for program, needed in names.NEEDED_AT_START.items() if source in needed]
         times = (sample.sent for sample in history.output(source))
         for last, following in names.gaps(times, -math.inf, math.inf):
             if following - last > FLOWING:
-                yield Effect(waiting, last, following, WAITING, history)
+                yield Effect(waiting, last, following, Why.WAITING, history)
     positions = history.stream(topics.EFFECTOR_POSITION)
     moves = (two.sent for one, two in itertools.pairwise(positions) if one.value != two.value)
     begin = positions[0].sent if positions else history.end
     for last, following in names.gaps(moves, begin, history.end):
         if following - last > GAP:
-            yield Effect((VELOCITY,), last, following, STILL, history)
+            yield Effect((VELOCITY,), last, following, Why.STILL, history)
 
 
 def _from(time: float) -> float:
@@ -166,7 +172,7 @@ def _to(time: float) -> float:
 
 
 def disturbing(
-    found: Iterable[Effect], program: str, begin: float, end: float, *why: str, but: object = None
+    found: Iterable[Effect], program: str, begin: float, end: float, *why: Why, but: object = None
 ) -> Iterator[Effect]:
     """Yield the effects on a program between two times for some reasons, without those of one cause."""
     for effect in found:
@@ -176,13 +182,13 @@ def disturbing(
 
 
 def undisturbed(
-    found: Iterable[Effect], program: str, begin: float, end: float, *why: str, but: object = None
+    found: Iterable[Effect], program: str, begin: float, end: float, *why: Why, but: object = None
 ) -> bool:
     """Return whether a program has no effect between two times for some reasons, but for one cause."""
     return next(disturbing(found, program, begin, end, *why, but=but), None) is None
 
 
-def disturbed_for(found: Iterable[Effect], program: str, begin: float, end: float, *why: str) -> float:
+def disturbed_for(found: Iterable[Effect], program: str, begin: float, end: float, *why: Why) -> float:
     """Return how long [s] a program has effects between two times for some reasons."""
     parts = (
         (max(begin, each.begin), min(end, each.end)) for each in disturbing(found, program, begin, end, *why)

@@ -16,11 +16,8 @@ from deploy.promises.effects import (
     RESTARTED,
     SAME,
     SETTLED,
-    SILENT,
-    STILL,
-    UNWATCHED,
-    WAITING,
     Effect,
+    Why,
     disturbed_for,
     effects,
     undisturbed,
@@ -105,11 +102,11 @@ def other_streams_flow(history: History) -> Finding:
         for program in STREAMS:
             if not _flowed(history, program, fault.begin, GAP):
                 continue
-            if not undisturbed(found, program, fault.begin - BEFORE, end + GAP, SILENT):
+            if not undisturbed(found, program, fault.begin - BEFORE, end + GAP, Why.SILENT):
                 continue
             excused = 0
             for one, two in _intervals(history, program, fault.begin - GAP, end):
-                if two - one > GAP >= two - one - disturbed_for(found, program, one, two, *MISSED, STILL):
+                if two - one > GAP >= two - one - disturbed_for(found, program, one, two, *MISSED, Why.STILL):
                     excused = 1  # the observer may have missed messages, or there was nothing to tell
                     continue
                 longest = max(longest, two - one)
@@ -143,7 +140,7 @@ def right_after_restart(history: History) -> Finding:
         if time is None:
             continue
         begin = fault.begin + time + SETTLED
-        if not undisturbed(found, KINEMATICS, begin, begin + 1.0, SILENT, but=fault):
+        if not undisturbed(found, KINEMATICS, begin, begin + 1.0, Why.SILENT, but=fault):
             continue
         positions = between(history.stream(topics.EFFECTOR_POSITION), begin, begin + 1.0)
         right = bool(positions) and published.explain(positions[-1], within=SETTLED)
@@ -171,7 +168,7 @@ def hung_is_replaced(history: History) -> Finding:
         until = fault.begin + (0.0 if time is None else min(time, HUNG))
         if (
             time is None
-            or not undisturbed(found, fault.target, fault.begin - BEFORE, until, UNWATCHED, but=fault)
+            or not undisturbed(found, fault.target, fault.begin - BEFORE, until, Why.UNWATCHED, but=fault)
             or not _is_alone(found, fault, fault.begin, until)
             or _paused(found, fault, time, HUNG)
         ):
@@ -232,8 +229,8 @@ def _is_alone(
     # If all were hit, those that it follows had to start as well.
     followed = [each for each, dependents in DEPENDENTS.items() if program in dependents]
     starting = (program, *followed) if fault.target == ALL else (program,)
-    return undisturbed(found, program, begin, end, SILENT, but=fault) and all(
-        undisturbed(found, each, time, time, WAITING) for each in starting for time in (begin, end)
+    return undisturbed(found, program, begin, end, Why.SILENT, but=fault) and all(
+        undisturbed(found, each, time, time, Why.WAITING) for each in starting for time in (begin, end)
     )
 
 

@@ -13,7 +13,7 @@ from mcap_files import McapFile, UnreadableError
 from rclpy.serialization import deserialize_message
 from std_msgs.msg import String
 
-from deploy.promises.effects import LATE_LINE, LATE_START, Effect, effects, undisturbed
+from deploy.promises.effects import Effect, Why, effects, undisturbed
 from deploy.promises.history import (
     ALL,
     NO_TARGET,
@@ -101,7 +101,7 @@ def late_receptions(history: History) -> list[tuple[float, float]]:
     Messages that a fault of the network may have delayed do not count, nor those of a publisher that the
     observer may not have discovered yet.
     """
-    found = [each for each in effects(history) if each.why in (LATE_LINE, LATE_START)]
+    found = [each for each in effects(history) if each.why in (Why.LATE_LINE, Why.LATE_START)]
     return merged(
         (sample.sent, sample.received)
         for topic in topics.CONTRACT
@@ -113,8 +113,8 @@ def late_receptions(history: History) -> list[tuple[float, float]]:
 def _shows_overload(found: Iterable[Effect], topic: topics.Topic, sample: Sample) -> bool:
     """Return whether nothing else explains that a message was late."""
     publishers = topic.publishers if topic is not topics.DIAGNOSTICS else sample.value[:1]
-    return undisturbed(found, ALL, sample.sent, sample.received, LATE_LINE) and all(
-        undisturbed(found, each, sample.sent, sample.sent, LATE_START) for each in publishers
+    return undisturbed(found, ALL, sample.sent, sample.received, Why.LATE_LINE) and all(
+        undisturbed(found, each, sample.sent, sample.sent, Why.LATE_START) for each in publishers
     )
 
 

@@ -7,15 +7,7 @@ import math
 from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
 
-from deploy.promises.effects import (
-    CUT_OFF,
-    DISCOVERY,
-    LONGEST_PAUSE,
-    MISSED,
-    UNDISCOVERED,
-    Effect,
-    undisturbed,
-)
+from deploy.promises.effects import DISCOVERY, LONGEST_PAUSE, MISSED, Effect, Why, undisturbed
 from deploy.promises.history import SOURCES, History, Sample, last_sent
 from interfaces import topics
 
@@ -59,10 +51,9 @@ def may_lack_values(history: History, found: Sequence[Effect], time: float) -> b
     for source in SOURCES:
         newest = last_sent(history.output(source), time)
         seen = newest.sent if newest else -math.inf
+        missed = not undisturbed(found, source, time - DISCOVERY, time, *MISSED, Why.UNDISCOVERED)
         # What a source sends while it is killed may reach kinematics only.
-        if not undisturbed(found, source, time - DISCOVERY, time, *MISSED, UNDISCOVERED) or not undisturbed(
-            found, source, seen, time, CUT_OFF
-        ):
+        if missed or not undisturbed(found, source, seen, time, Why.CUT_OFF):
             return True
     return False
 

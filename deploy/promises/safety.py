@@ -11,19 +11,13 @@ from operator import itemgetter
 from deploy.promises.effects import (
     BAD_TRANSPORT,
     BEFORE,
-    DEAF,
-    DELAYED,
     LONGEST_PAUSE,
     MISSED,
-    OVERLOADED,
     REFUSING,
-    REPLACED,
     SAME,
-    SILENT,
-    SUSPENDED,
     TRANSPORT,
-    UNDISCOVERED,
     Effect,
+    Why,
     disturbing,
     effects,
     undisturbed,
@@ -50,8 +44,8 @@ from interfaces import topics
 from interfaces.topics import DRIVE_TIMEOUT, INCAPACITATED, OFF, ON, TURN_OFF, TURN_ON
 
 FAIL_SAFES = {
-    WATCHDOG: (SILENT, SUSPENDED, DEAF, DELAYED, *MISSED),
-    CONTROLLER: (SILENT, SUSPENDED, *MISSED),
+    WATCHDOG: (Why.SILENT, Why.SUSPENDED, Why.DEAF, Why.DELAYED, *MISSED),
+    CONTROLLER: (Why.SILENT, Why.SUSPENDED, *MISSED),
 }
 """The programs of F1 and F2 (deploy/SAFETY.md), and the effects that may keep them from acting in time."""
 
@@ -61,7 +55,7 @@ def engines_off_in_time(history: History) -> Finding:
     alive = [s.sent for s in history.signs_of_life()]
     evidence, longest, longest_undisturbed, cases, unknown = [], 0.0, 0.0, 0, 0
     given, on, found = history.reaction, list(running(history)), effects(history)
-    overloads = merged((each.begin, each.end) for each in found if each.why == OVERLOADED)
+    overloads = merged((each.begin, each.end) for each in found if each.why == Why.OVERLOADED)
     for begin, end in gaps(alive, -math.inf, history.end):
         late = _overlapping_part(on, begin, end)
         if not late:
@@ -133,7 +127,7 @@ def turned_on_with_operator(history: History) -> Finding:
             cases += 1
             oldest = max(oldest, on.sent - seen[-1].sent)
         elif _was_present(history, on.sent) and not undisturbed(
-            found, SWITCH, on.sent, on.sent, UNDISCOVERED
+            found, SWITCH, on.sent, on.sent, Why.UNDISCOVERED
         ):
             unknown += 1
         elif not undisturbed(found, ALL, max(stopped, on.sent - age), on.sent, *MISSED):
@@ -233,9 +227,9 @@ def _changes(history: History, before: str, after: str) -> Iterator[tuple[Sample
 
 def _was_away(found: Sequence[Effect], on: Sample, off: Sample) -> bool:
     """Return whether the controller was replaced or suspended between its `on` and its `off`."""
-    if not undisturbed(found, CONTROLLER, on.sent, off.sent, REPLACED):
+    if not undisturbed(found, CONTROLLER, on.sent, off.sent, Why.REPLACED):
         return True
-    paused = not undisturbed(found, CONTROLLER, on.sent, off.sent, SUSPENDED, *MISSED)
+    paused = not undisturbed(found, CONTROLLER, on.sent, off.sent, Why.SUSPENDED, *MISSED)
     return paused and off.sent - on.sent > DRIVE_TIMEOUT
 
 
@@ -268,7 +262,7 @@ def _is_of_watchdog(history: History, command: Sample) -> bool:
 
 def _transport(found: Sequence[Effect], time: float) -> float:
     """Return how long a message may have taken that arrived then [s]."""
-    quick = undisturbed(found, ALL, time - BAD_TRANSPORT, time, DELAYED)
+    quick = undisturbed(found, ALL, time - BAD_TRANSPORT, time, Why.DELAYED)
     return TRANSPORT if quick else BAD_TRANSPORT
 
 
@@ -287,7 +281,7 @@ def _strikes(history: History, found: Sequence[Effect], time: float) -> float:
     # A suspended watchdog receives no heartbeat either, nor the last one before; S2 does not cover that.
     deaf = [
         (max(effect.begin - given.reading, begin), min(effect.end, time))
-        for effect in disturbing(found, WATCHDOG, begin, time, DEAF)
+        for effect in disturbing(found, WATCHDOG, begin, time, Why.DEAF)
     ]
     # Intervals that only touch have a heartbeat in between.
     silences = merged([*gaps(heartbeats, begin, time), *deaf])
@@ -299,7 +293,7 @@ def _abandoned(history: History, found: Sequence[Effect], off: Sample) -> bool:
     given = history.reaction
     # A presence is as old as its stamp.
     begin = off.sent - given.controller.presence_timeout + given.watchdog.sampling + TRANSPORT
-    deaf = list(disturbing(found, WATCHDOG, begin, off.sent, DEAF))
+    deaf = list(disturbing(found, WATCHDOG, begin, off.sent, Why.DEAF))
     for presence in between(history.stream(topics.OPERATOR_PRESENCE), begin, off.sent - TRANSPORT):
         # A presence sent right after resuming may stem from an older heartbeat.
         if not any(each.begin < presence.sent <= each.end + TRANSPORT for each in deaf):

@@ -5,26 +5,7 @@ from collections.abc import Sequence
 
 import pytest
 
-from deploy.promises.effects import (
-    CUT_OFF,
-    DEAF,
-    DELAYED,
-    LATE_LINE,
-    LATE_START,
-    LOST,
-    MISSED,
-    OVERLOADED,
-    REPLACED,
-    SILENT,
-    SUSPENDED,
-    UNDISCOVERED,
-    UNWATCHED,
-    WAITING,
-    Effect,
-    disturbed_for,
-    effects,
-    undisturbed,
-)
+from deploy.promises.effects import MISSED, Effect, Why, disturbed_for, effects, undisturbed
 from deploy.promises.history import (
     ALL,
     CONTROLLER,
@@ -66,56 +47,68 @@ def rows(
 @pytest.mark.parametrize(
     ("kind", "target", "expected"),
     [
-        ("kill", KINEMATICS, [({KINEMATICS, "velocity"}, 10.0, 16.0, SILENT)]),
-        ("kill", "config_l1", [({"config_l1"}, 10.0, 16.0, SILENT), ({"config_l1"}, 9.98, 10.02, CUT_OFF)]),
-        ("kill", SENTINEL, [({SENTINEL}, 10.0, 16.0, SILENT), ({ALL}, 9.999, 14.0, UNWATCHED)]),
-        ("kill_all", ALL, [({ALL}, 10.0, 19.0, SILENT), ({ALL}, 9.999, 14.0, UNWATCHED)]),
-        ("crash_loop", "velocity", [({"velocity"}, 10.0, 19.0, SILENT)]),
+        ("kill", KINEMATICS, [({KINEMATICS, "velocity"}, 10.0, 16.0, Why.SILENT)]),
+        (
+            "kill",
+            "config_l1",
+            [({"config_l1"}, 10.0, 16.0, Why.SILENT), ({"config_l1"}, 9.98, 10.02, Why.CUT_OFF)],
+        ),
+        ("kill", SENTINEL, [({SENTINEL}, 10.0, 16.0, Why.SILENT), ({ALL}, 9.999, 14.0, Why.UNWATCHED)]),
+        ("kill_all", ALL, [({ALL}, 10.0, 19.0, Why.SILENT), ({ALL}, 9.999, 14.0, Why.UNWATCHED)]),
+        ("crash_loop", "velocity", [({"velocity"}, 10.0, 19.0, Why.SILENT)]),
         *(
-            (kind, CONTROLLER, [({CONTROLLER}, 10.0, 19.0, SILENT), ({CONTROLLER}, 10.0, 14.0, SUSPENDED)])
+            (
+                kind,
+                CONTROLLER,
+                [({CONTROLLER}, 10.0, 19.0, Why.SILENT), ({CONTROLLER}, 10.0, 14.0, Why.SUSPENDED)],
+            )
             for kind in ("stop", "hang", "hog", "slow")
         ),
         (
             "stop",
             WATCHDOG,
             [
-                ({WATCHDOG, *DEPENDENTS[WATCHDOG]}, 10.0, 19.0, SILENT),
-                ({WATCHDOG}, 10.0, 14.0, SUSPENDED),
-                ({WATCHDOG}, 10.0, 14.0, DEAF),
+                ({WATCHDOG, *DEPENDENTS[WATCHDOG]}, 10.0, 19.0, Why.SILENT),
+                ({WATCHDOG}, 10.0, 14.0, Why.SUSPENDED),
+                ({WATCHDOG}, 10.0, 14.0, Why.DEAF),
             ],
         ),
         *(
-            (kind, NO_TARGET, [({NO_TARGET}, 10.0, 16.0, SILENT), (HEARTBEATS, 10.0, 16.0, SILENT)])
+            (kind, NO_TARGET, [({NO_TARGET}, 10.0, 16.0, Why.SILENT), (HEARTBEATS, 10.0, 16.0, Why.SILENT)])
             for kind in ("flood", "babble")
         ),
         (
             "partition",
             OPERATOR,
             [
-                ({OPERATOR, *HEARTBEATS}, 10.0, 24.0, SILENT),
-                ({WATCHDOG}, 10.0, 24.0, DEAF),
-                ({ALL}, 10.0, 24.0, LATE_LINE),
+                ({OPERATOR, *HEARTBEATS}, 10.0, 24.0, Why.SILENT),
+                ({WATCHDOG}, 10.0, 24.0, Why.DEAF),
+                ({ALL}, 10.0, 24.0, Why.LATE_LINE),
             ],
         ),
         (
             "bad_line",
             ALL,
             [
-                ({ALL}, 10.0, 16.0, SILENT),
-                ({ALL}, 9.999, 14.0, UNWATCHED),
-                ({ALL}, 10.0, 14.0, DELAYED),
-                ({ALL}, 10.0, 24.0, LATE_LINE),
+                ({ALL}, 10.0, 16.0, Why.SILENT),
+                ({ALL}, 9.999, 14.0, Why.UNWATCHED),
+                ({ALL}, 10.0, 14.0, Why.DELAYED),
+                ({ALL}, 10.0, 24.0, Why.LATE_LINE),
             ],
         ),
         (
             "hold",
             "operator_heartbeat",
-            [({"operator_heartbeat"}, 10.0, 16.0, SILENT), ({WATCHDOG}, 10.0, 14.5, DEAF)],
+            [({"operator_heartbeat"}, 10.0, 16.0, Why.SILENT), ({WATCHDOG}, 10.0, 14.5, Why.DEAF)],
         ),
-        ("hold", "operator_presence", [({"operator_presence"}, 10.0, 16.0, SILENT)]),
-        ("step_clock", NO_TARGET, [({NO_TARGET}, 10.0, 16.0, SILENT), ({WATCHDOG}, 10.0, 11.0, DEAF)]),
-        ("overload", NO_TARGET, [({NO_TARGET}, 10.0, 16.0, SILENT), ({ALL}, 10.0, 14.0, OVERLOADED)]),
-        ("loss", NO_TARGET, [({NO_TARGET}, 10.0, 16.0, SILENT), ({ALL}, 10.0, 14.0, LOST)]),
+        ("hold", "operator_presence", [({"operator_presence"}, 10.0, 16.0, Why.SILENT)]),
+        (
+            "step_clock",
+            NO_TARGET,
+            [({NO_TARGET}, 10.0, 16.0, Why.SILENT), ({WATCHDOG}, 10.0, 11.0, Why.DEAF)],
+        ),
+        ("overload", NO_TARGET, [({NO_TARGET}, 10.0, 16.0, Why.SILENT), ({ALL}, 10.0, 14.0, Why.OVERLOADED)]),
+        ("loss", NO_TARGET, [({NO_TARGET}, 10.0, 16.0, Why.SILENT), ({ALL}, 10.0, 14.0, Why.LOST)]),
     ],
 )
 def test_effects_of_a_fault_from_10_to_14_s(kind: str, target: str, expected: list[Row]) -> None:
@@ -143,42 +136,44 @@ def test_fault_from_10_to_14_s_keeps_heartbeats_from_the_watchdog_of_a_quick_arm
     kind: str, target: str, parameter: tuple[str, float], ends: list[float]
 ) -> None:
     found = rows([InjectedFault(kind, target, 10.0, 14.0)], (), parameter)
-    assert [row for row in found if row[-1] == DEAF] == [({WATCHDOG}, 10.0, end, DEAF) for end in ends]
+    assert [row for row in found if row[-1] == Why.DEAF] == [
+        ({WATCHDOG}, 10.0, end, Why.DEAF) for end in ends
+    ]
 
 
-@pytest.mark.parametrize(("end", "late"), [(100.0, []), (101.0, [({ALL}, 10.0, 111.0, LATE_LINE)])])
+@pytest.mark.parametrize(("end", "late"), [(100.0, []), (101.0, [({ALL}, 10.0, 111.0, Why.LATE_LINE)])])
 def test_loss_that_lasts_beyond_the_record_makes_messages_late(end: float, late: list[Row]) -> None:
     found = rows([InjectedFault("loss", NO_TARGET, 10.0, end)])
-    assert [row for row in found if row[-1] == LATE_LINE] == late
+    assert [row for row in found if row[-1] == Why.LATE_LINE] == late
 
 
 def test_replaced_process_is_no_longer_suspended() -> None:
     lives = [Life(WATCHDOG, 7, 0.0, 12.0)]
     found = rows([InjectedFault("hang", WATCHDOG, 10.0, 25.0, 7)], lives)
-    assert ({WATCHDOG}, 10.0, 12.0, DEAF) in found
-    assert ({WATCHDOG, *DEPENDENTS[WATCHDOG]}, 10.0, 17.0, SILENT) in found
+    assert ({WATCHDOG}, 10.0, 12.0, Why.DEAF) in found
+    assert ({WATCHDOG, *DEPENDENTS[WATCHDOG]}, 10.0, 17.0, Why.SILENT) in found
 
 
 @pytest.mark.parametrize(
     ("program", "expected"),
     [
         ("velocity", []),
-        ("config_l1", [({"config_l1"}, 10.25, 11.0, UNDISCOVERED)]),
-        (SWITCH, [({SWITCH}, 10.25, 13.25, UNDISCOVERED)]),
-        (CONTROLLER, [({CONTROLLER}, 10.25, 10.27, REPLACED)]),
-        (SENTINEL, [({*PROGRAMS} - {SENTINEL}, 10.25, 10.25, UNWATCHED)]),
+        ("config_l1", [({"config_l1"}, 10.25, 11.0, Why.UNDISCOVERED)]),
+        (SWITCH, [({SWITCH}, 10.25, 13.25, Why.UNDISCOVERED)]),
+        (CONTROLLER, [({CONTROLLER}, 10.25, 10.27, Why.REPLACED)]),
+        (SENTINEL, [({*PROGRAMS} - {SENTINEL}, 10.25, 10.25, Why.UNWATCHED)]),
     ],
 )
 def test_effects_of_a_start(program: str, expected: list[Row]) -> None:
     found = rows(lives=[Life(program, 7, 10.25, None)])
-    assert found == [({program}, 10.25, 12.25, LATE_START), *expected]
+    assert found == [({program}, 10.25, 12.25, Why.LATE_START), *expected]
 
 
 def test_source_without_a_message_stays_undiscovered() -> None:
     (found,) = (
         each
         for each in effects(History(9.0, lives=[Life("config_l1", 7, 1.0, None)]))
-        if each.why == UNDISCOVERED and "config_l2" not in each.programs
+        if each.why == Why.UNDISCOVERED and "config_l2" not in each.programs
     )
     assert (found.begin, found.end) == (1.0, math.inf)
 
@@ -188,7 +183,7 @@ def test_silent_source_keeps_a_new_program_waiting() -> None:
     flowing = [Sample(float(at), float(at), 0.0) for at in range(10)]
     streams = dict.fromkeys(topics.CONFIGURATION, flowing) | {"l1": values}
     history = History(9.0, streams)
-    found = [each for each in effects(history) if each.why == WAITING and each.end < 9.0]
+    found = [each for each in effects(history) if each.why == Why.WAITING and each.end < 9.0]
     assert [(each.begin, each.end) for each in found] == [
         (-math.inf, 0.0),
         (1.2, 4.0),
@@ -198,8 +193,8 @@ def test_silent_source_keeps_a_new_program_waiting() -> None:
 
 
 def test_last_values_of_a_record_may_be_missing() -> None:
-    (last,) = (each for each in effects(History(9.0)) if each.why == UNDISCOVERED)
-    assert last == Effect(SOURCES, 8.9, math.inf, UNDISCOVERED, last.cause)
+    (last,) = (each for each in effects(History(9.0)) if each.why == Why.UNDISCOVERED)
+    assert last == Effect(SOURCES, 8.9, math.inf, Why.UNDISCOVERED, last.cause)
 
 
 @pytest.mark.parametrize(
@@ -209,25 +204,25 @@ def test_last_values_of_a_record_may_be_missing() -> None:
 def test_effect_disturbs_an_interval_with_which_it_has_time_in_common(
     begin: float, end: float, overlaps: bool
 ) -> None:
-    effect = Effect((KINEMATICS,), 2.0, 4.0, DEAF, "a fault")
-    assert undisturbed([effect], KINEMATICS, begin, end, DEAF) is not overlaps
+    effect = Effect((KINEMATICS,), 2.0, 4.0, Why.DEAF, "a fault")
+    assert undisturbed([effect], KINEMATICS, begin, end, Why.DEAF) is not overlaps
 
 
 def test_recovery_includes_its_ends() -> None:
     found = effects(History(99.0, faults=[InjectedFault("kill", "velocity", 10.0, 10.0)]))
     times = (8.0, 9.75), (8.0, 10.0), (12.0, 13.0), (12.25, 13.0)
-    disturbed = [not undisturbed(found, "velocity", *each, SILENT) for each in times]
+    disturbed = [not undisturbed(found, "velocity", *each, Why.SILENT) for each in times]
     assert disturbed == [False, True, True, False]
 
 
 def test_effect_disturbs_only_its_programs_for_its_reason_and_not_its_cause() -> None:
     fault = InjectedFault("stop", KINEMATICS, 2.0, 4.0)
-    one, every = (Effect((name,), 2.0, 4.0, DEAF, fault) for name in (KINEMATICS, ALL))
-    assert not undisturbed([one], KINEMATICS, 1.0, 3.0, SILENT, DEAF)
-    assert undisturbed([one], KINEMATICS, 1.0, 3.0, SILENT)
-    assert undisturbed([one], "velocity", 1.0, 3.0, DEAF)
-    assert not undisturbed([every], "velocity", 1.0, 3.0, DEAF)
-    assert undisturbed([one, every], KINEMATICS, 1.0, 3.0, DEAF, but=fault)
+    one, every = (Effect((name,), 2.0, 4.0, Why.DEAF, fault) for name in (KINEMATICS, ALL))
+    assert not undisturbed([one], KINEMATICS, 1.0, 3.0, Why.SILENT, Why.DEAF)
+    assert undisturbed([one], KINEMATICS, 1.0, 3.0, Why.SILENT)
+    assert undisturbed([one], "velocity", 1.0, 3.0, Why.DEAF)
+    assert not undisturbed([every], "velocity", 1.0, 3.0, Why.DEAF)
+    assert undisturbed([one, every], KINEMATICS, 1.0, 3.0, Why.DEAF, but=fault)
 
 
 def test_observer_misses_messages_by_overload_and_loss() -> None:
