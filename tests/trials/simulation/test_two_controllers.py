@@ -1,15 +1,12 @@
 """Two controllers of one arm, as after a start on two hosts that were cut from each other, in virtual time.
 
-    RUNTIME=embedded deploy/commands/venv.sh -m tests.trials.simulation.test_two_controllers 10
-
-simulates ten hours, and says how often the two controllers contradicted each other.
+Here run whole processes; tests/component/test_two_controllers.py has their recipes, for many more hours.
 """
 
 from __future__ import annotations
 
 import itertools
 import random
-import sys
 import tempfile
 from bisect import bisect
 from collections import defaultdict
@@ -159,20 +156,3 @@ def test_no_controller_moves_the_joints_against_another() -> None:
 def test_drive_that_obeys_any_controller_is_found() -> None:
     with planted(NO_VETO):
         assert fight("1").against
-
-
-def main(hours: float) -> int:
-    """Simulate; return the exit code."""
-    contradictions, moved, against = 0, 0.0, 0
-    for number in range(round(hours * 3600.0 / LENGTH)):
-        found = fight(str(number))
-        contradictions, moved = contradictions + found.contradictions, moved + found.moved
-        against += len(found.against)
-    print(
-        f"{hours:g} h: {contradictions} contradictions, {moved:.0f} s moved, {against} s against a controller"
-    )
-    return int(bool(against))
-
-
-if __name__ == "__main__":
-    sys.exit(main(float(sys.argv[1])))
