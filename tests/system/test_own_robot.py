@@ -156,9 +156,10 @@ def test_own_programs_are_supervised_and_are_the_only_joints(robot: Robot, modul
         robot.spin(0.1)
     assert status.wait() == 0
     rows = {line.split()[0]: line.split() for line in status.output.splitlines()[3:]}
-    healths = {name: row[-1] for name, row in rows.items()}
-    del healths["sentinel"]  # it tells when the machine is busy
-    assert set(healths.values()) == {"ok"}
+    complaints = {name: " ".join(row) for name, row in rows.items() if row[-1] != "ok"}
+    if "sentinel" in complaints:  # it may tell only that this machine is busy
+        assert complaints.pop("sentinel").endswith("the processor has too much to do")
+    assert complaints == {}
     assert {"joint_source", "drive_adapter", "twist_gate", "own_guard", "config_l1"} <= rows.keys()
     assert not {"config_theta1", "config_theta2", "drive"} & rows.keys()
 
