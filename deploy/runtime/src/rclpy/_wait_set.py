@@ -141,7 +141,8 @@ class WaitableWatch:
             return 0
         if any(map(self._is_triggered, self._watched("guard_condition"))):
             return 0
-        return min((timer._rclpy_remaining() for timer in self._watched("timer")), default=INFINITY)
+        remaining = min((timer._rclpy_remaining() for timer in self._watched("timer")), default=INFINITY)
+        return max(0, remaining)  # DDS refuses the negative time of an overdue timer
 
     def _watched(self, kind: str) -> list[Any]:
         """The timers or guard conditions in the wait set, whose changes will wake the executor."""

@@ -131,6 +131,16 @@ def test_a_timer_runs_a_waitable(node: Node, context: Context, spin_until: SpinU
     node.remove_waitable(ticker)
 
 
+def test_an_overdue_timer_runs_a_waitable(node: Node, context: Context, spin_until: SpinUntil) -> None:
+    ticker = Ticker(context)
+    node.add_waitable(ticker)
+    while not ticker.timer.is_ready():
+        time.sleep(0.001)
+    spin_until(lambda: ticker.ticks >= 1)
+    ticker.timer.cancel()
+    node.remove_waitable(ticker)
+
+
 def test_a_removed_waitable_does_not_run(
     bell: Bell, node: Node, executor: SingleThreadedExecutor, spin_until: SpinUntil
 ) -> None:
