@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from typing import NamedTuple
 
@@ -11,7 +12,10 @@ from reactivex.scheduler import ImmediateScheduler
 
 from interfaces.service import ServiceNode
 from interfaces.topics import DRIVE_TIMEOUT, ENGINES_STATE, OFF, ON
+from reactive_node.sampled_reader import keep_last
 
+UNREAD = 100
+"""States that wait while the process is paused. With room for one, an ``on`` would replace another controller's ``off``."""
 NEVER = datetime.min.replace(tzinfo=UTC)
 
 
@@ -66,8 +70,9 @@ def permissions(states: Observable[EngineState]) -> Observable[bool]:
 
 def engine_states(node: ServiceNode) -> Observable[EngineState]:
     """Return the states of the engines of the arm of a node."""
+    every = replace(ENGINES_STATE, qos=keep_last(ENGINES_STATE.qos, UNREAD))
     # The arrival before the age: a pause in between must make a state older, not younger.
-    states = node.observe(ENGINES_STATE, timestamped=True).timestamp()
+    states = node.observe(every, timestamped=True).timestamp()
     return states.map(lambda it: EngineState(it.value.value, it.timestamp, node.age(it.value.timestamp)))
 
 

@@ -6,9 +6,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from interfaces import permission
 from interfaces.permission import EngineState, permissions
-from interfaces.topics import OFF, ON
-from reactive_node.testing import VirtualTime
+from interfaces.service import ServiceNode
+from interfaces.topics import ENGINES_STATE, OFF, ON
+from rclpy.node import Node
+from reactive_node.testing import MakeNode, SpinUntil, VirtualTime
+from std_msgs.msg import String
 
 
 def changes(*states: tuple[float, str, float], until: float = 3.0) -> list[tuple[float, bool]]:
@@ -83,3 +87,17 @@ def test_no_permission_outlives_the_on_that_gave_it(states: list[tuple[float, st
             assert begin <= end <= max(until) + 0.02
             offs = [at for at, name, _ in ordered if name == OFF]
             assert not [at for at in offs if begin - 0.38 < at < end - 0.02]
+
+
+def test_a_paused_drive_finds_the_off_of_each_controller(make_node: MakeNode, spin_until: SpinUntil) -> None:
+    one, other = (
+        make_node(name, kind=Node).create_publisher(String, ENGINES_STATE.name, ENGINES_STATE.qos)
+        for name in ("one", "other")
+    )
+    heard: list[bool] = []
+    permission.observe(make_node("drive", kind=ServiceNode)).subscribe(heard.append)
+    spin_until(lambda: one.get_subscription_count() == other.get_subscription_count() == 1)
+    one.publish(String(data=OFF))
+    other.publish(String(data=ON))
+    spin_until(lambda: len(heard) > 1)  # begins to spin now: both waited
+    assert heard == [False, False]
