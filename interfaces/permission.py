@@ -15,7 +15,7 @@ from interfaces.topics import DRIVE_TIMEOUT, ENGINES_STATE, OFF, ON
 from reactive_node.sampled_reader import keep_last
 
 UNREAD = 100
-"""States that wait while the process is paused. With room for one, an ``on`` would replace another controller's ``off``."""
+"""States that wait while the process is paused: an ``on`` must not replace another controller's ``off``."""
 NEVER = datetime.min.replace(tzinfo=UTC)
 
 

@@ -5,14 +5,14 @@ import itertools
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from rclpy.node import Node
+from std_msgs.msg import String
 
 from interfaces import permission
 from interfaces.permission import EngineState, permissions
 from interfaces.service import ServiceNode
 from interfaces.topics import ENGINES_STATE, OFF, ON
-from rclpy.node import Node
 from reactive_node.testing import MakeNode, SpinUntil, VirtualTime
-from std_msgs.msg import String
 
 
 def changes(*states: tuple[float, str, float], until: float = 3.0) -> list[tuple[float, bool]]:

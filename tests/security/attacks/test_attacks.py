@@ -123,6 +123,16 @@ def test_ros2_reads_as_a_tool_and_commands_as_the_terminal(secure_site: SecureSi
     until(lambda: watcher("heard", ENGINES) == ["turn_off"])
 
 
+def test_services_give_way_to_a_process_that_joins(secure_site: SecureSite) -> None:
+    tasks = Path(f"/proc/{secure_site.members['kinematics']}/task")
+
+    def niceness() -> dict[str, int]:
+        threads = ((it / "comm", os.getpriority(os.PRIO_PROCESS, int(it.name))) for it in tasks.iterdir())
+        return {name.read_text().strip(): nice for name, nice in threads}
+
+    until(lambda: {"fsm": 10, "dq.builtins": 10, "tev": 0}.items() <= niceness().items())
+
+
 @pytest.fixture(params=["no keys", "keys of another CA"])
 def stranger(
     request: pytest.FixtureRequest, secure_site: SecureSite, make_peer: MakePeer, tmp_path: Path

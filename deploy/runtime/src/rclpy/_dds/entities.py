@@ -118,6 +118,8 @@ class Participant:
             except Exception:
                 domain.leave(domain_id)
                 raise
+        if properties:
+            security.give_way()
         self.gid = _guid(self.handle)
         self.publisher = checked(blocking.dds_create_publisher(self.handle, None, None), "publisher")
         self.subscriber = checked(blocking.dds_create_subscriber(self.handle, None, None), "subscriber")
