@@ -88,19 +88,24 @@ def _wake_executors(signals: int, steps: int | None) -> None:
         if fd is not None:
             poll.register(fd, select.POLLIN)
     while True:
-        ready = [fd for fd, _ in poll.poll()]
-        if steps in ready:
-            _clock_steps.acknowledge(steps)
-        numbers = os.read(signals, 64) if signals in ready else b""
-        contexts = [context for context in _contexts if context._rclpy_valid]
-        for executor in _executors:
-            executor.wake()
-        if contexts and any(signal.getsignal(number) is _handle for number in numbers):
-            time.sleep(_HANDLER_TIME)
-            # Not newer contexts: the program initialized them after the signal.
-            left = [context for context in contexts if context._rclpy_valid]
-            if left and _options:
-                _shut_down(left)
+        _wake_executors_once(poll, signals, steps)
+
+
+def _wake_executors_once(poll: select.poll, signals: int, steps: int | None) -> None:
+    # A function of its own: its variables must keep no executor and no context until the next signal.
+    ready = [fd for fd, _ in poll.poll()]
+    if steps in ready:
+        _clock_steps.acknowledge(steps)
+    numbers = os.read(signals, 64) if signals in ready else b""
+    contexts = [context for context in _contexts if context._rclpy_valid]
+    for executor in _executors:
+        executor.wake()
+    if contexts and any(signal.getsignal(number) is _handle for number in numbers):
+        time.sleep(_HANDLER_TIME)
+        # Not newer contexts: the program initialized them after the signal.
+        left = [context for context in contexts if context._rclpy_valid]
+        if left and _options:
+            _shut_down(left)
 
 
 def _listen() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import signal
 import threading
 import time
 import weakref
@@ -155,9 +156,23 @@ def test_a_dropped_executor_leaves_nothing_in_dds(
     handles = [entity.handle for entity in executor._rclpy_dds]
     assert all(blocking.dds_triggered(handle) >= 0 for handle in handles)
     del executor
-    assert becomes_true_after_collection(
-        lambda: dropped() is None and all(blocking.dds_triggered(handle) < 0 for handle in handles)
-    )
+    assert becomes_true_after_collection(lambda: dropped() is None), gc.get_referrers(dropped())
+    assert becomes_true_after_collection(lambda: all(blocking.dds_triggered(it) < 0 for it in handles))
+
+
+def test_a_signal_keeps_no_executor(context: Context) -> None:
+    executor = SingleThreadedExecutor(context=context)
+    woken = threading.Event()
+    executor.wake = woken.set  # type: ignore[method-assign]
+    dropped = weakref.ref(executor)
+    before = signal.signal(signal.SIGUSR1, lambda *_: None)
+    try:
+        signal.raise_signal(signal.SIGUSR1)
+        assert woken.wait(10)
+    finally:
+        signal.signal(signal.SIGUSR1, before)
+    del executor
+    assert becomes_true_after_collection(lambda: dropped() is None), gc.get_referrers(dropped())
 
 
 def test_a_context_drops_the_shutdown_callbacks_of_dead_objects(context: Context) -> None:
