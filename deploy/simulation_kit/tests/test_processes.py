@@ -10,6 +10,7 @@ import signal
 import sys
 import threading
 import time
+import weakref
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from time import sleep
@@ -185,6 +186,20 @@ def test_a_process_ends_with_its_last_thread_that_is_no_daemon(simulation: Simul
     process = run(simulation, program)
     assert process.output.text == "main\nthread\nlast\n"
     assert simulation.now == 1.0
+
+
+@pytest.fixture
+def no_finalizer_yet(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(weakref.finalize, "_registered_with_atexit", False)
+    monkeypatch.setattr(weakref.finalize, "_shutdown", False)
+
+
+@pytest.mark.usefixtures("no_finalizer_yet")
+def test_a_process_that_ends_does_not_end_the_finalizers_of_others(simulation: Simulation) -> None:
+    run(simulation, lambda: weakref.finalize(lambda: None, int))
+    finalized: list[str] = []
+    weakref.finalize(lambda: None, finalized.append, "dropped at once")
+    assert finalized == ["dropped at once"]
 
 
 # Signals

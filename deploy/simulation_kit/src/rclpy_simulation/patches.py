@@ -14,6 +14,7 @@ import socket
 import sys
 import threading
 import time
+import weakref
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
@@ -250,6 +251,9 @@ def _names_of(functions: dict[int, Any]) -> list[tuple[Any, str, Any]]:
 @contextmanager
 def installed(domains: Domains) -> Iterator[None]:
     """Replace the functions until the end of the ``with``; new participants join ``domains``."""
+    # The first finalizer of an interpreter registers an exit function, which ends all finalizers.
+    # No simulated process may be the first: its end would end those of all others.
+    weakref.finalize(domains, int).detach()
     new = _replacements(domains)
     by_identity = {id(vars(owner)[name]): function for owner, name, function in new}
     replaced = [
