@@ -10,12 +10,12 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import reactivex as rx
-from rclpy.qos import QoSProfile
 from reactivex import Observable
 
 from interfaces.service.node import ServiceNode
 from interfaces.topics import Topic
 from reactive_node import Timestamp
+from reactive_node.sampled_reader import keep_last
 from reactive_node.signals import Refused, Signal, Unchanged, hold, linear
 from reactive_node.stamps import stamped
 
@@ -36,7 +36,7 @@ def observe_state(node: ServiceNode, topic: Topic, gap: float = GAP) -> Signal[f
     :param gap: the longest time between two samples of a movement [s].
     """
     clock = node.get_clock()
-    every = QoSProfile(depth=DEPTH, reliability=topic.qos.reliability, durability=topic.qos.durability)
+    every = replace(topic, qos=keep_last(topic.qos, DEPTH))
 
     def refused(sample: Refused) -> None:
         if not sample.is_first:  # a late reader gets the last value, however old it is
@@ -44,7 +44,7 @@ def observe_state(node: ServiceNode, topic: Topic, gap: float = GAP) -> Signal[f
 
     lives = rx.timer(0.0, LIFE_PERIOD).map(lambda _: node.count_publishers(topic.name) > 0)
     return state(
-        node.observe(replace(topic, qos=every), timestamped=True),
+        node.observe(every, timestamped=True),
         lives.map(lambda it: stamped(it, clock.now().nanoseconds)),
         gap,
         refused,
