@@ -1,4 +1,4 @@
-"""Notes the start and the end of every process of the observed arms."""
+"""Notes start and end of every process of the observed arms, and long waits for a processor."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from deploy.promises.history import Life
 from deploy.promises.marks import BABBLER
 from deploy.running import processes
 
-STALL = 0.1  # s; a round that takes longer shows that the machine is overloaded
+STALL = 0.1  # s; the kernel schedules each thread within this time, or the machine is overloaded (A4)
 SCAN_PERIOD = 0.02  # s
 NAMING_TIMEOUT = 0.5  # s within which a new process shows its program
 FORK_TIME = 0.2  # s for which a child of supervisord may look like supervisord
@@ -50,11 +50,13 @@ class ProcessMonitor:
         """
         self._namespaces = {str(run): namespace for run, namespace in runs.items()}
         self._report = report
+        self._overload = overload
         self._rounds = Rounds(overload)
         self._poll = select.poll()
         self._known: set[int] = set()
         self._pending: dict[int, float] = {}  # new processes that do not show their program yet, since when
         self._alive: dict[int, tuple[str, Life]] = {}  # by pidfd
+        self._waited: dict[int, float] = {}  # by pidfd
 
     def run(self, ended: threading.Event) -> None:
         self._rounds.note(time.monotonic())
@@ -75,6 +77,16 @@ class ProcessMonitor:
             age = now - since
             if self._identify(pid, age) or (age > NAMING_TIMEOUT and not self._is_child_of_supervisord(pid)):
                 del self._pending[pid]
+        for handle, (_, life) in self._alive.items():
+            self._note_wait(handle, life.pid)
+
+    def _note_wait(self, handle: int, pid: int) -> None:
+        """Report an overload if a process waited too long for a processor since the last scan."""
+        waited, now = _waiting_time(pid), time.monotonic()
+        lasted = waited - self._waited.get(handle, waited)
+        if lasted > STALL:
+            self._overload(now - lasted, now)
+        self._waited[handle] = waited
 
     def _identify(self, pid: int, age: float) -> bool:
         """Report a process that shows its arm and its program; return whether it does, or has ended."""
@@ -104,6 +116,7 @@ class ProcessMonitor:
         self._poll.unregister(handle)
         os.close(handle)
         namespace, life = self._alive.pop(handle)
+        self._waited.pop(handle, None)
         self._report(namespace, life._replace(ended=now))
 
 
@@ -112,6 +125,17 @@ def _start_time(pid: int) -> float:
     ticks = int(processes.stat_of(pid)[19])
     suspended = time.clock_gettime(time.CLOCK_BOOTTIME) - time.monotonic()
     return ticks / os.sysconf("SC_CLK_TCK") - suspended
+
+
+def _waiting_time(pid: int) -> float:
+    """Return how long the main thread of a process has waited for a processor until it ran last [s].
+
+    It is 0 if the process has ended, or if the kernel does not count it (proc(5), schedstat).
+    """
+    try:
+        return int(Path(f"/proc/{pid}/schedstat").read_text().split()[1]) / 1e9
+    except (OSError, IndexError):
+        return 0.0
 
 
 def _command(pid: int) -> str:

@@ -29,7 +29,7 @@ from deploy.running.system import System
 from deploy.trials.chaos import process_monitor
 from deploy.trials.chaos.arm import RealArm
 from deploy.trials.chaos.faults import FAULT_KINDS, PARAMETERS, Undo
-from deploy.trials.chaos.process_monitor import ProcessMonitor, Rounds
+from deploy.trials.chaos.process_monitor import STALL, ProcessMonitor, Rounds
 from interfaces import topics
 
 
@@ -237,6 +237,45 @@ def test_a_late_round_is_an_overload() -> None:
     for now in (1.0, 1.09, 1.2, 1.25, 4.0):
         rounds.note(now)
     assert late == [(1.09, 1.2), (1.25, 4.0)]
+
+
+ON_ONE_PROCESSOR = """
+import os, time
+os.sched_setaffinity(0, [min(os.sched_getaffinity(0))])
+"""
+PATIENT = f"""{ON_ONE_PROCESSOR}
+os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
+print(flush=True)
+while True:
+    pass
+"""
+BUSY = f"""{ON_ONE_PROCESSOR}
+while time.process_time() < 1.0:
+    pass
+"""
+
+
+def test_a_process_that_waits_long_for_a_processor_shows_an_overload(arm: RealArm) -> None:
+    waits: list[float] = []
+    monitor = ProcessMonitor(
+        {arm.system.run: "/"}, lambda *_: None, lambda begin, end: waits.append(end - begin)
+    )
+    environment = arm.environment() | {"SUPERVISOR_PROCESS_NAME": "velocity"}
+    with (
+        subprocess.Popen([sys.executable, "-c", PATIENT], env=environment, stdout=subprocess.PIPE) as patient,
+        subprocess.Popen([sys.executable, "-c", BUSY]) as busy,
+    ):
+        try:
+            assert patient.stdout is not None
+            patient.stdout.readline()
+            deadline = time.monotonic() + 60.0
+            while not waits and time.monotonic() < deadline:
+                monitor.scan()
+            close(monitor)
+        finally:
+            busy.kill()
+            patient.kill()
+    assert max(waits, default=0.0) > STALL
 
 
 def test_a_process_that_is_reaped_while_it_is_found_leaves_no_handle(
