@@ -43,6 +43,9 @@ _LARGEST_SOCKET = Path("/proc/sys/net/core/rmem_max")
 _LOOPBACK_IS_DOWN = (
     "the loopback interface is down, but nodes of one host meet through it: run `ip link set lo up`"
 )
+# For so long, a writer that is deleted waits for readers that have not acknowledged its last messages.
+# Cyclone's second for each writer delays a restart while a reader is dead, but not missed yet.
+_SOON_DELETED = "<Internal><WriterLingerDuration>100 ms</WriterLingerDuration></Internal>"
 # Version 0.10 neither knows nor needs these: it asks peers without end, and obeys AllowMulticast alone.
 _FOREVER = ' PruneDelay="inf"' if IS_RECENT else ""
 _NEVER_MULTICAST = ' allow_multicast="false"' if IS_RECENT else ""
@@ -87,7 +90,7 @@ def configuration(environment: Mapping[str, str] | None = None, domain_id: int =
         settings = _localhost if discovery_range == "LOCALHOST" else _subnet
         general, discovery = settings(peers, _choices(uri))
         own = f"{general}<Discovery>{_index(domain_id)}{discovery}</Discovery>"
-    return f"<CycloneDDS><Domain>{own}</Domain></CycloneDDS>" + (f",{uri}" if uri else "")
+    return f"<CycloneDDS><Domain>{own}{_SOON_DELETED}</Domain></CycloneDDS>" + (f",{uri}" if uri else "")
 
 
 def _off() -> str:
