@@ -24,7 +24,8 @@ NAME = r"(?!.{31})[a-z][a-z0-9]*(_[a-z0-9]+)*"  # of a module, of a node and of 
 LAST_TOPIC = "DIAGNOSTICS = Topic("
 LAST_PROGRAMS = "operator_page, sentinel\n"
 LAST_SECTIONS = "[program:operator_page]\n"
-PUBLISHERS = re.compile(r"(\nENGINES = Topic\((?:\n    .*){4}\n    \(.*)(\*OPERATOR_NODES\))")
+ENGINES = {"ENGINES": 4, "ENGINES_STATE": 5}
+"""The topics of a guard besides its own, each with the lines of its row before the nodes that it joins."""
 
 
 class Refused(Exception):
@@ -116,9 +117,11 @@ def _with_topic(contract: str, name: str) -> str:
 )
 """
     contract = _once(TOPICS, contract, LAST_TOPIC, row + LAST_TOPIC)
-    contract, count = PUBLISHERS.subn(rf'\1"{name}", \2', contract)
-    if count != 1:
-        raise Refused(f"{TOPICS}: has no `ENGINES = Topic(` with its publishers in the sixth line")
+    for topic, lines in ENGINES.items():
+        nodes = rf"\n{topic} = Topic\((?:\n    .*){{{lines}}}\n    \("
+        contract, count = re.subn(nodes, rf'\g<0>"{name}", ', contract)
+        if count != 1:
+            raise Refused(f"{TOPICS}: has no `{topic} = Topic(` with nodes in line {lines + 2}")
     return contract
 
 

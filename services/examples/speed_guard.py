@@ -2,15 +2,20 @@
 
 from dataclasses import dataclass
 
+import reactivex as rx
 from reactivex import Observable
 
 from interfaces import service, topics
 
 
-def too_fast(speeds: Observable[float], limit: float) -> Observable[str]:
-    """Emit `turn_off` when a speed is above the limit [m/s]."""
-    excess = speeds.map(lambda speed: speed > limit).distinct_until_changed()
-    return excess.filter(bool).map(lambda _: topics.TURN_OFF)
+def too_fast(speeds: Observable[float], engines: Observable[str], limit: float) -> Observable[str]:
+    """Emit `turn_off` when a speed is above the limit [m/s] while the engines are on.
+
+    So a `turn_on` during the excess turns them on for a moment only.
+    """
+    excess = speeds.map(lambda speed: speed > limit)
+    dangers = rx.combine_latest(excess, engines).filter(lambda now: now == (True, topics.ON))
+    return dangers.map(lambda _: topics.TURN_OFF)
 
 
 @dataclass(frozen=True)
@@ -20,7 +25,8 @@ class Parameters:
 
 def wire(node: service.ServiceNode) -> None:
     speeds = node.observe(topics.EFFECTOR_VELOCITY).map(lambda velocity: velocity.speed)
-    node.publish(topics.ENGINES, too_fast(speeds, node.declare(Parameters).limit))
+    engines = node.observe(topics.ENGINES_STATE)
+    node.publish(topics.ENGINES, too_fast(speeds, engines, node.declare(Parameters).limit))
 
 
 if __name__ == "__main__":

@@ -324,19 +324,17 @@ def test_a_second_arm_runs_in_a_namespace_of_the_same_domain(module_site: Site, 
 
 def test_example_of_a_service_joins_the_system(module_site: Site, peer: Peer) -> None:
     commands, velocity = peer.collect(topics.ENGINES), peer.publisher(topics.EFFECTOR_VELOCITY)
-    reports = peer.collect(topics.DIAGNOSTICS)
+    terminal = module_site.begin_command(sys.executable, "-m", "deploy.commands.launcher", "terminal")
+    terminal.await_line("Engines are off")
+    terminal.insist("press\n", "Operator is alive")
+    terminal.insist("turn_on\n", "Engines are on")
     guard = module_site.begin_python("-m", "services.examples.speed_guard", "--ros-args", "-p", "limit:=3.0")
 
-    def it_has_commanded() -> bool:  # the operator watchdog may command as well
-        for value in (2.9, 3.1):
-            velocity.publish(TwistStamped(twist=Twist(linear=Vector3(x=value))))
-        health = [status for report in reports for status in report.status if status.name == "/speed_guard"]
-        published = (
-            int(pair.value) for status in health for pair in status.values if pair.key == "published"
-        )
-        return bool(commands) and any(published)
+    def it_has_commanded() -> bool:
+        velocity.publish(TwistStamped(twist=Twist(linear=Vector3(x=3.1))))
+        return any(command.data == topics.TURN_OFF for command in commands)
 
     peer.spin_until(it_has_commanded)
-    assert commands[0].data == topics.TURN_OFF
+    terminal.await_line("speed_guard turned off the engines")
     guard.signal(signal.SIGTERM)
     assert guard.wait() == 0
