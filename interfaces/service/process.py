@@ -3,7 +3,8 @@
 Exit codes: 0 on SIGTERM or Ctrl-C; 1 after an error of the recipe, or if the service already runs; 2 after an
 error in the command line, the environment, the parameters or the scenario. An error is one line on standard
 error, or one log message. Before the service spins, a signal ends the process on the spot. From then on it
-shuts down in order; if that takes too long, or a second signal comes, the process ends on the spot as well.
+ends in order, and its recipe may publish a last value; if that takes too long, or a second signal comes, the
+process ends on the spot as well.
 """
 
 from __future__ import annotations
@@ -19,7 +20,9 @@ from typing import NoReturn
 
 import rclpy
 from rclpy.exceptions import NameValidationException, ParameterException
-from rclpy.executors import ExternalShutdownException
+from rclpy.executors import Executor
+from rclpy.signals import SignalHandlerOptions
+from rclpy.task import Future
 
 from interfaces.service import enclave, instance, middleware, overrides
 from interfaces.service.errors import UserError
@@ -34,7 +37,8 @@ USER_ERRORS = (NameValidationException, ParameterException, UserError)
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 _SHUTDOWN_TIMEOUT = 0.8  # [s], of the second that a service has to end
 
-_spins = False
+_end_of_spin: Future | None = None
+"""A signal completes it. There is none before the service spins."""
 
 
 def run(name: str, wire: Callable[[ServiceNode], None]) -> NoReturn:
@@ -59,7 +63,8 @@ def _run(name: str, wire: Callable[[ServiceNode], None]) -> int:
     try:
         chosen = _enclave(name)
         with middleware.without_shared_memory():
-            rclpy.init(args=[*sys.argv, *chosen])
+            # rclpy's handlers would shut DDS down at once, before a last value is published.
+            rclpy.init(args=[*sys.argv, *chosen], signal_handler_options=SignalHandlerOptions.NO)
             node = ServiceNode(name, namespace=os.environ.get(NAMESPACE, ""))
         node.health.keys = enclave.keys(chosen[-1]) if chosen else None
     except (*USER_ERRORS, RuntimeError) as error:  # RuntimeError: of domain, discovery or DDS
@@ -84,21 +89,18 @@ def _enclave(name: str) -> list[str]:
 
 
 def _spin(node: ServiceNode, wire: Callable[[ServiceNode], None]) -> int:
-    global _spins
+    global _end_of_spin
     with instance.claim(node), create_executor() as executor:
         try:
             wire(node)
             overrides.check(node, sys.argv[1:])
             executor.add_node(node)
-            _spins = True
-            executor.spin()
-        except ExternalShutdownException:
-            pass
+            _wake_at_signals(executor)
+            _end_of_spin = Future()
+            executor.spin_until_future_complete(_end_of_spin)
         except USER_ERRORS:
             raise
         except Exception:
-            if not node.context.ok():  # a signal has shut down rclpy just before a message was published
-                return 0
             node.get_logger().fatal(traceback.format_exc())
             return 1
     return 0
@@ -110,20 +112,36 @@ def _refuse(name: str, reason: object, code: int) -> int:
 
 
 def handle_signals() -> None:
-    """Handle SIGTERM and Ctrl-C; rclpy chains its handlers to these."""
+    """Handle SIGTERM and Ctrl-C."""
     for number in _SIGNALS:
         signal.signal(number, _on_signal)
 
 
 def _on_signal(number: int, frame: FrameType | None) -> None:
-    global _spins
-    if not _spins:
+    spinning = _end_of_spin
+    if spinning is None or spinning.done():
         _end()
-    _spins = False
     last_resort = threading.Timer(_SHUTDOWN_TIMEOUT, _end)
     last_resort.daemon = True
     last_resort.start()
+    spinning.set_result(None)
 
 
-def _end() -> None:
+def _wake_at_signals(executor: Executor) -> None:
+    """Wake the executor at each signal: while the main thread waits in DDS, Python runs no handler."""
+    if (other := signal.set_wakeup_fd(-1)) != -1:  # the embedded rclpy wakes its executors itself
+        signal.set_wakeup_fd(other)
+        return
+    reading, writing = os.pipe()
+    os.set_blocking(writing, False)
+    signal.set_wakeup_fd(writing)
+
+    def wake() -> None:
+        while os.read(reading, 1):
+            executor.wake()
+
+    threading.Thread(target=wake, daemon=True).start()
+
+
+def _end() -> NoReturn:
     os._exit(0)

@@ -2,8 +2,9 @@
 
 User story (ours): as an operator of a mobile robot, I drive it only while I hold the switch.
 
-Commands come on `cmd_vel_in`, the robot listens to `cmd_vel`. A robot that stops when `cmd_vel` falls silent
-stops in time even if this process dies; another one waits until supervisord has started the process again.
+Commands come on `cmd_vel_in`, the robot listens to `cmd_vel`. The last message of this process is zero. A
+robot that stops when `cmd_vel` falls silent stops in time even if this process is killed; another one waits
+until supervisord has started the process again.
 """
 
 import math
@@ -40,14 +41,19 @@ REPEAT = 0.1  # s: the zero is repeated, so that a base that starts later gets i
 
 
 def gated(commands: Observable[Any], permissions: Observable[bool], zero: Any) -> Observable[Any]:
-    """Emit the commands while they are permitted, and ``zero`` otherwise, at once and repeatedly."""
+    """Emit the commands while they are permitted, and ``zero`` otherwise, at once and repeatedly.
+
+    It ends with the permissions, and its last item is ``zero``.
+    """
 
     def velocities(permissions: Observable[bool]) -> Observable[Any]:
         passing = (
             commands.with_latest_from(permissions).filter(lambda pair: pair[1]).map(lambda pair: pair[0])
         )
         zeros = rx.timer(0.0, REPEAT).map(lambda _: zero)
-        return rx.merge(passing, permissions.switch_map(lambda permitted: rx.never() if permitted else zeros))
+        standing = permissions.switch_map(lambda permitted: rx.never() if permitted else zeros)
+        last = permissions.ignore_elements().default_if_empty(zero)
+        return rx.merge(passing.take_until(last), standing.take_until(last), last)
 
     return permissions.distinct_until_changed().publish(velocities)
 

@@ -15,6 +15,7 @@ from rclpy.node import Node
 from rclpy.utilities import get_rmw_implementation_identifier
 
 from interfaces.service import process
+from interfaces.topics import L1
 from reactive_node.testing import MakeNode, SpinUntil
 
 CYCLONE = get_rmw_implementation_identifier() == "rmw_cyclonedds_cpp"
@@ -59,14 +60,11 @@ service.run("failing", wire)
 
 SPEAKING = """
 from interfaces import service
+from interfaces.topics import L1
 
 def wire(node):
-    def speak():
-        print("speaks", flush=True)
-        while node.context.ok():
-            pass
-        node.health.report()
-    node.create_timer(0.01, speak)
+    node.publish(L1, node.observe(L1).filter(lambda _: False).default_if_empty(7.0))
+    node.create_timer(0.01, lambda: node.count_subscribers(L1.name) > 1 and print("ready", flush=True))
 
 service.run("speaking", wire)
 """
@@ -113,6 +111,7 @@ atexit.register(lambda: os.kill(os.getpid(), signal.SIGTERM))
 
 NO_LAST_RESORT = """
 from interfaces.service import process
+from interfaces.topics import L1
 process._SHUTDOWN_TIMEOUT = 3600.0
 """
 
@@ -166,14 +165,26 @@ def service(name: str, announce: bool = False) -> tuple[str, ...]:
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-@pytest.mark.parametrize(("program", "line"), [(HANGING, "hangs"), (NO_LAST_RESORT + SPEAKING, "speaks")])
-def test_signal_ends_a_service_that_hangs_or_is_about_to_publish(
-    start: Start, number: signal.Signals, program: str, line: str
-) -> None:
-    process = start("-c", program)
-    assert process.wait_for_line() == line
+def test_signal_ends_a_service_that_hangs(start: Start, number: signal.Signals) -> None:
+    process = start("-c", HANGING)
+    assert process.wait_for_line() == "hangs"
 
     assert process.end(by=number) == (0, "")
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_service_publishes_a_last_value_at_a_signal(
+    start: Start, number: signal.Signals, make_node: MakeNode, spin_until: SpinUntil
+) -> None:
+    heard: list[float] = []
+    peer = make_node("peer")
+    peer.create_subscription(L1.type, L1.name, lambda message: heard.append(message.data), L1.qos)
+    process = start("-c", SPEAKING)
+    assert process.wait_for_line() == "ready"
+
+    assert process.end(by=number) == (0, "")
+    spin_until(lambda: heard)
+    assert heard == [7.0]
 
 
 def test_second_signal_ends_a_service_at_once(start: Start) -> None:

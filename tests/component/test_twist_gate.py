@@ -26,6 +26,13 @@ def test_commands_pass_only_while_they_are_permitted(scheduler: VirtualTime) -> 
     ]
 
 
+def test_last_item_is_zero(scheduler: VirtualTime) -> None:
+    commands = scheduler.hot(*((0.2 * n, n) for n in range(1, 9)))
+    permissions = scheduler.hot((0.5, True)).take_until(scheduler.hot((0.9, None)))
+    recording = scheduler.record(gated(commands, permissions, "zero"), until=2.0)
+    assert [(round(at, 2), it) for at, it in recording.items] == [(0.6, 3), (0.8, 4), (0.9, "zero")]
+
+
 def topic(kind: Any, name: str) -> Topic:
     return Topic(name, kind, COMMANDS.qos, "", (), (), "", raw=True)
 

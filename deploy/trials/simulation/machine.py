@@ -31,7 +31,7 @@ def simulated_services(
     seed: str, network: Network, supervisor: Callable[[], Any] = lambda: None
 ) -> Iterator[Simulation]:
     """Simulate programs that are services until the end of the ``with``."""
-    variables = [(vars(service_process), "_spins")]
+    variables = [(vars(service_process), "_end_of_spin")]
     with (
         Simulation(seed, network, variables=variables) as simulation,
         Machine(simulation, supervisor).installed(),
