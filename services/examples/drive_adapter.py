@@ -72,6 +72,7 @@ def wire(node: ServiceNode) -> None:
         orders(permissions, order).subscribe(report, node.fail, scheduler=node.scheduler)
 
     if given.file:
+        write(False)  # at once: a signal may end this process before the recipe does so
         connect(lambda on: rx.from_callable(lambda: write(on)), lambda: write(False))
     if given.service:
         call = node.create_call(SetBool, given.service, timeout=DRIVE_TIMEOUT)

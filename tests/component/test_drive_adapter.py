@@ -101,6 +101,15 @@ def test_file_follows_the_engines_and_is_off_at_the_end(
     assert pin.read_text() == "0\n"
 
 
+def test_file_is_off_before_the_service_spins(
+    make_node: MakeNode, spin_until: SpinUntil, tmp_path: Path
+) -> None:
+    pin = tmp_path / "value"
+    pin.write_text("1\n")
+    start(make_node, spin_until, file=str(pin))
+    assert pin.read_text() == "0\n"
+
+
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")  # of rclpy: the client is gone before the answer
 def test_service_follows_the_engines_and_is_off_at_the_end(
     make_node: MakeNode, spin_until: SpinUntil
