@@ -94,7 +94,7 @@ def _silent_for_good(history: History, found: Sequence[Effect]) -> Iterator[Evid
 
 
 def other_streams_flow(history: History) -> Finding:
-    """L2: meanwhile the other services' streams show no gap over 250 ms."""
+    """L2: meanwhile the other services' continuous streams (4 Hz or faster) show no gap over 250 ms."""
     found = effects(history)
     evidence, cases, unknown, longest = [], 0, 0, 0.0
     for fault in _kills(history):
