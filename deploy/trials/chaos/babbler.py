@@ -76,7 +76,7 @@ def babble(node: Node, rate: float) -> None:
 
 
 def pretend(node: Node, rate: float) -> None:
-    """Report at a rate [Hz] that the operator was seen two seconds ago."""
+    """Report at a rate [Hz] that the operator was seen 1.2 s ago."""
     topic = topics.OPERATOR_PRESENCE
     publisher = node.create_publisher(topic.type, topic.name, topic.qos)
     for _ in _ticks(rate):
