@@ -361,8 +361,8 @@ ENGINES_STATE = Topic(
     ("engine_controller",),
     ("drive", "dead_mans_switch", *OPERATOR_NODES, FLEET),
     f"`{ON}` or `{OFF}`, on every change and at 10 Hz by default: the drive accepts an `{ON}` for "
-    f"{1000 * DRIVE_TIMEOUT:.0f} ms, and none for as long after an `{OFF}`. So, of two controllers, none "
-    "moves it against the other",
+    f"{1000 * DRIVE_TIMEOUT:.0f} ms, and for {1000 * DRIVE_TIMEOUT:.0f} ms after an `{OFF}` it accepts none. "
+    "So two controllers that disagree move nothing",
     _not_one_of(ON, OFF),
 )
 DIAGNOSTICS = Topic(
