@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Iterator, Mapping
+from types import ModuleType
 from typing import Any
 
 from deploy.running import interruption, manifest
@@ -43,20 +44,32 @@ def reaction_to(document: Mapping[str, Any], namespace: str) -> Reaction:
     """Return the reaction of an arm whose services start with the content of a parameter file."""
     shared = document.get(ALL, {}).get(KEY, {})
     given = {_program_of(node, namespace): content[KEY] for node, content in document.items()}
-    return reaction({program: shared | given.get(program, {}) for program in declared()})
+    # The names are enough: an import of a user's program may fail, or open its device a second time.
+    return reaction({each.name: shared | given.get(each.name, {}) for each in manifest.everywhere()})
 
 
 def declared() -> dict[str, dict[str, Declaration]]:
-    """Return the parameters that a user may set, by program of the manifest and by name."""
+    """Return the parameters that a user may set, by program of the manifest and by name.
+
+    :raises UserError: if a program cannot be imported.
+    """
     return {program.name: _declared_by(program) for program in manifest.everywhere()}
 
 
 def _declared_by(program: manifest.Program) -> dict[str, Declaration]:
-    parameters = getattr(importlib.import_module(program.module), "Parameters", None)
-    if parameters and program.arguments:  # one module serves several programs
-        parameters = parameters[program.arguments[0]]
+    parameters = getattr(_imported(program.module), "Parameters", None)
+    if isinstance(parameters, Mapping):  # one module serves several programs
+        parameters = next((parameters[word] for word in program.arguments if word in parameters), None)
     found = declarations(parameters) if parameters else ()
     return {each.name: each for each in (*found, USE_SIM_TIME)}
+
+
+def _imported(module: str) -> ModuleType:
+    try:
+        return importlib.import_module(module)
+    except (Exception, SystemExit) as error:  # whatever a user's module does
+        reason = f"{type(error).__name__}: {' '.join(str(error).split())}"
+        raise UserError(f"{module}: cannot be imported: {reason}") from None
 
 
 def problems(document: Any, namespace: str) -> Iterator[tuple[str, str]]:

@@ -6,11 +6,14 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from textwrap import dedent
 
 import pytest
 
-from deploy.running import manifest
+from deploy.running import manifest, parameter_file
 from deploy.running.errors import DeploymentError
+from deploy.running.reaction import reaction
+from interfaces.service import UserError
 
 GUARD = "[program:guard]\ncommand = python3 -m services.examples.speed_guard\n"
 OURS = manifest.programs(manifest.PATH)
@@ -66,6 +69,49 @@ def test_modules_beside_the_file_are_found(own: Path) -> None:
     with manifest.chosen(str(own)):
         assert manifest.programs()[-1] == ("guard", "my_own_guard", ("fast",), manifest.ROBOT)
         assert os.environ["PYTHONPATH"].split(os.pathsep)[-1] == str(own.parent)
+
+
+def test_parameters_of_own_program_are_known_whatever_its_arguments(own: Path) -> None:
+    text = """
+        from dataclasses import dataclass
+        from interfaces.service import parameter
+
+        @dataclass
+        class Parameters:
+            limit: float = parameter(1.0, None, "rad", "the greatest angle")
+    """
+    (own.parent / "guard_of_a_side.py").write_text(dedent(text))
+    own.write_text("[program:guard]\ncommand = python3 -m guard_of_a_side left\n")
+    with manifest.chosen(str(own)):
+        assert [*parameter_file.declared()["guard"]] == ["limit", "use_sim_time"]
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("def wire(", "SyntaxError: '(' was never closed (broken_guard.py, line 1)"),
+        ("import no_such_driver", "ModuleNotFoundError: No module named 'no_such_driver'"),
+        ("raise RuntimeError('no port:\\n/dev/ttyUSB0')", "RuntimeError: no port: /dev/ttyUSB0"),
+        ("raise SystemExit('no GPIO')", "SystemExit: no GPIO"),
+    ],
+)
+def test_own_program_that_cannot_be_imported_is_one_line(own: Path, text: str, told: str) -> None:
+    (own.parent / "broken_guard.py").write_text(text)
+    own.write_text("[program:guard]\ncommand = python3 -m broken_guard\n")
+    parameters = own.with_name("mine.yaml")
+    parameters.write_text("{}")
+    with manifest.chosen(str(own)), pytest.raises(UserError) as raised:
+        parameter_file.load(str(parameters), "/")
+    assert str(raised.value) == f"broken_guard: cannot be imported: {told}"
+
+
+def test_bound_needs_no_import_of_own_program(own: Path) -> None:
+    (own.parent / "guard_with_a_port.py").write_text("raise RuntimeError('the port is in use')")
+    own.write_text("[program:guard]\ncommand = python3 -m guard_with_a_port\n")
+    given = {"engine_controller": {"presence_timeout": 5.0}}
+    document = {program: {"ros__parameters": parameters} for program, parameters in given.items()}
+    with manifest.chosen(str(own)):
+        assert parameter_file.reaction_to(document, "/") == reaction(given)
 
 
 ERRORS = [
