@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, NoReturn
 from deploy.commands.stop import stop
 from deploy.operator.output import say
 from deploy.running import interruption, manifest, messages, rclpy_choice
-from deploy.running.environment import ADOPTED, NAMESPACE, RANGE, namespace_of, set_middleware
+from deploy.running.environment import NAMESPACE, RANGE, is_adopted, namespace_of, set_middleware
 from deploy.running.errors import DeploymentError
 from deploy.running.run_directory import ALL, KEY, LEAD, MANIFEST, RUN
 from deploy.running.supervisord import Program
@@ -297,8 +297,8 @@ def _adopt_environment(system: System) -> bool:
     running = system.environment()
     if not running:
         return False
-    kept = {name: value for name, value in os.environ.items() if not name.startswith(ADOPTED)}
-    adopted = {name: value for name, value in running.items() if name.startswith(ADOPTED)}
+    kept = {name: value for name, value in os.environ.items() if not is_adopted(name)}
+    adopted = {name: value for name, value in running.items() if is_adopted(name)}
     wanted = kept | adopted | {LIBRARIES_ARE_KNOWN: "1"}
     if wanted != os.environ:
         # Only a new process finds another rclpy and its libraries: this shell may have sourced another ROS.

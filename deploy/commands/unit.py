@@ -7,14 +7,14 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from deploy.commands.parameters import WEB
-from deploy.running.environment import ADOPTED, KEYSTORE, NAMESPACE, namespace_of
+from deploy.running.environment import KEYSTORE, NAMESPACE, is_adopted, namespace_of
 from deploy.running.errors import DeploymentError
 from deploy.running.extension import SENTINEL_START_TIMEOUT
 from deploy.running.processes import ROOT, RUN_DIRECTORY
 
 MANIFEST = "MANIFEST"  # environment variable: the file with the user's own programs
-KEPT = (*ADOPTED, RUN_DIRECTORY, WEB, MANIFEST)
-"""The beginnings of the variables that the unit takes over from the environment of `make unit`."""
+KEPT = (RUN_DIRECTORY, WEB, MANIFEST)
+"""The variables of `make unit` that the unit takes over, besides those that belong to an arm."""
 START_LIMIT = 90  # s until all services are up
 WATCHDOG = SENTINEL_START_TIMEOUT + 10.0  # s without the sentinel: it has to start, and to see the others
 
@@ -53,7 +53,9 @@ def text(scenario: str, parameter_file: str, environment: Mapping[str, str]) -> 
     become = ["-m", "deploy.commands.launcher", "become", scenario, parameter_file]
     # By the shell: systemd allows fewer characters in the path of a program than in arguments.
     command = ["/bin/sh", str(ROOT / "deploy" / "commands" / "venv.sh"), *become]
-    kept = {name: value for name, value in environment.items() if name.startswith(KEPT) and value}
+    kept = {
+        name: value for name, value in environment.items() if value and (is_adopted(name) or name in KEPT)
+    }
     for name in {MANIFEST, KEYSTORE} & kept.keys():
         kept[name] = os.path.abspath(kept[name])
     return UNIT.format(

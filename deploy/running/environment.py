@@ -18,21 +18,16 @@ KEYSTORE = "ROS_SECURITY_KEYSTORE"
 """Environment variable of ROS 2: the folder of the keystore."""
 OVERRIDE = "ROS_SECURITY_ENCLAVE_OVERRIDE"
 """Environment variable of ROS 2: the enclave of all processes."""
-ADOPTED = (
-    "RUNTIME",
+_NAMES = (
+    rclpy_choice.RUNTIME,
     "PYTHONPATH",
     "LD_LIBRARY_PATH",
     "AMENT_PREFIX_PATH",
-    "ROS_",
-    "RMW_",
-    "CYCLONEDDS_",
-    "FASTRTPS_",
-    "FASTDDS_",
     NAMESPACE,
     manifest.VARIABLE,
     manifest.HOST,
 )
-"""The beginnings of the variables that belong to an arm: other commands for it take them over."""
+_BEGINNINGS = ("ROS_", "RMW_", "CYCLONEDDS_", "FASTRTPS_", "FASTDDS_")
 FASTDDS_PROFILES = Path(__file__).resolve().parents[1] / "fastdds.xml"
 CYCLONEDDS = "CYCLONEDDS_URI"
 RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
@@ -45,6 +40,11 @@ _BY_MULTICAST = (
 _WITHOUT_INDEX = (
     "<ParticipantIndex>none</ParticipantIndex><MaxAutoParticipantIndex>0</MaxAutoParticipantIndex>"
 )
+
+
+def is_adopted(name: str) -> bool:
+    """Whether a variable belongs to an arm: other commands for it take it over."""
+    return name in _NAMES or name.startswith(_BEGINNINGS)
 
 
 def is_secured(environment: Mapping[str, str]) -> bool:

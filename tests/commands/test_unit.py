@@ -25,6 +25,8 @@ def test_the_unit_starts_this_checkout_with_its_environment(tmp_path: Path) -> N
         "WEB": "off",
         "ROS_STATIC_PEERS": "",
         "SHELL": "/bin/bash",
+        "WEBHOOK_TOKEN": "secret",
+        "RUNTIME_KEY": "secret",
     }
     content = unit.text("demo", str(parameters), environment)
     shell, script, *words = command_of(content)
