@@ -77,7 +77,9 @@ def write(content: str, environment: Mapping[str, str]) -> Path:
             another = f"{path} is the unit of another arm: give this one a namespace"
             raise DeploymentError(f"{another} ({NAMESPACE}=/arm2), or remove the file")
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(content, encoding="utf-8")
+        new = path.with_suffix(".new")
+        new.write_text(content, encoding="utf-8")
+        os.replace(new, path)  # systemd reads the old or the new one, even if the disk is full
     except OSError as error:
         raise DeploymentError(f"{path}: {error.strerror}") from None
     return path

@@ -82,6 +82,15 @@ def test_a_unit_that_cannot_be_written_is_one_line(tmp_path: Path) -> None:
         unit.write("", {"XDG_CONFIG_HOME": str(tmp_path)})
 
 
+def test_a_full_disk_leaves_the_old_unit(tmp_path: Path) -> None:
+    environment = {"XDG_CONFIG_HOME": str(tmp_path)}
+    path = unit.write("[Unit]\n", environment)
+    path.with_suffix(".new").symlink_to("/dev/full")
+    with pytest.raises(DeploymentError, match=r"/reactive-arm.service: No space left on device$"):
+        unit.write("[Unit]\n" * 2, environment)
+    assert path.read_text() == "[Unit]\n"
+
+
 def test_systemd_accepts_the_unit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     if not shutil.which("systemd-analyze"):
         pytest.skip("platform: no systemd-analyze")
