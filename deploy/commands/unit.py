@@ -17,6 +17,8 @@ KEPT = (RUN_DIRECTORY, WEB, MANIFEST)
 """The variables of `make unit` that the unit takes over, besides those that belong to an arm."""
 START_LIMIT = 90  # s until all services are up
 WATCHDOG = SENTINEL_START_TIMEOUT + 10.0  # s without the sentinel: it has to start, and to see the others
+ESCAPES = str.maketrans({"\\": "\\\\", "%": "%%", "\n": "\\n", "\r": "\\r"})
+"""What stands for a character (systemd.syntax(7)); a newline in a value would end its setting."""
 
 UNIT = """\
 # Written by `make unit` in {root}.
@@ -96,4 +98,4 @@ def _quoted(word: str) -> str:
 
 
 def _escaped(word: str) -> str:
-    return word.replace("\\", "\\\\").replace("%", "%%")
+    return word.translate(ESCAPES)

@@ -11,7 +11,7 @@ from deploy.commands import unit
 from deploy.running.errors import DeploymentError
 from tests.commands.systemd import command_of, environment_of
 
-UNPLEASANT = 'it\'s 100 % $HOME "fine" \\ %n'
+UNPLEASANT = 'it\'s 100 % $HOME "fine" \\ %n \\n\n\r\n\tend'
 
 
 def test_the_unit_starts_this_checkout_with_its_environment(tmp_path: Path) -> None:
@@ -24,6 +24,7 @@ def test_the_unit_starts_this_checkout_with_its_environment(tmp_path: Path) -> N
         "REACTIVE_ARM_RUN_DIR": str(tmp_path / UNPLEASANT),
         "WEB": "off",
         "ROS_STATIC_PEERS": "",
+        "CYCLONEDDS_URI": "<CycloneDDS>\n\t<Domain/>\r\n</CycloneDDS>\n",
         "SHELL": "/bin/bash",
         "WEBHOOK_TOKEN": "secret",
         "RUNTIME_KEY": "secret",
@@ -32,7 +33,7 @@ def test_the_unit_starts_this_checkout_with_its_environment(tmp_path: Path) -> N
     shell, script, *words = command_of(content)
     assert (shell, script) == ("/bin/sh", str(unit.ROOT / "deploy" / "commands" / "venv.sh"))
     assert words == ["-m", "deploy.commands.launcher", "become", "demo", str(parameters)]
-    kept = ("RUNTIME", "ROS_DOMAIN_ID", "REACTIVE_ARM_RUN_DIR", "WEB")
+    kept = ("RUNTIME", "ROS_DOMAIN_ID", "REACTIVE_ARM_RUN_DIR", "WEB", "CYCLONEDDS_URI")
     assert environment_of(content) == {name: environment[name] for name in kept}
 
 
