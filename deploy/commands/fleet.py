@@ -26,7 +26,7 @@ from rclpy.signals import SignalHandlerOptions
 from reactivex import Observable
 
 from deploy.operator.fleet import HEADER, Arm, Seen, fleet, row, watched
-from deploy.operator.output import say
+from deploy.operator.output import accept_any_text, say
 from deploy.running import interruption, processes
 from deploy.running.columns import table
 from deploy.running.environment import (
@@ -251,6 +251,7 @@ def run(named: Sequence[str]) -> None:
 def main(arguments: Sequence[str]) -> int:
     """Watch the fleet; return the exit code."""
     interruption.install()
+    accept_any_text()
     parser = argparse.ArgumentParser(prog="make fleet", description=__doc__)
     parser.add_argument("arms", nargs="*", metavar="ARM", help="an arm of another host: /arm1, or /arm1=5")
     named = parser.parse_args(arguments).arms

@@ -12,7 +12,7 @@ from contextlib import AbstractContextManager, ExitStack, closing, contextmanage
 from typing import TYPE_CHECKING, NoReturn
 
 from deploy.commands.stop import stop
-from deploy.operator.output import say
+from deploy.operator.output import accept_any_text, say
 from deploy.running import interruption, manifest, messages, rclpy_choice
 from deploy.running.environment import NAMESPACE, RANGE, is_adopted, namespace_of, set_middleware
 from deploy.running.errors import DeploymentError
@@ -309,6 +309,7 @@ def _adopt_environment(system: System) -> bool:
 
 def main(arguments: list[str]) -> int:
     interruption.install()
+    accept_any_text()
     parser = argparse.ArgumentParser(prog="launcher")
     commands = parser.add_subparsers(required=True)
     for name, starts in (("run", run), ("start", start), ("unit", unit), ("become", become)):

@@ -4,10 +4,17 @@ from __future__ import annotations
 
 import select
 import sys
+from io import TextIOWrapper
 from typing import TextIO
 
 PATIENCE = 0.1  # s: a terminal takes nothing for a moment while another thread writes to it
 _patience = PATIENCE  # none while the reader is stuck
+
+
+def accept_any_text() -> None:
+    """Escape what standard output cannot encode, such as θ in Latin-1: no text may end a command."""
+    if isinstance(sys.stdout, TextIOWrapper):  # it may be closed
+        sys.stdout.reconfigure(errors="backslashreplace")
 
 
 def say(line: str) -> None:

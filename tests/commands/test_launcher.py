@@ -1,5 +1,8 @@
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -32,3 +35,19 @@ def test_damaged_parameters_of_a_running_system_are_one_line(tmp_path: Path, wri
         with pytest.raises(DeploymentError) as raised:
             use()
         assert str(raised.value) == f"{system.parameters} was deleted or damaged: make stop, make start"
+
+
+@pytest.mark.parametrize(
+    ("module", "command", "arguments"),
+    [("launcher", "status", ["status"]), ("launcher", "logs", ["logs"]), ("fleet", "run", [])],
+)
+def test_text_that_the_locale_cannot_show_ends_no_command(
+    module: str, command: str, arguments: list[str]
+) -> None:
+    show = f"{module}.{command} = lambda _: print('\\u03b8 = 1'); {module}.main({arguments})"
+    done = subprocess.run(
+        [sys.executable, "-c", f"from deploy.commands import {module}; {show}"],
+        env=os.environ | {"PYTHONIOENCODING": "ascii"},
+        capture_output=True,
+    )
+    assert (done.stdout, done.stderr) == (b"\\u03b8 = 1\n", b"")
