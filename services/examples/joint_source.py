@@ -46,7 +46,8 @@ def joint_angle(
             return newest, Rejected(ROBOT_JOINTS, f"{joint}: not each joint has a position")
         if not -CLOCK_TOLERANCE <= late <= max_age:
             return newest, Rejected(ROBOT_JOINTS, f"{joint}: {late:.3f} s old")
-        if stamp <= newest:
+        # Two states of such ages are further apart only if the clock was set back.
+        if 0.0 <= (newest - stamp) / 1e9 <= max_age + CLOCK_TOLERANCE:
             return newest, Rejected(ROBOT_JOINTS, f"{joint}: not newer than the state before")
         return stamp, state.position[list(state.name).index(joint)]
 

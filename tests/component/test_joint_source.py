@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -22,12 +23,17 @@ def state(stamp: float, *joints: tuple[str, float]) -> JointState:
     return JointState(header=header, name=[name for name, _ in joints], position=[it for _, it in joints])
 
 
-def angles(*states: tuple[float, JointState], until: float = 1.4) -> list[tuple[float, Any]]:
-    """Return the angles of the elbow, and the reasons of rejections, each with its time to a tenth."""
+def angles(
+    *states: tuple[float, JointState], until: float = 1.4, clock: Callable[[float], float] = float
+) -> list[tuple[float, Any]]:
+    """Return the angles of the elbow, and the reasons of rejections, each with its time to a tenth.
+
+    :param clock: returns what the clock of ages shows at a time [s].
+    """
     scheduler = VirtualTime()
 
     def age(it: JointState) -> float:
-        return scheduler.clock - it.header.stamp.sec - it.header.stamp.nanosec / 1e9
+        return clock(scheduler.clock) - it.header.stamp.sec - it.header.stamp.nanosec / 1e9
 
     recipe = joint_angle(scheduler.hot(*states), "elbow", age, max_age=0.2)
     items = scheduler.record(recipe, until=until).items
@@ -47,9 +53,18 @@ def test_state_that_is_old_or_of_the_future_is_rejected(at: float, reason: str) 
 
 
 def test_state_that_is_not_newer_is_rejected() -> None:
-    newest, older = state(0.5, ("elbow", 1.0)), state(0.45, ("elbow", 2.0))
+    newest, older = state(0.54, ("elbow", 1.0)), state(0.31, ("elbow", 2.0))  # their ages are just allowed
     reason = "elbow: not newer than the state before"
-    assert angles((0.5, newest), (0.55, older), (0.6, newest)) == [(0.5, 1.0), (0.6, reason), (0.6, reason)]
+    assert angles((0.5, newest), (0.5, older), (0.6, newest)) == [(0.5, 1.0), (0.5, reason), (0.6, reason)]
+
+
+@pytest.mark.parametrize("step", [0.4, 3600.0])
+def test_states_count_after_the_clock_was_set_back(step: float) -> None:
+    def clock(at: float) -> float:
+        return 3600.0 + at - (step if at > 0.55 else 0.0)
+
+    states = [(at, state(clock(at), ("elbow", at))) for at in (0.5, 0.6, 0.7)]
+    assert angles(*states, clock=clock) == [(0.5, 0.5), (0.6, 0.6), (0.7, 0.7)]
 
 
 def test_state_without_positions_is_rejected() -> None:
