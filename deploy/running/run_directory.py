@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import os
 import shutil
 from collections.abc import Iterator, Mapping, Sequence
@@ -11,8 +10,9 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from deploy.running import interruption, processes
+from deploy.running import processes
 from deploy.running.errors import DeploymentError
+from deploy.running.lock import held
 
 # `make stop` runs without .venv: PyYAML is imported where it is needed.
 
@@ -108,18 +108,8 @@ class RunDirectory:
         """Hold the logs: only one start or stop at a time. supervisord holds the run directory."""
         make_directory(self.run, 0o700)
         make_directory(self.logs)
-        directory = os.open(self.logs, os.O_RDONLY)
-        try:
-            try:
-                fcntl.flock(directory, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError:
-                with suppress(OSError):  # a closed terminal
-                    print("Waiting for another make to end its start or stop.", flush=True)
-                with interruption.blocking():
-                    fcntl.flock(directory, fcntl.LOCK_EX)
+        with held(self.logs, "start or stop"):
             yield
-        finally:
-            os.close(directory)
 
 
 def make_directory(path: Path, mode: int = 0o777) -> None:

@@ -20,6 +20,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from deploy.running.errors import DeploymentError
+from deploy.running.lock import held
 from deploy.security import documents
 from deploy.security.rights import Rights
 from interfaces.service.enclave import SOON
@@ -71,9 +72,11 @@ class Keystore:
         :raises DeploymentError: if openssl is missing or fails, or if this is an export, which has no CA key.
         """
         with _private():
-            self._write_ca()
-            self._sign(self._enclaves / "governance", documents.governance(domains))
-            return min(self._write_enclave(enclave, each, domains) for enclave, each in rights.items())
+            self.folder.mkdir(parents=True, exist_ok=True)
+            with held(self.folder, "keystore"):  # two at once would leave a CA with the key of the other
+                self._write_ca()
+                self._sign(self._enclaves / "governance", documents.governance(domains))
+                return min(self._write_enclave(enclave, each, domains) for enclave, each in rights.items())
 
     def enclaves(self) -> list[str]:
         """Return the enclaves that exist, sorted."""

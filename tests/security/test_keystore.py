@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 import stat
 import subprocess
+import sys
 from collections.abc import Iterator
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -13,6 +14,7 @@ from xml.etree import ElementTree
 import pytest
 
 from deploy.running.errors import DeploymentError
+from deploy.running.lock import held
 from deploy.security import keystore as keystores
 from deploy.security.keystore import Keystore
 from deploy.security.rights import Rule
@@ -154,6 +156,19 @@ def test_a_key_that_is_interrupted_or_lost_is_made_again(lost: str, tmp_path: Pa
     keystore.write(TALKER, [7])
     of_key = openssl("pkey", "-in", certificate.with_name("key.pem"), "-pubout")
     assert of_key == openssl("x509", "-in", certificate, "-noout", "-pubkey")
+
+
+def test_a_second_make_waits_for_the_first(tmp_path: Path) -> None:
+    write = "import sys; from pathlib import Path; from deploy.security.keystore import Keystore"
+    write += "; Keystore(Path(sys.argv[1])).write({'/talker': ()}, [7])"
+    with held(tmp_path, "keystore"):
+        second = subprocess.Popen([sys.executable, "-c", write, tmp_path], stdout=subprocess.PIPE, text=True)
+        assert second.stdout is not None
+        assert second.stdout.readline() == "Waiting for another make to end its keystore.\n"
+        assert layout(tmp_path) == {}
+    second.communicate()
+    assert second.returncode == 0
+    assert Keystore(tmp_path).enclaves() == ["/talker"]
 
 
 def test_writing_again_renews_what_ends_soon(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
