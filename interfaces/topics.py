@@ -34,6 +34,7 @@ ON, OFF = "on", "off"
 ALIVE, MISSED, INCAPACITATED = "alive", "missed", "incapacitated"
 DRIVE_TIMEOUT = 0.4  # s for which the engines' drive accepts an `on`
 CLOCK_TOLERANCE = 0.05  # s between the clocks of two hosts (deploy/SAFETY.md, A3)
+LARGEST = 1e9  # of all numbers: no square overflows, and a timer waits for no time after the year 9999
 FRAME = "base"
 
 Conversion = Callable[[Any], Any]
@@ -155,24 +156,25 @@ class Topic:
         return self.name if self.name[0] == "/" else f"{namespace.rstrip('/')}/{self.name}"
 
 
-def _not_finite(value: float) -> str:
-    return "" if math.isfinite(value) else f"{value} is not finite"
+def _not_usable(*numbers: float) -> str:
+    if all(abs(number) <= LARGEST for number in numbers):  # this refuses NaN
+        return ""
+    shown = numbers if len(numbers) > 1 else numbers[0]
+    if all(map(math.isfinite, numbers)):
+        return f"{shown} is not from {-LARGEST:g} to {LARGEST:g}"
+    return f"{shown} is not finite"
 
 
 def _not_a_length(value: float) -> str:
-    if 0 <= value < math.inf:
-        return ""
-    return _not_finite(value) or f"{value} is negative"
+    return _not_usable(value) or ("" if value >= 0 else f"{value} is negative")
 
 
 def _not_a_position(position: Position) -> str:
-    _, x, y, _ = position
-    return "" if math.isfinite(x) and math.isfinite(y) else f"({x}, {y}) is not finite"
+    return _not_usable(position.x, position.y)
 
 
 def _not_a_velocity(velocity: Velocity) -> str:
-    _, *found, _ = velocity
-    return "" if all(map(math.isfinite, found)) else f"{tuple(found)} is not finite"
+    return _not_usable(velocity.x, velocity.y, velocity.turn)
 
 
 def _not_pressed(beat: bool) -> str:
@@ -233,7 +235,7 @@ THETA1 = Topic(
     ("config_theta1",),
     _CONFIGURED,
     "angle of the first joint",
-    _not_finite,
+    _not_usable,
     follows=DRIVEN_TIME.name,
 )
 THETA2 = Topic(
@@ -244,7 +246,7 @@ THETA2 = Topic(
     ("config_theta2",),
     _CONFIGURED,
     "angle of the second joint",
-    _not_finite,
+    _not_usable,
     follows=DRIVEN_TIME.name,
 )
 EFFECTOR_POSITION = Topic(

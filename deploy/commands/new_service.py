@@ -112,7 +112,7 @@ def _with_topic(contract: str, name: str) -> str:
     ("sensor",),
     ("{name}",),
     "what `{name}` limits",
-    _not_finite,
+    _not_usable,
     longest_gap=math.inf,
 )
 """

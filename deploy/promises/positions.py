@@ -60,7 +60,7 @@ def may_lack_values(history: History, found: Sequence[Effect], time: float) -> b
 
 def _any_fits(candidates: list[list[float]], x: float, y: float) -> bool:
     """Return whether any combination of the values gives the position, up to rounding."""
-    if not (math.isfinite(x) and math.isfinite(y)):
+    if not (abs(x) <= topics.LARGEST and abs(y) <= topics.LARGEST):  # this refuses NaN
         return False
     l1s, l2s, theta1s, theta2s = candidates
     l2s = sorted(l2s)
@@ -68,13 +68,9 @@ def _any_fits(candidates: list[list[float]], x: float, y: float) -> bool:
         # The rest has to fit the second link in length before angles are tried.
         rest_x, rest_y = x - l1 * math.cos(theta1), y - l1 * math.sin(theta1)
         length = math.hypot(rest_x, rest_y)
-        if not math.isfinite(length):
-            continue
         rounding = max(ROUNDING, PRECISION * l1 + PRECISION * length)
         for l2 in l2s[bisect_left(l2s, length - rounding) : bisect_right(l2s, length + rounding)]:
             for heading in (theta1 + theta2 for theta2 in theta2s):
-                if math.isinf(heading):  # kinematics has no position for it
-                    continue
                 error_x, error_y = rest_x - l2 * math.cos(heading), rest_y - l2 * math.sin(heading)
                 if abs(error_x) < rounding and abs(error_y) < rounding:
                     return True

@@ -41,10 +41,10 @@ from interfaces import topics
 from interfaces.service.errors import UserError
 from interfaces.sources import yaml_file
 from interfaces.sources.timeline import Events, Sweep
+from interfaces.topics import LARGEST
 
 T = TypeVar("T")
 
-LARGEST = 1e9  # of all numbers: a timer waits for no time after the year 9999
 SHORTEST = 0.001  # s, of a period
 DRIVE_RATE = 25.0  # Hz, by default
 

@@ -106,7 +106,11 @@ GOOD_AND_BAD = [
         [number(0.0), number(2.5)],
         [number(math.nan), number(math.inf), number(-math.inf), number(-1e-9)],
     ),
-    (topics.THETA2, [number(-7.0), number(1e300)], [number(math.nan), number(math.inf), number(-math.inf)]),
+    (
+        topics.THETA2,
+        [number(-7.0), number(1e9)],
+        [number(math.nan), number(math.inf), number(-math.inf), number(-1e300)],
+    ),
     (
         topics.EFFECTOR_POSITION,
         [position(-1.0, 2.0)],

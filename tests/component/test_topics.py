@@ -12,7 +12,9 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64, Header, String
 
 from interfaces import topics
-from interfaces.topics import Position, Topic
+from interfaces.topics import Position, Topic, Velocity
+
+BEYOND = "{} is not from -1e+09 to 1e+09"
 
 
 @pytest.mark.parametrize(
@@ -29,6 +31,14 @@ from interfaces.topics import Position, Topic
         (topics.EFFECTOR_POSITION, Position(0, 1.0, -1.0), ""),
         (topics.EFFECTOR_POSITION, Position(0, math.nan, 1.0), "(nan, 1.0) is not finite"),
         (topics.EFFECTOR_POSITION, Position(0, 1.0, math.inf), "(1.0, inf) is not finite"),
+        (topics.DRIVEN_TIME, 1e9, ""),
+        (topics.DRIVEN_TIME, 1e300, BEYOND.format("1e+300")),
+        (topics.THETA1, -1e9, ""),
+        (topics.THETA1, -1.1e9, BEYOND.format("-1100000000.0")),
+        (topics.EFFECTOR_POSITION, Position(0, 1e10, 1.0), BEYOND.format("(10000000000.0, 1.0)")),
+        (topics.EFFECTOR_VELOCITY, Velocity(0, 1.0, -2.0, 3.0), ""),
+        (topics.EFFECTOR_VELOCITY, Velocity(0, 1.0, 0.0, math.nan), "(1.0, 0.0, nan) is not finite"),
+        (topics.EFFECTOR_VELOCITY, Velocity(0, 1e308, 1e308, 0.0), BEYOND.format("(1e+308, 1e+308, 0.0)")),
         (topics.OPERATOR_HEARTBEAT, True, ""),
         (topics.OPERATOR_HEARTBEAT, False, "a released switch is no sign of life"),
         *((topics.ENGINES, data, "") for data in ("turn_on", "turn_off")),
