@@ -37,7 +37,7 @@ from deploy.running.service_manager import ALIVE, READY, notify
 from deploy.running.supervisord import Program, Supervisord
 from interfaces import service
 from interfaces.service import ServiceNode, parameter
-from interfaces.service.health import Health, healths
+from interfaces.service.health import Health, healths, seconds
 from interfaces.topics import DIAGNOSTICS
 
 MANY_RESTARTS = 3  # within a minute: a warning
@@ -71,11 +71,11 @@ def _program(values: Mapping[str, str]) -> Program:
         name=values["process"],
         state=values["state"],
         pid=int(values["pid"]),
-        uptime=float(values["uptime"]),
+        uptime=seconds(values["uptime"]),
         restarts=int(values["restarts"]),
         exit=values["last exit"],
         error="",
-        away=float(values["away"]),
+        away=seconds(values["away"]),
     )
 
 

@@ -6,7 +6,6 @@ This module writes and reads the format of these reports.
 from __future__ import annotations
 
 import json
-import math
 import os
 import socket
 import time
@@ -23,7 +22,7 @@ from rclpy.exceptions import InvalidHandle
 from rclpy.node import Node
 
 from interfaces.service.enclave import Keys
-from interfaces.topics import DIAGNOSTICS
+from interfaces.topics import DIAGNOSTICS, LARGEST
 
 PERIOD = 1.0  # [s]
 _PID, _PUBLISHED, _SINCE_OUTPUT = "pid", "published", "seconds_since_output"
@@ -226,14 +225,19 @@ def _health(status: DiagnosticStatus, values: dict[str, str]) -> Health:
         pid=int(values[_PID]),
         ok=status.level == DiagnosticStatus.OK,
         reason=status.message,
-        since_output=_age(values, _SINCE_OUTPUT),
-        since_turn_off=_age(values, _SINCE_TURN_OFF),
+        since_output=_age(values.get(_SINCE_OUTPUT)),
+        since_turn_off=_age(values.get(_SINCE_TURN_OFF)),
         host=status.hardware_id,
     )
 
 
-def _age(values: dict[str, str], key: str) -> float | None:
-    age = float(values[key]) if values.get(key) else None
-    if age is not None and not math.isfinite(age):
-        raise ValueError(f"{key} is {age}")
-    return age
+def _age(value: str | None) -> float | None:
+    return seconds(value) if value else None
+
+
+def seconds(value: str) -> float:
+    """Return a time in a report [s]. Raises ValueError for one from which no date can be computed."""
+    found = float(value)
+    if not 0.0 <= found <= LARGEST:  # this refuses NaN
+        raise ValueError(f"{value} is no time")
+    return found

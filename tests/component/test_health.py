@@ -42,6 +42,8 @@ def test_report_of_a_service_in_the_namespace_is_read() -> None:
         ("/arm1/battery", GOOD | {"seconds_since_output": "long ago"}),
         ("/arm1/battery", GOOD | {"seconds_since_output": "nan"}),
         ("/arm1/battery", GOOD | {"seconds_since_output": "inf"}),
+        ("/arm1/battery", GOOD | {"seconds_since_output": "1e300"}),
+        ("/arm1/battery", GOOD | {"seconds_since_turn_off": "-1"}),
         ("", {}),
     ],
 )

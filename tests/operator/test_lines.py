@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable
 from datetime import UTC, datetime, timedelta
 from itertools import pairwise
@@ -318,6 +319,12 @@ def test_new_supervisord_is_no_death_of_its_processes(play: Play) -> None:
     script = [processes(1, 3, pid=7), processes(2, 0, pid=8), alive(2.1, pid=8), processes(3, 0, pid=8)]
     script += [processes(4, 1, pid=9), alive(4.1, pid=9), processes(5, 1, pid=9)]
     assert deaths(play(script)) == [DIED(0.4)]
+
+
+@pytest.mark.parametrize("age", [-1e300, 1e300, math.inf, math.nan])
+def test_report_with_an_impossible_time_is_ignored(play: Play, age: float) -> None:
+    odd = [processes(1, 0, pid=7, age=age), turn_off_by("torque_guard", 1, age)]
+    assert texts(play([*odd, *states((2, "on"))])) == ["Engines are on"]
 
 
 def test_fast_lines_are_thinned_to_one_a_second(play: Play) -> None:

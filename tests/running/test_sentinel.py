@@ -188,6 +188,14 @@ def test_states_that_make_no_sense_are_not_read() -> None:
         assert reported(DiagnosticArray(status=[DiagnosticStatus(name=status.name, values=wrong)]), "") == []
 
 
+@pytest.mark.parametrize("time", ["-1", "nan", "inf", "1e300"])
+@pytest.mark.parametrize("key", ["uptime", "away"])
+def test_states_with_an_impossible_time_are_not_read(key: str, time: str) -> None:
+    (status,) = states([program("kinematics")], {}, {}, "/sentinel")
+    status.values = [KeyValue(key=it.key, value=time if it.key == key else it.value) for it in status.values]
+    assert reported(DiagnosticArray(status=[status]), "") == []
+
+
 def test_observes_nothing_when_supervisord_is_gone(tmp_path: Path) -> None:
     with pytest.raises(DeploymentError, match="supervisord has died"):
         Probe(tmp_path, Supervisord(os.getpid())).observe()  # which is not whose child this process is
