@@ -14,6 +14,7 @@ from reactivex import Observable
 
 from deploy.running.reaction import reaction
 from deploy.running.sentinel import reported
+from interfaces.service import UserError
 from interfaces.service.health import Health, healths, reported_parameters
 from interfaces.topics import ALIVE, DIAGNOSTICS, ENGINES_STATE, OPERATOR_ACTIVITY, Topic
 
@@ -44,11 +45,11 @@ class Arm(NamedTuple):
     engines: Told = Told()
     operator: Told = Told()
     healths: Mapping[str, Health] = {}
-    """The latest report of each program."""
+    """What was last heard of each program."""
     states: Mapping[str, str] = {}
     """The state of each process, as the sentinel sees it."""
-    parameters: Mapping[str, Mapping[str, Any]] = {}
-    """By program, those whose value is not the default."""
+    reports: Mapping[str, Any] = {}
+    """The latest report of each program, as it came."""
 
 
 Change = Callable[[Arm], Arm]
@@ -81,8 +82,8 @@ def _health(message: Any) -> Change:
         namespace = arm.name.rstrip("/")
         states = {program.name: program.state for program in reported(message, namespace)}
         news = healths(message, namespace)
-        parameters = {
-            program: reported_parameters(status)
+        reports = {
+            program: status
             for status in message.status
             for program in news
             if status.name == f"{namespace}/{program}"
@@ -90,7 +91,7 @@ def _health(message: Any) -> Change:
         return arm._replace(
             healths={**arm.healths, **news},
             states={**arm.states, **states},
-            parameters={**arm.parameters, **parameters},
+            reports={**arm.reports, **reports},
         )
 
     return change
@@ -113,8 +114,17 @@ def row(arm: Arm, now: float) -> tuple[str, ...]:
         operator or UNKNOWN,
         engines,
         _in_words(arm, now),
-        f"{reaction(arm.parameters).off_within:g} s" if arm.healths else UNKNOWN,
+        _bound(arm),
     )
+
+
+def _bound(arm: Arm) -> str:
+    """Return how soon the engines stop, if that follows from what the programs report."""
+    try:
+        bound = reaction({name: reported_parameters(it) for name, it in arm.reports.items()}).off_within
+    except (ArithmeticError, TypeError, ValueError, UserError):  # of another version, or not ours
+        return UNKNOWN
+    return f"{bound:g} s" if arm.reports and math.isfinite(bound) else UNKNOWN
 
 
 def _in_words(arm: Arm, now: float) -> str:

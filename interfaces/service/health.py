@@ -153,11 +153,15 @@ class HealthReporter:
 
 def reported_parameters(status: DiagnosticStatus) -> dict[str, Any]:
     """Return the parameters in a report: those whose value is not the default. Raises ValueError."""
-    return {
-        pair.key.removeprefix(_PARAMETER): json.loads(pair.value)
+    given = {
+        pair.key.removeprefix(_PARAMETER): pair.value
         for pair in status.values
         if pair.key.startswith(_PARAMETER)
     }
+    try:
+        return {name: json.loads(value) for name, value in given.items()}
+    except RecursionError as error:
+        raise ValueError("a parameter is nested too deeply") from error
 
 
 def reported_refusals(status: DiagnosticStatus, subject: str) -> list[tuple[int, int | None]]:

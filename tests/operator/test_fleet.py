@@ -86,6 +86,23 @@ def test_bound_follows_from_the_presence_timeout_of_the_arm() -> None:
     assert row(arm, 0.0)[-1] == "5 s"
 
 
+UNUSABLE = ["soon", 100_000 * "[", '"soon"', "[1.0]", "NaN", "1e400", "1" + 400 * "0"]
+
+
+@pytest.mark.parametrize("value", UNUSABLE, ids=lambda value: value[:9])
+def test_bound_of_an_unusable_parameter_is_unknown(value: str) -> None:
+    report = health("/arm1/engine_controller", **{"parameter presence_timeout": value})
+    arm = last([(1.0, DIAGNOSTICS, report)])
+    assert row(arm, arm.healths["engine_controller"].heard)[5:] == ("1 ok", "-")
+
+
+@pytest.mark.parametrize(("sampling", "silence"), [("0.5", "0.1"), ('"b"', '"a"')])
+def test_bound_of_parameters_that_contradict_each_other_is_unknown(sampling: str, silence: str) -> None:
+    given = {"parameter sampling": sampling, "parameter silence": silence}
+    arm = last([(1.0, DIAGNOSTICS, health("/arm1/operator_watchdog", **given))])
+    assert row(arm, 0.0)[-1] == "-"
+
+
 def well(heard: float, **problems: str) -> Arm:
     """Return an arm of three programs, some of which report a problem."""
     reports = {
