@@ -11,7 +11,7 @@ from typing import Any
 from rclpy.node import Node
 
 from deploy.commands.member import Member
-from deploy.running import manifest
+from deploy.running import manifest, processes
 from deploy.running.environment import NAMESPACE, RANGE
 from deploy.running.errors import DeploymentError
 from deploy.running.probe import is_here
@@ -20,6 +20,7 @@ from deploy.running.supervisord import Program
 from deploy.running.system import System
 from interfaces.service.clocks import Clocks, difference
 from interfaces.service.health import Health, healths, listening
+from interfaces.service.process import SUPERVISED
 
 LOOK = 2.0  # s before a start: each service reports its health once a second
 
@@ -50,15 +51,23 @@ class Hosts:
         """Refuse a start beside these hosts.
 
         :param ours: the orphans of the last start, which this start replaces: their programs by pid.
-        :raises DeploymentError: if another host runs one of our programs, or its clock is wrong.
+        :raises DeploymentError: if another host runs one of our programs or has our name, or if its clock is
+            wrong.
         """
         here = {program.name for program in manifest.programs()}
+        elsewhere = {program.name for program in manifest.everywhere()} - here
         for (host, program), health in sorted(self.healths.items()):
             is_own = is_here(host) and ours.get(health.pid) == program
             if program in here and not is_own:
                 raise DeploymentError(
                     f"{program} runs on host {host} already, and a program runs on one host only: start the"
                     f" parts by HOST=robot and HOST=operator, or give this arm another {NAMESPACE}"
+                )
+            # Another host of our name would hide its clock. The other part may run on this host, too.
+            is_known = processes.environment_of(health.pid).get(SUPERVISED) == program
+            if program in elsewhere and is_here(host) and not is_known:
+                raise DeploymentError(
+                    f"both hosts are named {host}: give each its own hostname (hostnamectl)"
                 )
         for host, behind in self._clocks.wrong().items():
             raise DeploymentError(f"Clocks: {difference(host, behind)}; synchronise both (NTP or PTP)")

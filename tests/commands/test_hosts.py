@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import socket
+from collections.abc import Iterator
 from functools import partial
 
 import pytest
 
 from deploy.commands.hosts import Hosts
+from deploy.running import manifest, processes
 from deploy.running.errors import DeploymentError
 from tests import health_reports
 from tests.health_reports import report
@@ -51,6 +53,29 @@ def test_least_age_of_a_report_tells_the_clock() -> None:
     assert hosts.clocks() in [
         f"Clocks: the clock of host desk is {ms} ms behind ours\n" for ms in range(1, 20)
     ]
+
+
+@pytest.fixture
+def robot(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """This host is the robot of two hosts, and its process 7 is a dead man's switch."""
+    monkeypatch.setenv(manifest.VARIABLE, "")
+    environments = {7: {"SUPERVISOR_PROCESS_NAME": "dead_mans_switch"}}
+    monkeypatch.setattr(processes, "environment_of", lambda pid: environments.get(pid, {}))
+    with manifest.chosen("", host="robot"):
+        yield
+
+
+@pytest.mark.usefixtures("robot")
+@pytest.mark.parametrize("program", ["dead_mans_switch", "sentinel_operator"])
+def test_other_host_of_the_same_name_is_refused(program: str) -> None:
+    words = f"^both hosts are named {HERE}: give each its own hostname \\(hostnamectl\\)$"
+    with pytest.raises(DeploymentError, match=words):
+        heard(report(f"/{program}", HERE, pid=8)).check({})
+
+
+@pytest.mark.usefixtures("robot")
+def test_both_parts_of_an_arm_may_run_on_one_host() -> None:
+    heard(report("/dead_mans_switch", HERE, pid=7), report("/operator_page", "desk", pid=8)).check({})
 
 
 def test_own_clock_is_not_shown() -> None:
