@@ -181,6 +181,7 @@ def test_service_publishes_a_last_value_at_a_signal(
     peer.create_subscription(L1.type, L1.name, lambda message: heard.append(message.data), L1.qos)
     process = start("-c", SPEAKING)
     assert process.wait_for_line() == "ready"
+    spin_until(lambda: peer.count_publishers(L1.name))  # each knows the other one
 
     assert process.end(by=number) == (0, "")
     spin_until(lambda: heard)

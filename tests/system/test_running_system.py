@@ -323,18 +323,19 @@ def test_a_second_arm_runs_in_a_namespace_of_the_same_domain(module_site: Site, 
 
 
 def test_example_of_a_service_joins_the_system(module_site: Site, peer: Peer) -> None:
-    commands, velocity = peer.collect(topics.ENGINES), peer.publisher(topics.EFFECTOR_VELOCITY)
+    velocity = peer.publisher(topics.EFFECTOR_VELOCITY)
     terminal = module_site.begin_command(sys.executable, "-m", "deploy.commands.launcher", "terminal")
     terminal.await_line("Engines are off")
     terminal.insist("press\n", "Operator is alive")
     terminal.insist("turn_on\n", "Engines are on")
+    states = peer.collect(topics.ENGINES_STATE)
+    peer.spin_until(lambda: states and states[-1].data == topics.ON)
     guard = module_site.begin_python("-m", "services.examples.speed_guard", "--ros-args", "-p", "limit:=3.0")
 
-    def it_has_commanded() -> bool:
+    def engines_are_off() -> bool:
         velocity.publish(TwistStamped(twist=Twist(linear=Vector3(x=3.1))))
-        return any(command.data == topics.TURN_OFF for command in commands)
+        return bool(states[-1].data == topics.OFF)
 
-    peer.spin_until(it_has_commanded)
-    terminal.await_line("speed_guard turned off the engines")
+    peer.spin_until(engines_are_off)
     guard.signal(signal.SIGTERM)
     assert guard.wait() == 0

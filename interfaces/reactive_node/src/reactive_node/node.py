@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 import threading
+import time
 from collections.abc import Callable
 from contextlib import ExitStack
 from typing import TYPE_CHECKING, Any
 
 import reactivex as rx
 from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.duration import Duration
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -29,6 +31,8 @@ from reactive_node.shared_reader import SharedReader
 
 if TYPE_CHECKING:
     from reactive_node.transforms import Transforms
+
+_DELIVERY = 0.1  # [s], for all readers together: one of them may be dead
 
 
 class ReactiveNode(Node):
@@ -394,4 +398,12 @@ class ReactiveNode(Node):
                 stack.callback(self._sinks.dispose)
                 for sink in reversed(self._sinks.to_list()):  # each, even if another one raises
                     stack.callback(sink.dispose)
+                stack.callback(self._deliver)
                 self._end.come()
+
+    def _deliver(self) -> None:
+        """Wait until the last messages are read: Fast DDS drops those of a writer that has ended."""
+        end = time.monotonic() + _DELIVERY
+        for publisher in self.publishers:
+            if self.context.ok():
+                publisher.wait_for_all_acked(Duration(seconds=max(0.0, end - time.monotonic())))
