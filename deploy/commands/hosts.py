@@ -64,8 +64,7 @@ class Hosts:
                     f" parts by HOST=robot and HOST=operator, or give this arm another {NAMESPACE}"
                 )
             # Another host of our name would hide its clock. The other part may run on this host, too.
-            is_known = processes.environment_of(health.pid).get(SUPERVISED) == program
-            if program in elsewhere and is_here(host) and not is_known:
+            if program in elsewhere and is_here(host) and not _is_process(health.pid, program):
                 raise DeploymentError(
                     f"both hosts are named {host}: give each its own hostname (hostnamectl)"
                 )
@@ -92,3 +91,7 @@ def check(member: Member, system: System) -> None:
             member.spin_once()
     hosts.check(ours)
     print(hosts.clocks(), end="")
+
+
+def _is_process(pid: int, program: str) -> bool:
+    return processes.environment_of(pid).get(SUPERVISED) == program
