@@ -328,7 +328,7 @@ def test_example_of_a_service_joins_the_system(module_site: Site, peer: Peer) ->
     terminal.await_line("Engines are off")
     terminal.insist("press\n", "Operator is alive")
     terminal.insist("turn_on\n", "Engines are on")
-    states = peer.collect(topics.ENGINES_STATE)
+    states, reports = peer.collect(topics.ENGINES_STATE), peer.collect(topics.DIAGNOSTICS)
     peer.spin_until(lambda: states and states[-1].data == topics.ON)
     guard = module_site.begin_python("-m", "services.examples.speed_guard", "--ros-args", "-p", "limit:=3.0")
 
@@ -336,6 +336,14 @@ def test_example_of_a_service_joins_the_system(module_site: Site, peer: Peer) ->
         velocity.publish(TwistStamped(twist=Twist(linear=Vector3(x=3.1))))
         return bool(states[-1].data == topics.OFF)
 
+    def it_has_commanded() -> bool:
+        health = [status for report in reports for status in report.status if status.name == "/speed_guard"]
+        published = (
+            int(pair.value) for status in health for pair in status.values if pair.key == "published"
+        )
+        return any(published)
+
     peer.spin_until(engines_are_off)
+    peer.spin_until(it_has_commanded)
     guard.signal(signal.SIGTERM)
     assert guard.wait() == 0
