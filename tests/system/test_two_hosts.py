@@ -20,6 +20,7 @@ from pathlib import Path
 import pytest
 
 from deploy.running import manifest
+from deploy.running.environment import set_middleware
 from deploy.trials.chaos import clock
 from deploy.trials.chaos.faults import INJECTED
 from deploy.trials.chaos.partition import BRIDGE, CONTROL, NETWORK, ROBOT, missing, namespaces
@@ -248,7 +249,9 @@ def test_long_cut_stops_the_engines_until_they_are_turned_on(arm: Arm) -> None:
 
 def test_second_controller_on_the_other_host_stops_the_joints(arm: Arm) -> None:
     arm.turn_on()
-    second = arm.operator.begin_command(sys.executable, "-m", "services.engine_controller")
+    environment = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}
+    set_middleware(environment)  # it keeps Fast DDS from shared memory, which a killed process leaves behind
+    second = arm.operator.begin_command(sys.executable, "-m", "services.engine_controller", **environment)
     if KEYS:  # the operator's host has none for it
         assert second.wait() != 0, second.output
         return
