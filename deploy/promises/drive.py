@@ -28,7 +28,7 @@ def joints_stand_in_time(history: History) -> Finding:
             continue
         blind = disturbing(found, SWITCH, begin, last, *MISSED)
         since = max([begin, *(min(each.end, last) for each in blind)])
-        if begin == -math.inf:
+        if since == -math.inf:
             evidence.append(Evidence(last, "a joint moved before the operator's first sign of life"))
         elif last - since > allowed:
             text = f"a joint still moved {last - since:.2f} s after the operator's last sign of life"

@@ -66,7 +66,7 @@ def engines_off_in_time(history: History) -> Finding:
             for one, two in _between(overloads, begin, end)
             if (part := _overlapping_part(on, one, two))
         )
-        lasted, since = max(observed, default=(0.0, begin))
+        lasted, since = max(observed, default=(0.0, late[0][0]))
         if since == -math.inf:
             evidence.append(Evidence(late[0][0], "engines on before the operator's first sign of life"))
             continue

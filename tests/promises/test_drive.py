@@ -72,6 +72,9 @@ def test_s6_joint_that_moves_before_the_first_sign_of_life() -> None:
     (evidence,) = joints_stand_in_time(moved).evidence
     assert evidence == Evidence(0.25, "a joint moved before the operator's first sign of life")
 
+    found = joints_stand_in_time(replace(moved, faults=[InjectedFault(OVERLOAD, NO_TARGET, 0.0, 0.5)]))
+    assert (found.cases, found.unknown, found.evidence) == (0, 1, [])
+
 
 @pytest.mark.parametrize(("end", "expected"), [(1.9, (1, 1)), (4.0, (0, 0))])
 def test_s6_operator_may_be_seen_in_an_overload(end: float, expected: tuple[int, int]) -> None:

@@ -170,9 +170,9 @@ def test_s1_first_sign_of_life_may_have_been_missed_in_an_overload() -> None:
     states = engines((3.0, ON), (13.25, OFF))
     found = [
         CHECKERS["S1"](history(heartbeats=[(30.0, True)], states=states, faults=[each]))
-        for each in (overload(2.0, 2.75), overload(2.0, 2.5), overload(3.5, 4.0))
+        for each in (overload(2.0, 2.75), overload(2.0, 2.5), overload(3.5, 4.0), overload(2.0, 14.0))
     ]
-    assert [(each.cases, each.unknown) for each in found] == [(0, 1), (1, 0), (0, 0)]
+    assert [(each.cases, each.unknown) for each in found] == [(0, 1), (1, 0), (0, 0), (0, 1)]
     assert found[1].evidence == [
         Evidence(13.0, "engines still on 10.75 s after the operator's last sign of life")
     ]
