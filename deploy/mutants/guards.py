@@ -38,6 +38,7 @@ GUARDS: dict[str, tuple[str, ...]] = {
         "tests/component/test_topics.py",
         "tests/component/test_readme.py",
         "tests/component/test_service_node.py",
+        "tests/security/test_rights.py",
     ),
     "interfaces/service/clocks.py": (
         "tests/component/test_clocks.py",
