@@ -5,7 +5,7 @@ SCENARIO ?= demo
 PARAMETERS ?=
 MANIFEST ?=
 WEB ?=
-# The page has a run of its own. Only .ci/run attacks an arm with keys and one fail-safe at a time, breaks the line between
+# The page has a run of its own. Only CI attacks an arm with keys and one fail-safe at a time, breaks the line between
 # two hosts, and compares costs.
 LEFT_OUT := tests/operator/page tests/security/attacks tests/trials/simulation/test_attacks.py tests/system/test_two_hosts.py tests/benchmarks/test_ratios.py
 TESTS ?= tests interfaces/reactive_node $(LEFT_OUT:%=--ignore=%)

@@ -1,6 +1,6 @@
 """An arm on two hosts: network namespaces with host names of their own, and a line between them.
 
-On the embedded rclpy, its processes have keys, if there is a Cyclone DDS with security.
+Its processes have keys on an installed ROS 2, and on the embedded rclpy if there is a Cyclone DDS with security.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ import pytest
 
 from deploy.running import manifest
 from deploy.running.environment import set_middleware
+from deploy.running.rclpy_choice import sourced_rclpy
 from deploy.trials.chaos import clock
 from deploy.trials.chaos.faults import INJECTED
 from deploy.trials.chaos.partition import BRIDGE, CONTROL, NETWORK, ROBOT, missing, namespaces
@@ -28,7 +29,8 @@ from tests.system.sites import LIMIT, ROOT, Command, Site
 
 TABLET = "tablet"
 SECURITY = Path(f"/usr/lib/{platform.machine()}-linux-gnu/libddsc.so.0debian")
-KEYS = {"ROS_SECURITY_ENABLE": "true"} if os.environ.get("RUNTIME") and SECURITY.exists() else {}
+HAS_SECURITY = SECURITY.exists() if os.environ.get("RUNTIME") else bool(sourced_rclpy())
+KEYS = {"ROS_SECURITY_ENABLE": "true"} if HAS_SECURITY else {}
 OPERATORS_KEYS = "dead_mans_switch operator_page sentinel_operator terminal"  # as deploy/README.md has it
 ADDRESSES = {host: f"{NETWORK}.{number}" for number, host in enumerate((ROBOT, CONTROL, TABLET), start=1)}
 PARAMETERS = f"""
@@ -249,7 +251,7 @@ def test_long_cut_stops_the_engines_until_they_are_turned_on(arm: Arm) -> None:
 
 def test_second_controller_on_the_other_host_stops_the_joints(arm: Arm) -> None:
     arm.turn_on()
-    environment = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}
+    environment = KEYS | {"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}
     set_middleware(environment)  # it keeps Fast DDS from shared memory, which a killed process leaves behind
     second = arm.operator.begin_command(sys.executable, "-m", "services.engine_controller", **environment)
     if KEYS:  # the operator's host has none for it
@@ -307,7 +309,7 @@ def faked(arm: Arm) -> Iterator[dict[str, str]]:
     with clock.faked() as environment:
         yield environment | {
             "FAKETIME_TIMESTAMP_FILE": str(arm.operator.site.run.parent / "ahead"),
-            "PYTHONPATH": str(INJECTED),
+            "PYTHONPATH": os.pathsep.join([str(INJECTED), os.environ.get("PYTHONPATH", "")]),
         }
 
 
