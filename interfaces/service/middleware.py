@@ -33,13 +33,14 @@ def settings() -> dict[str, str]:
     The settings are in ``NAME.localhost.xml`` next to ``NAME.xml``, the profiles file of the environment;
     without that file, nothing changes.
 
-    :raises RuntimeError: if there is no way to other processes: Fast DDS would join and hear nobody.
+    :raises RuntimeError: if there is no way to other processes: the node would hear nobody.
     """
-    wants_localhost = os.environ.get(RANGE, "").upper() == "LOCALHOST" and not os.environ.get(PEERS)
-    if not wants_localhost or get_rmw_implementation_identifier() != "rmw_fastrtps_cpp":
+    if os.environ.get(RANGE, "").upper() != "LOCALHOST" or os.environ.get(PEERS):
         return {}
     if not loopback_is_up():
         raise RuntimeError(LOOPBACK_DOWN)
+    if get_rmw_implementation_identifier() != "rmw_fastrtps_cpp":
+        return {}
     local = f"{os.environ.get(PROFILES, '').removesuffix('.xml').removesuffix('.localhost')}.localhost.xml"
     if not Path(local).is_file():
         return {}

@@ -16,7 +16,8 @@ FILES = ("conftest.py", "pyproject.toml", "Makefile", "README.md", "CONTRIBUTING
 
 
 def run(directory: Path, *words: str) -> subprocess.CompletedProcess[str]:
-    environment = os.environ | {"RUNTIME": "embedded", "PYTHONPATH": str(directory)}
+    path = [str(directory), *filter(None, [os.environ.get("PYTHONPATH")])]  # of a sourced ROS 2
+    environment = os.environ | {"RUNTIME": "embedded", "PYTHONPATH": os.pathsep.join(path)}
     command = [sys.executable, "-m", *words]
     return subprocess.run(
         command, cwd=directory, env=environment, capture_output=True, text=True, check=False, timeout=240

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -25,6 +24,9 @@ print(*(name for name, spec in specs.items() if spec and spec.origin.startswith(
 SECURE = {"ROS_SECURITY_ENABLE": "true"}
 CYCLONE = {"RMW_IMPLEMENTATION": "rmw_cyclonedds_cpp"}
 ROS = "/opt/ros/jazzy/lib/python3.12/site-packages/rclpy/__init__.py"
+EMBEDDED_ONLY = pytest.mark.skipif(
+    bool(rclpy_choice.sourced_rclpy()), reason="platform: ROS 2 is sourced, and its rclpy wins"
+)
 
 
 def in_venv(program: str, **environment: str) -> str:
@@ -33,6 +35,7 @@ def in_venv(program: str, **environment: str) -> str:
     return subprocess.check_output(command, env=os.environ | environment, text=True, timeout=30).strip()
 
 
+@EMBEDDED_ONLY
 def test_each_package_of_the_embedded_runtime_comes_from_it() -> None:
     assert in_venv(FIND, RUNTIME="embedded").split() == PACKAGES
 
@@ -44,7 +47,7 @@ def test_no_package_of_the_default_runtime_is_embedded() -> None:
 def test_interpreter_of_the_default_runtime_starts_once_with_its_libraries() -> None:
     program = "import os; print(open('/proc/self/environ').read().split(chr(0)))"
     environment = in_venv(program, RUNTIME="", LD_LIBRARY_PATH="/opt/mine")
-    if find_spec("rclpy._rclpy_pybind11") is None:  # a sourced ROS 2 brings its libraries itself
+    if rclpy_choice.sourced_rclpy():  # it brings its libraries itself
         assert "'LD_LIBRARY_PATH=/opt/mine'" in environment
     else:
         assert f"'LD_LIBRARY_PATH={ROOT}/.venv/lib:{ROOT}/.venv/lib/python3" in environment
@@ -122,6 +125,7 @@ def test_machine_without_glibc_has_no_wheels(monkeypatch: pytest.MonkeyPatch) ->
         assert not setup.has_wheels()
 
 
+@EMBEDDED_ONLY
 def test_workspace_messages_are_found_before_rclpy_is_imported(tmp_path: Path) -> None:
     (tmp_path / "share" / "my_messages" / "msg").mkdir(parents=True)
     (tmp_path / "share" / "my_messages" / "msg" / "Angle.msg").write_text("float64 value\n")
