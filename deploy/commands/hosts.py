@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
@@ -22,7 +22,11 @@ from interfaces.service.clocks import Clocks, difference
 from interfaces.service.health import Health, healths, listening
 from interfaces.service.process import SUPERVISED
 
-LOOK = 2.0  # s before a start: each service reports its health once a second
+LOOK, LOOK_AGAIN = 2.0, 1.5  # s before and after a start: each service reports its health once a second
+_TWICE = (
+    "{program} runs on host {host} already, and a program runs on one host only: start the parts by HOST=robot"
+    f" and HOST=operator, or give this arm another {NAMESPACE}"
+)
 
 
 class Hosts:
@@ -59,10 +63,7 @@ class Hosts:
         for (host, program), health in sorted(self.healths.items()):
             is_own = is_here(host) and ours.get(health.pid) == program
             if program in here and not is_own:
-                raise DeploymentError(
-                    f"{program} runs on host {host} already, and a program runs on one host only: start the"
-                    f" parts by HOST=robot and HOST=operator, or give this arm another {NAMESPACE}"
-                )
+                raise DeploymentError(_TWICE.format(program=program, host=host))
             # Another host of our name would hide its clock. The other part may run on this host, too.
             if program in elsewhere and is_here(host) and not _is_process(health.pid, program):
                 raise DeploymentError(
@@ -70,6 +71,13 @@ class Hosts:
                 )
         for host, behind in self._clocks.wrong().items():
             raise DeploymentError(f"Clocks: {difference(host, behind)}; synchronise both (NTP or PTP)")
+
+    def check_again(self) -> None:
+        """Raise DeploymentError if another host runs one of our programs."""
+        here = {program.name for program in manifest.programs()}
+        for host, program in sorted(self.healths):
+            if program in here and not is_here(host):
+                raise DeploymentError(_TWICE.format(program=program, host=host))
 
 
 @contextmanager
@@ -80,17 +88,38 @@ def heard(node: Node) -> Iterator[Hosts]:
         yield hosts
 
 
-def check(member: Member, system: System) -> None:
-    """Look for other hosts of the arm before a start. Raises DeploymentError if it must not start."""
-    if os.environ.get(RANGE) == "LOCALHOST" and not os.environ.get("ROS_STATIC_PEERS"):
-        return  # nothing of another host is heard
+def are_heard() -> bool:
+    """Whether messages of other hosts come here."""
+    return os.environ.get(RANGE) != "LOCALHOST" or bool(os.environ.get("ROS_STATIC_PEERS"))
+
+
+@contextmanager
+def checked(member: Member, system: System) -> Iterator[Callable[[], None]]:
+    """Look for other hosts of the arm before a start.
+
+    Yields a function that looks again: a host that started at the same moment is heard only now.
+
+    :raises DeploymentError: if the arm must not start, or must not go on.
+    """
+    if not are_heard():
+        yield lambda: None
+        return
     ours = {process.pid: process.program for process in system.members()}
     with heard(member.node) as hosts:
-        deadline = time.monotonic() + LOOK
-        while time.monotonic() < deadline:
-            member.spin_once()
-    hosts.check(ours)
-    print(hosts.clocks(), end="")
+
+        def look(seconds: float) -> None:
+            deadline = time.monotonic() + seconds
+            while time.monotonic() < deadline:
+                member.spin_once()
+
+        def look_again() -> None:
+            look(LOOK_AGAIN)
+            hosts.check_again()
+
+        look(LOOK)
+        hosts.check(ours)
+        print(hosts.clocks(), end="")
+        yield look_again
 
 
 def _is_process(pid: int, program: str) -> bool:

@@ -80,11 +80,15 @@ def unit(system: System, scenario: str, parameter_file: str) -> None:
 
 def become(system: System, scenario: str, parameter_file: str) -> NoReturn:
     """Become the supervisord of the system: the command of its unit."""
-    from deploy.commands import parameters
+    from deploy.commands import hosts, parameters
+    from deploy.commands.member import Member
 
     with _chosen(scenario):
         parameters.check_environment(system)
         given = parameters.of_system(scenario, parameter_file)
+        if hosts.are_heard():
+            with Member() as member, hosts.checked(member, system):
+                pass
         given[ALL][KEY]["scenario_epoch"] = time.monotonic() + LEAD
         signal.signal(signal.SIGTERM, signal.SIG_DFL)  # supervisord would not know of a noted one
         interruption.check()
@@ -197,13 +201,14 @@ def _started(system: System, scenario: str, parameter_file: str) -> Iterator[Mem
         parameters.check_environment(system)
         given = parameters.of_system(scenario, parameter_file)
         member = stack.enter_context(Member())
-        hosts.check(member, system)
+        check_again = stack.enter_context(hosts.checked(member, system))
         log_sizes = {path.stem: path.stat().st_size for path in system.logs.glob("*.log")}
         interruption.check()  # the last time before there is anything to stop
         system.start(given)
         try:
             print(f"Starting the services, scenario {scenario}, {place(os.environ)} ...", flush=True)
             _await_services(system, member, log_sizes)
+            check_again()
             origin = time.monotonic() + BEGIN_LEAD
             system.keep_origin(origin)
             member.set_everywhere("scenario_epoch", origin, BEGIN_LIMIT)

@@ -5,12 +5,17 @@ from __future__ import annotations
 import socket
 from collections.abc import Iterator
 from functools import partial
+from types import SimpleNamespace
 
 import pytest
 
+from deploy.commands import hosts
 from deploy.commands.hosts import Hosts
 from deploy.running import manifest, processes
+from deploy.running.environment import RANGE
 from deploy.running.errors import DeploymentError
+from interfaces.topics import DIAGNOSTICS
+from reactive_node.testing import MakeNode, SpinFor, SpinUntil
 from tests import health_reports
 from tests.health_reports import report
 
@@ -80,3 +85,27 @@ def test_both_parts_of_an_arm_may_run_on_one_host() -> None:
 
 def test_own_clock_is_not_shown() -> None:
     assert heard(report("/velocity", HERE)).clocks() == ""
+
+
+def test_second_look_refuses_a_program_of_another_host() -> None:
+    heard(report("/velocity", HERE, pid=41), report("/sentinel_robot", "robot1")).check_again()
+    with pytest.raises(DeploymentError, match=r"^velocity runs on host robot1 already"):
+        heard(report("/velocity", HERE, pid=41), report("/velocity", "robot1")).check_again()
+
+
+def test_host_that_starts_during_the_start_is_heard_by_the_second_look(
+    make_node: MakeNode, spin_until: SpinUntil, spin_for: SpinFor, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(hosts, "LOOK", 0.0)
+    monkeypatch.setenv(RANGE, "SUBNET")
+    publisher = make_node().create_publisher(DIAGNOSTICS.type, DIAGNOSTICS.name, DIAGNOSTICS.qos)
+
+    def spin_once() -> None:
+        spin_until(lambda: publisher.get_subscription_count())
+        publisher.publish(report("/velocity", "robot1"))
+        spin_for(0.05)
+
+    member = SimpleNamespace(node=make_node(), spin_once=spin_once)
+    with hosts.checked(member, SimpleNamespace(members=list)) as look_again:  # type: ignore[arg-type]
+        with pytest.raises(DeploymentError, match=r"^velocity runs on host robot1 already"):
+            look_again()

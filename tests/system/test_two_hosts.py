@@ -204,16 +204,20 @@ def test_status_of_each_host_shows_both(arm: Arm, name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("part", "words"),
-    [("", r"^ROS domain \d+ is in use"), (CONTROL, "^dead_mans_switch runs on host operator-host already")],
+    ("command", "part", "words"),
+    [
+        ("start", "", r"^ROS domain \d+ is in use"),
+        ("start", CONTROL, "^dead_mans_switch runs on host operator-host already"),
+        ("become", CONTROL, "^dead_mans_switch runs on host operator-host already"),  # of a unit
+    ],
 )
-def test_program_is_not_started_on_a_second_host(arm: Arm, part: str, words: str) -> None:
+def test_program_is_not_started_on_a_second_host(arm: Arm, command: str, part: str, words: str) -> None:
     second = arm.robot.beside(arm.robot.site.run.with_name("second"))
     with closing(second.site):
-        command = second.begin("start", "demo", **{manifest.HOST: part})
-        assert command.wait() == 1
+        refused = second.begin(command, "demo", "", **{manifest.HOST: part})
+        assert refused.wait() == 1
         assert second.site.members == {}
-    assert re.search(words, command.output, re.MULTILINE)
+    assert re.search(words, refused.output, re.MULTILINE)
 
 
 def test_short_cut_keeps_the_engines_on_and_a_release_stops_them(arm: Arm) -> None:
@@ -253,10 +257,13 @@ def test_second_controller_on_the_other_host_stops_the_joints(arm: Arm) -> None:
     arm.turn_on()
     environment = KEYS | {"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}
     set_middleware(environment)  # it keeps Fast DDS from shared memory, which a killed process leaves behind
-    second = arm.operator.begin_command(sys.executable, "-m", "services.engine_controller", **environment)
-    if KEYS:  # the operator's host has none for it
-        assert second.wait() != 0, second.output
-        return
+    controller = [sys.executable, "-m", "services.engine_controller"]
+    second = arm.operator.begin_command(*controller, **environment)
+    if KEYS:
+        assert second.wait() != 0
+        assert re.search("keys_operator/enclaves/engine_controller", second.output), second.output
+        keys = {"ROS_SECURITY_KEYSTORE": str(arm.robot.keys)}
+        second = arm.operator.begin_command(*controller, **environment, **keys)
     arm.view.await_line("engine_controller: it runs on host operator-host as well", LIMIT, arm.shown)
     shown = len(arm.view.lines)
     time.sleep(2.0)
@@ -288,6 +295,20 @@ def test_host_that_dies_stops_the_engines(arm: Arm) -> None:
     arm.turn_on()
     arm.operator.die()
     arm.await_off()
+
+
+def test_the_same_part_does_not_start_on_both_hosts_at_once(arm: Arm) -> None:
+    arm.operator.die()
+    second = arm.robot.beside(arm.robot.site.run.with_name("at_once"))
+    with closing(second.site):
+        starts = [
+            host.begin("start", "demo", str(arm.parameters), **{manifest.HOST: CONTROL})
+            for host in (arm.operator, second)
+        ]
+        assert any([each.wait(2 * LIMIT) for each in starts])
+        words = "runs on host (?:operator|robot)-host already"
+        assert [re.search(words, each.output) for each in starts if each.wait()]
+    arm.operator.die()
 
 
 # A wrong clock
