@@ -127,7 +127,7 @@ def wire(node: ServiceNode) -> None:
     hosts = clocks.observe(node)
     states = engine_state(
         commands.map(
-            lambda it: Command(it.timestamp, node.age(it.value.timestamp), it.value.value, hosts.problem())
+            lambda it: Command(it.timestamp, node.age(it.value.timestamp), it.value.value, hosts.objection())
         ),
         presences.map(lambda it: Presence(it.timestamp, node.age(it.value))),
         node.declare(Parameters),

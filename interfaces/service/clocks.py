@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import socket
 import time
@@ -31,6 +32,8 @@ class Clocks:
     def __init__(self, namespace: str) -> None:
         """:param namespace: that of the arm."""
         self._namespace = namespace.rstrip("/")
+        self.awaited_until = -math.inf
+        """Until when a first comparison is awaited, on the monotonic clock [s]."""
         self._ages: dict[str, deque[tuple[float, float]]] = defaultdict(deque)
 
     def hear(self, message: DiagnosticArray) -> None:
@@ -60,6 +63,12 @@ class Clocks:
             )
         return ""
 
+    def objection(self) -> str:
+        """Return why the engines may not be turned on, as yet; empty if they may."""
+        if time.monotonic() < self.awaited_until and not self.behind():
+            return "the clocks of the hosts are not compared yet"
+        return self.problem()
+
 
 def difference(host: str, behind: float, other: str = "ours") -> str:
     """Return in words by how much the clock of a host is behind another one [s]."""
@@ -82,6 +91,8 @@ def observe(node: ServiceNode) -> Clocks:
         node.health.facts = {f"{_CLOCK}{host}": f"{behind:.3f}" for host, behind in clocks.behind().items()}
 
     if os.environ.get(HOST):
+        # A host that says nothing for as long as a comparison takes does not run.
+        clocks.awaited_until = time.monotonic() + WINDOW
         node.observe(DIAGNOSTICS).subscribe(hear, node.fail, scheduler=node.scheduler)
     return clocks
 

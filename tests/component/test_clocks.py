@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import socket
 from functools import partial
 from typing import Any
@@ -106,5 +107,31 @@ def test_service_of_a_single_host_hears_no_reports(
 ) -> None:
     monkeypatch.delenv(manifest.HOST, raising=False)
     node: ServiceNode = make_node("service", kind=ServiceNode)
-    clocks.observe(node)
+    found = clocks.observe(node)
     assert DIAGNOSTICS.name not in [each.topic_name for each in node.subscriptions]
+    assert found.objection() == ""
+
+
+def test_engines_wait_for_the_first_comparison_of_the_clocks(
+    make_node: MakeNode, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now = clocks.time.monotonic()
+    monkeypatch.setattr(clocks.time, "monotonic", lambda: now)
+    monkeypatch.setenv(manifest.HOST, "robot")
+    found = clocks.observe(make_node("service", kind=ServiceNode))
+    monkeypatch.setattr(clocks.time, "monotonic", lambda: now + 2.9)
+    assert found.objection() == "the clocks of the hosts are not compared yet"
+    monkeypatch.setattr(clocks.time, "monotonic", lambda: now + 3.0)
+    assert found.objection() == ""  # no other host runs
+
+
+@pytest.mark.parametrize(
+    ("age", "words"), [(0.0, ""), (9.0, "the clock of host desk is more than 50 ms behind ours")]
+)
+def test_first_comparison_ends_the_wait(age: float, words: str) -> None:
+    found = Clocks("/")
+    found.awaited_until = math.inf
+    for _ in range(3):
+        assert found.objection() == "the clocks of the hosts are not compared yet"
+        found.hear(report(age))
+    assert found.objection() == words

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from std_msgs.msg import Header, String
 
-from interfaces.service.clocks import Clocks
+from interfaces.service.clocks import HOST, Clocks
 from interfaces.topics import ENGINES, ENGINES_STATE, OFF, ON, OPERATOR_PRESENCE, TURN_OFF, TURN_ON
 from reactive_node import stamps
 from reactive_node.testing import MakeNode, SpinUntil
@@ -111,10 +111,22 @@ def test_turn_on_is_refused_while_the_clock_of_another_host_is_wrong(
 ) -> None:
     controller = wired()
     controller.see()
-    monkeypatch.setattr(Clocks, "problem", lambda _: "the clock of host desk is wrong")
+    monkeypatch.setattr(Clocks, "objection", lambda _: "the clock of host desk is wrong")
     controller.command(TURN_ON)
 
     assert controller.await_rejection() == "engines: turn_on refused: the clock of host desk is wrong"
+
+
+def test_turn_on_is_refused_until_the_clocks_of_the_hosts_are_compared(
+    wired: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(HOST, "robot")
+    controller = wired()
+    controller.see()
+    controller.command(TURN_ON)
+
+    words = "engines: turn_on refused: the clocks of the hosts are not compared yet"
+    assert controller.await_rejection() == words
 
 
 def test_turn_on_that_waited_is_refused(wired: Any, monkeypatch: pytest.MonkeyPatch) -> None:
