@@ -24,8 +24,8 @@ from interfaces.service.process import SUPERVISED
 
 LOOK, LOOK_AGAIN = 2.0, 1.5  # s before and after a start: each service reports its health once a second
 _TWICE = (
-    "{program} runs on host {host} already, and a program runs on one host only: start the parts by HOST=robot"
-    f" and HOST=operator, or give this arm another {NAMESPACE}"
+    "{program} runs on host {host} already, and a program runs on one host only: start the parts by"
+    f" HOST=robot and HOST=operator, or give this arm another {NAMESPACE}"
 )
 
 

@@ -106,6 +106,7 @@ def test_host_that_starts_during_the_start_is_heard_by_the_second_look(
         spin_for(0.05)
 
     member = SimpleNamespace(node=make_node(), spin_once=spin_once)
-    with hosts.checked(member, SimpleNamespace(members=list)) as look_again:  # type: ignore[arg-type]
-        with pytest.raises(DeploymentError, match=r"^velocity runs on host robot1 already"):
-            look_again()
+    system = SimpleNamespace(members=list)
+    refused = pytest.raises(DeploymentError, match=r"^velocity runs on host robot1 already")
+    with hosts.checked(member, system) as look_again, refused:  # type: ignore[arg-type]
+        look_again()
