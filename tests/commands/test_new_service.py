@@ -54,10 +54,11 @@ def test_new_service_is_green_at_once(checkout: Path) -> None:
     assert make(checkout, "trial_guard") == ""
 
     tests = [f"tests/component/test_{name}.py" for name in ("trial_guard", "contract", "readme", "topics")]
+    tests += ["tests/running/test_manifest.py", "tests/trials/chaos/test_schedule.py"]
     for command in (
         ("ruff", "check", "."),
         ("ruff", "format", "--check", "services", "interfaces", "tests/component"),
-        ("pytest", "-q", "-p", "no:cacheprovider", *tests, "tests/running/test_manifest.py"),
+        ("pytest", "-q", "-p", "no:cacheprovider", *tests),
     ):
         done = run(checkout, *command)
         assert done.returncode == 0, done.stdout + done.stderr

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from deploy.promises.history import ALL, NO_TARGET, PROGRAMS
+from deploy.promises.limits import HUNG
 from deploy.promises.marks import STEP
 from deploy.trials.chaos.faults import FAULT_KINDS
 
@@ -155,6 +156,10 @@ def variously() -> Schedule:
         PlannedFault(AWAKE + 14.0, "kill_supervisor", ALL, 1.0),
         PlannedFault(AWAKE + 19.0, "kill_all", ALL),
     ]
+    killed = {each.target for each in planned if each.kind == "kill"}
+    own = [program for program in ROUND if program not in killed]  # of `make new-service`
+    begin = planned[-1].at + HUNG + PAUSE  # before, kill_all explains each silence
+    planned += [PlannedFault(begin + PAUSE * n, "kill", program) for n, program in enumerate(own)]
     return [each for each in planned if each.kind in FAULT_KINDS]
 
 

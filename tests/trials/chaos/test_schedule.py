@@ -5,7 +5,7 @@ from itertools import pairwise
 import pytest
 
 from deploy.promises.history import PROGRAMS
-from deploy.promises.limits import MEDIAN
+from deploy.promises.limits import HUNG, MEDIAN
 from deploy.trials.chaos import schedule
 from deploy.trials.chaos.faults import FAULT_KINDS
 
@@ -53,6 +53,14 @@ def test_kill_each_kills_every_program_twenty_times() -> None:
 def test_brief_run_kills_every_program_three_times_before_the_sleep() -> None:
     killed = [each.target for each in schedule.briefly() if each.at % schedule.DAY < schedule.AWAKE]
     assert {program: killed.count(program) for program in PROGRAMS} == dict.fromkeys(PROGRAMS, 3)
+
+
+def test_various_faults_kill_every_program_so_that_l1_is_judged() -> None:
+    planned = schedule.variously()
+    kills = [each for each in planned if each.kind == "kill"]
+    assert {each.target for each in kills} == set(PROGRAMS)
+    after = next(each.at for each in planned if each.kind == "kill_all")
+    assert not [each for each in kills if after <= each.at <= after + HUNG]  # L1 does not judge them
 
 
 def test_a_killed_program_has_time_to_restart_before_the_next_kill() -> None:
