@@ -17,7 +17,11 @@ FILES = ("conftest.py", "pyproject.toml", "Makefile", "README.md", "CONTRIBUTING
 
 def run(directory: Path, *words: str) -> subprocess.CompletedProcess[str]:
     path = [str(directory), *filter(None, [os.environ.get("PYTHONPATH")])]  # of a sourced ROS 2
-    environment = os.environ | {"RUNTIME": "embedded", "PYTHONPATH": os.pathsep.join(path)}
+    environment = os.environ | {
+        "RUNTIME": "embedded",
+        "PYTHONPATH": os.pathsep.join(path),
+        "MYPYPATH": str(directory / "stubs"),
+    }
     command = [sys.executable, "-m", *words]
     return subprocess.run(
         command, cwd=directory, env=environment, capture_output=True, text=True, check=False, timeout=240
@@ -59,6 +63,8 @@ def test_new_service_is_green_at_once(checkout: Path) -> None:
         ("ruff", "check", "."),
         ("ruff", "format", "--check", "services", "interfaces", "tests/component"),
         ("pytest", "-q", "-p", "no:cacheprovider", *tests),
+        ("rosidl_runtime_embedded.stubs", "--output", "stubs"),
+        ("mypy", "-p", "services", "-p", "interfaces"),
     ):
         done = run(checkout, *command)
         assert done.returncode == 0, done.stdout + done.stderr
