@@ -6,6 +6,8 @@ from typing import Any
 
 import pytest
 
+from deploy.running import parameter_file
+from deploy.running.processes import ROOT
 from deploy.running.reaction import reaction
 
 
@@ -16,6 +18,11 @@ def of_watchdog(**parameters: Any) -> dict[str, dict[str, Any]]:
 def test_engines_of_the_thesis_stop_within_10_5_s() -> None:
     words = "Engines stop within 10.5 s (10.45 s if one process dies, 10.05 s if none does)"
     assert reaction({}).words == words
+
+
+def test_engines_of_quick_stop_within_1_86_s() -> None:
+    found = parameter_file.reaction_to(parameter_file.load(str(ROOT / "deploy" / "quick.yaml"), "/"), "/")
+    assert found.words == "Engines stop within 1.86 s (1.5 s if one process dies, 0.5 s if none does)"
 
 
 @pytest.mark.parametrize(
