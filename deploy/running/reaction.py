@@ -8,10 +8,10 @@ from typing import Any, NamedTuple
 
 from interfaces.service import UserError
 from interfaces.topics import CLOCK_TOLERANCE, DRIVE_TIMEOUT
-from services import engine_controller, operator_watchdog
+from services import dead_mans_switch, engine_controller, operator_watchdog
 
 DELAY = 0.05  # s of scheduling and transport on the way to the drive
-BEAT = 0.05  # s between two heartbeats of a switch
+BEAT = 0.05  # s between two heartbeats of a switch; the virtual one may be slower
 RESTART = 1.2  # s from the death of the operator watchdog to its next presence, on two busy cores
 
 
@@ -20,6 +20,7 @@ class Reaction(NamedTuple):
 
     watchdog: operator_watchdog.Parameters
     controller: engine_controller.Parameters
+    switch: dead_mans_switch.Parameters
 
     @property
     def off_within(self) -> float:
@@ -53,6 +54,19 @@ class Reaction(NamedTuple):
     def check(self) -> None:
         """Raise UserError if no arm can work with these parameters."""
         watchdog, controller = self.watchdog, self.controller
+        least = 2 * CLOCK_TOLERANCE
+        if watchdog.lifespan < least:
+            raise UserError(
+                f"lifespan must be at least {least:g} s, not {watchdog.lifespan:g}: "
+                f"a heartbeat waits for up to half of it, and clocks differ by up to {CLOCK_TOLERANCE:g} s"
+            )
+        beat = max(BEAT, 1.0 / self.switch.rate)
+        least = round(watchdog.sampling + 2 * beat, 3)
+        if watchdog.silence < least:
+            raise UserError(
+                f"silence must be at least {least:g} s, not {watchdog.silence:g}: sampling and two periods of"
+                f" the switch (dead_mans_switch.rate), {beat:g} s each: one lost heartbeat is no strike"
+            )
         most = round(watchdog.strikes * watchdog.silence - watchdog.sampling - BEAT, 3)
         if controller.max_presence_age > most:
             raise UserError(
@@ -93,4 +107,5 @@ def reaction(given: Mapping[str, Mapping[str, Any]]) -> Reaction:
     return Reaction(
         of("operator_watchdog", operator_watchdog.DEFAULTS),
         of("engine_controller", engine_controller.DEFAULTS),
+        of("dead_mans_switch", dead_mans_switch.Parameters()),
     )

@@ -222,6 +222,19 @@ def test_watchdog_does_not_fire_without_a_silence(gaps: list[int]) -> None:
     assert watched[1:] == ([], [], [])
 
 
+@given(st.integers(1, 50), st.integers(10, 100))
+def test_a_lost_heartbeat_is_no_strike_if_silence_is_sampling_and_two_periods(
+    begin: int, sampling: int
+) -> None:
+    shortest = Parameters(sampling=sampling / 1000, silence=(sampling + 2 * 50) / 1000, strikes=1)
+    times = [(begin + 50 * beat) / 1000 for beat in range(40) if beat % 4]  # each fourth one is lost
+    scheduler = TestScheduler()
+
+    watched = watch(scheduler, hot(scheduler, *times), times[-1], given=shortest, resumes=True)
+
+    assert watched[1:] == ([], [], [])
+
+
 @given(st.lists(st.integers(3500, 6000), min_size=3, max_size=3))
 def test_three_gaps_with_a_silence_each_turn_off(gaps: list[int]) -> None:
     times = [500.0]

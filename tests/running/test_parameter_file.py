@@ -106,6 +106,23 @@ def test_all_errors_of_a_file_are_reported_a_line_for_each(tmp_path: Path) -> No
             "sampling: must be less than silence, 3 s, not 3",
         ),
         (
+            "operator_watchdog: {ros__parameters: {lifespan: 0.0994}}",
+            "lifespan must be at least 0.1 s, not 0.0994: "
+            "a heartbeat waits for up to half of it, and clocks differ by up to 0.05 s",
+        ),
+        (
+            "{dead_mans_switch: {ros__parameters: {rate: 1000.0}}, "
+            "operator_watchdog: {ros__parameters: {sampling: 0.05, silence: 0.1494}}}",
+            "silence must be at least 0.15 s, not 0.1494: sampling and two periods of the switch"
+            " (dead_mans_switch.rate), 0.05 s each: one lost heartbeat is no strike",
+        ),
+        (
+            "{dead_mans_switch: {ros__parameters: {rate: 1.0}}, "
+            "operator_watchdog: {ros__parameters: {silence: 2.4}}}",
+            "silence must be at least 2.5 s, not 2.4: sampling and two periods of the switch"
+            " (dead_mans_switch.rate), 1 s each: one lost heartbeat is no strike",
+        ),
+        (
             "operator_watchdog: {ros__parameters: {silence: 1.0004, strikes: 1}}",
             "max_presence_age must be at most 0.45 s, not 1: "
             "a turn_on after the last strike would turn the engines on without an operator",
