@@ -67,7 +67,8 @@ class Reaction(NamedTuple):
                 f"silence must be at least {least:g} s, not {watchdog.silence:g}: sampling and two periods of"
                 f" the switch (dead_mans_switch.rate), {beat:g} s each: one lost heartbeat is no strike"
             )
-        most = round(watchdog.strikes * watchdog.silence - watchdog.sampling - BEAT, 3)
+        # An operator who returned between the strikes was seen until one silence before the last of them.
+        most = round(min(watchdog.silence, watchdog.strikes * watchdog.silence - watchdog.sampling - BEAT), 3)
         if controller.max_presence_age > most:
             raise UserError(
                 f"max_presence_age must be at most {most:g} s, not {controller.max_presence_age:g}: "

@@ -128,6 +128,11 @@ def test_all_errors_of_a_file_are_reported_a_line_for_each(tmp_path: Path) -> No
             "a turn_on after the last strike would turn the engines on without an operator",
         ),
         (
+            "operator_watchdog: {ros__parameters: {silence: 0.9}}",
+            "max_presence_age must be at most 0.9 s, not 1: "
+            "a turn_on after the last strike would turn the engines on without an operator",
+        ),
+        (
             "engine_controller: {ros__parameters: {presence_timeout: 2.0}}",
             "presence_timeout must be at least 2.2 s, not 2: "
             "lifespan, sampling and a restart of the operator watchdog, 1.2 s",

@@ -53,7 +53,8 @@ def test_bounds_follow_from_the_parameters(
         of_watchdog(silence=1.55, strikes=1),  # max_presence_age is just short enough
         {"engine_controller": {"presence_timeout": 2.2}},
         of_watchdog(lifespan=0.1),
-        of_watchdog(sampling=0.0504, silence=0.15, strikes=8),
+        of_watchdog(silence=1.0),
+        of_watchdog(sampling=0.0504, silence=0.15) | {"engine_controller": {"max_presence_age": 0.15}},
         of_watchdog(silence=2.5) | {"dead_mans_switch": {"rate": 1.0}},
     ],
 )
