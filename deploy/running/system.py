@@ -68,6 +68,7 @@ class System(RunDirectory):
         with self.alone():
             self._prepare(parameters)
             self._end_members()
+            self.part_logs()
             os.chdir(self.run)
             os.umask(0o077)
             command = [*supervisord.COMMAND, *arguments]

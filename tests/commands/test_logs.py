@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import os
 import time
 from pathlib import Path
 
@@ -7,6 +8,7 @@ import pytest
 
 from deploy.commands.logs import follow, readable
 from deploy.running.run_directory import RUN, RunDirectory
+from deploy.running.system import System
 
 
 @pytest.fixture(autouse=True)
@@ -54,3 +56,24 @@ def test_a_line_stands_between_two_runs(tmp_path: Path) -> None:
     assert first == "first run"
     assert between.startswith(RUN)
     assert silent.read_text() == ""
+
+
+def test_a_line_stands_between_two_boots_of_a_unit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    class Replaced(Exception):
+        """In place of the new program of this process."""
+
+    def execve(*command: object) -> None:
+        raise Replaced
+
+    monkeypatch.setattr(os, "execve", execve)
+    monkeypatch.setattr(os, "umask", lambda mask: 0)
+    monkeypatch.chdir(tmp_path)  # and back at the end
+    system = System(tmp_path)
+    system.logs.mkdir()
+    log = system.logs / "velocity.log"
+    log.write_text("first boot\n")
+    with pytest.raises(Replaced):
+        system.become_supervisord({}, ["--nodaemon"])
+    first, between = log.read_text().splitlines()
+    assert first == "first boot"
+    assert between.startswith(RUN)
