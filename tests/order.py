@@ -5,6 +5,7 @@ from __future__ import annotations
 LONGEST = (
     "tests/trials/chaos/test_promises.py",
     "tests/trials/chaos/test_partition.py",
+    "tests/trials/chaos/test_quick.py",
     "tests/system",
     "tests/component/test_service_life.py",
     "interfaces/reactive_node/tests/test_signals_operations.py",
