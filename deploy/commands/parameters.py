@@ -35,7 +35,10 @@ from interfaces.sources import scenario_file
 SCENARIOS = ROOT / "deploy" / "scenarios"
 NONE = "none"
 """The scenario without virtual joints, drive and operator."""
-LIMITS = {"operator_watchdog": ("silence", "strikes"), "engine_controller": ("presence_timeout",)}
+LIMITS = {
+    "operator_watchdog": ("silence", "strikes"),
+    "engine_controller": ("max_presence_age", "presence_timeout"),
+}
 """The parameters of other services that the page shows."""
 WEB = "WEB"  # environment variable: the port of the page, or off
 

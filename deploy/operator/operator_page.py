@@ -65,6 +65,9 @@ class _Parameters:
     settings: str = parameter("", None, "", "folder that keeps the address of the page, or empty")
     silence: float = parameter(operator_watchdog.DEFAULTS.silence, None, "s", "of the operator watchdog")
     strikes: int = parameter(operator_watchdog.DEFAULTS.strikes, None, "", "of the operator watchdog")
+    max_presence_age: float = parameter(
+        engine_controller.DEFAULTS.max_presence_age, None, "s", "of the engine controller"
+    )
     presence_timeout: float = parameter(
         engine_controller.DEFAULTS.presence_timeout, None, "s", "of the engine controller"
     )
@@ -78,6 +81,7 @@ def wire(node: ServiceNode) -> None:
     clock = state.Clock(hold.monotonic, node.age, lambda: epoch.elapsed() if epoch.is_known else 0.0)
     initial = state.PageState(
         strikes=given.strikes,
+        max_presence_age=given.max_presence_age,
         presence_timeout=given.presence_timeout,
         engines=state.Engines(since_when=state.OLDER if epoch.is_past else state.NOT_YET),
     )

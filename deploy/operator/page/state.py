@@ -173,6 +173,8 @@ class PageState(NamedTuple):
 
     strikes: int = operator_watchdog.DEFAULTS.strikes
     """The strike that turns the engines off."""
+    max_presence_age: float = engine_controller.DEFAULTS.max_presence_age
+    """How long ago the operator may have been seen to count as seen [s]."""
     presence_timeout: float = engine_controller.DEFAULTS.presence_timeout
     """How long the engines stay on without an operator [s]."""
     arm: Arm = Arm()

@@ -11,12 +11,10 @@ from deploy.running import manifest, sentinel
 from interfaces import topics
 from interfaces.loopback import LOOPBACK_DOWN
 from interfaces.topics import OFF, ON
-from services import engine_controller
 
 HEARTBEAT_VISIBLE = 0.25  # s for which a heartbeat shows that the switch is held
-PRESENCE_VISIBLE = engine_controller.Parameters().max_presence_age
 REFUSAL_VISIBLE = 10.0  # s
-HEALTH_TIMEOUT = sentinel.Parameters().health_timeout
+HEALTH_TIMEOUT = sentinel.Parameters().health_timeout  # a sentinel that waits longer hides no silence
 SILENT_CONTROLLER = "the engine controller is silent, so the drive stops the engines"
 
 
@@ -46,7 +44,7 @@ def moment(state: PageState, page: str, now: float) -> dict[str, Any]:
     refused = engines.refused[1] if engines.refused and now - engines.refused[0] <= REFUSAL_VISIBLE else None
     return {
         "operator": {
-            "seen": age <= PRESENCE_VISIBLE,
+            "seen": age <= state.max_presence_age,
             "age": round(age, 1) if math.isfinite(age) else None,
             "activity": operator.activity,
             "strikes_left": operator.strikes_left,

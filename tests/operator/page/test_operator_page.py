@@ -7,13 +7,14 @@ import json
 import socket
 import time
 from collections.abc import Callable, Iterator
+from datetime import timedelta
 from pathlib import Path
 from typing import Any
 
 import pytest
 from rclpy.parameter import Parameter
 from reactivex.subject import Subject
-from std_msgs.msg import Bool, String
+from std_msgs.msg import Bool, Header, String
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
@@ -27,7 +28,7 @@ from interfaces import topics
 from interfaces.loopback import LOOPBACK_DOWN
 from interfaces.service import ServiceNode
 from interfaces.topics import CONFIGURATION
-from reactive_node import ReactiveNode
+from reactive_node import ReactiveNode, stamps
 from services import config_publisher, dead_mans_switch
 
 SpinUntil = Callable[..., None]
@@ -394,6 +395,21 @@ def test_page_shows_the_limits_of_this_arm(
     with World(make_node, spin_until, tmp_path, **limits).page() as page:
         assert {name: page.welcome[name] for name in limits} == limits
         assert page.welcome["off_within"] == 4.5
+
+
+def test_page_sees_the_operator_as_the_controller_of_this_arm_does(
+    make_node: Callable[..., Any], spin_until: SpinUntil, tmp_path: Path
+) -> None:
+    watchdog, topic = make_node("watchdog"), topics.OPERATOR_PRESENCE
+    publisher = watchdog.create_publisher(topic.type, topic.name, topic.qos)
+    age = timedelta(seconds=0.5)
+    watchdog.create_timer(
+        0.05, lambda: publisher.publish(Header(stamp=stamps.to_message(stamps.now() - age)))
+    )
+    world = World(make_node, spin_until, tmp_path, max_presence_age=0.2)
+    with world.page() as page:
+        world.until(lambda: page.shown["operator"]["age"])
+        assert not page.shown["operator"]["seen"]
 
 
 def test_slider_sets_its_source(world: World) -> None:

@@ -185,14 +185,17 @@ def test_new_watchdog_begins_new_strikes(play: Play) -> None:
 
 
 def test_limits_are_those_of_this_arm(play: Play) -> None:
-    initial = PageState(strikes=5, presence_timeout=2.5)
+    initial = PageState(strikes=5, max_presence_age=0.2, presence_timeout=2.5)
     play.watchdogs = [on_next(201, True)]
     conclude(play, (205, MISSED))
+    play.say(208, topics.OPERATOR_PRESENCE, START + timedelta(seconds=208))
     engines(play, (209, ON), (209.1, OFF))
 
     found = play.run(210, initial)
 
     assert found.operator.strikes_left == 4
+    assert view(found, "page", 208.1)["operator"]["seen"] is True
+    assert view(found, "page", 208.3)["operator"]["seen"] is False
     assert view(found, "page", 209.2)["engines"]["why"] == BY_CONTROLLER.replace("10", "2.5")
 
 
