@@ -18,6 +18,7 @@ from reactivex.abc import SchedulerBase
 from reactivex.subject import BehaviorSubject, Subject
 
 from deploy.operator import hold
+from deploy.operator.engines import NOT_YET, OLDER, Engines, graph
 from deploy.operator.lines import line_batches
 from deploy.operator.page import address, protocol, requests, server, state
 from deploy.operator.page.site import Site
@@ -82,8 +83,7 @@ def wire(node: ServiceNode) -> None:
     initial = state.PageState(
         strikes=given.strikes,
         max_presence_age=given.max_presence_age,
-        presence_timeout=given.presence_timeout,
-        engines=state.Engines(since_when=state.OLDER if epoch.is_past else state.NOT_YET),
+        engines=Engines(since_when=OLDER if epoch.is_past else NOT_YET),
     )
     newest = BehaviorSubject(initial)
 
@@ -114,7 +114,7 @@ def wire(node: ServiceNode) -> None:
 
     # What pages show
     changes = rx.merge(
-        state.always(seen, engines, new_watchdogs(node, epoch), controllers(node), strangers(node), clock),
+        state.always(seen, engines, new_watchdogs(node, epoch), graph(node), clock),
         during(is_open, state.while_open(seen, lines, node.get_namespace(), clock)),
         switch.holds.map(state.held),
         switch.pressed.map(state.pressed),
@@ -175,19 +175,6 @@ def loopback(node: ServiceNode) -> Observable[bool]:
     """Emit whether the loopback interface is up."""
     looks = rx.timer(0.0, LOOPBACK_PERIOD, node.scheduler)
     return looks.map(lambda _: loopback_is_up()).distinct_until_changed()
-
-
-def controllers(node: ServiceNode) -> Callable[[], frozenset[tuple[int, ...]]]:
-    """Return what returns the identifiers of the publishers of the engines' state."""
-    name = node.resolve_topic_name(topics.ENGINES_STATE.name)
-    return lambda: frozenset(tuple(each.endpoint_gid) for each in node.get_publishers_info_by_topic(name))
-
-
-def strangers(node: ServiceNode) -> Callable[[], set[str]]:
-    """Return what returns the nodes that may command the engines and report no health, such as a terminal."""
-    name = node.resolve_topic_name(topics.ENGINES.name)
-    services = {program.name for program in manifest.programs()}
-    return lambda: {each.node_name for each in node.get_publishers_info_by_topic(name)} - services
 
 
 def serve(

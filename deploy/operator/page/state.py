@@ -11,37 +11,25 @@ from typing import Any, NamedTuple
 import reactivex as rx
 from reactivex import Observable
 
+from deploy.operator.engines import BY_COMMAND, BY_PAGE, BY_WATCHDOG, OLDER, TOGETHER, Engines, Graph
 from deploy.operator.hold import Hold
 from deploy.running import manifest
 from deploy.running.sentinel import reported
 from interfaces import topics
 from interfaces.service.health import healths
-from interfaces.topics import ALIVE, INCAPACITATED, MISSED, ON, TURN_OFF
+from interfaces.topics import ALIVE, INCAPACITATED, MISSED, TURN_OFF
 from reactive_node import stamps
 from reactive_node.stamps import Timestamp
 from services import engine_controller, operator_watchdog
 
 PROGRAMS = tuple(program.name for program in manifest.everywhere())
 ENGINE_CONTROLLER = "engine_controller"
-WATCHDOG = "operator_watchdog"
 ECHO = 0.15  # s after a beat of a page for which a heartbeat on the topic is taken for that beat
-TOGETHER = 1.0  # s within which a command or a conclusion explains that the engines are off
-EARLY = 0.3  # s that a command may be older by the sender's health than by its arrival
-REPORTED = 2.0  # s within which each service that sent a command has told so
-RENEWED = 0.5  # s: the drive's 0.4 s and the way of the message
 SAMPLE_PERIOD = 1 / 30  # s between two samples of the trace
 BEAT = "beat"  # the request of a page that is held
 MAX_SAMPLES, MAX_LINES = 1800, 400  # those of a minute, for a page that opens later
 MAX_REFUSALS = 20  # that are kept for a page that is slow
 
-BY_WATCHDOG = "turned off by operator_watchdog (operator incapacitated)"
-BY_PAGE = "turned off on a page"
-BY_COMMAND = "turned off by a command of another node"
-BY_NODE = "turned off by {}"
-BY_CONTROLLER = "turned off by engine_controller (no operator seen for {:g} s)"
-RESTARTED = "turned off as engine_controller was killed or stopped"
-NOT_YET = "not turned on yet"
-OLDER = "off since before the page was served"
 _REFUSED = re.compile(r"turn_on refused: ([^;]*)")
 
 Seen = Callable[[topics.Topic], Observable[Timestamp[Any]]]
@@ -125,49 +113,6 @@ class Hands(NamedTuple):
     """Whether a hand at a terminal sends heartbeats."""
 
 
-class Engines(NamedTuple):
-    state: str | None = None
-    reported: float = -math.inf
-    """When the state was published."""
-    controllers: frozenset[Any] = frozenset()
-    """The publishers of the state when they went on."""
-    off_since: float = -math.inf
-    off_at: float | None = None
-    """The same, since the origin of the scenario; ``None`` if it is not known."""
-    since_when: str = NOT_YET
-    """Why they are off, if no command explains it."""
-    cause: str = ""
-    """The command or conclusion that has turned them off."""
-    caused: float = -math.inf
-    strangers: tuple[str, ...] = ()
-    """The nodes without health that may have sent that command."""
-    own_turn_off: float = -math.inf
-    """When a page has turned them off."""
-    refused: tuple[float, str] | None = None
-    """When and why a `turn_on` was refused."""
-
-    def explain(self, cause: str, now: float) -> Engines:
-        """Note why they go off: messages of other topics may come a little before or after that."""
-        goes_off = self.state == ON or now - self.off_since < TOGETHER
-        is_older = self.off_since == -math.inf and self.since_when == OLDER
-        # The command of the watchdog may overtake its conclusion.
-        is_first = not self.cause or (self.cause == BY_COMMAND and now - self.caused < TOGETHER)
-        return self._replace(cause=cause, caused=now) if (goes_off or is_older) and is_first else self
-
-    def name(self, service: str, sent: float) -> Engines:
-        """Note that a service sent a command `turn_off` at a time [s]."""
-        if self.cause != BY_COMMAND or not self.caused - EARLY <= sent <= self.caused + TOGETHER:
-            return self
-        return self._replace(cause=BY_WATCHDOG if service == WATCHDOG else BY_NODE.format(service))
-
-    def reason(self, now: float, heard_since: float) -> str:
-        """Return why they are off at a time [s]; the services are heard since ``heard_since`` [s]."""
-        is_nameless = now - max(self.caused, heard_since) > REPORTED
-        if self.cause == BY_COMMAND and self.strangers and is_nameless:
-            return BY_NODE.format(" or ".join(self.strangers))
-        return self.cause or self.since_when
-
-
 class PageState(NamedTuple):
     """All that a page may show; times are those of :attr:`Clock.now` [s]."""
 
@@ -175,8 +120,6 @@ class PageState(NamedTuple):
     """The strike that turns the engines off."""
     max_presence_age: float = engine_controller.DEFAULTS.max_presence_age
     """How long ago the operator may have been seen to count as seen [s]."""
-    presence_timeout: float = engine_controller.DEFAULTS.presence_timeout
-    """How long the engines stay on without an operator [s]."""
     arm: Arm = Arm()
     by_hand: frozenset[str] = frozenset()
     """The sources of the configuration that were set by hand."""
@@ -204,22 +147,19 @@ def always(
     seen: Seen,
     engines: Observable[Timestamp[str]],
     watchdogs: Observable[bool],
-    controllers: Callable[[], frozenset[Any]],
-    strangers: Callable[[], Iterable[str]],
+    graph: Graph,
     clock: Clock,
 ) -> Observable[Change]:
     """The changes that count even while no page is open: a page that opens later shows strikes and reasons.
 
     :param engines: the states of the engines.
     :param watchdogs: emits for each operator watchdog that appears, whether its strikes are known to begin.
-    :param controllers: returns the present publishers of the engines' state.
-    :param strangers: returns the present nodes without health that may command the engines.
     """
     return rx.merge(
         watchdogs.map(lambda begins: lambda state: _new_watchdog(state, begins)),
         _changes(seen(topics.OPERATOR_ACTIVITY), _activity, clock),
-        _changes(seen(topics.ENGINES), _command(strangers), clock),
-        _changes(engines, _engines(controllers), clock),
+        _changes(seen(topics.ENGINES), _command(graph), clock),
+        _changes(engines, _engines(graph), clock),
     )
 
 
@@ -318,7 +258,7 @@ def _activity(state: PageState, message: Timestamp[Any], clock: Clock) -> PageSt
 # The engines
 
 
-def _command(strangers: Callable[[], Iterable[str]]) -> Callable[[PageState, Any, Clock], PageState]:
+def _command(graph: Graph) -> Callable[[PageState, Any, Clock], PageState]:
     def change(state: PageState, message: Timestamp[Any], clock: Clock) -> PageState:
         if message.value != TURN_OFF:
             return state
@@ -331,7 +271,7 @@ def _command(strangers: Callable[[], Iterable[str]]) -> Callable[[PageState, Any
         cause = BY_WATCHDOG if operator.activity == INCAPACITATED else BY_COMMAND
         after = _explain(state._replace(operator=operator), cause, clock)
         if cause == BY_COMMAND and after.engines is not state.engines:
-            after = after._replace(engines=after.engines._replace(strangers=tuple(sorted(strangers()))))
+            after = after._replace(engines=after.engines._replace(strangers=tuple(sorted(graph.strangers()))))
         return after
 
     return change
@@ -341,22 +281,13 @@ def _explain(state: PageState, cause: str, clock: Clock) -> PageState:
     return state._replace(engines=state.engines.explain(cause, clock.now()))
 
 
-def _engines(controllers: Callable[[], frozenset[Any]]) -> Callable[[PageState, Any, Clock], PageState]:
+def _engines(graph: Graph) -> Callable[[PageState, Any, Clock], PageState]:
     def change(state: PageState, message: Timestamp[Any], clock: Clock) -> PageState:
-        engines, now = state.engines, clock.now()
-        was_on = engines.state == ON
-        after = engines._replace(state=message.value, reported=now)
-        if message.value == ON:
-            # A repeated `on` may come after the command that ends it.
-            cause = engines.cause if was_on and now - engines.caused < TOGETHER else ""
-            known = engines.controllers if was_on else controllers()
-            after = after._replace(controllers=known, cause=cause, refused=None)
-        elif was_on:
-            is_new = not controllers() <= engines.controllers
-            is_restarted = is_new or now - engines.reported >= RENEWED
-            fallback = RESTARTED if is_restarted else BY_CONTROLLER.format(state.presence_timeout)
-            after = after._replace(off_since=now, off_at=round(clock.elapsed(), 1), since_when=fallback)
-        return state._replace(engines=after)
+        before = state.engines
+        engines = before.report(message.value, clock.now(), graph.controllers)
+        if engines.off_since != before.off_since:
+            engines = engines._replace(off_at=round(clock.elapsed(), 1))
+        return state._replace(engines=engines)
 
     return change
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from deploy.operator.engines import RENEWED
 from deploy.operator.page.protocol import LIMITS
-from deploy.operator.page.state import BEAT, PROGRAMS, RENEWED, Clock, PageState, Program
+from deploy.operator.page.state import BEAT, PROGRAMS, Clock, PageState, Program
 from deploy.running import manifest, sentinel
 from interfaces import topics
 from interfaces.loopback import LOOPBACK_DOWN

@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from deploy.operator.page.state import RESTARTED
+from deploy.operator.engines import RESTARTED
 from deploy.running.manifest import PAGE
 from deploy.running.system import System
 from interfaces import topics

@@ -19,9 +19,9 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
 from deploy.operator import hold, operator_page, remote
+from deploy.operator.engines import RESTARTED
 from deploy.operator.hand import Hand
 from deploy.operator.page.server import UPDATE_PERIOD
-from deploy.operator.page.state import RESTARTED
 from deploy.operator.switch import ECHO
 from deploy.running.run_directory import PAGE_FILE
 from interfaces import topics
