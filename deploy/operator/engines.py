@@ -39,7 +39,7 @@ class Graph(NamedTuple):
 def graph(node: ReactiveNode) -> Graph:
     """Return the others that a node sees."""
     states, commands = (node.resolve_topic_name(each.name) for each in (topics.ENGINES_STATE, topics.ENGINES))
-    known = {program.name for program in manifest.programs()}
+    known = {program.name for program in manifest.everywhere()} | {node.get_name()}
     return Graph(
         lambda: frozenset(tuple(it.endpoint_gid) for it in node.get_publishers_info_by_topic(states)),
         lambda: {it.node_name for it in node.get_publishers_info_by_topic(commands)} - known,
