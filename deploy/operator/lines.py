@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from datetime import UTC, datetime, timedelta
 from enum import IntEnum, auto
@@ -10,6 +11,7 @@ from typing import Any, NamedTuple
 import reactivex as rx
 from reactivex import Observable
 
+from deploy.operator import engines
 from deploy.running.sentinel import reported
 from interfaces import topics
 from interfaces.service.clocks import difference
@@ -28,10 +30,8 @@ SIGNAL_BURST = 12  # Listing 5.9 has 11 signals
 FIRST, LAST = datetime.min.replace(tzinfo=UTC), datetime.max.replace(tzinfo=UTC)
 NEVER = (LAST, FIRST)
 TURNING_OFF = "Turning off engines..."
-TOGETHER = timedelta(seconds=1)  # between a command and its effect
-ENGINES_ON = f"Engines are {topics.ON}"
-BY_CONTROLLER = "engine_controller saw no operator, or was killed or stopped"
-WATCHDOG = "operator_watchdog"
+TOGETHER = timedelta(seconds=engines.TOGETHER)
+ENGINES_ON, ENGINES_OFF = f"Engines are {topics.ON}", f"Engines are {topics.OFF}"
 
 
 class Kind(IntEnum):
@@ -106,16 +106,20 @@ class Differences(NamedTuple):
 
 
 def line_batches(
-    seen: Seen, own_turn_offs: Observable[Span], ticks: Observable[Any], namespace: str = "/"
+    seen: Seen,
+    own_turn_offs: Observable[Span],
+    ticks: Observable[Any],
+    graph: engines.Graph,
+    namespace: str = "/",
 ) -> Observable[list[Line]]:
     """Emit the lines of an arm, at each tick those since the last one in the order of their times, if any.
 
     :param own_turn_offs: when this terminal has turned off the engines.
     :param namespace: that of the arm; ``/diagnostics`` carries the health of all arms.
     """
-    commands = engines(seen, own_turn_offs)
+    about_engines = rx.merge(commands(seen, own_turn_offs), states(seen, graph))
     health = rx.merge(*(told(seen, namespace) for told in (services, deaths, senders, clocks)))
-    lines = rx.merge(measurements(seen), operator(seen), commands, health)
+    lines = rx.merge(measurements(seen), operator(seen), about_engines, health)
     batches: Observable[list[Line]] = lines.buffer(ticks).filter(bool)
     return batches.scan(next_batch, Batch(None, [])).map(lambda batch: batch.lines).filter(bool)
 
@@ -149,24 +153,36 @@ def operator(seen: Seen) -> Observable[Line]:
     )
 
 
-def engines(seen: Seen, own_turn_offs: Observable[Span]) -> Observable[Line]:
-    """Commands to the engines from here and from other nodes, and whether the engines are on."""
-    commands = seen(topics.ENGINES)
+def commands(seen: Seen, own_turn_offs: Observable[Span]) -> Observable[Line]:
+    """Commands to the engines from here and from other nodes."""
+    all_ = seen(topics.ENGINES)
     own, others = (
-        commands.filter(_says(topics.TURN_OFF))
+        all_.filter(_says(topics.TURN_OFF))
         .with_latest_from(own_turn_offs.start_with(NEVER))
         .partition(_is_own)
     )
     return rx.merge(
-        thinned(commands.filter(_says(topics.TURN_ON))).map(_line(Kind.ENGINES, "Turning on engines...")),
+        thinned(all_.filter(_says(topics.TURN_ON))).map(_line(Kind.ENGINES, "Turning on engines...")),
         own.map(_first).map(_line(Kind.OWN_TURN_OFF, "Turning off engines, as you asked...")),
         thinned(others.map(_first)).map(
             _line(Kind.OTHERS_TURN_OFF, "Turning off engines, as another node asked...")
         ),
-        thinned(seen(topics.ENGINES_STATE).distinct_until_changed(lambda it: it.value)).map(
-            _line(Kind.STATE, "Engines are {}".format)
-        ),
     )
+
+
+def states(seen: Seen, graph: engines.Graph) -> Observable[Line]:
+    """Whether the engines are on, and why they go off, if no command explains it."""
+
+    def report(before: Timestamp[Any], state: Timestamp[str]) -> Timestamp[Any]:
+        now = before.value.report(state.value, state.timestamp.timestamp(), graph.controllers)
+        return Timestamp(now, state.timestamp)
+
+    def words(now: engines.Engines) -> str:
+        went_off = now.state == topics.OFF and now.off_since > -math.inf
+        return f"Engines are {now.state}" + (f", {now.since_when}" if went_off else "")
+
+    reports = seen(topics.ENGINES_STATE).scan(report, Timestamp(engines.Engines(), FIRST))
+    return thinned(reports.distinct_until_changed(lambda it: it.value.state)).map(_line(Kind.STATE, words))
 
 
 def services(seen: Seen, namespace: str) -> Observable[Line]:
@@ -207,7 +223,7 @@ def senders(seen: Seen, namespace: str) -> Observable[Line]:
 
     def tell(diagnostics: Timestamp[Any]) -> Iterator[Line]:
         for name, health in healths(diagnostics.value, namespace.rstrip("/")).items():
-            if health.since_turn_off is not None and name != WATCHDOG:
+            if health.since_turn_off is not None and name != engines.WATCHDOG:
                 sent = diagnostics.timestamp - timedelta(seconds=health.since_turn_off)
                 yield Line(sent, Kind.SENDER, f"{name} turned off the engines")
 
@@ -307,8 +323,8 @@ def next_batch(previous: Batch, lines: list[Line]) -> Batch:
             case Kind.STATE:
                 was_on, is_on = is_on, line.text == ENGINES_ON
                 went_off = line.time if was_on and not is_on else went_off
-                if was_on and not is_on and line.time - turned_off > TOGETHER:
-                    line = line._replace(text=f"{line.text}: {BY_CONTROLLER}")
+                if not is_on and line.time - turned_off <= TOGETHER:
+                    line = line._replace(text=ENGINES_OFF)
             case Kind.SENDER:
                 if abs(line.time - went_off) > TOGETHER or abs(line.time - asked) <= TOGETHER:
                     continue  # it sends again while they are off, has sent it long ago, or is the own node

@@ -110,11 +110,12 @@ def wire(node: ServiceNode) -> None:
     unseen = node.observe_sampled(UNSEEN, UNSEEN_PERIOD, timestamped=True)
     engines = is_open.start_with(False).switch_map(lambda it: seen(topics.ENGINES_STATE) if it else unseen)
     ticks = rx.interval(LINES_PERIOD, node.scheduler)
-    lines = line_batches(seen, own_turn_offs, ticks, node.get_namespace())
+    present = graph(node)
+    lines = line_batches(seen, own_turn_offs, ticks, present, node.get_namespace())
 
     # What pages show
     changes = rx.merge(
-        state.always(seen, engines, new_watchdogs(node, epoch), graph(node), clock),
+        state.always(seen, engines, new_watchdogs(node, epoch), present, clock),
         during(is_open, state.while_open(seen, lines, node.get_namespace(), clock)),
         switch.holds.map(state.held),
         switch.pressed.map(state.pressed),

@@ -13,6 +13,7 @@ from reactivex.scheduler import VirtualTimeScheduler
 from reactivex.subject import Subject
 from reactivex.testing import TestScheduler
 
+from deploy.operator.engines import Graph
 from deploy.operator.lines import Line, line_batches
 from interfaces import topics
 from interfaces.sources import playback, scenario_file
@@ -78,7 +79,7 @@ class Arm:
         self.topics: dict[str, Subject[Any]] = {topic.name: Subject() for topic in topics.CONTRACT}
         self.lines: list[str] = []
         played = scenario_file.load(path)
-        batches = line_batches(self.seen, rx.never(), rx.interval(0.1))
+        batches = line_batches(self.seen, rx.never(), rx.interval(0.1), Graph(frozenset, set))
         batches.subscribe(self.print, scheduler=self.scheduler)
         self.scheduler.advance_to(START)
         self.wire()

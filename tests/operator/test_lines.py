@@ -14,6 +14,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from reactivex import Observable
 from reactivex.testing import ReactiveTest, TestScheduler
 
+from deploy.operator.engines import BY_CONTROLLER, RESTARTED, Graph
 from deploy.operator.lines import Allowance, Kind, Line, line_batches, unrepeated
 from deploy.running import sentinel
 from deploy.running.supervisord import Program
@@ -28,13 +29,19 @@ Play = Callable[..., list[Line]]
 ORIGIN = datetime(1970, 1, 1, tzinfo=UTC)
 PERIOD = 0.1  # s between two batches
 AGE = 0.02  # s of a message that arrives late
+NOBODY = Graph(frozenset, set)
 
 
 @pytest.fixture
 def play(scheduler: TestScheduler) -> Play:
-    """Return the lines shown until 60 s; `late` was sent `AGE` before it arrives, `own` are own turn_offs."""
+    """Return the lines shown until 60 s.
 
-    def play(script: Iterable[Message], *, late: Any = None, own: Iterable[float] = ()) -> list[Line]:
+    `late` was sent `AGE` before it arrives, `own` are own turn_offs, and `graph` tells who is present.
+    """
+
+    def play(
+        script: Iterable[Message], *, late: Any = None, own: Iterable[float] = (), graph: Graph = NOBODY
+    ) -> list[Line]:
         def sent(message: Any) -> Timestamp[Any]:
             return Timestamp(message, scheduler.now - timedelta(seconds=AGE if message is late else 0))
 
@@ -46,7 +53,7 @@ def play(scheduler: TestScheduler) -> Play:
             spans = [
                 ReactiveTest.on_next(at, (scheduler.to_datetime(at), scheduler.to_datetime(at))) for at in own
             ]
-            return line_batches(seen, scheduler.create_hot_observable(spans), rx.interval(PERIOD))
+            return line_batches(seen, scheduler.create_hot_observable(spans), rx.interval(PERIOD), graph)
 
         # RxPY takes 0 for none.
         shown = scheduler.start(batches, created=1e-9, subscribed=1e-9, disposed=60.0)
@@ -215,9 +222,16 @@ def test_service_that_turned_off_the_engines_before_is_not_named(play: Play) -> 
     assert not any("torque_guard" in text for text in texts(play(script)))
 
 
-def test_engines_that_go_off_without_a_command_say_so(play: Play) -> None:
-    off = "Engines are off: engine_controller saw no operator, or was killed or stopped"
-    assert texts(play(states((1, "off"), (2, "on"), (3, "off"), (4, "off"))))[1:] == ["Engines are on", off]
+@pytest.mark.parametrize(("off", "why"), [(2.4, BY_CONTROLLER), (3, RESTARTED)])
+def test_engines_that_go_off_without_a_command_say_why(play: Play, off: float, why: str) -> None:
+    shown = texts(play(states((1, "off"), (2, "on"), (off, "off"), (4, "off"), (5, "on"))))
+    assert shown == ["Engines are off", "Engines are on", f"Engines are off, {why}", "Engines are on"]
+
+
+def test_controller_that_was_killed_and_is_back_at_once_is_told(play: Play) -> None:
+    lives = iter([frozenset({"first"}), frozenset({"first", "second"})])
+    shown = texts(play(states((1, "on"), (1.4, "off")), graph=Graph(lambda: next(lives), set)))
+    assert shown == ["Engines are on", f"Engines are off, {RESTARTED}"]
 
 
 def test_own_turn_off_needs_no_other_name(play: Play) -> None:

@@ -14,6 +14,7 @@ from reactivex import Observable
 from reactivex.subject import Subject
 from std_msgs.msg import String
 
+from deploy.operator.engines import graph
 from deploy.operator.hand import BEAT_PERIOD, Hand
 from deploy.operator.lines import Kind, Line, Span, line_batches
 from deploy.operator.output import say
@@ -53,7 +54,7 @@ class Terminal:
         again = self._turned_off.switch_map(lambda span: rx.timer(AGAIN).take_until(self._settled(span)))
         again.subscribe(lambda _: self._command_engines(topics.TURN_OFF), scheduler=node.scheduler)
         self._ticks: Subject[None] = Subject()
-        batches = line_batches(self._seen, self._turned_off, self._ticks, node.get_namespace())
+        batches = line_batches(self._seen, self._turned_off, self._ticks, graph(node), node.get_namespace())
         batches.subscribe(self._show, scheduler=node.scheduler)
 
     def __enter__(self) -> Terminal:
