@@ -70,10 +70,10 @@ class Batch(NamedTuple):
     """Whether the engines are on."""
     turned_off: datetime = FIRST
     """The time of the last command `turn_off`."""
-    asked: datetime = FIRST
-    """The time of the last own one."""
+    told: datetime = FIRST
+    """The time of the last one whose sender was told with it: the own node, or the watchdog."""
     went_off: datetime = FIRST
-    """When the engines went off, until the sender of that command is known."""
+    """When the engines went off, until it is told who sent that command."""
 
 
 class Complaints(NamedTuple):
@@ -117,7 +117,7 @@ def line_batches(
     :param own_turn_offs: when this terminal has turned off the engines.
     :param namespace: that of the arm; ``/diagnostics`` carries the health of all arms.
     """
-    about_engines = rx.merge(commands(seen, own_turn_offs), states(seen, graph))
+    about_engines = rx.merge(commands(seen, own_turn_offs, graph), states(seen, graph))
     health = rx.merge(*(told(seen, namespace) for told in (services, deaths, senders, clocks)))
     lines = rx.merge(measurements(seen), operator(seen), about_engines, health)
     batches: Observable[list[Line]] = lines.buffer(ticks).filter(bool)
@@ -153,20 +153,28 @@ def operator(seen: Seen) -> Observable[Line]:
     )
 
 
-def commands(seen: Seen, own_turn_offs: Observable[Span]) -> Observable[Line]:
-    """Commands to the engines from here and from other nodes."""
+def commands(seen: Seen, own_turn_offs: Observable[Span], graph: engines.Graph) -> Observable[Line]:
+    """Commands to the engines from here and from other nodes, and the nodes without health that may have
+    sent those: after the reports of the services, of which one may have done it.
+    """
     all_ = seen(topics.ENGINES)
     own, others = (
         all_.filter(_says(topics.TURN_OFF))
         .with_latest_from(own_turn_offs.start_with(NEVER))
         .partition(_is_own)
     )
+    others = thinned(others.map(_first)).share()
+
+    def sender(command: Timestamp[Any]) -> Observable[Line]:
+        names = " or ".join(sorted(graph.strangers()))
+        line = Line(command.timestamp, Kind.SENDER, f"{names} turned off the engines")
+        return reports(seen, since=command).map(lambda _: line) if names else rx.empty()
+
     return rx.merge(
         thinned(all_.filter(_says(topics.TURN_ON))).map(_line(Kind.ENGINES, "Turning on engines...")),
         own.map(_first).map(_line(Kind.OWN_TURN_OFF, "Turning off engines, as you asked...")),
-        thinned(others.map(_first)).map(
-            _line(Kind.OTHERS_TURN_OFF, "Turning off engines, as another node asked...")
-        ),
+        others.map(_line(Kind.OTHERS_TURN_OFF, "Turning off engines, as another node asked...")),
+        others.flat_map(sender),
     )
 
 
@@ -183,6 +191,12 @@ def states(seen: Seen, graph: engines.Graph) -> Observable[Line]:
 
     reports = seen(topics.ENGINES_STATE).scan(report, Timestamp(engines.Engines(), FIRST))
     return thinned(reports.distinct_until_changed(lambda it: it.value.state)).map(_line(Kind.STATE, words))
+
+
+def reports(seen: Seen, since: Timestamp[Any]) -> Observable[Any]:
+    """Emit once, when each service has reported its health since a message."""
+    later = since.timestamp + timedelta(seconds=engines.REPORTED)
+    return seen(topics.DIAGNOSTICS).filter(lambda it: it.timestamp >= later).take(1)
 
 
 def services(seen: Seen, namespace: str) -> Observable[Line]:
@@ -219,11 +233,11 @@ def unrepeated(
 
 
 def senders(seen: Seen, namespace: str) -> Observable[Line]:
-    """Each service that has sent a `turn_off`, by its own health. The watchdog's conclusion says more."""
+    """Each service that has sent a `turn_off`, by its own health."""
 
     def tell(diagnostics: Timestamp[Any]) -> Iterator[Line]:
         for name, health in healths(diagnostics.value, namespace.rstrip("/")).items():
-            if health.since_turn_off is not None and name != engines.WATCHDOG:
+            if health.since_turn_off is not None:
                 sent = diagnostics.timestamp - timedelta(seconds=health.since_turn_off)
                 yield Line(sent, Kind.SENDER, f"{name} turned off the engines")
 
@@ -304,14 +318,15 @@ class Allowance:
 
 def next_batch(previous: Batch, lines: list[Line]) -> Batch:
     """Sort lines, tell why the engines go off, and show one command of the watchdog for each sleep."""
-    is_asleep, _, is_on, turned_off, asked, went_off = previous
+    is_asleep, _, is_on, turned_off, told, went_off = previous
     shown = []
     for line in sorted(lines):
         if line.kind in (Kind.ASLEEP, Kind.OWN_TURN_OFF, Kind.OTHERS_TURN_OFF):
             turned_off = line.time
+        if line.kind in (Kind.ASLEEP, Kind.OWN_TURN_OFF):
+            told = line.time
+            went_off = FIRST if abs(told - went_off) <= TOGETHER else went_off
         match line.kind:
-            case Kind.OWN_TURN_OFF:
-                asked = line.time
             case Kind.ALIVE | Kind.MISSED:
                 is_asleep = False
             case Kind.ASLEEP:
@@ -322,17 +337,17 @@ def next_batch(previous: Batch, lines: list[Line]) -> Batch:
                 is_asleep, line = True, line._replace(text=TURNING_OFF)
             case Kind.STATE:
                 was_on, is_on = is_on, line.text == ENGINES_ON
-                went_off = line.time if was_on and not is_on else went_off
+                went_off = line.time if was_on and not is_on and line.time - told > TOGETHER else went_off
                 if not is_on and line.time - turned_off <= TOGETHER:
                     line = line._replace(text=ENGINES_OFF)
             case Kind.SENDER:
-                if abs(line.time - went_off) > TOGETHER or abs(line.time - asked) <= TOGETHER:
-                    continue  # it sends again while they are off, has sent it long ago, or is the own node
+                if abs(line.time - went_off) > TOGETHER:
+                    continue  # it sends again while they are off, has sent it long ago, or was told already
                 went_off = FIRST
         shown.append(line)
         if line.kind is Kind.ASLEEP:
             shown.append(Line(line.time, Kind.ENGINES, TURNING_OFF))
-    return Batch(is_asleep, shown, is_on, turned_off, asked, went_off)
+    return Batch(is_asleep, shown, is_on, turned_off, told, went_off)
 
 
 def _line(kind: Kind, text: str | Callable[[Any], str]) -> Callable[[Timestamp[Any]], Line]:

@@ -240,12 +240,38 @@ def test_own_turn_off_needs_no_other_name(play: Play) -> None:
     assert shown[1:] == ["Turning off engines, as you asked...", "Engines are off"]
 
 
-@pytest.mark.parametrize("conclusion", [True, False])
-def test_watchdog_that_turned_off_the_engines_is_not_named_twice(play: Play, conclusion: bool) -> None:
-    script = states((1, "on"), (13.51, "off")) + commands(topics.TURN_OFF, 13.5)
-    script += activity(topics.ALIVE, 4) + activity(topics.INCAPACITATED, 13.5) if conclusion else []
-    shown = texts(play([*script, turn_off_by("operator_watchdog", 14, 0.5)]))
-    assert shown[-1] == "Engines are off"
+def test_node_without_health_is_named_when_no_service_has_sent_the_command(play: Play) -> None:
+    script = states((1, "on"), (2.01, "off")) + activity(topics.ALIVE, 1.5) + commands(topics.TURN_OFF, 2)
+    script += [alive(3, pid=7), alive(4.1, pid=7)]
+    present = Graph(frozenset, lambda: {"terminal_7", "rqt"})
+    shown = play(script, graph=present)
+    assert texts(shown)[2:] == [OTHER, "Engines are off", "rqt or terminal_7 turned off the engines"]
+    assert times(shown)[4] == 2.0
+
+
+@pytest.mark.parametrize(
+    ("own", "reports", "named"),
+    [([2], [], []), ([], [turn_off_by("guard", 2.9, 0.9)], ["guard turned off the engines"])],
+)
+def test_node_without_health_is_not_named_for_a_command_of_another_one(
+    play: Play, own: list[float], reports: list[Message], named: list[str]
+) -> None:
+    script = states((1, "on"), (2.01, "off")) + activity(topics.ALIVE, 1.5) + commands(topics.TURN_OFF, 2)
+    shown = play([*script, *reports, alive(4.1, pid=7)], own=own, graph=Graph(frozenset, lambda: {"rqt"}))
+    assert texts(shown)[4:] == named
+
+
+@pytest.mark.parametrize("conclusion", [13.5, 13.75, None])
+def test_watchdog_that_turned_off_the_engines_is_named_if_its_conclusion_is_lost(
+    play: Play, conclusion: float | None
+) -> None:
+    script = states((1, "on"), (13.6, "off")) + commands(topics.TURN_OFF, 13.5) + activity(topics.ALIVE, 4)
+    script += activity(topics.INCAPACITATED, conclusion) if conclusion else []
+    script += commands(topics.TURN_OFF, 14.55)  # repeated
+    reports = [turn_off_by("operator_watchdog", 14, 0.5), alive(16, pid=7), alive(17, pid=7)]
+    shown = texts(play([*script, *reports], graph=Graph(frozenset, lambda: {"rqt"})))
+    named = [] if conclusion else ["operator_watchdog turned off the engines"]
+    assert [text for text in shown if "turned off the engines" in text] == named
 
 
 def test_new_complaint_of_a_service_is_shown_once(play: Play) -> None:
