@@ -267,7 +267,7 @@ def _show(system: System, member: Member, *, owner: bool = False) -> None:
     # In the background, reading the terminal fails and does not stop the process.
     signal.signal(signal.SIGTTIN, signal.SIG_IGN)
     parent = os.getppid()
-    with Terminal(member.node, system.origin()) as terminal:
+    with Terminal(member.node, system.origin(), attached=not owner) as terminal:
         say(_bound(system))
         say(HELP)
         is_connected = True

@@ -30,7 +30,7 @@ SIGNAL_BURST = 12  # Listing 5.9 has 11 signals
 FIRST, LAST = datetime.min.replace(tzinfo=UTC), datetime.max.replace(tzinfo=UTC)
 NEVER = (LAST, FIRST)
 TURNING_OFF = "Turning off engines..."
-TOGETHER = timedelta(seconds=engines.TOGETHER)
+TOGETHER, REPORTED = (timedelta(seconds=each) for each in (engines.TOGETHER, engines.REPORTED))
 ENGINES_ON, ENGINES_OFF = f"Engines are {topics.ON}", f"Engines are {topics.OFF}"
 
 
@@ -111,15 +111,20 @@ def line_batches(
     ticks: Observable[Any],
     graph: engines.Graph,
     namespace: str = "/",
+    *,
+    attached: bool = False,
 ) -> Observable[list[Line]]:
     """Emit the lines of an arm, at each tick those since the last one in the order of their times, if any.
 
     :param own_turn_offs: when this terminal has turned off the engines.
     :param namespace: that of the arm; ``/diagnostics`` carries the health of all arms.
+    :param attached: whether this terminal begins later than the arm.
     """
     about_engines = rx.merge(commands(seen, own_turn_offs, graph), states(seen, graph))
     health = rx.merge(*(told(seen, namespace) for told in (services, deaths, senders, clocks)))
     lines = rx.merge(measurements(seen), operator(seen), about_engines, health)
+    if attached:
+        lines = rx.merge(lines, earlier(seen, namespace))
     batches: Observable[list[Line]] = lines.buffer(ticks).filter(bool)
     return batches.scan(next_batch, Batch(None, [])).map(lambda batch: batch.lines).filter(bool)
 
@@ -168,7 +173,8 @@ def commands(seen: Seen, own_turn_offs: Observable[Span], graph: engines.Graph) 
     def sender(command: Timestamp[Any]) -> Observable[Line]:
         names = " or ".join(sorted(graph.strangers()))
         line = Line(command.timestamp, Kind.SENDER, f"{names} turned off the engines")
-        return reports(seen, since=command).map(lambda _: line) if names else rx.empty()
+        later = seen(topics.DIAGNOSTICS).filter(lambda it: it.timestamp - command.timestamp >= REPORTED)
+        return later.take(1).map(lambda _: line) if names else rx.empty()
 
     return rx.merge(
         thinned(all_.filter(_says(topics.TURN_ON))).map(_line(Kind.ENGINES, "Turning on engines...")),
@@ -191,12 +197,6 @@ def states(seen: Seen, graph: engines.Graph) -> Observable[Line]:
 
     reports = seen(topics.ENGINES_STATE).scan(report, Timestamp(engines.Engines(), FIRST))
     return thinned(reports.distinct_until_changed(lambda it: it.value.state)).map(_line(Kind.STATE, words))
-
-
-def reports(seen: Seen, since: Timestamp[Any]) -> Observable[Any]:
-    """Emit once, when each service has reported its health since a message."""
-    later = since.timestamp + timedelta(seconds=engines.REPORTED)
-    return seen(topics.DIAGNOSTICS).filter(lambda it: it.timestamp >= later).take(1)
 
 
 def services(seen: Seen, namespace: str) -> Observable[Line]:
@@ -236,12 +236,32 @@ def senders(seen: Seen, namespace: str) -> Observable[Line]:
     """Each service that has sent a `turn_off`, by its own health."""
 
     def tell(diagnostics: Timestamp[Any]) -> Iterator[Line]:
-        for name, health in healths(diagnostics.value, namespace.rstrip("/")).items():
-            if health.since_turn_off is not None:
-                sent = diagnostics.timestamp - timedelta(seconds=health.since_turn_off)
-                yield Line(sent, Kind.SENDER, f"{name} turned off the engines")
+        for sent, name in _turn_offs(diagnostics, namespace):
+            yield Line(sent, Kind.SENDER, f"{name} turned off the engines")
 
     return seen(topics.DIAGNOSTICS).flat_map(lambda it: rx.from_iterable(tell(it)))
+
+
+def earlier(seen: Seen, namespace: str) -> Observable[Line]:
+    """What the services know of engines that are off already."""
+
+    def gather(last: Timestamp[Any], diagnostics: Timestamp[Any]) -> Timestamp[Any]:
+        turn_offs = (last.value, *_turn_offs(diagnostics, namespace))
+        return Timestamp(max(turn_offs), diagnostics.timestamp)
+
+    def tell(last: Timestamp[Any]) -> Line:
+        sent, name = last.value
+        age = (last.timestamp - sent).total_seconds()
+        known = (
+            f"{name} sent the last turn_off, {age:.1f} s ago" if name else "no service has sent a turn_off"
+        )
+        return Line(last.timestamp, Kind.SERVICE, f"Engines were off before this terminal began; {known}")
+
+    def told(first: Timestamp[str]) -> Observable[Line]:
+        last = seen(topics.DIAGNOSTICS).scan(gather, Timestamp((FIRST, ""), FIRST))
+        return last.filter(lambda it: it.timestamp - first.timestamp >= REPORTED).take(1).map(tell)
+
+    return seen(topics.ENGINES_STATE).take(1).filter(_says(topics.OFF)).flat_map(told)
 
 
 def deaths(seen: Seen, namespace: str) -> Observable[Line]:
@@ -375,6 +395,13 @@ def _is_own(command: tuple[Timestamp[Any], Span]) -> bool:
 
 def _first(pair: tuple[Timestamp[Any], Any]) -> Timestamp[Any]:
     return pair[0]
+
+
+def _turn_offs(diagnostics: Timestamp[Any], namespace: str) -> Iterator[tuple[datetime, str]]:
+    """Yield when each service has sent its last `turn_off`, and its name."""
+    for name, health in healths(diagnostics.value, namespace.rstrip("/")).items():
+        if health.since_turn_off is not None:
+            yield diagnostics.timestamp - timedelta(seconds=health.since_turn_off), name
 
 
 def _complaints(diagnostics: Any, namespace: str) -> Iterator[tuple[str, str]]:

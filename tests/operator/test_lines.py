@@ -36,11 +36,17 @@ NOBODY = Graph(frozenset, set)
 def play(scheduler: TestScheduler) -> Play:
     """Return the lines shown until 60 s.
 
-    `late` was sent `AGE` before it arrives, `own` are own turn_offs, and `graph` tells who is present.
+    `late` was sent `AGE` before it arrives, `own` are own turn_offs, `graph` tells who is present, and an
+    `attached` terminal begins later than the arm.
     """
 
     def play(
-        script: Iterable[Message], *, late: Any = None, own: Iterable[float] = (), graph: Graph = NOBODY
+        script: Iterable[Message],
+        *,
+        late: Any = None,
+        own: Iterable[float] = (),
+        graph: Graph = NOBODY,
+        attached: bool = False,
     ) -> list[Line]:
         def sent(message: Any) -> Timestamp[Any]:
             return Timestamp(message, scheduler.now - timedelta(seconds=AGE if message is late else 0))
@@ -53,7 +59,9 @@ def play(scheduler: TestScheduler) -> Play:
             spans = [
                 ReactiveTest.on_next(at, (scheduler.to_datetime(at), scheduler.to_datetime(at))) for at in own
             ]
-            return line_batches(seen, scheduler.create_hot_observable(spans), rx.interval(PERIOD), graph)
+            return line_batches(
+                seen, scheduler.create_hot_observable(spans), rx.interval(PERIOD), graph, attached=attached
+            )
 
         # RxPY takes 0 for none.
         shown = scheduler.start(batches, created=1e-9, subscribed=1e-9, disposed=60.0)
@@ -272,6 +280,31 @@ def test_watchdog_that_turned_off_the_engines_is_named_if_its_conclusion_is_lost
     shown = texts(play([*script, *reports], graph=Graph(frozenset, lambda: {"rqt"})))
     named = [] if conclusion else ["operator_watchdog turned off the engines"]
     assert [text for text in shown if "turned off the engines" in text] == named
+
+
+SINCE_BEFORE = "Engines were off before this terminal began; "
+
+
+@pytest.mark.parametrize(
+    ("ages", "known"),
+    [
+        ([], "no service has sent a turn_off"),
+        ([("guard", 8.3), ("operator_page", 61.5)], "guard sent the last turn_off, 10.0 s ago"),
+    ],
+)
+def test_terminal_that_attaches_tells_who_turned_off_the_engines_before(
+    play: Play, ages: list[tuple[str, float]], known: str
+) -> None:
+    reports = [turn_off_by(name, 2.3, age) for name, age in ages] + [alive(at, pid=7) for at in (3, 4, 5)]
+    shown = play([*states((2, "off"), (2.1, "off"), (7, "on"), (8, "off")), *reports], attached=True)
+    assert texts(shown)[:2] == ["Engines are off", SINCE_BEFORE + known]
+    assert times(shown)[:3] == [2.0, 4.0, 7.0]
+    assert len(shown) == 4
+
+
+def test_terminal_that_attaches_while_the_engines_are_on_has_nothing_to_tell(play: Play) -> None:
+    script = [*states((2, "on"), (2.1, "off")), turn_off_by("guard", 2.3, 7), alive(5, pid=7)]
+    assert not any(SINCE_BEFORE in text for text in texts(play(script, attached=True)))
 
 
 def test_new_complaint_of_a_service_is_shown_once(play: Play) -> None:

@@ -237,6 +237,7 @@ def test_the_operator_commands_switch_and_engines_from_the_terminal(
     terminal = begin(sys.executable, "-m", "deploy.commands.launcher", "terminal")
     terminal.await_line("Engines stop within 10.5 s")
     terminal.await_line("Engines are off")
+    terminal.await_line("Engines were off before this terminal began; ")
     terminal.insist("press\n", "Operator is alive")
     terminal.insist("turn_on\n", "Engines are on")
     terminal.type("turn_off\n")

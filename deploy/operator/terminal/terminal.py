@@ -35,8 +35,10 @@ Lines that come too fast to be read are thinned to one a second of each kind."""
 class Terminal:
     """The terminal of a node, open in a ``with``. It shows batches: to spin less saves most of the work."""
 
-    def __init__(self, node: ReactiveNode, epoch: float) -> None:
-        """:param epoch: the origin of the lines' times [s, monotonic clock]."""
+    def __init__(self, node: ReactiveNode, epoch: float, *, attached: bool = False) -> None:
+        """:param epoch: the origin of the lines' times [s, monotonic clock].
+        :param attached: whether it begins later than the arm.
+        """
         self.has_quit = False
         self._node = node
         self._engines = node.create_publisher(String, topics.ENGINES.name, topics.ENGINES.qos)
@@ -54,7 +56,9 @@ class Terminal:
         again = self._turned_off.switch_map(lambda span: rx.timer(AGAIN).take_until(self._settled(span)))
         again.subscribe(lambda _: self._command_engines(topics.TURN_OFF), scheduler=node.scheduler)
         self._ticks: Subject[None] = Subject()
-        batches = line_batches(self._seen, self._turned_off, self._ticks, graph(node), node.get_namespace())
+        batches = line_batches(
+            self._seen, self._turned_off, self._ticks, graph(node), node.get_namespace(), attached=attached
+        )
         batches.subscribe(self._show, scheduler=node.scheduler)
 
     def __enter__(self) -> Terminal:
