@@ -13,7 +13,7 @@ from typing import Any
 
 import reactivex as rx
 from geometry_msgs.msg import Twist, TwistStamped
-from rclpy.qos import QoSProfile
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 from reactivex import Observable
 
 from interfaces import permission, service, topics
@@ -29,7 +29,7 @@ def _not_finite(command: Any) -> str:
 COMMANDS = topics.Topic(
     "cmd_vel_in",
     Twist,
-    QoSProfile(depth=1),
+    QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT),  # meets every publisher
     "m/s, rad/s",
     ("teleoperation or navigation",),
     ("twist_gate",),
@@ -68,7 +68,10 @@ class Parameters:
 def wire(node: service.ServiceNode) -> None:
     kind = TwistStamped if node.declare(Parameters).stamped else Twist
     source = replace(COMMANDS, type=kind)
-    sink = replace(source, name="cmd_vel", publishers=("twist_gate",), subscribers=("the robot",))
+    reliable = QoSProfile(depth=1)  # which meets every robot
+    sink = replace(
+        source, name="cmd_vel", qos=reliable, publishers=("twist_gate",), subscribers=("the robot",)
+    )
     # A command that waited in a queue is not what the hand wants now.
     commands = node.observe(source, max_age=DRIVE_TIMEOUT)
 

@@ -5,12 +5,13 @@ from typing import Any
 
 import pytest
 from geometry_msgs.msg import Twist, TwistStamped, Vector3
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_msgs.msg import String
 
 from interfaces.topics import ENGINES_STATE, ON, Topic
 from reactive_node.testing import MakeNode, SpinUntil, VirtualTime
 from services.examples import twist_gate
-from services.examples.twist_gate import COMMANDS, gated
+from services.examples.twist_gate import gated
 from tests.component.wiring import Wired
 
 
@@ -33,15 +34,20 @@ def test_last_item_is_zero(scheduler: VirtualTime) -> None:
     assert [(round(at, 2), it) for at, it in recording.items] == [(0.6, 3), (0.8, 4), (0.9, "zero")]
 
 
-def topic(kind: Any, name: str) -> Topic:
-    return Topic(name, kind, COMMANDS.qos, "", (), (), "", raw=True)
+RELIABLE, BEST_EFFORT = ReliabilityPolicy.RELIABLE, ReliabilityPolicy.BEST_EFFORT
 
 
-@pytest.mark.parametrize("kind", [Twist, TwistStamped])
+def topic(kind: Any, name: str, reliability: ReliabilityPolicy = RELIABLE) -> Topic:
+    return Topic(name, kind, QoSProfile(depth=1, reliability=reliability), "", (), (), "", raw=True)
+
+
+@pytest.mark.parametrize(
+    ("kind", "sent"), [(Twist, BEST_EFFORT), (Twist, RELIABLE), (TwistStamped, RELIABLE)]
+)
 def test_robot_stands_still_unless_the_engines_are_on(
-    make_node: MakeNode, spin_until: SpinUntil, kind: Any
+    make_node: MakeNode, spin_until: SpinUntil, kind: Any, sent: ReliabilityPolicy
 ) -> None:
-    source, sink = topic(kind, "cmd_vel_in"), topic(kind, "cmd_vel")
+    source, sink = topic(kind, "cmd_vel_in", sent), topic(kind, "cmd_vel")
     wired = Wired(
         make_node,
         spin_until,
