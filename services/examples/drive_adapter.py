@@ -3,8 +3,9 @@
 User story (ours): as a robot operator, I find the drive off unless the engine controller has said `on` within
 the last 400 ms: also when this process starts, when it ends, and when an order to the drive fails.
 
-The order is repeated every 100 ms. A drive that stops when the repetition ends is safe even while this
-process is killed or stopped; another one stays on until supervisord has started the process again.
+The order is repeated every 100 ms, or when the drive has answered, if that takes longer. A drive that stops
+when the repetition ends is safe even while this process is killed or stopped; another one stays on until
+supervisord has started the process again.
 """
 
 import os
