@@ -21,6 +21,7 @@ from deploy.operator import hold
 from deploy.operator.engines import NOT_YET, OLDER, Engines, graph
 from deploy.operator.lines import line_batches
 from deploy.operator.page import address, protocol, requests, server, state
+from deploy.operator.page.history import SPAN
 from deploy.operator.page.site import Site
 from deploy.operator.remote import parameter_changes
 from deploy.operator.switch import VIRTUAL_SWITCH, Switch
@@ -34,7 +35,7 @@ from interfaces.topics import TURN_OFF
 from reactive_node import stamps
 from services import engine_controller, operator_watchdog
 
-LINGER = 5.0  # s after the last page has left until its topics are given up: a reload is faster
+LINGER = SPAN  # s after the last page has left until its topics are given up: the next one shows this time
 LINES_PERIOD = 0.5  # s
 TERMINALS_PERIOD = 0.5  # s
 LOOPBACK_PERIOD = 1.0  # s

@@ -24,7 +24,7 @@ from websockets.http11 import Response
 from deploy.operator import hold
 from deploy.operator.page import protocol
 from deploy.operator.page.connection import BAD_REQUEST, TOO_LATE, TOO_MANY, Allowance, Connection
-from deploy.operator.page.history import History
+from deploy.operator.page.history import SPAN, History
 from deploy.operator.page.site import SOCKET, Site, respond
 from deploy.operator.page.state import Clock, PageState
 from deploy.operator.page.updates import Updates, lasting
@@ -110,6 +110,7 @@ class PageServer:
         self._tls = tls
         self._clients: list[_Client] = []
         self._history = History()
+        self._shown = -math.inf  # when a page was open for the last time
         self._due = 0.0
         self._selector = selectors.DefaultSelector()
         listener.setblocking(False)
@@ -140,8 +141,9 @@ class PageServer:
             self._woken.close()
 
     def _serve_once(self) -> None:
-        # Without clients there is nothing to do.
-        wait = max(0.0, self._due - self._clock.now()) if self._clients else None
+        # Without clients there is nothing to do, but for the history.
+        is_busy = self._clients or self._clock.now() - self._shown < SPAN
+        wait = max(0.0, self._due - self._clock.now()) if is_busy else None
         for key, _ in self._selector.select(wait):
             if key.fileobj is self._listener:
                 self._accept()
@@ -153,6 +155,8 @@ class PageServer:
         if now >= self._due:
             self._due = max(self._due + UPDATE_PERIOD, now)
             if any(client.page for client in self._clients):
+                self._shown = now
+            if now - self._shown < SPAN:
                 self._history.note(round(self._clock.elapsed(), 3), lasting(self._newest(), now))
             for client in list(self._clients):
                 self._tick(client, now)

@@ -482,8 +482,11 @@ def test_input_outside_the_protocol_is_counted_in_the_health(
         )
 
 
-def test_topics_are_observed_only_while_a_page_is_open(world: World, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_topics_are_observed_only_while_a_page_is_open(
+    make_node: Callable[..., Any], spin_until: SpinUntil, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(operator_page, "LINGER", 0.2)
+    world = World(make_node, spin_until, tmp_path)
 
     def observed() -> set[str]:
         return {each.topic_name for each in world.program.subscriptions}

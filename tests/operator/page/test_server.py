@@ -3,6 +3,7 @@ from __future__ import annotations
 import contextlib
 import itertools
 import json
+import queue
 import shutil
 import socket
 import ssl
@@ -262,6 +263,24 @@ def test_page_that_opens_later_gets_the_history(arm: Arm) -> None:
             later.send(json.dumps({"type": "hello", "token": TOKEN}))
             ((time, moment),) = message(later)["history"]
     assert (time, moment["switch"]) == (1.25, {"held": True, "by": "scenario"})
+
+
+def test_history_goes_on_after_the_last_page_has_closed_until_its_span_ends(
+    arm: Arm, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    noted: queue.SimpleQueue[PageState] = queue.SimpleQueue()
+    monkeypatch.setattr(server, "lasting", lambda state, _: noted.put(state))
+    monkeypatch.setattr(server, "SPAN", 3.0)
+    with arm.page() as page:
+        update(page)
+    arm.next(server.Closed)
+    arm.state = PageState(arm=state.Arm(speed=1.0))
+
+    while noted.get(timeout=5.0) is not arm.state:
+        pass
+    rest = itertools.islice(iter(lambda: noted.get(timeout=1.5), None), 200)
+    with pytest.raises(queue.Empty):
+        list(rest)
 
 
 def test_refusal_reaches_its_page_only(arm: Arm) -> None:
