@@ -25,10 +25,10 @@ from deploy.promises.history import (
     target_name,
 )
 
-LEFT, ROW, BAR = 150, 26, 14  # px: labels, rows, bars
+LEFT, ROW, BAR = 150, 26, 14  # px: names of rows, rows, bars
 PER_SECOND, PER_SECOND_LONG, NARROWEST = 8.0, 3.0, 1000.0  # px of a timeline
 LONG = 240.0  # s; a longer timeline is drawn at a smaller scale
-CHARACTER = 5.2  # px, of a fault's label
+CHARACTER = 6.0  # px
 TOP, HISTOGRAM, BIN = 10, 140, 0.1  # px, px, s of a histogram
 SHORT_AXIS, LONG_AXIS = 2.2, 5.2  # s
 
@@ -42,7 +42,7 @@ COLORS = """
 """
 STYLE = """
 svg text { font: 12px system-ui, sans-serif; fill: var(--text); } svg .soft { fill: var(--soft); }
-svg .label { font-size: 10px; } svg .title { font-size: 14px; font-weight: 600; }
+svg .title { font-size: 14px; font-weight: 600; }
 svg .figures { white-space: pre; }
 svg .grid { stroke: var(--line); } svg .bound { stroke: var(--bad); stroke-dasharray: 4 3; }
 svg .card { fill: var(--card); stroke: var(--line); }
@@ -155,7 +155,7 @@ def _marks(history: History, row: str, x: Callable[[float], float], top: int) ->
         label = f"{number} {fault.kind}"
         if CHARACTER * len(label) + 8 > following - left:
             label = str(number)
-        yield _tag("text", escape(label), class_="label", x=left + 5, y=top + 11)
+        yield _tag("text", escape(label), x=left + 5, y=top + 11)
 
 
 def _rows(fault: InjectedFault) -> tuple[str, ...]:
@@ -186,7 +186,7 @@ def _legend(y: float, history: History, findings: Sequence[Finding]) -> Iterator
         else:
             yield _tag("rect", class_=kind, x=left, y=y, width=16, height=3 if kind == "flow" else 8)
         yield _tag("text", text, class_="soft", x=left + 22, y=y + 8)
-        left += 44 + 6.0 * len(text)
+        left += 44 + CHARACTER * len(text)
 
 
 def histograms(durations: dict[str, list[float]], bounds: Sequence[float]) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 
-from deploy.promises.charts import COLORS, STYLE, histograms, timeline
+from deploy.promises.charts import COLORS, LEFT, STYLE, histograms, timeline
 from deploy.promises.findings import UNKNOWN, VIOLATED, Finding, count, overall
 from deploy.promises.history import ALL, NO_TARGET, History, InjectedFault, Life, target_name
 from deploy.promises.limits import DURATIONS
@@ -21,6 +21,9 @@ h1 { margin: 0; font-size: 26px; } h2 { margin: 36px 0 10px; font-size: 18px; }
 p { margin: 4px 0; color: var(--soft); }
 .card { background: var(--card); border: 1px solid var(--line); border-radius: 10px; padding: 14px 18px;
   overflow-x: auto; }
+.chart { display: flex; } .chart > svg { flex: none; }
+.chart .names { position: sticky; left: 0; height: auto; background: var(--card);
+  box-shadow: -18px 0 var(--card); }
 table { border-collapse: collapse; width: 100%; } td, th { padding: 6px 10px; text-align: left;
   border-bottom: 1px solid var(--line); vertical-align: top; } tr:last-child td { border: 0; }
 th { color: var(--soft); font-weight: 500; font-size: 13px; }
@@ -64,15 +67,26 @@ def html(title: str, remarks: Sequence[str], findings: Sequence[Finding], histor
         f"<h1 class={overall(findings).lower()}>{verdict(findings)}</h1>",
         *(f"<p>{escape(remark)}</p>" for remark in remarks),
         f"<h2>Promises</h2><div class=card>{_promises(findings)}</div>",
-        f"<h2>Timeline</h2><p>{LEGEND}</p><div class=card>{picture}</div>",
+        f"<h2>Timeline</h2><p>{LEGEND}</p>{_chart(picture, 'timeline')}",
         f"<h2>Faults</h2><div class=card>{_faults(history)}</div>",
     ]
     for finding in findings:
         if finding.times:
             durations = DURATIONS[finding.promise]
             picture = histograms(finding.times, durations.limits)
-            lines.append(f"<h2>{durations.title}</h2><div class=card>{picture}</div>")
+            lines.append(f"<h2>{durations.title}</h2>{_chart(picture, finding.promise)}")
     return "\n".join(lines) + "\n"
+
+
+def _chart(picture: str, name: str) -> str:
+    """Return a card with a picture that moves sideways, while the names of its rows stay.
+
+    :param name: of the picture in the page.
+    """
+    width = LEFT - 14  # px: before the first label of the axis
+    style = f"width: {width}px; margin-right: -{width}px"
+    names = f"<svg class=names style='{style}' aria-hidden=true><use href='#{name}' /></svg>"
+    return f"<div class='card chart'>{names}{picture.replace('<svg', f'<svg id={name}', 1)}</div>"
 
 
 def _promises(findings: Sequence[Finding]) -> str:

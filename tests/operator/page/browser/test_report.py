@@ -17,8 +17,15 @@ TOO_WIDE = """
     .filter((it) => it.scrollWidth > it.clientWidth).map((it) => it.textContent)
 """
 SMALL = """
-(least) => [...document.querySelectorAll("h1, h2, p, td, .evidence")]
+(least) => [...document.querySelectorAll("h1, h2, p, td, .evidence, text")]
     .filter((it) => parseFloat(getComputedStyle(it).fontSize) < least).map((it) => it.textContent)
+"""
+SCROLL = """
+() => [...document.querySelectorAll(".chart")].map((card) => {
+    card.scrollLeft = card.scrollWidth;
+    const names = card.querySelector(".names").getBoundingClientRect();
+    return [card.scrollLeft, names.left - card.getBoundingClientRect().left, names.height];
+})
 """
 
 
@@ -32,3 +39,7 @@ def test_report_is_read_without_moving_its_tables(browser: Any, width: int) -> N
         assert page.evaluate("document.documentElement.scrollWidth") <= width
         assert page.evaluate(TOO_WIDE) == []
         assert page.evaluate(SMALL, LEGIBLE) == []
+        for scrolled, left, height in page.evaluate(SCROLL):
+            assert (width > 1000) or scrolled > 0
+            assert 0 <= left <= 20, "the names of the rows stay"
+            assert height > 200
