@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import socket
 import sys
 import time
 from collections.abc import Mapping
@@ -17,7 +18,7 @@ from interfaces.service.health import Health, heard_healths
 from reactive_node import ReactiveNode
 from reactive_node.executor import create_executor
 
-VICTIM = "kinematics"
+VICTIM = socket.gethostname(), "kinematics"
 LIMIT = 10.0  # s
 
 
@@ -29,17 +30,17 @@ def main() -> int:
     executor = create_executor()
     executor.add_node(node)
 
-    def other_than(pid: int, health: Mapping[str, Health]) -> Health:
+    def other_than(pid: int, health: Mapping[tuple[str, str], Health]) -> Health:
         deadline = time.monotonic() + LIMIT
         while VICTIM not in health or health[VICTIM].pid == pid:
             if time.monotonic() > deadline:
-                raise TimeoutError(f"{VICTIM} is not heard within {LIMIT:g} s")
+                raise TimeoutError(f"{VICTIM[1]} is not heard within {LIMIT:g} s")
             executor.spin_once(timeout_sec=0.1)
         return health[VICTIM]
 
     with heard_healths(node) as health:
         pid = other_than(0, health).pid
-        processes.send_signal(processes.run_directory(), VICTIM, pid, signal.SIGKILL)
+        processes.send_signal(processes.run_directory(), VICTIM[1], pid, signal.SIGKILL)
         killed = time.monotonic()
         print(other_than(pid, health).heard - killed)
     executor.shutdown()

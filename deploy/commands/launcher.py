@@ -11,6 +11,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import AbstractContextManager, ExitStack, closing, contextmanager, suppress
 from typing import TYPE_CHECKING, NoReturn
 
+from deploy.commands.status import health_of, of_services
 from deploy.commands.stop import stop
 from deploy.operator.output import accept_any_text, say
 from deploy.running import interruption, manifest, messages, rclpy_choice
@@ -114,7 +115,6 @@ def status(system: System) -> None:
         return
     from deploy.commands import hosts
     from deploy.commands.member import Member
-    from deploy.commands.status import of_services
     from interfaces.service.health import heard_healths
 
     programs = system.programs()
@@ -133,13 +133,16 @@ def status(system: System) -> None:
         with Member() as member, heard_healths(member.node) as health, hosts.heard(member.node) as others:
             deadline = time.monotonic() + STATUS_LIMIT
             _listen(member, running, health, STATUS_LIMIT)
-            while not elsewhere <= health.keys() & others.processes.keys() and time.monotonic() < deadline:
+            theirs = others.processes
+            while time.monotonic() < deadline and not all(
+                name in theirs and health_of(theirs[name], health) for name in elsewhere
+            ):
                 member.spin_once()
     except DeploymentError:  # for example, its keys have ended; supervisord tells its part
         print(of_services(programs, {}))
         raise
     print(others.clocks(), end="")
-    programs += [others.processes[name] for name in host_of if name in elsewhere & others.processes.keys()]
+    programs += [theirs[name] for name in host_of if name in elsewhere & theirs.keys()]
     print(of_services(programs, health, host_of if elsewhere else {}))
 
 
@@ -227,7 +230,7 @@ def _await_services(system: System, member: Member, log_sizes: dict[str, int]) -
 
     deadline = time.monotonic() + START_LIMIT
     with heard_healths(member.node) as health:
-        while missing := [program for program in system.programs() if not _reports(program, health)]:
+        while missing := [program for program in system.programs() if not health_of(program, health)]:
             for program in missing:
                 if program.state in ("BACKOFF", "FATAL") or program.restarts >= START_ATTEMPTS:
                     words = _last_words(system, program, log_sizes.get(program.name, 0))
@@ -239,9 +242,11 @@ def _await_services(system: System, member: Member, log_sizes: dict[str, int]) -
             _listen(member, missing, health, LOOK_PERIOD)
 
 
-def _listen(member: Member, programs: list[Program], health: Mapping[str, Health], limit: float) -> None:
+def _listen(
+    member: Member, programs: list[Program], health: Mapping[tuple[str, str], Health], limit: float
+) -> None:
     deadline = time.monotonic() + limit
-    while not all(_reports(program, health) for program in programs) and time.monotonic() < deadline:
+    while not all(health_of(program, health) for program in programs) and time.monotonic() < deadline:
         member.spin_once()
 
 
@@ -253,11 +258,6 @@ def _last_words(system: System, program: Program, begin: int) -> str:
         lines = {line: None for line in lines if not line.startswith(RUN)}
         return "\n".join(list(lines)[-LOG_LINES:]) or program.error
     return program.error
-
-
-def _reports(program: Program, health: Mapping[str, Health]) -> bool:
-    """Whether this very process, not one of another system in the domain, has reported its health."""
-    return program.name in health and health[program.name].pid == program.pid
 
 
 def _show(system: System, member: Member, *, owner: bool = False) -> None:

@@ -62,11 +62,11 @@ def reported(message: DiagnosticArray, namespace: str) -> list[Program]:
         name, _, process = status.name.partition(": ")
         if process == values.get("process") and node.fullmatch(name):
             with suppress(KeyError, ValueError):  # not a report of ours
-                found.append(_program(values))
+                found.append(_program(values, status.hardware_id))
     return found
 
 
-def _program(values: Mapping[str, str]) -> Program:
+def _program(values: Mapping[str, str], host: str) -> Program:
     return Program(
         name=values["process"],
         state=values["state"],
@@ -76,6 +76,7 @@ def _program(values: Mapping[str, str]) -> Program:
         exit=values["last exit"],
         error="",
         away=seconds(values["away"]),
+        host=host,
     )
 
 

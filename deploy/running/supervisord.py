@@ -36,6 +36,8 @@ class Program(NamedTuple):
     """supervisord's words about the last start or end"""
     away: float = 0.0
     """[s] from the last end of a process to the next start; 0 before the first"""
+    host: str = ""
+    """the name of its host, as a sentinel reports it; '' for this host"""
 
 
 def start(run: Path, environment: Mapping[str, str], within: Sequence[str] = ()) -> int:

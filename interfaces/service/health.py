@@ -203,11 +203,19 @@ def listening(node: Node, hear: Callable[[DiagnosticArray], None]) -> Iterator[N
 
 
 @contextmanager
-def heard_healths(node: Node) -> Iterator[dict[str, Health]]:
-    """Listen to /diagnostics: the latest health of each service in the namespace of a node, by program."""
-    latest: dict[str, Health] = {}
+def heard_healths(node: Node) -> Iterator[dict[tuple[str, str], Health]]:
+    """Listen to /diagnostics: the latest health of each service in the namespace of a node.
+
+    It is kept by host and program: two hosts may run the same program, by mistake.
+    """
+    latest: dict[tuple[str, str], Health] = {}
     namespace = node.get_namespace().rstrip("/")
-    with listening(node, lambda message: latest.update(healths(message, namespace))):
+
+    def hear(message: DiagnosticArray) -> None:
+        for program, health in healths(message, namespace).items():
+            latest[health.host, program] = health
+
+    with listening(node, hear):
         yield latest
 
 

@@ -1,12 +1,15 @@
 from __future__ import annotations
 
+import socket
 import time
 
 import pytest
 
-from deploy.commands.status import of_services
+from deploy.commands.status import health_of, of_services
 from deploy.running.supervisord import Program
 from interfaces.service.health import Health
+
+HERE = socket.gethostname()
 
 
 def health(pid: int, *, since_output: float | None = 0.0, reason: str = "") -> Health:
@@ -22,10 +25,10 @@ def test_the_table_shows_each_service(monkeypatch: pytest.MonkeyPatch) -> None:
         Program("engine_controller", "BACKOFF", 0, 0.0, 7, "", ""),
     ]
     reports = {
-        "kinematics": health(101, since_output=0.2, reason="l1: nan is not finite"),
-        "velocity": health(102, since_output=None),
-        "operator_watchdog": health(99),  # the previous process
-        "engine_controller": health(104),
+        (HERE, "kinematics"): health(101, since_output=0.2, reason="l1: nan is not finite"),
+        (HERE, "velocity"): health(102, since_output=None),
+        (HERE, "operator_watchdog"): health(99),  # the previous process
+        (HERE, "engine_controller"): health(104),
     }
     assert of_services(programs, reports).splitlines() == [
         "SERVICE            STATE    PID  UPTIME   RESTARTS  LAST OUTPUT  HEALTH",
@@ -34,6 +37,16 @@ def test_the_table_shows_each_service(monkeypatch: pytest.MonkeyPatch) -> None:
         "operator_watchdog  RUNNING  103  0:00:01  1         -            no report",
         "engine_controller  BACKOFF  -    -        7         -            -",
     ]
+
+
+def test_report_of_another_host_is_not_taken_for_that_of_a_process_with_the_same_pid() -> None:
+    ours = Program("drive", "RUNNING", 7, 1.0, 0, "", "")
+    theirs = ours._replace(host="desk")
+    own, other = health(7), health(7, reason="slow")
+    assert health_of(ours, {("desk", "drive"): other}) is None
+    both = {("desk", "drive"): other, (HERE, "drive"): own}
+    assert health_of(ours, both) is own
+    assert health_of(theirs, both) is other
 
 
 def test_the_table_names_the_hosts_if_there_are_two() -> None:

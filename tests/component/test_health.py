@@ -20,9 +20,10 @@ from services import dead_mans_switch, operator_watchdog
 GOOD = {"pid": "7", "published": "3", "seconds_since_output": "0.5"}
 
 
-def message(name: str, values: dict[str, Any]) -> DiagnosticArray:
+def message(name: str, values: dict[str, Any], host: str = "") -> DiagnosticArray:
     pairs = [KeyValue(key=key, value=value) for key, value in values.items()]
-    return DiagnosticArray(status=[DiagnosticStatus(name=name, message="running", values=pairs)])
+    status = DiagnosticStatus(name=name, message="running", hardware_id=host, values=pairs)
+    return DiagnosticArray(status=[status])
 
 
 def test_report_of_a_service_in_the_namespace_is_read() -> None:
@@ -70,17 +71,19 @@ def test_report_without_pid_is_ignored_but_not_the_others() -> None:
 
 
 @pytest.mark.parametrize("namespace", ["", "/armX"])
-def test_latest_report_of_each_service_is_kept(
+def test_latest_report_of_each_service_of_each_host_is_kept(
     make_node: MakeNode, spin_until: SpinUntil, namespace: str
 ) -> None:
     publisher = make_node("peer").create_publisher(DIAGNOSTICS.type, DIAGNOSTICS.name, DIAGNOSTICS.qos)
     with heard_healths(make_node("listener", namespace=namespace)) as latest:
         spin_until(publisher.get_subscription_count)
-        for name, pid in (("velocity", "7"), ("kinematics", "8"), ("velocity", "9")):
-            publisher.publish(message(f"{namespace}/{name}", GOOD | {"pid": pid}))
-        spin_until(lambda: {name: health.pid for name, health in latest.items()}.get("velocity") == 9)
+        told = [("a", "velocity", 7), ("a", "kinematics", 8), ("b", "velocity", 7), ("a", "velocity", 9)]
+        for host, name, pid in told:
+            publisher.publish(message(f"{namespace}/{name}", GOOD | {"pid": str(pid)}, host))
+        spin_until(lambda: ("a", "velocity") in latest and latest["a", "velocity"].pid == 9)
 
-    assert {name: health.pid for name, health in latest.items()} == {"velocity": 9, "kinematics": 8}
+    pids = {process: health.pid for process, health in latest.items()}
+    assert pids == {("a", "velocity"): 9, ("a", "kinematics"): 8, ("b", "velocity"): 7}
     spin_until(lambda: not publisher.get_subscription_count())
 
 

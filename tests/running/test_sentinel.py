@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import os
+import socket
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -178,7 +179,7 @@ def test_states_are_read_as_they_were_published() -> None:
         program("velocity", "BACKOFF"),
     ]
     message = DiagnosticArray(status=states(programs, {}, {}, "/arm/sentinel"))
-    assert reported(message, "/arm") == programs
+    assert reported(message, "/arm") == [each._replace(host=socket.gethostname()) for each in programs]
     assert reported(message, "") == []
 
 
