@@ -44,10 +44,10 @@ class Arm(NamedTuple):
     domain: int
     engines: Told = Told()
     operator: Told = Told()
-    healths: Mapping[str, Health] = {}
-    """What was last heard of each program."""
-    states: Mapping[str, str] = {}
-    """The state of each process, as the sentinel sees it."""
+    healths: Mapping[tuple[str, str], Health] = {}
+    """What was last heard, by host and program."""
+    states: Mapping[tuple[str, str], str] = {}
+    """The state of each process as the sentinel of its host sees it, by host and program."""
     reports: Mapping[str, Any] = {}
     """The latest report of each program, as it came."""
 
@@ -80,7 +80,7 @@ def watched(arm: Arm, seen: Seen, clock: Clock) -> Observable[Arm]:
 def _health(message: Any) -> Change:
     def change(arm: Arm) -> Arm:
         namespace = arm.name.rstrip("/")
-        states = {program.name: program.state for program in reported(message, namespace)}
+        states = {(program.host, program.name): program.state for program in reported(message, namespace)}
         news = healths(message, namespace)
         reports = {
             program: status
@@ -89,7 +89,7 @@ def _health(message: Any) -> Change:
             if status.name == f"{namespace}/{program}"
         }
         return arm._replace(
-            healths={**arm.healths, **news},
+            healths={**arm.healths, **{(it.host, program): it for program, it in news.items()}},
             states={**arm.states, **states},
             reports={**arm.reports, **reports},
         )
@@ -106,7 +106,7 @@ def row(arm: Arm, now: float) -> tuple[str, ...]:
     operator = arm.operator.value
     if operator == ALIVE and now - arm.operator.at >= LONGEST_SILENCE:
         operator = ""
-    hosts = {health.host for health in arm.healths.values()}
+    hosts = {host for host, _ in _present(arm, now)}
     return (
         arm.name,
         str(arm.domain),
@@ -129,14 +129,31 @@ def _bound(arm: Arm) -> str:
 
 def _in_words(arm: Arm, now: float) -> str:
     """Return the health of an arm: how many programs are well, or the first problem."""
-    silent = {name for name, health in arm.healths.items() if now - health.heard >= LONGEST_SILENCE}
-    if len(silent) == len(arm.healths):
+    healths = _present(arm, now)
+    silent = {name for (_, name), health in healths.items() if now - health.heard >= LONGEST_SILENCE}
+    if silent == {name for _, name in healths}:
         return SILENT
-    problems = {name: health.reason for name, health in arm.healths.items() if not health.ok}
+    problems = {name: health.reason for (_, name), health in healths.items() if not health.ok}
     problems |= dict.fromkeys(silent, SILENT)
-    problems |= {name: state for name, state in arm.states.items() if state not in ("STARTING", "RUNNING")}
+    hosts = {host for host, _ in healths}
+    problems |= {
+        name: state
+        for (host, name), state in arm.states.items()
+        if host in hosts and state not in ("STARTING", "RUNNING")
+    }
     if not problems:
-        return f"{len(arm.healths)} ok"
+        return f"{len(healths)} ok"
     first = min(problems)
     more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
     return f"{first}: {problems[first]}{more}"
+
+
+def _present(arm: Arm, now: float) -> dict[tuple[str, str], Health]:
+    """Return the healths without those of silent processes that another host has replaced."""
+    old = {process for process, health in arm.healths.items() if now - health.heard >= LONGEST_SILENCE}
+    heard = {program for _, program in arm.healths.keys() - old}
+    return {
+        (host, program): health
+        for (host, program), health in arm.healths.items()
+        if (host, program) not in old or program not in heard
+    }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import socket
 from typing import Any
 
 import pytest
@@ -19,13 +20,13 @@ Script = list[tuple[float, Topic, Any]]
 """When a message arrives [s], on which topic, and its value."""
 
 
-def health(program: str, *, ok: bool = True, **values: str) -> DiagnosticArray:
+def health(program: str, *, ok: bool = True, host: str = "robot1", **values: str) -> DiagnosticArray:
     given = {"pid": "7", "published": "1", **values}
     status = DiagnosticStatus(
         name=program,
         level=DiagnosticStatus.OK if ok else DiagnosticStatus.WARN,
         message="running" if ok else "too old",
-        hardware_id="robot1",
+        hardware_id=host,
         values=[KeyValue(key=key, value=value) for key, value in given.items()],
     )
     return DiagnosticArray(status=[status])
@@ -93,7 +94,7 @@ UNUSABLE = ["soon", 100_000 * "[", '"soon"', "[1.0]", "NaN", "1e400", "1" + 400 
 def test_bound_of_an_unusable_parameter_is_unknown(value: str) -> None:
     report = health("/arm1/engine_controller", **{"parameter presence_timeout": value})
     arm = last([(1.0, DIAGNOSTICS, report)])
-    assert row(arm, arm.healths["engine_controller"].heard)[5:] == ("1 ok", "-")
+    assert row(arm, arm.healths["robot1", "engine_controller"].heard)[5:] == ("1 ok", "-")
 
 
 @pytest.mark.parametrize(("sampling", "silence"), [("0.5", "0.1"), ('"b"', '"a"')])
@@ -103,10 +104,10 @@ def test_bound_of_parameters_that_contradict_each_other_is_unknown(sampling: str
     assert row(arm, 0.0)[-1] == "-"
 
 
-def well(heard: float, **problems: str) -> Arm:
-    """Return an arm of three programs, some of which report a problem."""
+def well(heard: float, host: str = "robot1", **problems: str) -> Arm:
+    """Return an arm of three programs on one host, some of which report a problem."""
     reports = {
-        name: Health(heard, 7, name not in problems, problems.get(name, "running"), None)
+        (host, name): Health(heard, 7, name not in problems, problems.get(name, "running"), None)
         for name in ("drive", "kinematics", "velocity")
     }
     return Arm("/", 0, Told(ON, heard), Told(ALIVE, heard), reports)
@@ -127,8 +128,43 @@ def test_first_problem_of_an_arm_is_shown(problems: dict[str, str], words: str) 
 def test_process_that_does_not_run_is_a_problem() -> None:
     program = Program("drive", "FATAL", 0, 0.0, 3, "exit code 1", "")
     states = DiagnosticArray(status=sentinel.states([program], {}, {}, "/arm1/sentinel"))
-    arm = last([(1.0, DIAGNOSTICS, health("/arm1/velocity")), (1.1, DIAGNOSTICS, states)])
-    assert row(arm, arm.healths["velocity"].heard)[5] == "drive: FATAL"
+    here = socket.gethostname()
+    arm = last([(1.0, DIAGNOSTICS, health("/arm1/velocity", host=here)), (1.1, DIAGNOSTICS, states)])
+    assert row(arm, arm.healths[here, "velocity"].heard)[5] == "drive: FATAL"
+
+
+@pytest.mark.parametrize("ok", [(True, True), (False, True), (True, False)])
+def test_program_on_two_hosts_counts_twice_and_a_problem_of_either_is_shown(ok: tuple[bool, bool]) -> None:
+    reports = [health("/arm1/drive", ok=good, host=host) for good, host in zip(ok, "ab", strict=True)]
+    arm = last([(at, DIAGNOSTICS, report) for at, report in enumerate(reports, start=1)])
+    shown = row(arm, arm.healths["b", "drive"].heard)
+    assert (shown[2], shown[5]) == ("a, b", "2 ok" if all(ok) else "drive: too old")
+
+
+def test_state_of_a_process_on_one_host_hides_no_other() -> None:
+    arm = last(
+        [
+            (1.0, DIAGNOSTICS, health("/arm1/drive", host="a")),
+            (1.1, DIAGNOSTICS, health("/arm1/drive", host="b")),
+            (1.2, DIAGNOSTICS, told_by("a", "FATAL")),
+            (1.3, DIAGNOSTICS, told_by("b", "RUNNING")),
+        ]
+    )
+    assert row(arm, arm.healths["b", "drive"].heard)[5] == "drive: FATAL"
+
+
+def told_by(host: str, state: str) -> DiagnosticArray:
+    """Return the state of a process as the sentinel of a host tells it."""
+    (status,) = sentinel.states([Program("drive", state, 7, 0.0, 0, "", "")], {}, {}, "/arm1/sentinel")
+    status.hardware_id = host
+    return DiagnosticArray(status=[status])
+
+
+def test_host_that_another_one_has_replaced_is_forgotten() -> None:
+    states = {("old", "drive"): "STOPPING", ("new", "drive"): "RUNNING"}
+    healths = {**well(1.0, host="old").healths, **well(10.0, host="new").healths}
+    shown = row(Arm("/", 0, healths=healths, states=states), 11.0)
+    assert (shown[2], shown[5]) == ("new", "3 ok")
 
 
 @pytest.mark.parametrize(("operator", "shown"), [(ALIVE, "-"), (MISSED, MISSED)])
@@ -139,8 +175,16 @@ def test_arm_that_falls_silent_shows_nothing_as_fresh(operator: str, shown: str)
 
 def test_service_that_falls_silent_is_a_problem() -> None:
     arm = well(10.0)
-    old = arm.healths["drive"]._replace(heard=8.0)
-    assert row(arm._replace(healths={**arm.healths, "drive": old}), 11.0)[5] == "drive: silent"
+    drive = "robot1", "drive"
+    old = arm.healths[drive]._replace(heard=8.0)
+    assert row(arm._replace(healths={**arm.healths, drive: old}), 11.0)[5] == "drive: silent"
+
+
+def test_host_that_falls_silent_is_still_named() -> None:
+    arm = well(10.0)
+    switch = Health(2.0, 7, True, "running", None)
+    arm = arm._replace(healths={**arm.healths, ("desk", "dead_mans_switch"): switch})
+    assert row(arm, 11.0)[2::3] == ("desk, robot1", "dead_mans_switch: silent")
 
 
 def test_arm_that_was_never_heard_is_silent() -> None:
