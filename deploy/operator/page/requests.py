@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import socket
 from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
@@ -76,12 +77,12 @@ class Configuration:
         return answer.map(lambda follows: follows_scenario(name, follows))
 
 
-def send_signal(request: Request, programs: Mapping[str, Program]) -> Observable[Change]:
-    """Kill or stop a process as a page asks; emit the refusal if that is not possible."""
+def send_signal(request: Request, programs: Mapping[tuple[str, str], Program]) -> Observable[Change]:
+    """Kill or stop a process of this host as a page asks; emit the refusal if that is not possible."""
     assert isinstance(request.message, protocol.Process)
     name, action = request.message
     run = os.environ.get(processes.MARK)
-    pid = programs.get(name, Program()).pid
+    pid = programs.get((socket.gethostname(), name), Program()).pid
     if not request.is_local:
         reason = "only pages on the machine of the arm may do this"
     elif run is None:

@@ -48,7 +48,7 @@ class Clock(NamedTuple):
 
 
 class Program(NamedTuple):
-    """A program, as the sentinel sees its process and as it reports its health."""
+    """A program on a host, as the sentinel sees its process and as it reports its health."""
 
     state: str = ""
     pid: int = 0
@@ -126,7 +126,8 @@ class PageState(NamedTuple):
     operator: Operator = Operator()
     hands: Hands = Hands()
     engines: Engines = Engines()
-    programs: Mapping[str, Program] = {}
+    programs: Mapping[tuple[str, str], Program] = {}
+    """By host and name."""
     heard_since: float = -math.inf
     """Since when the programs are heard."""
     loopback_is_up: bool = True
@@ -300,7 +301,7 @@ def _diagnostics(namespace: str) -> Callable[[PageState, Any, Clock], PageState]
         programs, now, engines = dict(state.programs), clock.now(), state.engines
         for name, health in healths(message.value, namespace).items():
             if name in PROGRAMS:
-                programs[name] = programs.get(name, Program())._replace(
+                programs[health.host, name] = programs.get((health.host, name), Program())._replace(
                     heard=now, ok=health.ok, reason=health.reason, since_output=health.since_output
                 )
             if health.since_turn_off is not None:
@@ -309,7 +310,8 @@ def _diagnostics(namespace: str) -> Callable[[PageState, Any, Clock], PageState]
                 engines = engines._replace(refused=(now, refusal[1].strip()))
         for process in reported(message.value, namespace):
             if process.name in PROGRAMS:
-                programs[process.name] = programs.get(process.name, Program())._replace(
+                key = process.host, process.name
+                programs[key] = programs.get(key, Program())._replace(
                     state=process.state, pid=process.pid, restarts=process.restarts, observed=now
                 )
         return state._replace(programs=programs, engines=engines)

@@ -28,9 +28,7 @@ def view(state: PageState, page: str, now: float) -> dict[str, Any]:
         "speed": arm.speed,
         **moment(state, page, now),
         "sources": {name: "hand" if name in state.by_hand else "scenario" for name in LIMITS},
-        "processes": [
-            _row(name, state.programs.get(name, Program()), now, state.loopback_is_up) for name in PROGRAMS
-        ],
+        "processes": [_row(name, state, now) for name in PROGRAMS],
     }
 
 
@@ -74,7 +72,20 @@ def _why(state: PageState, now: float) -> str:
     return "" if state.engines.state == ON else state.engines.reason(now, state.heard_since)
 
 
-def _row(name: str, program: Program, now: float, loopback_is_up: bool) -> dict[str, Any]:
+def _row(name: str, state: PageState, now: float) -> dict[str, Any]:
+    """Return the row of a program; if two hosts run it, that of the host where it has a problem."""
+    known = {host: program for (host, each), program in sorted(state.programs.items()) if each == name}
+    present = {
+        host: program
+        for host, program in known.items()
+        if now - max(program.heard, program.observed) <= HEALTH_TIMEOUT
+    }
+    programs = present or known or {"": Program()}
+    rows = [_row_of(name, program, now, state.loopback_is_up) for program in programs.values()]
+    return min(rows, key=lambda row: bool(row["ok"] and row["state"] == "RUNNING"))
+
+
+def _row_of(name: str, program: Program, now: float, loopback_is_up: bool) -> dict[str, Any]:
     # The health of the sentinel, which tells that the loopback interface is down, cannot be heard then.
     problem = f"loopback: {LOOPBACK_DOWN}" if name == manifest.sentinel() and not loopback_is_up else ""
     silence = now - program.heard

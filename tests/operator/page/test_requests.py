@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import socket
 from functools import reduce
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,10 @@ from deploy.operator.page.state import Change, PageState, Program
 from deploy.running import processes
 
 KILL = Request("page", Process("velocity", "kill"), is_local=True)
-PROGRAMS = {"velocity": Program(pid=7)}
+PROGRAMS = {
+    ("desk", "velocity"): Program(pid=8),
+    (socket.gethostname(), "velocity"): Program(pid=7),
+}
 
 
 @pytest.fixture
@@ -29,7 +33,7 @@ def sent(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[Any]:
     return signals
 
 
-def refusals(request: Request, programs: dict[str, Program]) -> list[tuple[str, str, str]]:
+def refusals(request: Request, programs: dict[tuple[str, str], Program]) -> list[tuple[str, str, str]]:
     changes: list[Change] = []
     requests.send_signal(request, programs).subscribe(changes.append)
     return list(reduce(lambda state, change: change(state), changes, PageState()).refusals.items)

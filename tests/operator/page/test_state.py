@@ -442,23 +442,27 @@ def diagnostics(*status: DiagnosticStatus) -> DiagnosticArray:
     return DiagnosticArray(status=list(status))
 
 
-def health(name: str, message: str = "running", since_output: str = "0.5", pid: int = 7) -> DiagnosticStatus:
+def health(
+    name: str, message: str = "running", since_output: str = "0.5", pid: int = 7, host: str = "robot1"
+) -> DiagnosticStatus:
     values = {"pid": str(pid), "published": "1", "seconds_since_output": since_output}
     return DiagnosticStatus(
         name=name,
         level=DiagnosticStatus.OK if message == "running" else DiagnosticStatus.WARN,
         message=message,
+        hardware_id=host,
         values=[KeyValue(key=key, value=value) for key, value in values.items()],
     )
 
 
 def process(
-    name: str, process_state: str = "RUNNING", pid: str = "7", restarts: str = "2"
+    name: str, process_state: str = "RUNNING", pid: str = "7", restarts: str = "2", host: str = "robot1"
 ) -> DiagnosticStatus:
     values = {"process": name, "state": process_state, "pid": pid, "restarts": restarts}
     values |= {"uptime": "1.0", "last exit": "", "away": "0.0"}
     return DiagnosticStatus(
         name=f"/arm/sentinel: {name}",
+        hardware_id=host,
         values=[KeyValue(key=key, value=value) for key, value in values.items()],
     )
 
@@ -490,6 +494,38 @@ def test_process_is_shown_with_state_and_health(play: Play) -> None:
         "ok": False,
         "health": "no health yet",
     }
+
+
+BOTH = ("robot1", "robot2")
+
+
+@pytest.mark.parametrize("bad", BOTH)
+def test_problem_of_either_of_two_hosts_of_a_program_is_shown(play: Play, bad: str) -> None:
+    for host in BOTH:
+        play.say(210, topics.DIAGNOSTICS, diagnostics(process("drive", host=host)))
+        words = "too old" if host == bad else "running"
+        play.say(210.5, topics.DIAGNOSTICS, diagnostics(health("/arm/drive", words, host=host)))
+
+    shown = row(play.run(212), "drive", 211)
+    assert (shown["state"], shown["ok"], shown["health"]) == ("RUNNING", False, "too old")
+
+
+@pytest.mark.parametrize("bad", BOTH)
+def test_state_of_a_process_on_one_host_hides_no_other(play: Play, bad: str) -> None:
+    for host in BOTH:
+        given = process("drive", "FATAL" if host == bad else "RUNNING", host=host)
+        play.say(210, topics.DIAGNOSTICS, diagnostics(given))
+        play.say(210.5, topics.DIAGNOSTICS, diagnostics(health("/arm/drive", host=host)))
+
+    assert row(play.run(212), "drive", 211)["state"] == "FATAL"
+
+
+def test_host_that_another_one_has_replaced_is_not_shown(play: Play) -> None:
+    for time, host in ((210, "old"), (220, "new")):
+        play.say(time, topics.DIAGNOSTICS, diagnostics(process("drive", host=host)))
+        play.say(time + 0.5, topics.DIAGNOSTICS, diagnostics(health("/arm/drive", host=host)))
+
+    assert row(play.run(222), "drive", 221)["ok"]
 
 
 def test_silent_process_looks_silent(play: Play) -> None:
