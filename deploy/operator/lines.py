@@ -77,20 +77,20 @@ class Batch(NamedTuple):
 
 
 class Complaints(NamedTuple):
-    known: dict[str, str]
-    """By the name of the service; empty if it does not complain."""
+    known: dict[tuple[str, str], str]
+    """By host and name of the service; empty if it does not complain."""
     new: Timestamp[str]
     """What was new in the latest message of ``/diagnostics``."""
 
 
 class Lives(NamedTuple):
-    """The lives of processes, by program."""
+    """The lives of processes, by host and program."""
 
-    told: dict[str, int]
+    told: dict[tuple[str, str], int]
     """The restarts that were told."""
-    died: dict[str, tuple[int, datetime]]
+    died: dict[tuple[str, str], tuple[int, datetime]]
     """The pid of the process, and when the one before it died."""
-    back: dict[str, tuple[int, datetime]]
+    back: dict[tuple[str, str], tuple[int, datetime]]
     """The pid of the process, and when it first told its health."""
     new: list[Line]
     """What was new in the latest message of ``/diagnostics``."""
@@ -204,7 +204,7 @@ def services(seen: Seen, namespace: str) -> Observable[Line]:
 
     def compare(before: Complaints, diagnostics: Timestamp[Any]) -> Complaints:
         now = dict(_complaints(diagnostics.value, namespace.rstrip("/")))
-        new = [f"{name}: {now[name]}" for name in now if now[name] and now[name] != before.known.get(name)]
+        new = [f"{key[1]}: {now[key]}" for key in now if now[key] and now[key] != before.known.get(key)]
         return Complaints(before.known | now, Timestamp("; ".join(new), diagnostics.timestamp))
 
     complaints = (
@@ -271,20 +271,20 @@ def deaths(seen: Seen, namespace: str) -> Observable[Line]:
     def compare(before: Lives, diagnostics: Timestamp[Any]) -> Lives:
         told, died, back, new = dict(before.told), dict(before.died), dict(before.back), []
         for name, health in healths(diagnostics.value, prefix).items():
-            if back.get(name, (0, FIRST))[0] != health.pid:
-                back[name] = health.pid, diagnostics.timestamp
+            if back.get((health.host, name), (0, FIRST))[0] != health.pid:
+                back[health.host, name] = health.pid, diagnostics.timestamp
         for program in reported(diagnostics.value, prefix):
-            name, pid = program.name, program.pid
-            if died.get(name, (0, FIRST))[0] != pid:  # by the first report, which is not repeated but new
-                died[name] = pid, diagnostics.timestamp - timedelta(seconds=program.uptime + program.away)
-            deaths = program.restarts - told.setdefault(name, program.restarts)
+            key, pid = (program.host, program.name), program.pid
+            if died.get(key, (0, FIRST))[0] != pid:  # by the first report, which is not repeated but new
+                died[key] = pid, diagnostics.timestamp - timedelta(seconds=program.uptime + program.away)
+            deaths = program.restarts - told.setdefault(key, program.restarts)
             if deaths < 0:  # a new supervisord begins to count again
-                told[name] = program.restarts
-            elif deaths and pid and back.get(name, (0, FIRST))[0] == pid:
-                told[name], returned = program.restarts, back[name][1]
+                told[key] = program.restarts
+            elif deaths and pid and back.get(key, (0, FIRST))[0] == pid:
+                told[key], returned = program.restarts, back[key][1]
                 how = f"died {deaths} times, last" if deaths > 1 else "died"
-                away = (returned - died[name][1]).total_seconds()
-                text = f"{name} {how} ({program.exit}), back after {away:.1f} s"
+                away = (returned - died[key][1]).total_seconds()
+                text = f"{program.name} {how} ({program.exit}), back after {away:.1f} s"
                 new.append(Line(returned, Kind.PROCESS, text))
         return Lives(told, died, back, new)
 
@@ -404,8 +404,8 @@ def _turn_offs(diagnostics: Timestamp[Any], namespace: str) -> Iterator[tuple[da
             yield diagnostics.timestamp - timedelta(seconds=health.since_turn_off), name
 
 
-def _complaints(diagnostics: Any, namespace: str) -> Iterator[tuple[str, str]]:
+def _complaints(diagnostics: Any, namespace: str) -> Iterator[tuple[tuple[str, str], str]]:
     for status in diagnostics.status:
         path, _, service = status.name.rpartition("/")
         if path == namespace:
-            yield service, "" if status.level == type(status).OK else status.message
+            yield (status.hardware_id, service), "" if status.level == type(status).OK else status.message

@@ -345,17 +345,21 @@ def test_clock_of_another_host_is_shown_when_it_is_known_and_when_that_matters(p
     ]
 
 
-def processes(time: float, restarts: int, pid: int, age: float = 0.25) -> Message:
+def processes(time: float, restarts: int, pid: int, age: float = 0.25, host: str = "robot1") -> Message:
     """What the sentinel tells; the process is `age` old, and there was none for 0.05 s before."""
     state = "RUNNING" if pid else "BACKOFF"
     program = Program("kinematics", state, pid, age, restarts, "code 1", "", 0.05)
-    return time, topics.DIAGNOSTICS, DiagnosticArray(status=sentinel.states([program], {}, {}, "/sentinel"))
+    (status,) = sentinel.states([program], {}, {}, "/sentinel")
+    status.hardware_id = host
+    return time, topics.DIAGNOSTICS, DiagnosticArray(status=[status])
 
 
-def alive(time: float, pid: int) -> Message:
+def alive(time: float, pid: int, *, host: str = "robot1", problem: str = "") -> Message:
     pairs = {"pid": str(pid), "published": "1", "seconds_since_output": ""}
     values = [KeyValue(key=key, value=value) for key, value in pairs.items()]
-    status = DiagnosticStatus(name="/kinematics", level=DiagnosticStatus.OK, message="running", values=values)
+    level = DiagnosticStatus.WARN if problem else DiagnosticStatus.OK
+    status = DiagnosticStatus(name="/kinematics", level=level, message=problem or "running", values=values)
+    status.hardware_id = host
     return time, topics.DIAGNOSTICS, DiagnosticArray(status=[status])
 
 
@@ -392,6 +396,14 @@ def test_new_supervisord_is_no_death_of_its_processes(play: Play) -> None:
     script = [processes(1, 3, pid=7), processes(2, 0, pid=8), alive(2.1, pid=8), processes(3, 0, pid=8)]
     script += [processes(4, 1, pid=9), alive(4.1, pid=9), processes(5, 1, pid=9)]
     assert deaths(play(script)) == [DIED(0.4)]
+
+
+def test_program_that_two_hosts_run_is_told_apart(play: Play) -> None:
+    script = [processes(1, 0, pid=7), alive(1.1, pid=7)]
+    for second in (2, 3, 4):
+        script += [processes(second, 0, pid=7), processes(second + 0.2, 5, pid=8, host="robot2")]
+        script += [alive(second + 0.4, pid=7), alive(second + 0.6, pid=8, host="robot2", problem="too old")]
+    assert texts(play(script)) == ["kinematics: too old"]
 
 
 @pytest.mark.parametrize("age", [-1e300, 1e300, math.inf, math.nan])
