@@ -82,7 +82,9 @@ def _row(name: str, state: PageState, now: float) -> dict[str, Any]:
     }
     programs = present or known or {"": Program()}
     rows = [_row_of(name, program, now, state.loopback_is_up) for program in programs.values()]
-    return min(rows, key=lambda row: bool(row["ok"] and row["state"] == "RUNNING"))
+    worst = min(rows, key=lambda row: bool(row["ok"] and row["state"] == "RUNNING"))
+    there_are_several = len({host for host, _ in state.programs}) > 1
+    return worst | {"host": ", ".join(programs) if there_are_several else ""}
 
 
 def _row_of(name: str, program: Program, now: float, loopback_is_up: bool) -> dict[str, Any]:

@@ -478,6 +478,7 @@ def test_process_is_shown_with_state_and_health(play: Play) -> None:
 
     assert row(found, "kinematics", 211) == {
         "name": "kinematics",
+        "host": "",
         "state": "RUNNING",
         "pid": 7,
         "restarts": 2,
@@ -487,6 +488,7 @@ def test_process_is_shown_with_state_and_health(play: Play) -> None:
     }
     assert row(found, "velocity", 211) == {
         "name": "velocity",
+        "host": "",
         "state": "BACKOFF",
         "pid": 0,
         "restarts": 2,
@@ -520,12 +522,27 @@ def test_state_of_a_process_on_one_host_hides_no_other(play: Play, bad: str) -> 
     assert row(play.run(212), "drive", 211)["state"] == "FATAL"
 
 
+def test_hosts_are_shown_if_there_is_more_than_one(play: Play) -> None:
+    for host, *programs in (("robot1", "drive", "velocity"), ("robot2", "drive", "operator_page")):
+        reports = [health(f"/arm/{program}", host=host) for program in programs]
+        play.say(210 if host == "robot1" else 220, topics.DIAGNOSTICS, diagnostics(*reports))
+
+    found = play.run(222)
+    shown = {row["name"]: row["host"] for row in view(found, "page", 211)["processes"]}
+    assert {name: host for name, host in shown.items() if host} == {
+        "drive": "robot1, robot2",
+        "velocity": "robot1",
+        "operator_page": "robot2",
+    }
+
+
 def test_host_that_another_one_has_replaced_is_not_shown(play: Play) -> None:
     for time, host in ((210, "old"), (220, "new")):
         play.say(time, topics.DIAGNOSTICS, diagnostics(process("drive", host=host)))
         play.say(time + 0.5, topics.DIAGNOSTICS, diagnostics(health("/arm/drive", host=host)))
 
-    assert row(play.run(222), "drive", 221)["ok"]
+    shown = row(play.run(222), "drive", 221)
+    assert (shown["ok"], shown["host"]) == (True, "new")
 
 
 def test_silent_process_looks_silent(play: Play) -> None:

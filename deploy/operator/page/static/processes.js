@@ -57,6 +57,7 @@ export class Processes {
     const cell = (column, ...children) => create("td", { "data-column": column }, ...children);
     const sign = create("span", { class: "sign", "data-sign": "idle", "aria-hidden": "true" });
     const state = create("span", {}, "not known");
+    const host = create("small", { class: "muted" });
     const cells = { restarts: cell("restarts"), output: cell("output"), health: cell("health") };
     const buttons = Object.entries(ACTIONS).map(([action, label]) => {
       const attributes = { type: "button", "data-action": action, "aria-label": `${label} ${name}` };
@@ -71,7 +72,7 @@ export class Processes {
     const row = create(
       "tr",
       { "data-process": name },
-      create("th", { scope: "row" }, ...breakable(name)),
+      create("th", { scope: "row" }, ...breakable(name), host),
       cell("state", sign, state),
       cells.restarts,
       cells.output,
@@ -79,7 +80,7 @@ export class Processes {
       create("td", { class: "local", "data-column": "actions" }, ...buttons),
     );
     byId("processes").tBodies[0].append(row);
-    this._rows.set(name, { row, sign, state, ...cells, buttons, ...UNSEEN });
+    this._rows.set(name, { row, host, sign, state, ...cells, buttons, ...UNSEEN });
   }
 
   _update(entry, process, time) {
@@ -96,6 +97,7 @@ export class Processes {
       setAttributes(entry.row, { "data-ok": process.ok ? "yes" : "no", "data-state": process.state.toLowerCase() });
       setAttributes(entry.sign, { "data-sign": isGood ? "good" : process.state === "STARTING" ? "warn" : "bad" });
       setText(entry.state, !process.ok && process.state === "RUNNING" ? "unhealthy" : process.state.toLowerCase());
+      setText(entry.host, process.host);
       setText(entry.restarts, String(process.restarts));
       setText(entry.output, process.since_output === null ? "–" : `${duration(process.since_output)} ago`);
     }

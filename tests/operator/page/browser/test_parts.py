@@ -22,8 +22,8 @@ async () => {
     const health = () => row().querySelector("[data-column=health]").textContent;
     const show = (welcome, time, state, pid) => {
         const ok = state === "RUNNING";
-        const process = { name: "velocity", state, pid, restarts: 0, ok, since_output: 0, health: "good" };
-        table.render({ processes: [process], welcome, time }, true);
+        const told = { host: "", restarts: 0, since_output: 0, health: "good" };
+        table.render({ processes: [{ ...told, name: "velocity", state, pid, ok }], welcome, time }, true);
         return row().dataset.back ? health() : "";
     };
     const first = welcome(), second = welcome();
@@ -36,6 +36,18 @@ async () => {
         show(second, 300, "UNKNOWN", 0), // a new connection
         show(second, 301, "RUNNING", 10),
     ];
+}
+"""
+
+HOSTS = """
+async () => {
+    const { Processes } = await import("/static/processes.js");
+    const table = new Processes(() => true);
+    const process = { name: "velocity", state: "RUNNING", pid: 7, restarts: 0, ok: true, since_output: 0 };
+    return ["", "robot1", "robot1, robot2", ""].map((host) => {
+        table.render({ processes: [{ ...process, host }], time: 0 }, true);
+        return document.querySelector("tr[data-process=velocity] th").innerText.trim();
+    });
 }
 """
 
@@ -180,6 +192,12 @@ def page(browser: Any) -> Iterator[Any]:
 
 def test_only_recoveries_that_the_page_has_seen_are_told(page: Any) -> None:
     assert page.evaluate(RECOVERIES) == ["", "", "", *2 * ["is back"], "", ""]
+
+
+def test_host_stands_with_the_name_of_a_process(page: Any) -> None:
+    name = "velocity"
+    hosts = ["robot1", "robot1, robot2"]
+    assert page.evaluate(HOSTS) == [name, *(f"{name}\n{host}" for host in hosts), name]
 
 
 def test_labels_of_the_angles_never_overlap(page: Any) -> None:
