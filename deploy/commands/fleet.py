@@ -11,7 +11,7 @@ import argparse
 import os
 import sys
 import time
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, MutableMapping, Sequence
 from contextlib import ExitStack, contextmanager
 from itertools import count
 from pathlib import Path
@@ -248,6 +248,15 @@ def run(named: Sequence[str]) -> None:
     raise DeploymentError(f"No{other} arm runs on this host. ARMS=/arm1 names an arm of another host.")
 
 
+def set_reach(environment: MutableMapping[str, str], named: Collection[str]) -> None:
+    """Look for named arms beyond this host, unless the user has set where.
+
+    This concerns no arm of this host: those are met as their own environments say.
+    """
+    if named and not environment.get("ROS_STATIC_PEERS"):
+        environment.setdefault(RANGE, "SUBNET")
+
+
 def main(arguments: Sequence[str]) -> int:
     """Watch the fleet; return the exit code."""
     interruption.install()
@@ -255,6 +264,7 @@ def main(arguments: Sequence[str]) -> int:
     parser = argparse.ArgumentParser(prog="make fleet", description=__doc__)
     parser.add_argument("arms", nargs="*", metavar="ARM", help="an arm of another host: /arm1, or /arm1=5")
     named = parser.parse_args(arguments).arms
+    set_reach(os.environ, named)
     set_middleware(os.environ)
     try:
         run(named)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import sys
 import time
 from collections.abc import Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from pathlib import Path
 
 import pytest
@@ -13,11 +14,14 @@ from std_msgs.msg import String
 from deploy.commands import fleet
 from deploy.commands.fleet import Domain, Place, places
 from deploy.running import processes
-from deploy.running.environment import CYCLONEDDS, set_middleware
+from deploy.running.environment import CYCLONEDDS, RANGE, set_middleware
 from deploy.running.errors import DeploymentError
 from deploy.security import rights
 from deploy.security.keystore import Keystore
+from deploy.trials.chaos.partition import CONTROL, ROBOT, missing, namespaces
 from reactive_node.domains import reserved_domain
+from tests.environment import user_environment
+from tests.system.sites import Command, Site
 
 LIMIT = 30.0  # s
 
@@ -141,6 +145,41 @@ def test_arms_of_this_host_and_named_ones_are_found(monkeypatch: pytest.MonkeyPa
     tags = [dict(place.domain.variables).get(CYCLONEDDS, "") for place in found if place.namespace == "/arm2"]
     assert sorted("<Tag>/arm2</Tag>" in tag for tag in tags) == [False, True]
     assert places([]) == {Place("/arm1", Domain(7, fleet.place(here).domain.variables))}
+
+
+@pytest.mark.parametrize(
+    ("named", "given", "reach"),
+    [
+        (["/arm2"], {}, "SUBNET"),
+        ([], {}, None),
+        (["/arm2"], {RANGE: "LOCALHOST"}, "LOCALHOST"),
+        (["/arm2"], {"ROS_STATIC_PEERS": "robot.example"}, None),
+    ],
+)
+def test_named_arms_are_looked_for_in_the_network_unless_the_user_says_where(
+    named: list[str], given: dict[str, str], reach: str | None
+) -> None:
+    environment = {**given}
+    fleet.set_reach(environment, named)
+    assert environment.get(RANGE) == reach
+
+
+def test_arm_of_another_host_is_heard(tmp_path: Path, domain: int) -> None:
+    if reason := missing():
+        pytest.skip(f"platform: {reason}")
+    given = {name: value for name, value in user_environment().items() if name != RANGE}
+    given["ROS_DOMAIN_ID"] = str(domain)
+    arm = given | {RANGE: "SUBNET", "REACTIVE_ARM_NAMESPACE": "/arm7"}
+    set_middleware(arm)
+    with namespaces() as full, closing(Site(tmp_path / "run", domain)) as site:
+
+        def begin(host: str, environment: dict[str, str], module: str, *arguments: str) -> Command:
+            command = ["ip", "netns", "exec", full(host), sys.executable, "-m", module, *arguments]
+            return site.begin_alone(command, environment)
+
+        begin(ROBOT, arm, "services.kinematics")
+        shown = begin(CONTROL, given, "deploy.commands.fleet", "/arm7")
+        shown.await_line(rf"^/arm7 +{domain} .* 1 ok ")
 
 
 @pytest.mark.parametrize("name", ["arm1", "/arm1=x", "=5"])
