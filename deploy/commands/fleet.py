@@ -1,8 +1,9 @@
 """`make fleet`: one process watches many arms, and shows a line for each.
 
 It shows the arms of this host that run now, and those that the user names for other hosts: `/arm1` in the
-ROS domain of this shell, `/arm1=5` in domain 5. It runs on the embedded rclpy, which sees arms of both. With
-SECURE=yes, it shows the arms that have keys, by the enclave /fleet of their keystores, else those without.
+ROS domain of this shell, `/arm1=5` in domain 5. It runs on the embedded rclpy, which sees arms of both, or on
+that of a sourced ROS 2. With SECURE=yes, it shows the arms that have keys, by the enclave /fleet of their
+keystores, else those without.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import get_rmw_implementation_identifier
 from reactivex import Observable
 
 from deploy.operator.fleet import HEADER, Arm, Seen, fleet, row, watched
@@ -68,9 +70,15 @@ class Place(NamedTuple):
     domain: Domain
 
 
+def _is_cyclone() -> bool:
+    """Whether this process obeys the settings of Cyclone DDS: a sourced ROS 2 may have another DDS."""
+    return get_rmw_implementation_identifier() == "rmw_cyclonedds_cpp"
+
+
 def place(environment: Mapping[str, str]) -> Place:
     """Return the place of the arm with this environment."""
-    variables = tuple((name, environment[name]) for name in DDS if environment.get(name))
+    known = [name for name in DDS if name != CYCLONEDDS or _is_cyclone()]
+    variables = tuple((name, environment[name]) for name in known if environment.get(name))
     return Place(namespace_of(environment), Domain(int(environment.get("ROS_DOMAIN_ID") or 0), variables))
 
 
@@ -114,9 +122,12 @@ def _places_of(name: str) -> list[Place]:
 def _numbers(domains: Iterable[Domain]) -> dict[Domain, int]:
     """Number the domains within this process: Cyclone DDS compares this number with that of the permissions.
 
-    Arms of several tags share a ROS domain: all but the first get a number that is free.
+    Arms of several tags share a ROS domain: all but the first get a number that is free. Another DDS would
+    join the domain of that number.
     """
     ordered = sorted({*domains})
+    if not _is_cyclone():
+        return {domain: domain.number for domain in ordered}
     free = (number for number in count() if number not in {domain.number for domain in ordered})
     numbers: dict[Domain, int] = {}
     for domain in ordered:

@@ -147,6 +147,20 @@ def test_arms_of_this_host_and_named_ones_are_found(monkeypatch: pytest.MonkeyPa
     assert places([]) == {Place("/arm1", Domain(7, fleet.place(here).domain.variables))}
 
 
+def test_other_dds_than_cyclone_joins_each_domain_once_under_its_number(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(fleet, "get_rmw_implementation_identifier", lambda: "rmw_fastrtps_cpp")
+    monkeypatch.setattr(processes, "systems", lambda: {Path("/run"): surroundings("/arm1", 5)})
+    monkeypatch.setenv(RANGE, "LOCALHOST")
+    found = places(["/arm1=5", "/arm2=5"])
+    assert {place.namespace for place in found} == {"/arm1", "/arm2"}
+    (domain,) = {place.domain for place in found}
+    assert (domain.number, CYCLONEDDS in dict(domain.variables)) == (5, False)
+    elsewhere = Domain(5, ((RANGE, "SUBNET"),))
+    assert fleet._numbers([domain, elsewhere]) == {domain: 5, elsewhere: 5}
+
+
 @pytest.mark.parametrize(
     ("named", "given", "reach"),
     [
