@@ -8,7 +8,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, closing
+from contextlib import ExitStack, closing, contextmanager
 from typing import Any
 
 import pytest
@@ -17,6 +17,7 @@ from rclpy._dds import security
 from deploy.running import manifest
 from deploy.security import rights
 from deploy.security.keystore import Keystore
+from reactive_node.domains import reserved_domain
 from tests.environment import user_environment
 from tests.system.sites import LIMIT, ROOT, Site
 
@@ -65,10 +66,24 @@ MakePeer = Callable[..., Peer]
 @pytest.fixture
 def make_peer(secure_site: SecureSite) -> Iterator[MakePeer]:
     """Make a peer that has joined, in the arm's environment with changes; ``None`` removes a variable."""
+    with peers(secure_site) as make:
+        yield make
+
+
+@pytest.fixture
+def make_open_peer(open_site: Site) -> Iterator[MakePeer]:
+    """Make a peer of the arm without keys, as ``make_peer`` does of the one with keys."""
+    with peers(open_site) as make:
+        yield make
+
+
+@contextmanager
+def peers(site: Site) -> Iterator[MakePeer]:
+    """Make peers of an arm, which end with the context."""
     with ExitStack() as stack:
 
         def make(node: str, enclave: str = "", **changes: str | None) -> Peer:
-            environment = {**secure_site.environment, **changes}
+            environment = {**site.environment, **changes}
             arguments = ["--ros-args", "--enclave", f"/{enclave or node}"]
             given = {name: value for name, value in environment.items() if value is not None}
             return stack.enter_context(closing(Peer(node, given, *arguments))).joined()
@@ -83,8 +98,16 @@ def until(condition: Callable[[], object], seconds: float = LIMIT) -> None:
         time.sleep(0.05)
 
 
-class SecureSite(Site):
-    """A site whose system joins with keys, on the embedded rclpy."""
+class EmbeddedSite(Site):
+    """A site whose system runs on the embedded rclpy."""
+
+    @property
+    def environment(self) -> dict[str, str]:
+        return super().environment | {"RUNTIME": "embedded", "_ROS_WHEELS_BOOTSTRAP_COMPLETE": "1"}
+
+
+class SecureSite(EmbeddedSite):
+    """A site whose system joins with keys."""
 
     @property
     def keystore(self) -> Keystore:
@@ -93,11 +116,9 @@ class SecureSite(Site):
     @property
     def environment(self) -> dict[str, str]:
         return super().environment | {
-            "RUNTIME": "embedded",
             "ROS_SECURITY_ENABLE": "true",
             "ROS_SECURITY_STRATEGY": "Enforce",
             "ROS_SECURITY_KEYSTORE": str(self.keystore.folder),
-            "_ROS_WHEELS_BOOTSTRAP_COMPLETE": "1",
         }
 
 
@@ -108,6 +129,21 @@ def secure_site(tmp_path_factory: pytest.TempPathFactory, module_domain_id: int)
         pytest.skip("no Cyclone DDS with security: apt-get install libddsc0debian")
     with closing(SecureSite(tmp_path_factory.mktemp("secure") / "run", module_domain_id)) as site:
         site.keystore.write(rights.of_arm("/", PROGRAMS), [site.domain])
-        code, output = site.do("start", "none")
-        assert code == 0, output
+        start(site)
         yield site
+
+
+@pytest.fixture(scope="module")
+def open_site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
+    """The same arm without keys, in a domain of its own: what an attack does there shows that it works."""
+    with (
+        reserved_domain() as domain,
+        closing(EmbeddedSite(tmp_path_factory.mktemp("open") / "run", domain)) as site,
+    ):
+        start(site)
+        yield site
+
+
+def start(site: Site) -> None:
+    code, output = site.do("start", "none")
+    assert code == 0, output

@@ -33,6 +33,16 @@ HEARTBEAT, ENGINES, STATE = "operator_heartbeat", "engines", "engines/state"
 @pytest.fixture
 def watcher(make_peer: MakePeer) -> Peer:
     """A peer with the recorder's keys that hears the state of the engines."""
+    return watching(make_peer)
+
+
+@pytest.fixture
+def open_watcher(make_open_peer: MakePeer) -> Peer:
+    """A peer that hears the state of the engines of the arm without keys."""
+    return watching(make_open_peer)
+
+
+def watching(make_peer: MakePeer) -> Peer:
     watcher = make_peer("recorder_1", "recorder")
     watcher("read", STATE)
     until(lambda: "off" in watcher("heard", STATE))
@@ -157,6 +167,19 @@ def test_a_stranger_moves_nothing_and_hears_nothing(stranger: Peer, watcher: Pee
     assert stranger("publish", ENGINES, "turn_on") == 0
     assert stranger("heard", STATE) == []
     assert "terminal_2" not in watcher("nodes")
+
+
+def test_the_same_stranger_moves_an_arm_without_keys(make_open_peer: MakePeer, open_watcher: Peer) -> None:
+    stranger = make_open_peer("terminal_2", "terminal")
+    stranger("read", STATE)
+    assert "on" in hold_switch_and_turn_on(stranger, open_watcher)
+    assert stranger("set_parameter", "dead_mans_switch", "pressed", False, ATTEMPTS)
+    assert "engine_controller" in stranger("nodes")
+    assert stranger("writers", STATE) == 1
+    assert stranger("publish", ENGINES, "turn_off") > 0
+    until(lambda: open_watcher("heard", STATE)[-1:] == ["off"])
+    assert "on" in stranger("heard", STATE)
+    assert "terminal_2" in open_watcher("nodes")
 
 
 @pytest.mark.parametrize("topic", [HEARTBEAT, "operator_presence", ENGINES, STATE])
