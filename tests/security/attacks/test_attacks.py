@@ -25,6 +25,8 @@ from deploy.running.system import System
 from deploy.security import keystore as keystores
 from deploy.security import rights
 from deploy.security.keystore import Keystore
+from deploy.trials.chaos import clock
+from deploy.trials.chaos.faults import INJECTED
 from tests.operator.page.clients import Hand
 from tests.security.attacks.conftest import PROGRAMS, MakePeer, Peer, Refused, SecureSite, until
 from tests.system.sites import Site
@@ -223,6 +225,31 @@ def test_others_refuse_a_valid_enclave_that_skips_its_own_checks(
     until(lambda: velocity("writers", "effector/position") == 1)
 
 
+def permissions(keystore: Keystore, enclave: str) -> Path:
+    return keystore.folder / "enclaves" / enclave / "permissions.p7s"
+
+
+def test_others_refuse_permissions_that_a_valid_enclave_must_not_show(
+    secure_site: SecureSite, make_peer: MakePeer, watcher: Peer, unchecked: str, tmp_path: Path
+) -> None:
+    own = permissions(secure_site.keystore, "velocity")
+    tampered = tmp_path / "permissions.p7s"
+    tampered.write_text(own.read_text().replace("rt/effector/speed", "rt/engines"))
+
+    def show(node: str, shown: Path) -> Peer:
+        return make_peer(node, "velocity", CYCLONEDDS_LIBRARY=unchecked, SHOWN_PERMISSIONS=str(shown))
+
+    show("velocity_1", own)
+    until(lambda: "velocity_1" in watcher("nodes"))  # this way of showing permissions works
+    refused = {
+        "velocity_2": show("velocity_2", tampered),
+        "velocity_3": show("velocity_3", permissions(secure_site.keystore, "terminal")),
+    }
+    time.sleep(ATTEMPTS)
+    assert {name: peer("nodes") for name, peer in refused.items()} == {name: [name] for name in refused}
+    assert refused.keys().isdisjoint(watcher("nodes"))
+
+
 @pytest.fixture
 def copy(secure_site: SecureSite, tmp_path: Path) -> Keystore:
     """A copy of the keys, to be damaged."""
@@ -267,6 +294,42 @@ def test_an_expired_certificate_does_not_join(make_peer: MakePeer, copy: Keystor
     subprocess.run([*renew, "-set_serial", "7", "-out", str(folder / "cert.pem")], check=True)
     with pytest.raises(Refused, match=r"cannot join DDS domain [^\n]* expired"):
         make_peer("velocity", ROS_SECURITY_KEYSTORE=str(copy.folder))
+
+
+@pytest.fixture
+def late(tmp_path: Path) -> Iterator[dict[str, str]]:
+    """The environment of a process whose clock is two hours behind."""
+    if reason := clock.missing():
+        pytest.skip(reason)
+    offset = tmp_path / "offset"
+    offset.write_text("-7200\n")
+    path = os.pathsep.join(filter(None, [str(INJECTED), os.environ.get("PYTHONPATH")]))
+    with clock.faked() as environment:
+        yield environment | clock.Clock(offset).environment() | {"PYTHONPATH": path}
+
+
+def test_others_refuse_a_certificate_that_has_expired(
+    secure_site: SecureSite,
+    make_peer: MakePeer,
+    watcher: Peer,
+    copy: Keystore,
+    late: dict[str, str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Its own library takes it, because its clock is behind."""
+    valid = make_peer("terminal_5", "terminal", **late)
+    until(lambda: "terminal_5" in watcher("nodes"))  # such a clock keeps nobody out
+    valid.close()  # by its clock, the other is valid
+    (copy.folder / "enclaves" / "terminal" / "cert.pem").unlink()
+    monkeypatch.setattr(keystores, "AFTER", -timedelta(hours=1))
+    copy.write({"/terminal": rights.of_arm("/", PROGRAMS)["/terminal"]}, [secure_site.domain])
+    shutil.copy(permissions(secure_site.keystore, "terminal"), permissions(copy, "terminal"))
+
+    expired = make_peer("terminal_6", "terminal", ROS_SECURITY_KEYSTORE=str(copy.folder), **late)
+
+    time.sleep(ATTEMPTS)
+    assert expired("nodes") == ["terminal_6"]
+    assert "terminal_6" not in watcher("nodes")
 
 
 def test_keys_that_end_stop_their_own_service_until_they_are_renewed(
