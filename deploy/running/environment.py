@@ -61,7 +61,9 @@ def set_middleware(environment: MutableMapping[str, str]) -> None:
     if is_secured(environment):
         environment.setdefault(STRATEGY, ENFORCE)
     elif environment.get(rclpy_choice.RUNTIME) and namespace_of(environment) != "/":
-        environment.setdefault(CYCLONEDDS, tagged(environment))  # version 0.10 does not know these settings
+        # Not with keys: of the tagged arms in a domain, `make fleet` could join only one, because permissions
+        # name the number that a domain has within the process. And version 0.10 does not know _BY_MULTICAST.
+        environment.setdefault(CYCLONEDDS, tagged(environment))
     environment.pop(OVERRIDE, None)  # it is for `ros2` in the same shell: processes of an arm name theirs
 
 
