@@ -54,6 +54,8 @@ hand = Hand(sys.argv[1], ssl.create_default_context(cafile=sys.argv[2]))
 while True:
     if hand.shown.get("switch", {}).get("by") != "this_page":
         hand.press()
+    else:
+        print("held", flush=True)
     hand.say("engines", command="turn_on")
     time.sleep(1.0)
 """
@@ -291,6 +293,7 @@ def test_page_on_a_third_host_holds_the_switch_by_tls(arm: Arm) -> None:
     assert line.startswith(f"The page: https://{ADDRESSES[CONTROL]}:")
     command = [sys.executable, "-c", HOLD_ON_PAGE, line, str(arm.parameters.parent / "page.pem")]
     tablet = arm.tablet.begin_command(*command, PYTHONPATH=os.pathsep.join([str(ROOT), *sys.path]))
+    tablet.await_line("^held$")
     arm.view.await_line("Engines are on", LIMIT, shown)
     shown = len(arm.view.lines)
     tablet.close()

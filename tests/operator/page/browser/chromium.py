@@ -189,7 +189,7 @@ class HandOnPage:
             self.page.wait_for_selector(DECIDED, state="attached", timeout=1000 * LIMIT)
             if self.state == "held":
                 return
-            assert self.stalled, f"not held: {self.why!r}"
+            assert self.stalled, f"not held: {self.state}, {self.why!r}"
             assert time.monotonic() < deadline, "the machine stands still all the time"
             (up or self.up)()
 
