@@ -115,7 +115,6 @@ def status(system: System) -> None:
         return
     from deploy.commands import hosts
     from deploy.commands.member import Member
-    from interfaces.service.health import heard_healths
 
     programs = system.programs()
     running = [program for program in programs if program.pid]
@@ -130,20 +129,20 @@ def status(system: System) -> None:
     host_of = {each.name: each.host for each in manifest.everywhere()}
     elsewhere = host_of.keys() - {program.name for program in programs}
     try:
-        with Member() as member, heard_healths(member.node) as health, hosts.heard(member.node) as others:
+        with Member() as member, hosts.heard(member.node) as heard:
             deadline = time.monotonic() + STATUS_LIMIT
-            _listen(member, running, health, STATUS_LIMIT)
-            theirs = others.processes
+            _listen(member, running, heard.healths, STATUS_LIMIT)
+            theirs = heard.processes
             while time.monotonic() < deadline and not all(
-                name in theirs and health_of(theirs[name], health) for name in elsewhere
+                name in theirs and health_of(theirs[name], heard.healths) for name in elsewhere
             ):
                 member.spin_once()
     except DeploymentError:  # for example, its keys have ended; supervisord tells its part
         print(of_services(programs, {}))
         raise
-    print(others.clocks(), end="")
+    print(heard.clocks(), end="")
     programs += [theirs[name] for name in host_of if name in elsewhere & theirs.keys()]
-    print(of_services(programs, health, host_of if elsewhere else {}))
+    print(of_services(programs, heard.healths, host_of if elsewhere else {}))
 
 
 def logs(system: System) -> None:

@@ -39,7 +39,7 @@ def test_the_table_shows_each_service(monkeypatch: pytest.MonkeyPatch) -> None:
     ]
 
 
-def test_report_of_another_host_is_not_taken_for_that_of_a_process_with_the_same_pid() -> None:
+def test_process_of_another_host_with_the_same_pid_is_no_match() -> None:
     ours = Program("drive", "RUNNING", 7, 1.0, 0, "", "")
     theirs = ours._replace(host="desk")
     own, other = health(7), health(7, reason="slow")
