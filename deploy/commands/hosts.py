@@ -12,7 +12,7 @@ from rclpy.node import Node
 
 from deploy.commands.member import Member
 from deploy.running import manifest, processes
-from deploy.running.environment import NAMESPACE, RANGE
+from deploy.running.environment import NAMESPACE, is_alone
 from deploy.running.errors import DeploymentError
 from deploy.running.probe import is_here
 from deploy.running.sentinel import reported
@@ -88,11 +88,6 @@ def heard(node: Node) -> Iterator[Hosts]:
         yield hosts
 
 
-def are_heard() -> bool:
-    """Whether messages of other hosts come here."""
-    return os.environ.get(RANGE) != "LOCALHOST" or bool(os.environ.get("ROS_STATIC_PEERS"))
-
-
 @contextmanager
 def checked(member: Member, system: System) -> Iterator[Callable[[], None]]:
     """Look for other hosts of the arm before a start.
@@ -101,7 +96,7 @@ def checked(member: Member, system: System) -> Iterator[Callable[[], None]]:
 
     :raises DeploymentError: if the arm must not start, or must not go on.
     """
-    if not are_heard():
+    if is_alone(os.environ):
         yield lambda: None
         return
     ours = {process.pid: process.program for process in system.members()}

@@ -15,7 +15,7 @@ from deploy.commands.status import health_of, of_services
 from deploy.commands.stop import stop
 from deploy.operator.output import accept_any_text, say
 from deploy.running import interruption, manifest, messages, rclpy_choice
-from deploy.running.environment import NAMESPACE, RANGE, is_adopted, namespace_of, set_middleware
+from deploy.running.environment import NAMESPACE, RANGE, is_adopted, is_alone, namespace_of, set_middleware
 from deploy.running.errors import DeploymentError
 from deploy.running.run_directory import ALL, KEY, LEAD, MANIFEST, RUN
 from deploy.running.supervisord import Program
@@ -87,7 +87,7 @@ def become(system: System, scenario: str, parameter_file: str) -> NoReturn:
     with _chosen(scenario):
         parameters.check_environment(system)
         given = parameters.of_system(scenario, parameter_file)
-        if hosts.are_heard():
+        if not is_alone(os.environ):
             with Member() as member, hosts.checked(member, system):
                 pass
         given[ALL][KEY]["scenario_epoch"] = time.monotonic() + LEAD

@@ -72,10 +72,14 @@ def tagged(environment: Mapping[str, str]) -> str:
 
     In a domain of many processes, each answers all others, and a busy machine repeats what is not answered.
     """
-    alone = environment.get(RANGE) == "LOCALHOST" and not environment.get("ROS_STATIC_PEERS")
-    general, index = (_BY_MULTICAST, _WITHOUT_INDEX) if alone else ("", "")
+    general, index = (_BY_MULTICAST, _WITHOUT_INDEX) if is_alone(environment) else ("", "")
     discovery = f"<Discovery>{index}<Tag>{namespace_of(environment)}</Tag></Discovery>"
     return f"<CycloneDDS><Domain>{general}{discovery}</Domain></CycloneDDS>"
+
+
+def is_alone(environment: Mapping[str, str]) -> bool:
+    """Whether no message of another host comes to the nodes of an environment."""
+    return environment.get(RANGE) == "LOCALHOST" and not environment.get("ROS_STATIC_PEERS")
 
 
 def namespace_of(environment: Mapping[str, str]) -> str:
