@@ -15,7 +15,7 @@ ROOT = Path(__file__).resolve().parent  # of the sources, even where colcon has 
 sys.path.insert(0, str(ROOT))
 
 from deploy.package.executables import ARM  # noqa: E402
-from deploy.running import manifest  # noqa: E402
+from deploy.supervision import manifest  # noqa: E402
 
 PACKAGE = "reactive_arm"
 EXECUTABLES = (*(program.name for program in manifest.programs()), ARM)

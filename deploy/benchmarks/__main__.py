@@ -34,8 +34,8 @@ from deploy.benchmarks.measurement import (
     measure,
 )
 from deploy.benchmarks.table import chain_tables, image_tables, tables
-from deploy.running import interruption
-from deploy.running.processes import run_directory
+from deploy.supervision import interruption
+from deploy.supervision.processes import run_directory
 
 COMPARISON, CHAIN, IMAGE, SCALE, SIGNALS = "comparison", "chain", "images", "scale", "signals"
 TABLES: dict[str, Callable[[Any], str]] = {

@@ -11,8 +11,8 @@ from pathlib import Path
 
 from deploy.benchmarks import c_program
 from deploy.benchmarks.link import HEARTBEATS, Job
-from deploy.running.processes import ROOT
-from deploy.running.rclpy_choice import RUNTIME
+from deploy.supervision.processes import ROOT
+from deploy.supervision.rclpy_choice import RUNTIME
 
 PYTHON = ROOT / "deploy" / "commands" / "venv.sh"
 _CHECK = """

@@ -8,7 +8,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from deploy.benchmarks.link import HEARTBEATS, Job
-from deploy.running.processes import run_directory
+from deploy.supervision.processes import run_directory
 
 PIPELINE, SERVICES = "pipeline", "services"
 LOOPBACK, LOCALHOST, DEFAULTS = "loopback.xml", "localhost.xml", "defaults.xml"

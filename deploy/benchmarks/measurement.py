@@ -28,7 +28,7 @@ from deploy.benchmarks.link import (
     WATCHDOG,
     Job,
 )
-from deploy.running import interruption
+from deploy.supervision import interruption
 from deploy.trials.chaos.cost import proportional_set_size
 from reactive_node.domains import reserved_domain
 

@@ -11,8 +11,8 @@ from collections.abc import Mapping
 
 import rclpy
 
-from deploy.running import processes
-from deploy.running.environment import namespace_of
+from deploy.supervision import processes
+from deploy.supervision.environment import namespace_of
 from interfaces.service import middleware
 from interfaces.service.health import Health, heard_healths
 from reactive_node import ReactiveNode

@@ -18,11 +18,11 @@ from pathlib import Path
 from deploy.benchmarks.alternatives import Alternative
 from deploy.benchmarks.measurement import MeasurementFailed, Scenario, measure_subscribers
 from deploy.benchmarks.table import Results, table
-from deploy.running import interruption
-from deploy.running.environment import NAMESPACE
-from deploy.running.processes import ROOT
-from deploy.running.rclpy_choice import sourced_rclpy
-from deploy.running.system import System
+from deploy.supervision import interruption
+from deploy.supervision.environment import NAMESPACE
+from deploy.supervision.processes import ROOT
+from deploy.supervision.rclpy_choice import sourced_rclpy
+from deploy.supervision.system import System
 from deploy.trials.chaos.arm import RealArm
 from deploy.trials.chaos.cost import Cost
 from reactive_node.domains import reserved_domain

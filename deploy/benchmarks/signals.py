@@ -23,8 +23,8 @@ from reactivex.disposable import Disposable
 from reactivex.subject import Subject
 
 from deploy.benchmarks.scale import Fleet
-from deploy.running import interruption
-from deploy.running.environment import NAMESPACE, set_middleware
+from deploy.supervision import interruption
+from deploy.supervision.environment import NAMESPACE, set_middleware
 from interfaces.robot_model import forward_kinematics
 from interfaces.sources.scenario_file import load
 from interfaces.topics import EFFECTOR_SPEED, EFFECTOR_VELOCITY, THETA1, THETA2

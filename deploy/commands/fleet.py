@@ -29,9 +29,10 @@ from reactivex import Observable
 
 from deploy.operator.fleet import HEADER, Arm, Seen, fleet, row, watched
 from deploy.operator.output import accept_any_text, say
-from deploy.running import interruption, processes
-from deploy.running.columns import table
-from deploy.running.environment import (
+from deploy.security.keystore import Keystore
+from deploy.supervision import interruption, processes
+from deploy.supervision.columns import table
+from deploy.supervision.environment import (
     CYCLONEDDS,
     KEYSTORE,
     NAMESPACE,
@@ -42,8 +43,7 @@ from deploy.running.environment import (
     set_middleware,
     tagged,
 )
-from deploy.running.errors import DeploymentError
-from deploy.security.keystore import Keystore
+from deploy.supervision.errors import DeploymentError
 from interfaces.service import UserError, enclave
 from interfaces.topics import DIAGNOSTICS, ENGINES_STATE, FLEET, Topic
 from reactive_node import ReactiveNode

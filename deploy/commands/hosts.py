@@ -11,13 +11,13 @@ from typing import Any
 from rclpy.node import Node
 
 from deploy.commands.member import Member
-from deploy.running import manifest, processes
-from deploy.running.environment import NAMESPACE, is_alone
-from deploy.running.errors import DeploymentError
-from deploy.running.probe import is_here
-from deploy.running.sentinel import reported
-from deploy.running.supervisord import Program
-from deploy.running.system import System
+from deploy.supervision import manifest, processes
+from deploy.supervision.environment import NAMESPACE, is_alone
+from deploy.supervision.errors import DeploymentError
+from deploy.supervision.probe import is_here
+from deploy.supervision.sentinel import reported
+from deploy.supervision.supervisord import Program
+from deploy.supervision.system import System
 from interfaces.service.clocks import Clocks, difference
 from interfaces.service.health import Health, healths, listening
 from interfaces.service.process import SUPERVISED

@@ -5,11 +5,11 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from deploy.running import manifest
-from deploy.running.environment import KEYSTORE, namespace_of
-from deploy.running.errors import DeploymentError
 from deploy.security import rights
 from deploy.security.keystore import Keystore
+from deploy.supervision import manifest
+from deploy.supervision.environment import KEYSTORE, namespace_of
+from deploy.supervision.errors import DeploymentError
 from interfaces.service.enclave import path
 
 

@@ -14,12 +14,19 @@ from typing import TYPE_CHECKING, NoReturn
 from deploy.commands.status import health_of, of_services
 from deploy.commands.stop import stop
 from deploy.operator.output import accept_any_text, say
-from deploy.running import interruption, manifest, messages, rclpy_choice
-from deploy.running.environment import NAMESPACE, RANGE, is_adopted, is_alone, namespace_of, set_middleware
-from deploy.running.errors import DeploymentError
-from deploy.running.run_directory import ALL, KEY, LEAD, MANIFEST, RUN
-from deploy.running.supervisord import Program
-from deploy.running.system import System
+from deploy.supervision import interruption, manifest, messages, rclpy_choice
+from deploy.supervision.environment import (
+    NAMESPACE,
+    RANGE,
+    is_adopted,
+    is_alone,
+    namespace_of,
+    set_middleware,
+)
+from deploy.supervision.errors import DeploymentError
+from deploy.supervision.run_directory import ALL, KEY, LEAD, MANIFEST, RUN
+from deploy.supervision.supervisord import Program
+from deploy.supervision.system import System
 from interfaces.loopback import LOOPBACK_DOWN, loopback_is_up
 
 if TYPE_CHECKING:
@@ -288,7 +295,7 @@ def _show(system: System, member: Member, *, owner: bool = False) -> None:
 
 def _bound(system: System) -> str:
     """The line that tells how soon the engines stop."""
-    from deploy.running.parameter_file import reaction_to
+    from deploy.supervision.parameter_file import reaction_to
 
     try:
         return reaction_to(system.written_parameters(), namespace_of(os.environ)).words

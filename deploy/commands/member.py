@@ -13,10 +13,10 @@ from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
-from deploy.running import interruption, manifest
-from deploy.running.environment import namespace_of
-from deploy.running.errors import DeploymentError
 from deploy.security.rights import TERMINAL
+from deploy.supervision import interruption, manifest
+from deploy.supervision.environment import namespace_of
+from deploy.supervision.errors import DeploymentError
 from interfaces.service import UserError, enclave, middleware
 from reactive_node import ReactiveNode
 from reactive_node.executor import create_executor

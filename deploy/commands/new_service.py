@@ -15,7 +15,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
-from deploy.running.processes import ROOT
+from deploy.supervision.processes import ROOT
 
 TOPICS, MANIFEST = Path("interfaces/topics.py"), Path("deploy/supervisord.conf")
 PAGES = (Path("interfaces/README.md"), Path("services/README.md"))
@@ -128,7 +128,7 @@ def _with_topic(contract: str, name: str) -> str:
 def _with_program(manifest: str, name: str) -> str:
     manifest = _once(MANIFEST, manifest, LAST_PROGRAMS, f"{name}, {LAST_PROGRAMS}")
     _, found, last = manifest.rpartition("[program:sentinel]")
-    section = f"{found}{last.rstrip()}\n\n".replace("deploy.running.sentinel", f"services.{name}")
+    section = f"{found}{last.rstrip()}\n\n".replace("deploy.supervision.sentinel", f"services.{name}")
     section = section.replace("sentinel", name)
     return _once(MANIFEST, manifest, LAST_SECTIONS, section + LAST_SECTIONS)
 

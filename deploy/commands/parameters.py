@@ -12,8 +12,10 @@ from rclpy.exceptions import InvalidNamespaceException
 from rclpy.validate_namespace import validate_namespace
 
 from deploy.operator.page.address import DEFAULT_PORT, host_names, tls
-from deploy.running import manifest, parameter_file, processes
-from deploy.running.environment import (
+from deploy.security.keystore import Keystore
+from deploy.security.rights import TERMINAL
+from deploy.supervision import manifest, parameter_file, processes
+from deploy.supervision.environment import (
     ENFORCE,
     KEYSTORE,
     NAMESPACE,
@@ -23,12 +25,10 @@ from deploy.running.environment import (
     is_secured,
     namespace_of,
 )
-from deploy.running.errors import DeploymentError
-from deploy.running.processes import ROOT
-from deploy.running.run_directory import ALL, KEY, NOT_YET, scenario_parameters
-from deploy.running.system import System
-from deploy.security.keystore import Keystore
-from deploy.security.rights import TERMINAL
+from deploy.supervision.errors import DeploymentError
+from deploy.supervision.processes import ROOT
+from deploy.supervision.run_directory import ALL, KEY, NOT_YET, scenario_parameters
+from deploy.supervision.system import System
 from interfaces.service import UserError, enclave, instance
 from interfaces.sources import scenario_file
 

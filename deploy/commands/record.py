@@ -10,10 +10,10 @@ from mcap_files import SAVE_PERIOD
 from rclpy.clock import Clock, ClockType
 
 from deploy.commands.member import Member
-from deploy.running import interruption, messages
-from deploy.running.errors import DeploymentError
-from deploy.running.recorder import Recorder, clocks, record
-from deploy.running.system import System
+from deploy.supervision import interruption, messages
+from deploy.supervision.errors import DeploymentError
+from deploy.supervision.recorder import Recorder, clocks, record
+from deploy.supervision.system import System
 
 
 def write(directory: Path, member: Member, system: System) -> None:

@@ -28,8 +28,8 @@ from functools import partial
 from pathlib import Path
 from types import FrameType
 
-from deploy.running.processes import ROOT, run_directory, using
-from deploy.running.rclpy_choice import RUNTIME, sourced_rclpy
+from deploy.supervision.processes import ROOT, run_directory, using
+from deploy.supervision.rclpy_choice import RUNTIME, sourced_rclpy
 
 VENV = ROOT / ".venv"
 PYTHON = VENV / "bin" / "python"

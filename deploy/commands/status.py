@@ -7,8 +7,8 @@ import time
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from deploy.running.columns import table
-from deploy.running.supervisord import Program
+from deploy.supervision.columns import table
+from deploy.supervision.supervisord import Program
 
 if TYPE_CHECKING:  # it imports rclpy, which takes its time to load
     from interfaces.service.health import Health

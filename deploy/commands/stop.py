@@ -6,9 +6,9 @@ import sys
 from contextlib import suppress
 
 from deploy.operator.output import say
-from deploy.running import interruption
-from deploy.running.errors import DeploymentError
-from deploy.running.system import System
+from deploy.supervision import interruption
+from deploy.supervision.errors import DeploymentError
+from deploy.supervision.system import System
 
 
 def stop(system: System) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from deploy.running.parameter_file import USE_SIM_TIME, declared
+from deploy.supervision.parameter_file import USE_SIM_TIME, declared
 from interfaces import topics
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import NamedTuple
 from xml.etree import ElementTree
 
-from deploy.running.rclpy_choice import RUNTIME, sourced_rclpy
+from deploy.supervision.rclpy_choice import RUNTIME, sourced_rclpy
 from tests.runtimes import left_out_here
 
 PASSED, FAILED, WRONG_USE, NO_TESTS = 0, 1, 4, 5  # exit codes of pytest

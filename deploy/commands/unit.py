@@ -7,10 +7,10 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from deploy.commands.parameters import WEB
-from deploy.running.environment import KEYSTORE, NAMESPACE, is_adopted, namespace_of
-from deploy.running.errors import DeploymentError
-from deploy.running.extension import SENTINEL_START_TIMEOUT
-from deploy.running.processes import ROOT, RUN_DIRECTORY
+from deploy.supervision.environment import KEYSTORE, NAMESPACE, is_adopted, namespace_of
+from deploy.supervision.errors import DeploymentError
+from deploy.supervision.extension import SENTINEL_START_TIMEOUT
+from deploy.supervision.processes import ROOT, RUN_DIRECTORY
 
 MANIFEST = "MANIFEST"  # environment variable: the file with the user's own programs
 KEPT = (RUN_DIRECTORY, WEB, MANIFEST)

@@ -22,8 +22,8 @@ from pathlib import Path
 from deploy.mutants.bench import Bench
 from deploy.mutants.guards import GUARDS, SIMULATION
 from deploy.mutants.mutations import Mutant, mutants
-from deploy.running import interruption
-from deploy.running.processes import ROOT
+from deploy.supervision import interruption
+from deploy.supervision.processes import ROOT
 
 EQUIVALENT = Path(__file__).with_name("equivalent.toml")
 _BENCHES = 2 * (os.cpu_count() or 1)  # many tests wait

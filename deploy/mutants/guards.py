@@ -25,9 +25,9 @@ GUARDS: dict[str, tuple[str, ...]] = {
         "tests/component/test_readme.py",
     ),
     "services/drive.py": ("tests/component/test_drive.py",),
-    "deploy/running/reaction.py": (
-        "tests/running/test_reaction.py",
-        "tests/running/test_parameter_file.py",
+    "deploy/supervision/reaction.py": (
+        "tests/supervision/test_reaction.py",
+        "tests/supervision/test_parameter_file.py",
     ),
     "interfaces/permission.py": (
         "tests/component/test_permission.py",
@@ -54,7 +54,7 @@ GUARDS: dict[str, tuple[str, ...]] = {
     "interfaces/service/parameters.py": (
         "tests/component/test_readme.py",
         "tests/component/test_service_node.py",
-        "tests/running/test_parameter_file.py",
+        "tests/supervision/test_parameter_file.py",
     ),
     "interfaces/service/process.py": ("tests/component/test_service_life.py",),
     f"{REACTIVE_NODE}/scheduler.py": (
@@ -98,13 +98,13 @@ GUARDS: dict[str, tuple[str, ...]] = {
     f"{REACTIVE_NODE}/signals/integral.py": (_OPERATIONS, _RUNS),
     f"{REACTIVE_NODE}/signals/replay.py": (_RUNS,),
     f"{REACTIVE_NODE}/signals/values.py": (_SAMPLES, _OPERATIONS),
-    "deploy/running/policy.py": (
-        "tests/running/test_policy.py",
-        "tests/running/test_sentinel.py",
+    "deploy/supervision/policy.py": (
+        "tests/supervision/test_policy.py",
+        "tests/supervision/test_sentinel.py",
     ),
-    "deploy/running/sentinel.py": (
-        "tests/running/test_sentinel.py",
-        "tests/running/test_sentinel_wiring.py",
+    "deploy/supervision/sentinel.py": (
+        "tests/supervision/test_sentinel.py",
+        "tests/supervision/test_sentinel_wiring.py",
         "tests/component/test_readme.py",
     ),
     "deploy/promises/history.py": ("tests/promises/test_history.py", *_CHECKERS),

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from deploy.running import manifest
+from deploy.supervision import manifest
 from interfaces import topics
 from interfaces.topics import ON
 from reactive_node import ReactiveNode

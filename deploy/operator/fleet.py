@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 import reactivex as rx
 from reactivex import Observable
 
-from deploy.running.reaction import reaction
-from deploy.running.sentinel import reported
+from deploy.supervision.reaction import reaction
+from deploy.supervision.sentinel import reported
 from interfaces.service import UserError
 from interfaces.service.health import Health, healths, reported_parameters
 from interfaces.topics import ALIVE, DIAGNOSTICS, ENGINES_STATE, OPERATOR_ACTIVITY, Topic

@@ -12,7 +12,7 @@ import reactivex as rx
 from reactivex import Observable
 
 from deploy.operator import engines
-from deploy.running.sentinel import reported
+from deploy.supervision.sentinel import reported
 from interfaces import topics
 from interfaces.service.clocks import difference
 from interfaces.service.clocks import reported as reported_clocks

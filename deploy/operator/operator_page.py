@@ -25,8 +25,8 @@ from deploy.operator.page.history import SPAN
 from deploy.operator.page.site import Site
 from deploy.operator.remote import parameter_changes
 from deploy.operator.switch import VIRTUAL_SWITCH, Switch
-from deploy.running import manifest
-from deploy.running.reaction import reaction
+from deploy.supervision import manifest
+from deploy.supervision.reaction import reaction
 from interfaces import service, topics
 from interfaces.loopback import loopback_is_up
 from interfaces.service import ServiceNode, UserError, parameter

@@ -13,8 +13,8 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, NamedTuple
 
-from deploy.running import manifest
-from deploy.running.reaction import Reaction, reaction
+from deploy.supervision import manifest
+from deploy.supervision.reaction import Reaction, reaction
 from interfaces import topics
 
 PROGRAMS = tuple(program.name for program in manifest.programs())

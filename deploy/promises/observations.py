@@ -25,8 +25,8 @@ from deploy.promises.history import (
     merged,
 )
 from deploy.promises.marks import is_babble
-from deploy.running.errors import DeploymentError
-from deploy.running.recorder import METADATA
+from deploy.supervision.errors import DeploymentError
+from deploy.supervision.recorder import METADATA
 from interfaces import topics
 from interfaces.service.health import reported_parameters
 

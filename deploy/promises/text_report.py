@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from deploy.promises.findings import VIOLATED, Finding, percentile
 from deploy.promises.limits import DURATIONS
 from deploy.promises.promises import meaning
-from deploy.running.columns import table
+from deploy.supervision.columns import table
 
 SHOWN = 5  # pieces of evidence of a promise
 HEADER = ("", "PROMISE", "VERDICT", "CASES", "UNKNOWN", "MEASURED")

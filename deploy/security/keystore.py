@@ -19,10 +19,10 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from deploy.running.errors import DeploymentError
-from deploy.running.lock import held
 from deploy.security import documents
 from deploy.security.rights import Rights
+from deploy.supervision.errors import DeploymentError
+from deploy.supervision.lock import held
 from interfaces.service.enclave import SOON
 
 CA = "sros2CA"  # the name that SROS2 gives it

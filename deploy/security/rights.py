@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable
 from typing import NamedTuple
 
-from deploy.running import manifest
+from deploy.supervision import manifest
 from interfaces import topics
 from interfaces.service.enclave import path
 

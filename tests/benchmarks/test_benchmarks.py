@@ -15,8 +15,8 @@ from deploy.benchmarks import alternatives, c_program, measurement, table
 from deploy.benchmarks.alternatives import Alternative
 from deploy.benchmarks.link import LAST, MIDDLE, SINK, SOURCE, Job
 from deploy.benchmarks.measurement import MeasurementFailed, Scenario
-from deploy.running.processes import RUN_DIRECTORY
-from deploy.running.rclpy_choice import sourced_rclpy
+from deploy.supervision.processes import RUN_DIRECTORY
+from deploy.supervision.rclpy_choice import sourced_rclpy
 
 
 @pytest.mark.parametrize(

@@ -12,8 +12,8 @@ from deploy.benchmarks import __main__ as command
 from deploy.benchmarks import measurement, scale
 from deploy.benchmarks.alternatives import Alternative
 from deploy.benchmarks.measurement import MeasurementFailed
-from deploy.running.rclpy_choice import sourced_rclpy
-from deploy.running.system import System
+from deploy.supervision.rclpy_choice import sourced_rclpy
+from deploy.supervision.system import System
 from deploy.trials.chaos.arm import RealArm
 from deploy.trials.chaos.cost import Cost
 

@@ -10,7 +10,7 @@ from zipfile import ZipFile
 
 import pytest
 
-from deploy.running.rclpy_choice import sourced_rclpy
+from deploy.supervision.rclpy_choice import sourced_rclpy
 
 ROOT = Path(__file__).parents[2]
 FOLDERS = {

@@ -13,11 +13,11 @@ from std_msgs.msg import String
 
 from deploy.commands import fleet
 from deploy.commands.fleet import Domain, Place, places
-from deploy.running import processes
-from deploy.running.environment import CYCLONEDDS, RANGE, set_middleware
-from deploy.running.errors import DeploymentError
 from deploy.security import rights
 from deploy.security.keystore import Keystore
+from deploy.supervision import processes
+from deploy.supervision.environment import CYCLONEDDS, RANGE, set_middleware
+from deploy.supervision.errors import DeploymentError
 from deploy.trials.chaos.partition import CONTROL, ROBOT, missing, namespaces
 from reactive_node.domains import reserved_domain
 from tests.environment import user_environment

@@ -11,9 +11,9 @@ import pytest
 
 from deploy.commands import hosts
 from deploy.commands.hosts import Hosts
-from deploy.running import manifest, processes
-from deploy.running.environment import RANGE
-from deploy.running.errors import DeploymentError
+from deploy.supervision import manifest, processes
+from deploy.supervision.environment import RANGE
+from deploy.supervision.errors import DeploymentError
 from interfaces.topics import DIAGNOSTICS
 from reactive_node.testing import MakeNode, SpinFor, SpinUntil
 from tests import health_reports

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from deploy.commands.launcher import place
-from deploy.running.errors import DeploymentError
-from deploy.running.system import System
+from deploy.supervision.errors import DeploymentError
+from deploy.supervision.system import System
 
 
 @pytest.mark.parametrize(

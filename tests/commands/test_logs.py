@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from deploy.commands.logs import follow, readable
-from deploy.running.run_directory import RUN, RunDirectory
-from deploy.running.system import System
+from deploy.supervision.run_directory import RUN, RunDirectory
+from deploy.supervision.system import System
 
 
 @pytest.fixture(autouse=True)

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from deploy.commands import setup
-from deploy.running import rclpy_choice
+from deploy.supervision import rclpy_choice
 
 ROOT = Path(__file__).parents[2]
 EMBEDDED = setup.EMBEDDED[0]

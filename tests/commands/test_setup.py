@@ -29,7 +29,7 @@ STAMP = ".venv/made-from"
 def checkout(tmp_path: Path) -> Path:
     """A checkout with the files of the set-up and of `make stop`."""
     checkout = tmp_path / "checkout"
-    for name in ("requirements", "running", "commands", "operator"):
+    for name in ("requirements", "supervision", "commands", "operator"):
         ignored = shutil.ignore_patterns("__pycache__")  # other workers write there
         shutil.copytree(ROOT / "deploy" / name, checkout / "deploy" / name, ignore=ignored)
     for name in ("Makefile", "deploy/__init__.py", "deploy/supervisord.conf"):

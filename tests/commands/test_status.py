@@ -6,7 +6,7 @@ import time
 import pytest
 
 from deploy.commands.status import health_of, of_services
-from deploy.running.supervisord import Program
+from deploy.supervision.supervisord import Program
 from interfaces.service.health import Health
 
 HERE = socket.gethostname()

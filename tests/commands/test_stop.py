@@ -13,8 +13,8 @@ from typing import Any
 
 import pytest
 
-from deploy.running import processes, rpc
-from deploy.running.system import System
+from deploy.supervision import processes, rpc
+from deploy.supervision.system import System
 
 HANGS = "import signal; signal.signal(signal.SIGTERM, signal.SIG_IGN); print(flush=True); signal.pause()"
 NEVER_ANSWERS = (

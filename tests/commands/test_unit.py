@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from deploy.commands import unit
-from deploy.running.errors import DeploymentError
+from deploy.supervision.errors import DeploymentError
 from tests.commands.systemd import command_of, environment_of
 
 UNPLEASANT = 'it\'s 100 % $HOME "fine" \\ %n \\n\n\r\n\tend'

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
-from deploy.running import manifest
+from deploy.supervision import manifest
 from interfaces.service import ServiceNode, clocks
 from interfaces.service.clocks import Clocks
 from interfaces.topics import DIAGNOSTICS

@@ -15,7 +15,7 @@ from rclpy.parameter import Parameter
 
 from deploy.operator.hand import Hand
 from deploy.operator.terminal.terminal import Terminal
-from deploy.running import manifest, processes
+from deploy.supervision import manifest, processes
 from interfaces import service, topics
 from interfaces.service import ServiceNode
 from reactive_node import ReactiveNode

@@ -18,7 +18,7 @@ from rclpy.parameter import Parameter
 from rclpy.qos import qos_profile_parameter_events
 from reactivex import Observable
 
-from deploy.running.run_directory import RunDirectory
+from deploy.supervision.run_directory import RunDirectory
 from interfaces import topics
 from interfaces.service import ServiceNode, UserError, parameter
 from interfaces.service.epoch import EPOCH, Epoch

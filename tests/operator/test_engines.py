@@ -6,7 +6,7 @@ import pytest
 from std_msgs.msg import String
 
 from deploy.operator.engines import graph
-from deploy.running import manifest
+from deploy.supervision import manifest
 from interfaces.topics import ENGINES, ENGINES_STATE
 from reactive_node import ReactiveNode
 from reactive_node.testing import MakeNode, SpinUntil

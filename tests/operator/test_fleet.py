@@ -11,8 +11,8 @@ from reactivex import Observable
 from reactivex.testing import ReactiveTest, TestScheduler
 
 from deploy.operator.fleet import Arm, Told, fleet, row, watched
-from deploy.running import sentinel
-from deploy.running.supervisord import Program
+from deploy.supervision import sentinel
+from deploy.supervision.supervisord import Program
 from interfaces.service.health import Health
 from interfaces.topics import ALIVE, DIAGNOSTICS, ENGINES_STATE, MISSED, OFF, ON, OPERATOR_ACTIVITY, Topic
 

@@ -16,8 +16,8 @@ from reactivex.testing import ReactiveTest, TestScheduler
 
 from deploy.operator.engines import BY_CONTROLLER, RESTARTED, Graph
 from deploy.operator.lines import Allowance, Kind, Line, line_batches, unrepeated
-from deploy.running import sentinel
-from deploy.running.supervisord import Program
+from deploy.supervision import sentinel
+from deploy.supervision.supervisord import Program
 from interfaces import topics
 from interfaces.topics import Position
 from reactive_node.stamps import Timestamp

@@ -12,7 +12,7 @@ import pytest
 
 from deploy.operator import output
 from deploy.operator.output import say
-from deploy.running.processes import ROOT
+from deploy.supervision.processes import ROOT
 
 LINES = 5000  # of 100 characters, more than a pipe holds
 FLOOD = f"from deploy.operator.output import say\nfor _ in range({LINES}): say('#' * 99)"

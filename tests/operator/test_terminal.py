@@ -17,7 +17,7 @@ from contextlib import suppress
 import pytest
 
 from deploy.operator.terminal.plain import PlainLines
-from deploy.running.processes import ROOT
+from deploy.supervision.processes import ROOT
 
 LIMIT = 20.0  # s for each awaited text
 ERASE = rb"\x1b\[J"  # from the cursor on

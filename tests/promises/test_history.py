@@ -31,7 +31,7 @@ from deploy.promises.history import (
     target_name,
 )
 from deploy.promises.liveness import STREAMS
-from deploy.running import processes
+from deploy.supervision import processes
 from interfaces import topics
 
 EXPECTED = {
@@ -67,7 +67,7 @@ def test_dependents_follow_the_contract() -> None:
 NEW_SERVICES = """
 import math
 from dataclasses import replace
-from deploy.running import manifest
+from deploy.supervision import manifest
 from interfaces import topics
 
 guard = replace(topics.ENGINES, name="guard/alarm", publishers=("guard",))

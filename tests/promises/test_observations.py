@@ -19,8 +19,8 @@ from std_msgs.msg import Bool, Float64, String
 from deploy.promises.history import NO_TARGET, OVERLOAD, InjectedFault, Life
 from deploy.promises.marks import STEP
 from deploy.promises.observations import FAULTS, PROCESSES, load, values
-from deploy.running import processes
-from deploy.running.recorder import Recorder, qos_profiles
+from deploy.supervision import processes
+from deploy.supervision.recorder import Recorder, qos_profiles
 from deploy.trials.chaos import __main__ as chaos
 from interfaces import topics
 

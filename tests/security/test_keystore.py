@@ -13,11 +13,11 @@ from xml.etree import ElementTree
 
 import pytest
 
-from deploy.running.errors import DeploymentError
-from deploy.running.lock import held
 from deploy.security import keystore as keystores
 from deploy.security.keystore import Keystore
 from deploy.security.rights import Rule
+from deploy.supervision.errors import DeploymentError
+from deploy.supervision.lock import held
 from interfaces.service.enclave import SOON
 from tests.security import sros2
 

@@ -6,9 +6,9 @@ from fnmatch import fnmatchcase
 
 import pytest
 
-from deploy.running import manifest
 from deploy.security import rights
 from deploy.security.rights import Rights
+from deploy.supervision import manifest
 from interfaces import topics
 
 PROGRAMS = [program.name for program in manifest.programs(manifest.PATH)]

@@ -13,12 +13,12 @@ import pytest
 
 from deploy.commands import parameters
 from deploy.commands.member import Member
-from deploy.running import manifest
-from deploy.running.environment import of_supervisord
-from deploy.running.errors import DeploymentError
-from deploy.running.system import System
 from deploy.security import documents
 from deploy.security.keystore import Keystore
+from deploy.supervision import manifest
+from deploy.supervision.environment import of_supervisord
+from deploy.supervision.errors import DeploymentError
+from deploy.supervision.system import System
 from interfaces.service import enclave
 from interfaces.service.enclave import Keys
 from tests.system.sites import ROOT, Site

@@ -23,8 +23,8 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 
-from deploy.running import manifest, processes
-from deploy.running.system import System
+from deploy.supervision import manifest, processes
+from deploy.supervision.system import System
 from interfaces import topics
 from tests.environment import user_environment
 

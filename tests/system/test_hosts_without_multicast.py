@@ -15,9 +15,9 @@ from pathlib import Path
 import pytest
 from rclpy.utilities import get_rmw_implementation_identifier
 
-from deploy.running import manifest
-from deploy.running.environment import RANGE, set_middleware
-from deploy.running.processes import ROOT
+from deploy.supervision import manifest
+from deploy.supervision.environment import RANGE, set_middleware
+from deploy.supervision.processes import ROOT
 from deploy.trials.chaos.partition import BRIDGE, CONTROL, NETWORK, ROBOT, missing, namespaces
 from tests.system.sites import LIMIT, STEADY, Command, Site
 

@@ -157,7 +157,7 @@ def test_a_service_in_the_same_domain_is_reported(site: Site) -> None:
 
 
 def test_the_sentinel_runs_only_under_supervisord(site: Site) -> None:
-    code, printed = site.do_command(sys.executable, "-m", "deploy.running.sentinel")
+    code, printed = site.do_command(sys.executable, "-m", "deploy.supervision.sentinel")
     assert (code, printed) == (2, "sentinel: runs only under supervisord: make start")
 
 

@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from deploy.running import manifest, processes
+from deploy.supervision import manifest, processes
 from tests.system.sites import ROOT, Site
 
 PACKAGE = "reactive_arm"

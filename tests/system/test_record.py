@@ -16,7 +16,7 @@ from mcap_files import McapFile
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
-from deploy.running.rclpy_choice import sourced_rclpy
+from deploy.supervision.rclpy_choice import sourced_rclpy
 from interfaces import topics
 from tests.system.sites import LIMIT, ROOT, Command, Site
 

@@ -19,9 +19,9 @@ import pytest
 from geometry_msgs.msg import Point, PointStamped, Twist, TwistStamped, Vector3
 from std_msgs.msg import Bool, Float64, String
 
-from deploy.running import processes
-from deploy.running.rclpy_choice import sourced_rclpy
-from deploy.running.system import System
+from deploy.supervision import processes
+from deploy.supervision.rclpy_choice import sourced_rclpy
+from deploy.supervision.system import System
 from interfaces import topics
 from tests.system.sites import LIMIT, ROOT, STEADY, Peer, Site
 

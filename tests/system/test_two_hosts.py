@@ -19,10 +19,10 @@ from pathlib import Path
 
 import pytest
 
-from deploy.running import manifest
-from deploy.running.environment import set_middleware
-from deploy.running.rclpy_choice import sourced_rclpy
-from deploy.running.reaction import reaction
+from deploy.supervision import manifest
+from deploy.supervision.environment import set_middleware
+from deploy.supervision.rclpy_choice import sourced_rclpy
+from deploy.supervision.reaction import reaction
 from deploy.trials.chaos import clock
 from deploy.trials.chaos.faults import INJECTED
 from deploy.trials.chaos.partition import BRIDGE, CONTROL, NETWORK, ROBOT, missing, namespaces

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 
-from deploy.running.run_directory import PAGE_FILE
+from deploy.supervision.run_directory import PAGE_FILE
 from interfaces.service import UserError
 
 DEFAULT_PORT = 8642

@@ -9,7 +9,7 @@ import json
 from collections.abc import Callable, Collection, Mapping
 from typing import Any, NamedTuple
 
-from deploy.running import manifest
+from deploy.supervision import manifest
 from interfaces.service.parameters import declarations
 from interfaces.topics import TURN_OFF, TURN_ON
 from services.config_publisher import Parameters

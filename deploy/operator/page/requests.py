@@ -16,7 +16,7 @@ from deploy.operator.page import protocol
 from deploy.operator.page.server import Request
 from deploy.operator.page.state import Change, Program, follows_scenario, refuse
 from deploy.operator.remote import ParameterChange, RemoteParameters
-from deploy.running import processes
+from deploy.supervision import processes
 from reactive_node import ReactiveNode, stamps
 from reactive_node.stamps import Timestamp
 

@@ -13,8 +13,8 @@ from reactivex import Observable
 
 from deploy.operator.engines import BY_COMMAND, BY_PAGE, BY_WATCHDOG, OLDER, TOGETHER, Engines, Graph
 from deploy.operator.hold import Hold
-from deploy.running import manifest
-from deploy.running.sentinel import reported
+from deploy.supervision import manifest
+from deploy.supervision.sentinel import reported
 from interfaces import topics
 from interfaces.service.health import healths
 from interfaces.topics import ALIVE, INCAPACITATED, MISSED, TURN_OFF

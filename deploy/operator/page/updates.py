@@ -8,7 +8,7 @@ from typing import Any
 from deploy.operator.engines import RENEWED
 from deploy.operator.page.protocol import LIMITS
 from deploy.operator.page.state import BEAT, PROGRAMS, Clock, PageState, Program
-from deploy.running import manifest, sentinel
+from deploy.supervision import manifest, sentinel
 from interfaces import topics
 from interfaces.loopback import LOOPBACK_DOWN
 from interfaces.topics import OFF, ON

@@ -30,7 +30,7 @@ def main() -> None:
         os.environ.setdefault("REACTIVE_ARM_RUN_DIR", str(_run_directory()))
         module = "deploy.commands.launcher"
     else:
-        from deploy.running import manifest
+        from deploy.supervision import manifest
 
         program = next(each for each in manifest.programs() if each.name == executable.name)
         module = program.module

@@ -21,11 +21,11 @@ from deploy.promises.findings import HOLDS, count, overall
 from deploy.promises.html_report import html, verdict
 from deploy.promises.promises import CHECKERS, overloads
 from deploy.promises.text_report import text
-from deploy.running import interruption, processes
-from deploy.running.environment import set_middleware
-from deploy.running.errors import DeploymentError
-from deploy.running.run_directory import make_directory
-from deploy.running.system import System
+from deploy.supervision import interruption, processes
+from deploy.supervision.environment import set_middleware
+from deploy.supervision.errors import DeploymentError
+from deploy.supervision.run_directory import make_directory
+from deploy.supervision.system import System
 from deploy.trials.chaos import plan
 from deploy.trials.chaos.arm import file_suffix
 from deploy.trials.chaos.cost import Cost

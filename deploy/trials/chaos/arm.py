@@ -9,9 +9,9 @@ from contextlib import suppress
 from typing import Any
 
 from deploy.promises.marks import BABBLER
-from deploy.running import processes
-from deploy.running.errors import DeploymentError
-from deploy.running.system import System
+from deploy.supervision import processes
+from deploy.supervision.errors import DeploymentError
+from deploy.supervision.system import System
 from deploy.trials.chaos.clock import Clock
 from deploy.trials.chaos.nested_faults import NestedFaults
 

@@ -24,7 +24,7 @@ from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import Bool, Float64, Header, String
 
 from deploy.promises.marks import BABBLER, GARBAGE, TEXT, nan
-from deploy.running.environment import namespace_of
+from deploy.supervision.environment import namespace_of
 from interfaces import topics
 from interfaces.service import enclave, middleware
 

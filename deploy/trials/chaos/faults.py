@@ -17,8 +17,8 @@ import yaml
 from deploy.promises import marks
 from deploy.promises.history import ALL, NO_TARGET, PROGRAMS
 from deploy.promises.marks import BABBLER
-from deploy.running import parameter_file, processes
-from deploy.running.run_directory import KEY, with_parameters
+from deploy.supervision import parameter_file, processes
+from deploy.supervision.run_directory import KEY, with_parameters
 from deploy.trials.chaos import clock
 from deploy.trials.chaos.arm import RealArm
 

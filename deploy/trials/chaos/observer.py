@@ -29,7 +29,7 @@ from rclpy.signals import SignalHandlerOptions
 from deploy.promises.history import LOSS, NO_TARGET, OVERLOAD, InjectedFault, Life
 from deploy.promises.marks import is_babble
 from deploy.promises.observations import FAULTS, PROCESSES
-from deploy.running.recorder import Recorder, clocks, record
+from deploy.supervision.recorder import Recorder, clocks, record
 from deploy.trials.chaos.process_monitor import SCAN_PERIOD, ProcessMonitor, Rounds
 from interfaces.service import UserError, enclave, middleware
 from reactive_node import ReactiveNode

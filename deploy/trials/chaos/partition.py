@@ -17,8 +17,8 @@ from pathlib import Path
 from typing import Any
 
 from deploy.promises.history import OPERATOR, SWITCH
-from deploy.running import manifest, processes
-from deploy.running.system import System
+from deploy.supervision import manifest, processes
+from deploy.supervision.system import System
 from deploy.trials.chaos.arm import RealArm
 from deploy.trials.chaos.faults import FAULT_KINDS, FaultKind, Undo
 from deploy.trials.chaos.schedule import PlannedFault

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from deploy.promises import marks
-from deploy.running import parameter_file
-from deploy.running.errors import DeploymentError
+from deploy.supervision import parameter_file
+from deploy.supervision.errors import DeploymentError
 from deploy.trials.chaos import clock, partition, schedule, schedule_file
 from deploy.trials.chaos.faults import FAULT_KINDS
 from deploy.trials.chaos.schedule import Schedule

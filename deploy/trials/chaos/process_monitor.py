@@ -12,7 +12,7 @@ from pathlib import Path
 
 from deploy.promises.history import Life
 from deploy.promises.marks import BABBLER
-from deploy.running import processes
+from deploy.supervision import processes
 
 STALL = 0.1  # s; the kernel schedules each thread within this time, or the machine is overloaded (A4)
 SCAN_PERIOD = 0.02  # s

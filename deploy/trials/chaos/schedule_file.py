@@ -21,7 +21,7 @@ from typing import Any
 
 import yaml
 
-from deploy.running.errors import DeploymentError
+from deploy.supervision.errors import DeploymentError
 from deploy.trials.chaos.schedule import PlannedFault, Schedule
 
 

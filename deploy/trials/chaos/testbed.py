@@ -39,13 +39,13 @@ from deploy.promises.history import (
     target_name,
 )
 from deploy.promises.marks import BABBLER
-from deploy.running import interruption, manifest, processes
-from deploy.running.environment import KEYSTORE, NAMESPACE, SECURITY
-from deploy.running.errors import DeploymentError
-from deploy.running.run_directory import scenario_parameters, with_parameters
-from deploy.running.system import System
 from deploy.security import rights
 from deploy.security.keystore import Keystore
+from deploy.supervision import interruption, manifest, processes
+from deploy.supervision.environment import KEYSTORE, NAMESPACE, SECURITY
+from deploy.supervision.errors import DeploymentError
+from deploy.supervision.run_directory import scenario_parameters, with_parameters
+from deploy.supervision.system import System
 from deploy.trials.chaos import clock
 from deploy.trials.chaos.arm import RealArm, file_suffix
 from deploy.trials.chaos.faults import FAULT_KINDS, INJECTED, Undo

@@ -16,9 +16,9 @@ from pathlib import Path
 
 import yaml
 
-from deploy.running import interruption, parameter_file
-from deploy.running.errors import DeploymentError
-from deploy.running.recorder import Recorder, qos_profiles
+from deploy.supervision import interruption, parameter_file
+from deploy.supervision.errors import DeploymentError
+from deploy.supervision.recorder import Recorder, qos_profiles
 from deploy.trials.replay import chains
 from deploy.trials.replay.job import Job, Outcome, run_all
 from deploy.trials.replay.record import Record, load

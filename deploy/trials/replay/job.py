@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from rclpy_simulation.host import SECOND
 
-from deploy.running import interruption
+from deploy.supervision import interruption
 from deploy.trials.replay import chains
 from deploy.trials.replay.chains import Chain
 from deploy.trials.replay.comparison import BOUNDS, Comparison, Interval, compare

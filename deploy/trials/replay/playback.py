@@ -19,8 +19,8 @@ from rclpy_simulation import Delay, Network, Process, Simulation
 from rclpy_simulation.host import BOOT, SECOND
 
 from deploy.promises.history import WATCHDOG
-from deploy.running import manifest
-from deploy.running.environment import NAMESPACE
+from deploy.supervision import manifest
+from deploy.supervision.environment import NAMESPACE
 from deploy.trials.replay import chains
 from deploy.trials.replay.chains import Chain
 from deploy.trials.replay.lives import AHEAD, ReplayedLife, Suspension, lives, origin

@@ -17,9 +17,9 @@ from deploy.promises.findings import count, how_often
 from deploy.promises.history import STUCK_DRIVE
 from deploy.promises.html_report import html, verdict
 from deploy.promises.text_report import text
-from deploy.running import interruption, parameter_file, processes
-from deploy.running.errors import DeploymentError
-from deploy.running.run_directory import make_directory
+from deploy.supervision import interruption, parameter_file, processes
+from deploy.supervision.errors import DeploymentError
+from deploy.supervision.run_directory import make_directory
 from deploy.trials.chaos import schedule_file
 from deploy.trials.chaos.plan import names, number
 from deploy.trials.chaos.schedule_file import Experiment

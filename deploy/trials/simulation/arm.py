@@ -13,11 +13,11 @@ from rclpy_simulation import Delay, Network, Process, Simulation
 from rclpy_simulation.host import BOOT, SECOND
 
 from deploy.promises.history import SWITCH, Life
-from deploy.running import manifest
-from deploy.running.errors import DeploymentError
-from deploy.running.processes import MARK
-from deploy.running.run_directory import SETTINGS, scenario_parameters, with_parameters
-from deploy.running.system import SERVICE_GRACE
+from deploy.supervision import manifest
+from deploy.supervision.errors import DeploymentError
+from deploy.supervision.processes import MARK
+from deploy.supervision.run_directory import SETTINGS, scenario_parameters, with_parameters
+from deploy.supervision.system import SERVICE_GRACE
 from deploy.trials.chaos.nested_faults import NestedFaults
 from deploy.trials.simulation.calibration import Calibration, load
 from deploy.trials.simulation.machine import simulated_services

@@ -40,8 +40,8 @@ from deploy.promises.history import (
     running,
 )
 from deploy.promises.marks import STEP
-from deploy.running import parameter_file
-from deploy.running.reaction import BEAT, Reaction
+from deploy.supervision import parameter_file
+from deploy.supervision.reaction import BEAT, Reaction
 from deploy.trials.chaos.schedule import PlannedFault
 from deploy.trials.chaos.schedule_file import Experiment
 from interfaces import topics

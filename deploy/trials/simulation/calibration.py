@@ -26,7 +26,7 @@ from deploy.promises import observations
 from deploy.promises.findings import percentile
 from deploy.promises.history import SOURCES, History, Life
 from deploy.promises.promises import CHECKERS
-from deploy.running.errors import DeploymentError
+from deploy.supervision.errors import DeploymentError
 
 PATH = Path(__file__).with_name("calibration.json")
 

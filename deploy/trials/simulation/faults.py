@@ -11,7 +11,7 @@ from rclpy_simulation import Delay, Process
 
 from deploy.promises import marks
 from deploy.promises.history import ALL, FALSE_PRESENCE, HOLD, NO_TARGET, OPERATOR, PARTITION, STUCK_DRIVE
-from deploy.running.run_directory import KEY, with_parameters
+from deploy.supervision.run_directory import KEY, with_parameters
 from deploy.trials.chaos import clock
 from deploy.trials.chaos.faults import PARAMETERS, Undo
 from deploy.trials.simulation import people

@@ -16,11 +16,11 @@ from unittest import mock
 from rclpy_simulation import Network, Process, Simulation
 from rclpy_simulation.process import running_process
 
-from deploy.running import machine as running_machine
-from deploy.running import probe, processes
-from deploy.running.errors import DeploymentError
-from deploy.running.processes import MARK
-from deploy.running.supervisord import Supervisord
+from deploy.supervision import machine as running_machine
+from deploy.supervision import probe, processes
+from deploy.supervision.errors import DeploymentError
+from deploy.supervision.processes import MARK
+from deploy.supervision.supervisord import Supervisord
 from interfaces.service import instance
 from interfaces.service import process as service_process
 from interfaces.sources import scenario_file

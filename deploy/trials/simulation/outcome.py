@@ -11,7 +11,7 @@ from typing import Any
 from deploy.promises.findings import Finding
 from deploy.promises.history import OPERATOR, PROGRAMS, SILENCE, History, InjectedFault
 from deploy.promises.promises import CHECKERS
-from deploy.running.errors import DeploymentError
+from deploy.supervision.errors import DeploymentError
 from deploy.trials.chaos.schedule import PlannedFault
 from deploy.trials.chaos.schedule_file import Experiment
 from deploy.trials.simulation import people

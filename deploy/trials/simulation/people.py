@@ -7,7 +7,7 @@ import random
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from deploy.running.reaction import Reaction
+from deploy.supervision.reaction import Reaction
 from deploy.trials.chaos import babbler
 from deploy.trials.chaos.testbed import sources
 from interfaces import topics

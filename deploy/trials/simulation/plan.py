@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from deploy.running import parameter_file
+from deploy.supervision import parameter_file
 from deploy.trials.chaos.schedule import random_faults
 from deploy.trials.chaos.schedule_file import Experiment
 from deploy.trials.simulation import people

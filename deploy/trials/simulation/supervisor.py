@@ -1,7 +1,7 @@
 """supervisord as the programs of an arm experience it, in virtual time.
 
 The rules are those of supervisor 4.3 with the settings of deploy/supervisord.conf and the extension of
-deploy/running: a program is started again as soon as it has ended; after an early end the pause grows by
+deploy/supervision: a program is started again as soon as it has ended; after an early end the pause grows by
 a second each time; a sentinel that stops asking is killed.
 """
 
@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 from rclpy_simulation import Process, Simulation
 
-from deploy.running import manifest
-from deploy.running.extension import LONGEST_WAIT, SENTINEL_START_TIMEOUT, SENTINEL_TIMEOUT
-from deploy.running.manifest import SENTINEL
-from deploy.running.supervisord import Program
+from deploy.supervision import manifest
+from deploy.supervision.extension import LONGEST_WAIT, SENTINEL_START_TIMEOUT, SENTINEL_TIMEOUT
+from deploy.supervision.manifest import SENTINEL
+from deploy.supervision.supervisord import Program
 
 START_SECONDS = 1.0  # s; supervisor's default of startsecs
 

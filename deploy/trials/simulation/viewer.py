@@ -10,7 +10,7 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 
-from deploy.running.environment import namespace_of
+from deploy.supervision.environment import namespace_of
 from interfaces import topics
 
 

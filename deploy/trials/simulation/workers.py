@@ -10,7 +10,7 @@ import tempfile
 from collections.abc import Iterator, Sequence
 from multiprocessing.pool import IMapIterator
 
-from deploy.running import interruption
+from deploy.supervision import interruption
 from deploy.trials.chaos.schedule_file import Experiment
 from deploy.trials.simulation.outcome import simulate
 from deploy.trials.simulation.summary import Summary

@@ -9,7 +9,7 @@ import pytest
 
 from deploy.operator.page import address
 from deploy.operator.page.address import AddressFile, host_names, listen, tls
-from deploy.running.run_directory import PAGE_FILE
+from deploy.supervision.run_directory import PAGE_FILE
 from interfaces.service import UserError
 
 LINE = "The page: http://127.0.0.1:8650/#tok-en_1"

@@ -14,8 +14,8 @@ from typing import Any
 import pytest
 
 from deploy.operator.engines import RESTARTED
-from deploy.running.manifest import PAGE
-from deploy.running.system import System
+from deploy.supervision.manifest import PAGE
+from deploy.supervision.system import System
 from interfaces import topics
 from interfaces.topics import OFF, ON
 from tests.operator.page.clients import Hand, Link

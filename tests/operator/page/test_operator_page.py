@@ -23,7 +23,7 @@ from deploy.operator.engines import RESTARTED
 from deploy.operator.hand import Hand
 from deploy.operator.page.server import UPDATE_PERIOD
 from deploy.operator.switch import ECHO
-from deploy.running.run_directory import PAGE_FILE
+from deploy.supervision.run_directory import PAGE_FILE
 from interfaces import topics
 from interfaces.loopback import LOOPBACK_DOWN
 from interfaces.service import ServiceNode

@@ -11,7 +11,7 @@ from deploy.operator.page import requests
 from deploy.operator.page.protocol import Process
 from deploy.operator.page.server import Request
 from deploy.operator.page.state import Change, PageState, Program
-from deploy.running import processes
+from deploy.supervision import processes
 
 KILL = Request("page", Process("velocity", "kill"), is_local=True)
 PROGRAMS = {

@@ -8,9 +8,9 @@ from typing import Any
 import pytest
 
 from deploy.commands import parameters
-from deploy.running.environment import NAMESPACE
-from deploy.running.errors import DeploymentError
-from deploy.running.run_directory import KEY
+from deploy.supervision.environment import NAMESPACE
+from deploy.supervision.errors import DeploymentError
+from deploy.supervision.run_directory import KEY
 
 
 def port_of(web: str, namespace: str = "", user_file: str = "") -> Any:

@@ -14,9 +14,9 @@ from typing import Any
 import pytest
 from rclpy._dds import security
 
-from deploy.running import manifest
 from deploy.security import rights
 from deploy.security.keystore import Keystore
+from deploy.supervision import manifest
 from reactive_node.domains import reserved_domain
 from tests.environment import user_environment
 from tests.system.sites import LIMIT, ROOT, Site

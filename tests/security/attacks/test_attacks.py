@@ -20,11 +20,11 @@ from pathlib import Path
 import pytest
 from rclpy._dds import security
 
-from deploy.running.manifest import VIRTUAL_JOINTS
-from deploy.running.system import System
 from deploy.security import keystore as keystores
 from deploy.security import rights
 from deploy.security.keystore import Keystore
+from deploy.supervision.manifest import VIRTUAL_JOINTS
+from deploy.supervision.system import System
 from deploy.trials.chaos import clock
 from deploy.trials.chaos.faults import INJECTED
 from tests.operator.page.clients import Hand

@@ -10,7 +10,7 @@ from deploy.promises import observations
 from deploy.promises.findings import Finding
 from deploy.promises.history import History
 from deploy.promises.promises import CHECKERS
-from deploy.running import processes
+from deploy.supervision import processes
 from deploy.trials.chaos.arm import file_suffix
 from tests.environment import user_environment
 

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from deploy.promises.history import ALL
-from deploy.running import processes
-from deploy.running.system import System
+from deploy.supervision import processes
+from deploy.supervision.system import System
 from deploy.trials.chaos.arm import RealArm
 from deploy.trials.chaos.cost import Cost
 from deploy.trials.chaos.faults import FAULT_KINDS

@@ -21,11 +21,11 @@ from std_msgs.msg import Float64
 
 from deploy.promises.history import ALL, NO_TARGET, Life
 from deploy.promises.marks import BABBLER
-from deploy.running import processes
-from deploy.running.environment import NAMESPACE
-from deploy.running.run_directory import ALL as ALL_NODES
-from deploy.running.run_directory import KEY
-from deploy.running.system import System
+from deploy.supervision import processes
+from deploy.supervision.environment import NAMESPACE
+from deploy.supervision.run_directory import ALL as ALL_NODES
+from deploy.supervision.run_directory import KEY
+from deploy.supervision.system import System
 from deploy.trials.chaos import process_monitor
 from deploy.trials.chaos.arm import RealArm
 from deploy.trials.chaos.faults import FAULT_KINDS, PARAMETERS, Undo

@@ -11,7 +11,7 @@ import pytest
 from deploy.promises.findings import HOLDS
 from deploy.promises.history import History, InjectedFault, between
 from deploy.promises.promises import CHECKERS
-from deploy.running import processes
+from deploy.supervision import processes
 from deploy.trials.chaos.partition import missing, namespaces
 from interfaces.topics import ENGINES_STATE, OFF, ON, OPERATOR_HEARTBEAT
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from deploy.running.errors import DeploymentError
+from deploy.supervision.errors import DeploymentError
 from deploy.trials.chaos import clock, plan
 from deploy.trials.chaos.schedule import PlannedFault
 from deploy.trials.chaos.schedule_file import Experiment, save

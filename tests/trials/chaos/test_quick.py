@@ -8,8 +8,8 @@ import pytest
 
 from deploy.promises.findings import HOLDS
 from deploy.promises.promises import CHECKERS
-from deploy.running import parameter_file
-from deploy.running.processes import ROOT
+from deploy.supervision import parameter_file
+from deploy.supervision.processes import ROOT
 from deploy.trials.chaos.schedule import PlannedFault
 from deploy.trials.chaos.schedule_file import Experiment, save
 from deploy.trials.chaos.testbed import SCENARIO

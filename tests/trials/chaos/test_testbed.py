@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 from deploy.promises.history import OUTPUTS
-from deploy.running.errors import DeploymentError
+from deploy.supervision.errors import DeploymentError
 from deploy.trials.chaos.testbed import START_TIMEOUT, Testbed
 
 ARMS = tuple(f"/arm{number}" for number in range(1, 31))

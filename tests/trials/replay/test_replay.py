@@ -27,8 +27,8 @@ from tf2_msgs.msg import TFMessage
 from deploy.promises.history import NO_TARGET, InjectedFault
 from deploy.promises.marks import STEP
 from deploy.promises.observations import FAULTS
-from deploy.running.errors import DeploymentError
-from deploy.running.recorder import Recorder
+from deploy.supervision.errors import DeploymentError
+from deploy.supervision.recorder import Recorder
 from deploy.trials.replay import chains
 from deploy.trials.replay.comparison import compare
 from deploy.trials.replay.record import Message, Record, load

@@ -19,9 +19,9 @@ from typing import Any, NamedTuple
 from unittest import mock
 
 from deploy.promises.history import CONTROLLER, DRIVE, WATCHDOG
-from deploy.running import parameter_file
-from deploy.running.manifest import Program
-from deploy.running.processes import ROOT
+from deploy.supervision import parameter_file
+from deploy.supervision.manifest import Program
+from deploy.supervision.processes import ROOT
 from deploy.trials.simulation import arm, plan
 from deploy.trials.simulation.faults import FAULT_KINDS
 from deploy.trials.simulation.outcome import simulate

@@ -8,7 +8,7 @@ import random
 import pytest
 
 from deploy.promises.history import CONTROLLER, FALSE_PRESENCE, STUCK_DRIVE
-from deploy.running import parameter_file
+from deploy.supervision import parameter_file
 from deploy.trials.chaos.schedule import PlannedFault
 from deploy.trials.chaos.schedule_file import Experiment
 from deploy.trials.simulation import __main__ as command_line

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from deploy.running.processes import ROOT
+from deploy.supervision.processes import ROOT
 from deploy.trials.chaos.schedule import PlannedFault
 from deploy.trials.chaos.schedule_file import Experiment, load, save
 from deploy.trials.chaos.testbed import SCENARIO

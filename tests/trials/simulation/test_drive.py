@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 from deploy.promises.history import CONTROLLER, DRIVE, WATCHDOG, History, Sample, between
-from deploy.running.plugin import SCENARIO
+from deploy.supervision.plugin import SCENARIO
 from deploy.trials.chaos.schedule import PlannedFault
 from deploy.trials.chaos.schedule_file import Experiment
 from deploy.trials.simulation import people

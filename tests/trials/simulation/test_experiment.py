@@ -15,8 +15,8 @@ import yaml
 from rclpy_simulation.host import BOOT, SECOND
 
 from deploy.promises.history import ALL, NO_TARGET, OPERATOR
-from deploy.running.manifest import Program
-from deploy.running.processes import ROOT
+from deploy.supervision.manifest import Program
+from deploy.supervision.processes import ROOT
 from deploy.trials.chaos import schedule
 from deploy.trials.chaos.schedule import AWAKE, DAY, PlannedFault
 from deploy.trials.chaos.schedule_file import Experiment

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import yaml
 
-from deploy.running.reaction import reaction
+from deploy.supervision.reaction import reaction
 from deploy.trials.simulation import people
 from interfaces import topics
 from interfaces.sources.scenario_file import load

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from deploy.running.errors import DeploymentError
+from deploy.supervision.errors import DeploymentError
 from deploy.trials.chaos import schedule_file
 from deploy.trials.chaos.schedule import PlannedFault
 from deploy.trials.chaos.schedule_file import Experiment

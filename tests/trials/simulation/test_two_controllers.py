@@ -20,7 +20,7 @@ from rclpy_simulation.process import running_process
 
 from deploy.promises.history import CONTROLLER, DRIVE, SWITCH, WATCHDOG
 from deploy.promises.observations import values
-from deploy.running.run_directory import scenario_parameters
+from deploy.supervision.run_directory import scenario_parameters
 from deploy.trials.simulation import arm
 from deploy.trials.simulation.arm import CONTROL, ROBOT
 from deploy.trials.simulation.calibration import load

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from std_msgs.msg import Float64
 
-from deploy.running import manifest
+from deploy.supervision import manifest
 from interfaces import topics
 from tests.system.sites import LIMIT, Peer
 

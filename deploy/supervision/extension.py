@@ -27,8 +27,8 @@ from supervisor import events, loggers
 from supervisor.loggers import RotatingFileHandler
 from supervisor.states import ProcessStates, SupervisorStates, getProcessStateDescription
 
-from deploy.running import manifest, prefork
-from deploy.running.run_directory import PARAMETERS
+from deploy.supervision import manifest, prefork
+from deploy.supervision.run_directory import PARAMETERS
 
 LONGEST_WAIT = 0.1  # s, while the state of a program changes with time
 _CHANGING = (ProcessStates.STARTING, ProcessStates.BACKOFF, ProcessStates.STOPPING)

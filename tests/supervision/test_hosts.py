@@ -10,10 +10,10 @@ from pathlib import Path
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 
-from deploy.running import manifest, sentinel
-from deploy.running.errors import DeploymentError
-from deploy.running.probe import Probe
-from deploy.running.supervisord import Program, Supervisord
+from deploy.supervision import manifest, sentinel
+from deploy.supervision.errors import DeploymentError
+from deploy.supervision.probe import Probe
+from deploy.supervision.supervisord import Program, Supervisord
 from interfaces.service.health import Health
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from deploy.running import manifest, parameter_file
+from deploy.supervision import manifest, parameter_file
 from interfaces.service import UserError
 
 PARAMETERS = {

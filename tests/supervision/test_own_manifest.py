@@ -10,9 +10,9 @@ from textwrap import dedent
 
 import pytest
 
-from deploy.running import manifest, parameter_file
-from deploy.running.errors import DeploymentError
-from deploy.running.reaction import reaction
+from deploy.supervision import manifest, parameter_file
+from deploy.supervision.errors import DeploymentError
+from deploy.supervision.reaction import reaction
 from interfaces.service import UserError
 
 GUARD = "[program:guard]\ncommand = python3 -m services.examples.speed_guard\n"

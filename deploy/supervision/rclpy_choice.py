@@ -6,7 +6,7 @@ import importlib.machinery
 import os
 from pathlib import Path
 
-from deploy.running.processes import ROOT
+from deploy.supervision.processes import ROOT
 
 RUNTIME = "RUNTIME"
 """Environment variable: "embedded" for the rclpy of this checkout, "" for ROS 2's own."""

@@ -8,10 +8,10 @@ import time
 from collections.abc import Mapping
 from pathlib import Path
 
-from deploy.running import processes
-from deploy.running.errors import DeploymentError
-from deploy.running.policy import Observation
-from deploy.running.supervisord import Program, Supervisord
+from deploy.supervision import processes
+from deploy.supervision.errors import DeploymentError
+from deploy.supervision.policy import Observation
+from deploy.supervision.supervisord import Program, Supervisord
 from interfaces.service.health import Health
 
 ASKING_PERIOD = 1.0  # s between two questions to supervisord; each costs both of us a millisecond

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from deploy.running.machine import Figures, Machine, figures
+from deploy.supervision.machine import Figures, Machine, figures
 from interfaces.loopback import LOOPBACK_DOWN
 
 PERIOD = 0.5

@@ -5,7 +5,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from deploy.running.environment import set_middleware
+from deploy.supervision.environment import set_middleware
 
 
 def test_the_settings_of_the_user_win() -> None:

@@ -6,9 +6,9 @@ from typing import Any
 
 import pytest
 
-from deploy.running import parameter_file
-from deploy.running.processes import ROOT
-from deploy.running.reaction import reaction
+from deploy.supervision import parameter_file
+from deploy.supervision.processes import ROOT
+from deploy.supervision.reaction import reaction
 
 
 def of_watchdog(**parameters: Any) -> dict[str, dict[str, Any]]:

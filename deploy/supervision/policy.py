@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
-from deploy.running import manifest, processes
-from deploy.running.supervisord import Program
+from deploy.supervision import manifest, processes
+from deploy.supervision.supervisord import Program
 from interfaces.service.health import PERIOD
 
 RECENT = 60.0  # s for which a restart counts as recent

@@ -11,11 +11,11 @@ import sys
 import time
 from pathlib import Path
 
-from deploy.running import manifest, processes
-from deploy.running.errors import DeploymentError
-from deploy.running.extension import make_interface
-from deploy.running.run_directory import LEAD, scenario_parameters
-from deploy.running.system import System
+from deploy.supervision import manifest, processes
+from deploy.supervision.errors import DeploymentError
+from deploy.supervision.extension import make_interface
+from deploy.supervision.run_directory import LEAD, scenario_parameters
+from deploy.supervision.system import System
 
 __all__ = ["make_interface"]
 

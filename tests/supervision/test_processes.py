@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from deploy.running import processes
+from deploy.supervision import processes
 
 Spawn = Callable[..., "subprocess.Popen[bytes]"]
 READY = "print(flush=True); "

@@ -16,13 +16,13 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.time import Time
 
-from deploy.running import manifest, processes, sentinel
-from deploy.running.errors import DeploymentError
-from deploy.running.machine import Figures
-from deploy.running.manifest import SENTINEL
-from deploy.running.policy import Action, Observation, Timeouts
-from deploy.running.service_manager import notify
-from deploy.running.supervisord import Program, Supervisord
+from deploy.supervision import manifest, processes, sentinel
+from deploy.supervision.errors import DeploymentError
+from deploy.supervision.machine import Figures
+from deploy.supervision.manifest import SENTINEL
+from deploy.supervision.policy import Action, Observation, Timeouts
+from deploy.supervision.service_manager import notify
+from deploy.supervision.supervisord import Program, Supervisord
 from interfaces.topics import DIAGNOSTICS
 from reactive_node.testing import MakeNode, SpinFor, SpinUntil
 from tests.component.wiring import Wired

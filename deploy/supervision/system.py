@@ -9,10 +9,10 @@ from contextlib import suppress
 from pathlib import Path
 from typing import NoReturn
 
-from deploy.running import environment, manifest, messages, processes, supervisord
-from deploy.running.errors import DeploymentError
-from deploy.running.run_directory import MANIFEST, RunDirectory
-from deploy.running.supervisord import Program, Supervisord
+from deploy.supervision import environment, manifest, messages, processes, supervisord
+from deploy.supervision.errors import DeploymentError
+from deploy.supervision.run_directory import MANIFEST, RunDirectory
+from deploy.supervision.supervisord import Program, Supervisord
 
 SERVICE_GRACE = 1.0  # s from SIGTERM to SIGKILL of a service, as in supervisord.conf
 SUPERVISOR_GRACE = 1.4  # s that supervisord has to stop all of them

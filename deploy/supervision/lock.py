@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from deploy.running import interruption
+from deploy.supervision import interruption
 
 
 @contextmanager

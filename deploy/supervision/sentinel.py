@@ -27,14 +27,14 @@ from pathlib import Path
 import reactivex as rx
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
-from deploy.running import manifest, processes
-from deploy.running.errors import DeploymentError
-from deploy.running.machine import Machine, figures
-from deploy.running.manifest import SENTINEL
-from deploy.running.policy import Action, Observation, Policy, Timeouts
-from deploy.running.probe import Probe, is_here
-from deploy.running.service_manager import ALIVE, READY, notify
-from deploy.running.supervisord import Program, Supervisord
+from deploy.supervision import manifest, processes
+from deploy.supervision.errors import DeploymentError
+from deploy.supervision.machine import Machine, figures
+from deploy.supervision.manifest import SENTINEL
+from deploy.supervision.policy import Action, Observation, Policy, Timeouts
+from deploy.supervision.probe import Probe, is_here
+from deploy.supervision.service_manager import ALIVE, READY, notify
+from deploy.supervision.supervisord import Program, Supervisord
 from interfaces import service
 from interfaces.service import ServiceNode, parameter
 from interfaces.service.health import Health, healths, seconds

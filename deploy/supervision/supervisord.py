@@ -11,8 +11,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from deploy.running import interruption, manifest, messages, rpc
-from deploy.running.errors import DeploymentError
+from deploy.supervision import interruption, manifest, messages, rpc
+from deploy.supervision.errors import DeploymentError
 
 COMMAND = (sys.executable, "-m", "supervisor.supervisord")
 ANSWER_LIMIT = 1.5  # s that it has to answer the sentinel

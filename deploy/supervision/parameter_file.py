@@ -11,9 +11,9 @@ from collections.abc import Iterator, Mapping
 from types import ModuleType
 from typing import Any
 
-from deploy.running import interruption, manifest
-from deploy.running.reaction import Reaction, reaction
-from deploy.running.run_directory import ALL, KEY
+from deploy.supervision import interruption, manifest
+from deploy.supervision.reaction import Reaction, reaction
+from deploy.supervision.run_directory import ALL, KEY
 from interfaces.service import UserError
 from interfaces.service.parameters import Declaration, declarations
 from interfaces.sources import yaml_file

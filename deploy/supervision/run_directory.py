@@ -10,9 +10,9 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from deploy.running import processes
-from deploy.running.errors import DeploymentError
-from deploy.running.lock import held
+from deploy.supervision import processes
+from deploy.supervision.errors import DeploymentError
+from deploy.supervision.lock import held
 
 # `make stop` runs without .venv: PyYAML is imported where it is needed.
 

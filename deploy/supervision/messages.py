@@ -5,8 +5,8 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
-from deploy.running import processes
-from deploy.running.run_directory import RunDirectory
+from deploy.supervision import processes
+from deploy.supervision.run_directory import RunDirectory
 
 
 def unattended(run: Path) -> str:

@@ -18,7 +18,7 @@ from supervisor import events, loggers
 from supervisor.poller import Poller
 from supervisor.states import ProcessStates
 
-from deploy.running.extension import LONGEST_WAIT, ArmInterface, LossyLog, make_interface
+from deploy.supervision.extension import LONGEST_WAIT, ArmInterface, LossyLog, make_interface
 
 LIMIT = 10  # bytes of a log until it is rolled over
 

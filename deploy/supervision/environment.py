@@ -7,7 +7,7 @@ import sys
 from collections.abc import Mapping, MutableMapping
 from pathlib import Path
 
-from deploy.running import manifest, processes, rclpy_choice
+from deploy.supervision import manifest, processes, rclpy_choice
 
 NAMESPACE = "REACTIVE_ARM_NAMESPACE"  # environment variable: the ROS namespace of an arm
 SECURITY = "ROS_SECURITY_ENABLE"

@@ -32,7 +32,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, NoReturn
 
-from deploy.running import processes
+from deploy.supervision import processes
 
 LIBRARIES = (
     "json",

@@ -8,14 +8,14 @@ from pathlib import Path
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
-from deploy.running import processes, rpc
-from deploy.running.errors import DeploymentError
-from deploy.running.manifest import SENTINEL
-from deploy.running.policy import Action, Observation, Policy, Timeouts
-from deploy.running.probe import Probe
-from deploy.running.processes import Process
-from deploy.running.sentinel import reported, states
-from deploy.running.supervisord import Program, Supervisord
+from deploy.supervision import processes, rpc
+from deploy.supervision.errors import DeploymentError
+from deploy.supervision.manifest import SENTINEL
+from deploy.supervision.policy import Action, Observation, Policy, Timeouts
+from deploy.supervision.probe import Probe
+from deploy.supervision.processes import Process
+from deploy.supervision.sentinel import reported, states
+from deploy.supervision.supervisord import Program, Supervisord
 
 SERVICES = ("engine_controller", "kinematics", "operator_watchdog", "velocity", SENTINEL)
 PIDS = {name: 100 + index for index, name in enumerate(SERVICES)}

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 from reactivex.testing import TestScheduler
 
-from deploy.running import recorder
+from deploy.supervision import recorder
 from interfaces import topics
 
 FOREIGN = b"from another publisher"

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from deploy.running import manifest
+from deploy.supervision import manifest
 
 ROOT = Path(__file__).parents[2]
 CONF = configparser.RawConfigParser(inline_comment_prefixes=(" ;",))
@@ -25,7 +25,7 @@ def test_all_programs_stop_at_the_same_time_as_one_group() -> None:
 def test_a_program_has_its_module_and_arguments() -> None:
     first, *_, last = manifest.programs()
     assert first == ("config_l1", "services.config_publisher", ("l1",), manifest.ROBOT)
-    assert last == ("sentinel", "deploy.running.sentinel", (), manifest.ROBOT)
+    assert last == ("sentinel", "deploy.supervision.sentinel", (), manifest.ROBOT)
 
 
 @pytest.mark.parametrize("name", SECTIONS)

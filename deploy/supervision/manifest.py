@@ -28,7 +28,7 @@ from pathlib import Path
 from tempfile import mkstemp
 from typing import NamedTuple
 
-from deploy.running.errors import DeploymentError
+from deploy.supervision.errors import DeploymentError
 
 PATH = Path(__file__).resolve().parents[1] / "supervisord.conf"
 VARIABLE = "REACTIVE_ARM_MANIFEST"

@@ -13,14 +13,14 @@ from pathlib import Path
 
 import pytest
 
-from deploy.running import manifest, prefork
-from deploy.running.processes import ROOT
+from deploy.supervision import manifest, prefork
+from deploy.supervision.processes import ROOT
 from reactive_node.domains import reserved_domain
 
 PYTHON = str(Path(sys.executable).with_name("python3"))
 WARM = """
 import os, signal, sys
-from deploy.running import prefork
+from deploy.supervision import prefork
 sys.is_supervisord = True
 signal.signal(signal.SIGTERM, lambda number, frame: print("supervisord's handler"))
 {more}
@@ -121,10 +121,10 @@ def test_signals_of_a_program_do_not_wake_supervisord(tmp_path: Path) -> None:
 
 
 def test_edited_module_of_the_checkout_counts_at_the_next_start(tmp_path: Path) -> None:
-    shutil.copytree(ROOT / "deploy" / "running", tmp_path / "deploy" / "running")
+    shutil.copytree(ROOT / "deploy" / "supervision", tmp_path / "deploy" / "supervision")
     (tmp_path / "deploy" / "__init__.py").touch()
-    edit = "from deploy.running import rpc; open('deploy/running/rpc.py', 'a').write('EDITED = True')"
-    done = run(tmp_path, f"from deploy.running import rpc; print(rpc.EDITED); {FORKED}", more=edit)
+    edit = "from deploy.supervision import rpc; open('deploy/supervision/rpc.py', 'a').write('EDITED = True')"
+    done = run(tmp_path, f"from deploy.supervision import rpc; print(rpc.EDITED); {FORKED}", more=edit)
     assert (done.stdout, done.stderr) == ("True\nTrue\n", "")
 
 

@@ -4,10 +4,10 @@ from collections.abc import Iterable
 
 import pytest
 
-from deploy.running.manifest import SENTINEL
-from deploy.running.policy import RECENT, Action, Observation, Policy, Timeouts
-from deploy.running.processes import Process
-from deploy.running.supervisord import Program
+from deploy.supervision.manifest import SENTINEL
+from deploy.supervision.policy import RECENT, Action, Observation, Policy, Timeouts
+from deploy.supervision.processes import Process
+from deploy.supervision.supervisord import Program
 
 TIMEOUTS = Timeouts(period=0.25, health=2.5)  # times without rounding
 PIDS = {name: 100 + index for index, name in enumerate(("a", "b", "c", "d", "e", SENTINEL))}
