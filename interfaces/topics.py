@@ -62,7 +62,7 @@ def _point(position: Position) -> PointStamped:
     return PointStamped(header=header, point=Point(x=x, y=y))
 
 
-class Velocity(NamedTuple):
+class PlanarTwist(NamedTuple):
     """A velocity of the effector."""
 
     stamp: int
@@ -78,13 +78,13 @@ class Velocity(NamedTuple):
         return math.hypot(self.x, self.y)
 
 
-def _velocity(message: TwistStamped) -> Velocity:
+def _velocity(message: TwistStamped) -> PlanarTwist:
     header, linear = message.header, message.twist.linear
     stamp = header.stamp.sec * 10**9 + header.stamp.nanosec
-    return Velocity(stamp, linear.x, linear.y, message.twist.angular.z, header.frame_id)
+    return PlanarTwist(stamp, linear.x, linear.y, message.twist.angular.z, header.frame_id)
 
 
-def _twist(velocity: Velocity) -> TwistStamped:
+def _twist(velocity: PlanarTwist) -> TwistStamped:
     stamp, x, y, turn, frame = velocity
     header = Header(stamp=stamps.time_message(stamp), frame_id=frame)
     return TwistStamped(header=header, twist=Twist(linear=Vector3(x=x, y=y), angular=Vector3(z=turn)))
@@ -173,7 +173,7 @@ def _not_a_position(position: Position) -> str:
     return _not_usable(position.x, position.y)
 
 
-def _not_a_velocity(velocity: Velocity) -> str:
+def _not_a_velocity(velocity: PlanarTwist) -> str:
     return _not_usable(velocity.x, velocity.y, velocity.turn)
 
 
@@ -209,7 +209,7 @@ OPERATOR_NODES = ("terminal", "operator_page")
 FLEET = "fleet"
 """The node of `make fleet`, which shows many arms."""
 _VIEWERS = ("RViz", "Foxglove")
-_CONFIGURED = ("kinematics", "motion", "robot_state", *OPERATOR_NODES)
+_CONFIGURED = ("kinematics", "twist", "robot_state", *OPERATOR_NODES)
 EVERY_SERVICE = "every service"
 """In place of the names of all programs of the arm."""
 
@@ -270,12 +270,12 @@ EFFECTOR_SPEED = Topic(
     _not_a_length,
     follows=EFFECTOR_POSITION.name,
 )
-EFFECTOR_VELOCITY = Topic(
-    "effector/velocity",
+EFFECTOR_TWIST = Topic(
+    "effector/twist",
     TwistStamped,
     _EVENTS,
     "m/s, rad/s",
-    ("motion",),
+    ("twist",),
     ("operator_page",),
     f"x, y and the turn about z in frame `{FRAME}`, at 50 Hz; true at the time in `header.stamp`. "
     "Silent while it is unknown: where a movement begins or ends, and while a source is dead",

@@ -27,7 +27,7 @@ from deploy.supervision import interruption
 from deploy.supervision.environment import NAMESPACE, set_middleware
 from interfaces.robot_model import forward_kinematics
 from interfaces.sources.scenario_file import load
-from interfaces.topics import EFFECTOR_SPEED, EFFECTOR_VELOCITY, THETA1, THETA2
+from interfaces.topics import EFFECTOR_SPEED, EFFECTOR_TWIST, THETA1, THETA2
 from reactive_node.signals import Answer, Refused, Signal, as_taken, lift, linear
 from reactive_node.stamps import from_nanoseconds, stamped
 from reactive_node.testing import VirtualTime
@@ -214,7 +214,7 @@ def speed(seconds: float = SECONDS) -> Row:
             velocities.append((stamp.sec + stamp.nanosec / NS, math.hypot(linear.x, linear.y)))
 
         for topic, heard in (
-            (EFFECTOR_VELOCITY, moved),
+            (EFFECTOR_TWIST, moved),
             (EFFECTOR_SPEED, lambda message: speeds.append((time.time(), message.data))),
         ):
             node.create_subscription(topic.type, topic.name, heard, topic.qos)

@@ -89,7 +89,7 @@ User story (ours): as a robot operator, I find the engines off after a value of
         ("lambda speed: speed > limit", "lambda value: value > limit"),
         ("when_a_speed_is", "when_a_value_is"),
         ('"m/s", "greatest speed allowed"', '"", "greatest value allowed"'),
-        ("(topics.EFFECTOR_VELOCITY).map(lambda velocity: velocity.speed)", f"(topics.{_constant(name)})"),
+        ("(topics.EFFECTOR_TWIST).map(lambda velocity: velocity.speed)", f"(topics.{_constant(name)})"),
         ("services.examples.", "services."),
         ("speed_guard", name),
         ("too_fast", "too_great"),

@@ -26,7 +26,7 @@ the sources play nothing. ::
 Every sample of a moving joint gives a position (``combine_latest``). If both joints move, a position shows a
 full step of one joint after a part of its time, so the speed is about twice the true one. In ``demo.yaml``,
 the joints take turns (``phase``, ``rest``). Any speed is also wrong by as much as `kinematics` is late. The
-topic ``effector/velocity`` has neither error: a speed guard should listen to that.
+topic ``effector/twist`` has neither error: a speed guard should listen to that.
 """
 
 from __future__ import annotations

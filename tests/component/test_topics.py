@@ -12,7 +12,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64, Header, String
 
 from interfaces import topics
-from interfaces.topics import Position, Topic, Velocity
+from interfaces.topics import PlanarTwist, Position, Topic
 
 BEYOND = "{} is not from -1e+09 to 1e+09"
 
@@ -36,9 +36,9 @@ BEYOND = "{} is not from -1e+09 to 1e+09"
         (topics.THETA1, -1e9, ""),
         (topics.THETA1, -1000000001.0, BEYOND.format("-1000000001.0")),
         (topics.EFFECTOR_POSITION, Position(0, 1e10, 1.0), BEYOND.format("(10000000000.0, 1.0)")),
-        (topics.EFFECTOR_VELOCITY, Velocity(0, 1.0, -2.0, 3.0), ""),
-        (topics.EFFECTOR_VELOCITY, Velocity(0, 1.0, 0.0, math.nan), "(1.0, 0.0, nan) is not finite"),
-        (topics.EFFECTOR_VELOCITY, Velocity(0, 1e308, 1e308, 0.0), BEYOND.format("(1e+308, 1e+308, 0.0)")),
+        (topics.EFFECTOR_TWIST, PlanarTwist(0, 1.0, -2.0, 3.0), ""),
+        (topics.EFFECTOR_TWIST, PlanarTwist(0, 1.0, 0.0, math.nan), "(1.0, 0.0, nan) is not finite"),
+        (topics.EFFECTOR_TWIST, PlanarTwist(0, 1e308, 1e308, 0.0), BEYOND.format("(1e+308, 1e+308, 0.0)")),
         (topics.OPERATOR_HEARTBEAT, True, ""),
         (topics.OPERATOR_HEARTBEAT, False, "a released switch is no sign of life"),
         *((topics.ENGINES, data, "") for data in ("turn_on", "turn_off")),
@@ -68,12 +68,12 @@ def test_problem_of_a_value(topic: Topic, value: Any, problem: str) -> None:
             Position(7_000_000_008, 1.0, -2.0, "arm1/base"),
         ),
         (
-            topics.EFFECTOR_VELOCITY,
+            topics.EFFECTOR_TWIST,
             TwistStamped(
                 header=Header(stamp=Time(sec=7, nanosec=8), frame_id="arm1/base"),
                 twist=Twist(linear=Vector3(x=1.0, y=-2.0), angular=Vector3(z=3.0)),
             ),
-            Velocity(7_000_000_008, 1.0, -2.0, 3.0, "arm1/base"),
+            PlanarTwist(7_000_000_008, 1.0, -2.0, 3.0, "arm1/base"),
         ),
         (
             topics.OPERATOR_PRESENCE,
@@ -90,7 +90,7 @@ def test_value_of_a_message_and_back(topic: Topic, message: Any, value: Any) -> 
 
 
 def test_frame_is_that_of_the_base_if_nobody_names_another() -> None:
-    assert Position(0, 1.0, 2.0).frame == Velocity(0, 1.0, 2.0, 3.0).frame == topics.FRAME
+    assert Position(0, 1.0, 2.0).frame == PlanarTwist(0, 1.0, 2.0, 3.0).frame == topics.FRAME
 
 
 def test_clocks_of_two_hosts_may_differ_by_50_ms() -> None:
@@ -101,7 +101,7 @@ def test_topics_that_report_single_events_may_be_silent() -> None:
     gaps = {topic.name: topic.longest_gap for topic in topics.CONTRACT}
     streams = ("l1", "theta2", "effector/position", "effector/speed", "joint_states", "engines/state")
     assert gaps == gaps | {
-        **dict.fromkeys(("effector/velocity", "robot_description", "operator_activity", "engines"), math.inf),
+        **dict.fromkeys(("effector/twist", "robot_description", "operator_activity", "engines"), math.inf),
         **dict.fromkeys(("operator_presence", "/diagnostics"), 1.0),  # at 2 Hz, at 1 Hz
         **dict.fromkeys((*streams, "operator_heartbeat"), 0.25),
     }

@@ -324,7 +324,7 @@ def test_a_second_arm_runs_in_a_namespace_of_the_same_domain(module_site: Site, 
 
 
 def test_example_of_a_service_joins_the_system(module_site: Site, peer: Peer) -> None:
-    velocity = peer.publisher(topics.EFFECTOR_VELOCITY)
+    velocity = peer.publisher(topics.EFFECTOR_TWIST)
     terminal = module_site.begin_command(sys.executable, "-m", "deploy.commands.launcher", "terminal")
     terminal.await_line("Engines are off")
     terminal.insist("press\n", "Operator is alive")

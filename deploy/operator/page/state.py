@@ -174,7 +174,7 @@ def while_open(seen: Seen, lines: Observable[Any], namespace: str, clock: Clock)
         rx.of(lambda state: _forget(state, clock.now())),
         *(_changes(seen(topic), _configuration(name), clock) for name, topic in topics.CONFIGURATION.items()),
         _changes(seen(topics.EFFECTOR_POSITION), _position, clock),
-        _changes(seen(topics.EFFECTOR_VELOCITY), _speed, clock),
+        _changes(seen(topics.EFFECTOR_TWIST), _speed, clock),
         _changes(seen(topics.OPERATOR_HEARTBEAT), _heartbeat, clock),
         _changes(seen(topics.OPERATOR_PRESENCE), _presence, clock),
         _changes(seen(topics.DIAGNOSTICS), _diagnostics(namespace.rstrip("/")), clock),

@@ -136,7 +136,7 @@ def variously() -> Schedule:
         PlannedFault(18.0, "babble", NO_TARGET, 7.0),
         PlannedFault(18.5, "kill", "engine_controller"),
         PlannedFault(20.5, "stop", "sentinel", 15.0),
-        PlannedFault(22.0, "kill", "motion"),
+        PlannedFault(22.0, "kill", "twist"),
         PlannedFault(23.0, STEP, NO_TARGET),
         PlannedFault(24.0, "kill", "drive"),
         PlannedFault(25.2, "kill", "kinematics"),  # config_l2, for which it may wait, is back

@@ -38,7 +38,7 @@ CHAINS: tuple[Chain, ...] = (
     ("robot_state",),
     ("kinematics",),
     ("velocity",),
-    ("motion",),
+    ("twist",),
     (WATCHDOG, CONTROLLER),
 )
 """Services that hear the replayed output of each other. Chains hear the recorded output of each other.

@@ -51,7 +51,7 @@ class Bounds(NamedTuple):
 BOUNDS: dict[str, Bounds] = {
     topics.EFFECTOR_POSITION.name: Bounds(1e-9, "m", 0.25, lost=0.05, near=0.2),
     topics.EFFECTOR_SPEED.name: Bounds(1e-9, "m/s", 0.25, lost=0.1, near=math.inf),
-    topics.EFFECTOR_VELOCITY.name: Bounds(1e-9, "m/s", 0.25, lost=0.1, near=math.inf, burst=0.0),
+    topics.EFFECTOR_TWIST.name: Bounds(1e-9, "m/s", 0.25, lost=0.1, near=math.inf, burst=0.0),
     topics.JOINT_STATES.name: Bounds(1e-9, "rad", 0.25, lost=0.1, near=0.1, burst=0.0),
     topics.TF.name: Bounds(1e-9, "", 0.25, lost=0.1, near=0.1, burst=0.0),
     topics.ROBOT_DESCRIPTION.name: Bounds(0.1, "m", 1.25),
@@ -184,7 +184,7 @@ def _velocity(message: Any) -> tuple[float, ...]:
 _READ: dict[str, Callable[[Any], Value]] = {
     topics.EFFECTOR_POSITION.name: lambda message: (message.point.x, message.point.y),
     topics.EFFECTOR_SPEED.name: lambda message: (message.data,),
-    topics.EFFECTOR_VELOCITY.name: _velocity,
+    topics.EFFECTOR_TWIST.name: _velocity,
     topics.JOINT_STATES.name: lambda message: tuple(message.position),
     topics.TF.name: _pose,
     topics.ROBOT_DESCRIPTION.name: lambda message: tuple(map(float, _NUMBER.findall(message.data))),

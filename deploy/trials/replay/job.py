@@ -18,7 +18,7 @@ from deploy.trials.replay.comparison import BOUNDS, Comparison, Interval, compar
 from deploy.trials.replay.lives import lives
 from deploy.trials.replay.playback import Playback, replay
 from deploy.trials.replay.record import Message, Record
-from interfaces.topics import CONFIGURATION, EFFECTOR_VELOCITY, ENGINES, Topic
+from interfaces.topics import CONFIGURATION, EFFECTOR_TWIST, ENGINES, Topic
 
 START = 2 * SECOND
 """After the begin of the record or of a process, in which nothing is compared: processes discover each other
@@ -73,7 +73,7 @@ def run(record: Record, job: Job) -> Outcome:
         recorded = chains.recorded(record, job.namespace, topic)
         if recorded or topic is ENGINES:  # which nobody may have sent
             excused = _excused(record, playback, topic, chains.known(record, job.namespace, topic))
-            if topic is EFFECTOR_VELOCITY:
+            if topic is EFFECTOR_TWIST:
                 excused += _without_a_source(record, job.namespace)
             replayed = playback.messages[topic.name]
             comparisons.append(compare(topic, recorded, replayed, excused, record.offsets))

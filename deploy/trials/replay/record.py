@@ -22,7 +22,7 @@ from interfaces.topics import Topic
 _OUTPUTS = (
     topics.EFFECTOR_POSITION,
     topics.EFFECTOR_SPEED,
-    topics.EFFECTOR_VELOCITY,
+    topics.EFFECTOR_TWIST,
     topics.OPERATOR_PRESENCE,
     topics.OPERATOR_ACTIVITY,
     topics.ENGINES_STATE,

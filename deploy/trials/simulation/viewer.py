@@ -1,4 +1,4 @@
-"""A tool that shows the arm: while nobody looks, robot_state and motion rest."""
+"""A tool that shows the arm: while nobody looks, robot_state and twist rest."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def view() -> None:
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     node = Node("viewer", namespace=namespace_of(os.environ))
     newest = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
-    for topic in (topics.JOINT_STATES, topics.TF, topics.EFFECTOR_VELOCITY):
+    for topic in (topics.JOINT_STATES, topics.TF, topics.EFFECTOR_TWIST):
         node.create_subscription(topic.type, topic.name, lambda _: None, newest)
     while True:
         time.sleep(3600.0)  # nothing is taken from DDS, which is what costs

@@ -112,7 +112,7 @@ def test_arm_position_and_speed(play: Play) -> None:
     for time, name, value in ((210, "l1", 2.0), (211, "theta1", 0.5), (212, "theta1", 0.6)):
         play.say(time, topics.CONFIGURATION[name], value)
     play.say(213, topics.EFFECTOR_POSITION, position(213, 1.0, 2.0))
-    play.say(214, topics.EFFECTOR_VELOCITY, topics.Velocity(214 * 10**9, 0.15, -0.2, 0.0))
+    play.say(214, topics.EFFECTOR_TWIST, topics.PlanarTwist(214 * 10**9, 0.15, -0.2, 0.0))
 
     shown = view(play.run(215), "page", 215)
 

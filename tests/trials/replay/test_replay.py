@@ -420,10 +420,8 @@ def test_answers_of_a_signal_may_come_two_at_a_time() -> None:
         ]
 
     single = velocities(lambda n: n)
-    assert compare(topics.EFFECTOR_VELOCITY, single, velocities(lambda n: n // 2 * 2), []).is_equal
-    assert not compare(
-        topics.EFFECTOR_VELOCITY, single, velocities(lambda n: n, lambda n: n + 0.5), []
-    ).is_equal
+    assert compare(topics.EFFECTOR_TWIST, single, velocities(lambda n: n // 2 * 2), []).is_equal
+    assert not compare(topics.EFFECTOR_TWIST, single, velocities(lambda n: n, lambda n: n + 0.5), []).is_equal
 
 
 def test_presences_of_a_stepped_arm_are_equal_to_replayed_ones() -> None:

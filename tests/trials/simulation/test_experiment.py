@@ -143,7 +143,7 @@ def test_the_example_of_a_service_violates_nothing(monkeypatch: pytest.MonkeyPat
     guard = Program("speed_guard", speed_guard.__name__, ())
     monkeypatch.setattr(arm, "PROGRAMS", (*arm.PROGRAMS, guard))
     monkeypatch.setattr(arm, "NAMES", (*arm.NAMES, "speed_guard"))
-    rate = 25.0  # Hz: motion knows no velocity of less than ten samples a second
+    rate = 25.0  # Hz: twist knows no velocity of less than ten samples a second
     outcome = simulate(Experiment("guard", 40.0, {**SCENARIO, **sources(rate)}, []))
     offs = [each for each in outcome.history.stream(topics.ENGINES) if each.value == topics.TURN_OFF]
     assert offs

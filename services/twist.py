@@ -15,7 +15,7 @@ from interfaces import service
 from interfaces.robot_model import BASE, forward_kinematics, frame_id
 from interfaces.service import ServiceNode, parameter
 from interfaces.service.states import GAP, observe_state
-from interfaces.topics import CONFIGURATION, EFFECTOR_VELOCITY, Velocity
+from interfaces.topics import CONFIGURATION, EFFECTOR_TWIST, PlanarTwist
 from reactive_node.signals import Answer, Signal, lift
 
 PERIOD = 0.02  # s
@@ -26,7 +26,7 @@ def pose(l1: float, l2: float, theta1: float, theta2: float) -> tuple[float, flo
     return *forward_kinematics(l1, l2, theta1, theta2), theta1 + theta2
 
 
-def effector_velocity(
+def effector_twist(
     configuration: Iterable[Signal[float]], gap: float
 ) -> Observable[Answer[tuple[float, float, float]]]:
     """Emit x, y [m/s] and the turn [rad/s] at all multiples of 20 ms, from l1, l2, theta1 and theta2."""
@@ -52,14 +52,14 @@ def wire(node: ServiceNode) -> None:
             node.health.count("uncertain")
         return answer.is_certain
 
-    def velocity(answer: Answer[tuple[float, float, float]]) -> Velocity:
+    def twist(answer: Answer[tuple[float, float, float]]) -> PlanarTwist:
         x, y, turn = answer.value
-        return Velocity(answer.time, x, y, turn, frame)
+        return PlanarTwist(answer.time, x, y, turn, frame)
 
     states = [observe_state(node, topic, gap) for topic in CONFIGURATION.values()]
-    certain = effector_velocity(states, gap).filter(is_certain)
-    node.publish(EFFECTOR_VELOCITY, certain.map(velocity), on_demand=True)  # most of the time nobody looks
+    certain = effector_twist(states, gap).filter(is_certain)
+    node.publish(EFFECTOR_TWIST, certain.map(twist), on_demand=True)  # most of the time nobody looks
 
 
 if __name__ == "__main__":
-    service.run("motion", wire)
+    service.run("twist", wire)

@@ -10,12 +10,12 @@ from reactivex import Observable
 from std_msgs.msg import Float64
 
 from interfaces.service.states import state
-from interfaces.topics import CONFIGURATION, EFFECTOR_VELOCITY
+from interfaces.topics import CONFIGURATION, EFFECTOR_TWIST
 from reactive_node.signals import Answer
 from reactive_node.stamps import from_message, now, stamped
 from reactive_node.testing import MakeNode, SpinUntil, VirtualTime
-from services import motion
-from services.motion import PERIOD, effector_velocity
+from services import twist
+from services.twist import PERIOD, effector_twist
 from tests.component.wiring import Wired
 
 NS = 10**9
@@ -33,7 +33,7 @@ def velocities(
     scheduler: VirtualTime, *topics: Any, alive: Observable[Any] | None = None, until: float = 3.0
 ) -> list[Answer[Any]]:
     living = scheduler.hot((0.01, stamped(True, 0))) if alive is None else alive
-    observable = effector_velocity([state(each, living, GAP) for each in topics], GAP)
+    observable = effector_twist([state(each, living, GAP) for each in topics], GAP)
     return [answer for _, answer in scheduler.record(observable, until=until).items if answer.is_certain]
 
 
@@ -122,15 +122,15 @@ def test_velocity_has_its_frame_and_its_time(
     wired = Wired(
         make_node,
         spin_until,
-        motion.wire,
+        twist.wire,
         inputs=CONFIGURATION.values(),
-        outputs=[EFFECTOR_VELOCITY],
+        outputs=[EFFECTOR_TWIST],
         namespace=namespace,
     )
     before = now()
     for topic in CONFIGURATION.values():
         wired.publish(topic, Float64(data=1.0))
-    heard: list[Any] = wired.heard[EFFECTOR_VELOCITY.name]
+    heard: list[Any] = wired.heard[EFFECTOR_TWIST.name]
     spin_until(lambda: heard)
 
     assert heard[0].header.frame_id == frame

@@ -19,10 +19,10 @@ from deploy.trials.simulation.arm import ROBOT
 from deploy.trials.simulation.machine import simulated_services
 from deploy.trials.simulation.viewer import view
 from interfaces.service.health import reported_refusals
-from interfaces.topics import CONFIGURATION, DIAGNOSTICS, EFFECTOR_VELOCITY, JOINT_STATES, L1
+from interfaces.topics import CONFIGURATION, DIAGNOSTICS, EFFECTOR_TWIST, JOINT_STATES, L1
 
 START = 3 * SECOND  # in which processes discover each other [ns]
-SERVICES = {"motion": EFFECTOR_VELOCITY, "robot_state": JOINT_STATES}
+SERVICES = {"twist": EFFECTOR_TWIST, "robot_state": JOINT_STATES}
 SCENARIO = """
 theta1: {center: 0.8, amplitude: 0.8, period: 20.0}
 theta2: {center: 0.8, amplitude: 0.5, period: 10.0, rest: 2.0}
@@ -82,7 +82,7 @@ def test_refused_samples_are_those_of_the_health_reports() -> None:
         return Message(at, serialize_message(Float64(data=float(at))))
 
     report = DiagnosticStatus(
-        name="/motion",
+        name="/twist",
         values=[
             KeyValue(key=key, value=value)
             for key, value in (
@@ -96,7 +96,7 @@ def test_refused_samples_are_those_of_the_health_reports() -> None:
     lengths = [sample(1), sample(2), sample(3), sample(4), sample(5), sample(5)._replace(data=b"second")]
     record = Record(0, 10, 0, {"/l1": lengths, "/diagnostics": [health]})
 
-    (topic, heard), *_ = chains.inputs(record, "/", ("motion",))
+    (topic, heard), *_ = chains.inputs(record, "/", ("twist",))
 
     assert topic is L1
     assert [each.sent for each in heard] == [1, 4, 5, 7]
