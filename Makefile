@@ -128,7 +128,7 @@ replay: setup
 	@RUNTIME=embedded exec $(HOLD) $(PY) -m deploy.trials.replay $(if $(RECORD),"$(RECORD)") $(REPLAY)
 
 test: setup
-	@$(PY) -m deploy.commands.test $(TESTS)
+	@$(PY) -m tests $(TESTS)
 
 mutants: setup
 	@RUNTIME=embedded exec $(HOLD) $(PY) -m deploy.mutants $(MODULES)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from deploy.commands import test as command
+from tests import __main__ as command
 from tests import order
 
 ROOT = Path(__file__).parents[2]

@@ -9,7 +9,7 @@ import pytest
 
 from deploy.commands import unit
 from deploy.supervision.errors import DeploymentError
-from tests.commands.systemd import command_of, environment_of
+from tests.system.systemd import command_of, environment_of
 
 UNPLEASANT = 'it\'s 100 % $HOME "fine" \\ %n \\n\n\r\n\tend'
 

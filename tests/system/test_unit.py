@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.commands.systemd import command_of, environment_of
 from tests.system.sites import LIMIT, STEADY, Command, Site
+from tests.system.systemd import command_of, environment_of
 
 
 class Systemd:

@@ -1,0 +1,1 @@
+"""What proves the arm: tests, and the programs that judge it."""
