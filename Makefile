@@ -134,7 +134,7 @@ mutants: setup
 	@RUNTIME=embedded exec $(HOLD) $(PY) -m deploy.mutants $(MODULES)
 
 bench: setup
-	@exec $(HOLD) $(PY) -m deploy.benchmarks $(BENCH)
+	@exec $(HOLD) $(PY) -m tests.benchmarks $(BENCH)
 
 tables: setup
 	@RUNTIME=embedded $(PY) -m deploy.commands.tables

@@ -26,7 +26,6 @@ ELSEWHERE = (
     "deploy/simulation_kit",
     "deploy/tools",
     "deploy/package",
-    "deploy/benchmarks",
     "deploy/trials",
     "deploy/promises",
     "deploy/mutants",

@@ -10,13 +10,13 @@ from typing import Any
 
 import pytest
 
-from deploy.benchmarks import __main__ as command
-from deploy.benchmarks import alternatives, c_program, measurement, table
-from deploy.benchmarks.alternatives import Alternative
-from deploy.benchmarks.link import LAST, MIDDLE, SINK, SOURCE, Job
-from deploy.benchmarks.measurement import MeasurementFailed, Scenario
 from deploy.supervision.processes import RUN_DIRECTORY
 from deploy.supervision.rclpy_choice import sourced_rclpy
+from tests.benchmarks import __main__ as command
+from tests.benchmarks import alternatives, c_program, measurement, table
+from tests.benchmarks.alternatives import Alternative
+from tests.benchmarks.link import LAST, MIDDLE, SINK, SOURCE, Job
+from tests.benchmarks.measurement import MeasurementFailed, Scenario
 
 
 @pytest.mark.parametrize(
@@ -59,7 +59,7 @@ def test_absent_alternatives_are_named_with_the_reason(capsys: pytest.CaptureFix
     assert command.present([here, unknown]) == [here]
 
     assert capsys.readouterr().out == (
-        "absent: unknown: ModuleNotFoundError: No module named 'deploy.benchmarks.links.nothing'\n"
+        "absent: unknown: ModuleNotFoundError: No module named 'tests.benchmarks.links.nothing'\n"
     )
 
 

@@ -11,9 +11,9 @@ from importlib.util import find_spec
 
 import pytest
 
-from deploy.benchmarks import measurement
-from deploy.benchmarks.alternatives import Alternative
-from deploy.benchmarks.measurement import Scenario
+from tests.benchmarks import measurement
+from tests.benchmarks.alternatives import Alternative
+from tests.benchmarks.measurement import Scenario
 
 pytestmark = [pytest.mark.alone, pytest.mark.timeout(120)]
 

@@ -8,14 +8,14 @@ from unittest import mock
 
 import pytest
 
-from deploy.benchmarks import __main__ as command
-from deploy.benchmarks import measurement, scale
-from deploy.benchmarks.alternatives import Alternative
-from deploy.benchmarks.measurement import MeasurementFailed
 from deploy.supervision.rclpy_choice import sourced_rclpy
 from deploy.supervision.system import System
 from deploy.trials.chaos.arm import RealArm
 from deploy.trials.chaos.cost import Cost
+from tests.benchmarks import __main__ as command
+from tests.benchmarks import measurement, scale
+from tests.benchmarks.alternatives import Alternative
+from tests.benchmarks.measurement import MeasurementFailed
 
 pytestmark = pytest.mark.timeout(120)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from deploy.benchmarks import signals
+from tests.benchmarks import signals
 
 
 def test_all_questions_are_answered() -> None:

@@ -15,7 +15,7 @@ PAGES = (
     "CONTRIBUTING.md",
     "deploy/README.md",
     "deploy/SAFETY.md",
-    "deploy/benchmarks/README.md",
+    "tests/benchmarks/README.md",
     "interfaces/README.md",
     "services/README.md",
     "tests/README.md",

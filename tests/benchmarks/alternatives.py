@@ -9,17 +9,17 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from deploy.benchmarks import c_program
-from deploy.benchmarks.link import HEARTBEATS, Job
 from deploy.supervision.processes import ROOT
 from deploy.supervision.rclpy_choice import RUNTIME
+from tests.benchmarks import c_program
+from tests.benchmarks.link import HEARTBEATS, Job
 
 PYTHON = ROOT / "deploy" / "commands" / "venv.sh"
 _CHECK = """
 import importlib.util, sys
 if bool(importlib.util.find_spec("rosidl_runtime_embedded")) == {ros}:
     sys.exit("this environment has the {other}")
-import deploy.benchmarks.links.{link}
+import tests.benchmarks.links.{link}
 """
 
 Commands = Callable[["Alternative", Sequence[Job]], list[list[str]]]
@@ -29,7 +29,7 @@ def job_command(alternative: Alternative, job: Job) -> list[str]:
     """Return the command of a process; its job goes to a file."""
     file = Path(job.directory, f"{job.role}.json")
     file.write_text(json.dumps(asdict(job)))
-    return [str(PYTHON), "-m", "deploy.benchmarks.worker", str(file)]
+    return [str(PYTHON), "-m", "tests.benchmarks.worker", str(file)]
 
 
 def processes(alternative: Alternative, jobs: Sequence[Job]) -> list[list[str]]:
@@ -58,7 +58,7 @@ def c_processes_with_defaults(alternative: Alternative, jobs: Sequence[Job]) -> 
 class Alternative:
     title: str
     link: str
-    """The module of :mod:`deploy.benchmarks.links`, or the program of :mod:`deploy.benchmarks.c_program`."""
+    """The module of :mod:`tests.benchmarks.links`, or the program of :mod:`tests.benchmarks.c_program`."""
     ros: bool = False
     """Whether it runs on ROS 2's rclpy: of .venv, or of a sourced ROS 2."""
     commands: Commands = processes

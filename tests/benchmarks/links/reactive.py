@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from deploy.benchmarks.links import callbacks
 from reactive_node import ReactiveNode
 from reactive_node.executor import create_executor
+from tests.benchmarks.links import callbacks
 
 
 class Connection(callbacks.Connection):

@@ -7,8 +7,8 @@ import subprocess
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from deploy.benchmarks.link import HEARTBEATS, Job
 from deploy.supervision.processes import run_directory
+from tests.benchmarks.link import HEARTBEATS, Job
 
 PIPELINE, SERVICES = "pipeline", "services"
 LOOPBACK, LOCALHOST, DEFAULTS = "loopback.xml", "localhost.xml", "defaults.xml"

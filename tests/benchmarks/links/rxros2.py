@@ -9,7 +9,7 @@ from reactivex import operators
 from reactivex.subject import Subject
 from std_msgs.msg import UInt8MultiArray
 
-from deploy.benchmarks.links import callbacks
+from tests.benchmarks.links import callbacks
 
 
 class Connection(callbacks.Connection):

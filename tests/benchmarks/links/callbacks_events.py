@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib
 
-from deploy.benchmarks.links import callbacks
+from tests.benchmarks.links import callbacks
 
 
 class Connection(callbacks.Connection):

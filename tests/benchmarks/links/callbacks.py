@@ -13,7 +13,7 @@ from rclpy.qos import QoSProfile
 from rclpy.task import Future
 from std_msgs.msg import UInt8MultiArray
 
-from deploy.benchmarks.link import Item, Job, Link
+from tests.benchmarks.link import Item, Job, Link
 
 
 class Connection(Link):

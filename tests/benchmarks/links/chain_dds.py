@@ -13,11 +13,11 @@ from rclpy._dds import Reader, WaitSet
 from reactivex import Observable
 from reactivex.subject import Subject
 
-from deploy.benchmarks.link import Job
-from deploy.benchmarks.links import chain
 from interfaces.topics import EFFECTOR_POSITION, EFFECTOR_SPEED, L1, L2, THETA1, THETA2, Position, Topic
 from services.kinematics import effector_position
 from services.velocity import effector_speed
+from tests.benchmarks.link import Job
+from tests.benchmarks.links import chain
 
 _HEADER = b"\0\1\0\0"  # CDR, little endian
 _NUMBER = struct.Struct("<4sd")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from deploy.benchmarks.links import callbacks_events, chain
+from tests.benchmarks.links import callbacks_events, chain
 
 
 class Connection(chain.Connection):

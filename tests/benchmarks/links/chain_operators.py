@@ -7,10 +7,10 @@ from typing import Any
 from reactivex import Observable
 from reactivex.subject import Subject
 
-from deploy.benchmarks.links import chain
 from interfaces.topics import EFFECTOR_POSITION, EFFECTOR_SPEED, L1, L2, THETA1, THETA2, Position, Topic
 from services.kinematics import effector_position
 from services.velocity import effector_speed
+from tests.benchmarks.links import chain
 
 
 class Connection(chain.Connection):

@@ -1,13 +1,13 @@
-"""Images through the node of :mod:`.callbacks`."""
+"""Images through the node of :mod:`.reactive`."""
 
 from __future__ import annotations
 
 from sensor_msgs.msg import Image
 
-from deploy.benchmarks.links import callbacks
+from tests.benchmarks.links import reactive
 
 
-class Connection(callbacks.Connection):
+class Connection(reactive.Connection):
     """Publishes images, with the octets of an item as their pixels."""
 
     message_type = Image

@@ -22,7 +22,6 @@ from rclpy.signals import SignalHandlerOptions
 from reactivex.disposable import Disposable
 from reactivex.subject import Subject
 
-from deploy.benchmarks.scale import Fleet
 from deploy.supervision import interruption
 from deploy.supervision.environment import NAMESPACE, set_middleware
 from interfaces.robot_model import forward_kinematics
@@ -31,6 +30,7 @@ from interfaces.topics import EFFECTOR_SPEED, EFFECTOR_TWIST, THETA1, THETA2
 from reactive_node.signals import Answer, Refused, Signal, as_taken, lift, linear
 from reactive_node.stamps import from_nanoseconds, stamped
 from reactive_node.testing import VirtualTime
+from tests.benchmarks.scale import Fleet
 
 MIX, LINE, SPEED, HOUR, COST, DAY = (
     "50 Hz and 60 Hz, jitter 5 ms, one in fifty 80 ms late, lateness 100 ms",
@@ -44,7 +44,7 @@ LATENESS, GAP = 0.1, 0.1  # s
 LINK1, LINK2 = 2.0, 3.0  # m, of the demo
 SECONDS = 60.0  # s of the live measurement
 NS = 1_000_000_000
-DEMO = Path(__file__).parents[1] / "scenarios" / "demo.yaml"
+DEMO = Path(__file__).parents[2] / "deploy" / "scenarios" / "demo.yaml"
 
 Row = tuple[str, str, str, str]
 """What was measured, the goal, the result, and what else was seen."""

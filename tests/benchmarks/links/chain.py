@@ -15,8 +15,6 @@ from typing import Any
 from geometry_msgs.msg import PointStamped
 from std_msgs.msg import Bool, Float64, Header
 
-from deploy.benchmarks.link import KINEMATICS, VELOCITY, Item, Job
-from deploy.benchmarks.links import callbacks
 from interfaces.topics import (
     EFFECTOR_POSITION,
     EFFECTOR_SPEED,
@@ -28,6 +26,8 @@ from interfaces.topics import (
     THETA2,
     Topic,
 )
+from tests.benchmarks.link import KINEMATICS, VELOCITY, Item, Job
+from tests.benchmarks.links import callbacks
 
 
 class Connection(callbacks.Connection):

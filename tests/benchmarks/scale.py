@@ -15,9 +15,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
-from deploy.benchmarks.alternatives import Alternative
-from deploy.benchmarks.measurement import MeasurementFailed, Scenario, measure_subscribers
-from deploy.benchmarks.table import Results, table
 from deploy.supervision import interruption
 from deploy.supervision.environment import NAMESPACE
 from deploy.supervision.processes import ROOT
@@ -26,6 +23,9 @@ from deploy.supervision.system import System
 from deploy.trials.chaos.arm import RealArm
 from deploy.trials.chaos.cost import Cost
 from reactive_node.domains import reserved_domain
+from tests.benchmarks.alternatives import Alternative
+from tests.benchmarks.measurement import MeasurementFailed, Scenario, measure_subscribers
+from tests.benchmarks.table import Results, table
 
 SIZES = (1, 2, 5, 10, 20, 30)
 OWN_DOMAINS = "arms, each in a ROS domain of its own"
@@ -35,7 +35,7 @@ FULL = 0.9  # of all cores: further arms would only take time from each other
 SETTLE = 5.0  # s after a start
 SECONDS = 20.0  # s of a measurement
 LAUNCH = [sys.executable, "-m", "deploy.commands.launcher", "start"]
-RESTART = [sys.executable, "-m", "deploy.benchmarks.restart"]
+RESTART = [sys.executable, "-m", "tests.benchmarks.restart"]
 RATE = 100.0  # Hz of the topic with many subscribers
 _LOOK = 0.1  # s between two looks for an interruption
 

@@ -1,4 +1,4 @@
-"""One process of a measurement: `python -m deploy.benchmarks.worker JOB`, a file with a job.
+"""One process of a measurement: `python -m tests.benchmarks.worker JOB`, a file with a job.
 
 It reports to the socket of the measurement. It ends on SIGTERM, or when its parent has ended.
 """
@@ -18,7 +18,7 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
-from deploy.benchmarks.link import FIRST, LAST, REPORTS, SINK, SOURCE, Job, Link
+from tests.benchmarks.link import FIRST, LAST, REPORTS, SINK, SOURCE, Job, Link
 
 _TURN = 0.1  # s at most between two looks whether to end
 
@@ -100,7 +100,7 @@ def main() -> None:
     life = Life()
     job = Job(**json.loads(Path(sys.argv[1]).read_text()))
     reports = Reports(job)
-    link: Link = importlib.import_module(f"deploy.benchmarks.links.{job.link}").Connection(job)
+    link: Link = importlib.import_module(f"tests.benchmarks.links.{job.link}").Connection(job)
     try:
         if job.role == SOURCE:
             publish(link, job, life)

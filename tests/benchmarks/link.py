@@ -27,7 +27,7 @@ REPORTS = "reports"
 @dataclass(frozen=True)
 class Job:
     link: str
-    """The module of :mod:`deploy.benchmarks.links`."""
+    """The module of :mod:`tests.benchmarks.links`."""
     role: str
     topic: str
     """Where the source publishes."""

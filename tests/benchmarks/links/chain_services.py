@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from deploy.benchmarks.link import KINEMATICS, VELOCITY, WATCHDOG
-from deploy.benchmarks.links import chain
 from interfaces.service import ServiceNode
 from reactive_node.executor import create_executor
 from services import kinematics, operator_watchdog, velocity
+from tests.benchmarks.link import KINEMATICS, VELOCITY, WATCHDOG
+from tests.benchmarks.links import chain
 
 _SERVICES = {KINEMATICS: kinematics, VELOCITY: velocity, WATCHDOG: operator_watchdog}
 

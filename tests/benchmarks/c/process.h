@@ -12,7 +12,7 @@
 #define TURN DDS_MSECS(100) /* at most between two looks whether to end */
 #define SECOND 1000000000LL
 
-/* A Job of deploy/benchmarks/link.py. */
+/* A Job of tests/benchmarks/link.py. */
 extern struct job {
     const char *role;
     const char *topic;
@@ -49,7 +49,7 @@ void spin(const dds_entity_t *readers, int count, void (*on_item)(int reader, co
 /* Report that this process listens; the others may start. */
 void report_ready(void);
 
-/* Note the latency of an item in the sink, as deploy/benchmarks/worker.py does. */
+/* Note the latency of an item in the sink, as tests/benchmarks/worker.py does. */
 void receive(int64_t sent_at, int64_t sent_so_far);
 
 #endif

@@ -14,8 +14,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from deploy.benchmarks.alternatives import Alternative
-from deploy.benchmarks.link import (
+from deploy.supervision import interruption
+from deploy.trials.chaos.cost import proportional_set_size
+from reactive_node.domains import reserved_domain
+from tests.benchmarks.alternatives import Alternative
+from tests.benchmarks.link import (
     FIRST,
     HEARTBEATS,
     KINEMATICS,
@@ -28,9 +31,6 @@ from deploy.benchmarks.link import (
     WATCHDOG,
     Job,
 )
-from deploy.supervision import interruption
-from deploy.trials.chaos.cost import proportional_set_size
-from reactive_node.domains import reserved_domain
 
 _SILENCE = 20.0  # s without a report that an alternative may take
 _GRACE = 3.0  # s to end

@@ -1,13 +1,13 @@
-"""Images through the node of :mod:`.reactive`."""
+"""Images through the node of :mod:`.callbacks`."""
 
 from __future__ import annotations
 
 from sensor_msgs.msg import Image
 
-from deploy.benchmarks.links import reactive
+from tests.benchmarks.links import callbacks
 
 
-class Connection(reactive.Connection):
+class Connection(callbacks.Connection):
     """Publishes images, with the octets of an item as their pixels."""
 
     message_type = Image

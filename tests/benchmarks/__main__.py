@@ -22,9 +22,11 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from deploy.benchmarks import scale, signals
-from deploy.benchmarks.alternatives import ALTERNATIVES, CHAINS, IMAGES, Alternative
-from deploy.benchmarks.measurement import (
+from deploy.supervision import interruption
+from deploy.supervision.processes import run_directory
+from tests.benchmarks import scale, signals
+from tests.benchmarks.alternatives import ALTERNATIVES, CHAINS, IMAGES, Alternative
+from tests.benchmarks.measurement import (
     CHAIN_SCENARIOS,
     IMAGE_SCENARIOS,
     SCENARIOS,
@@ -33,9 +35,7 @@ from deploy.benchmarks.measurement import (
     Scenario,
     measure,
 )
-from deploy.benchmarks.table import chain_tables, image_tables, tables
-from deploy.supervision import interruption
-from deploy.supervision.processes import run_directory
+from tests.benchmarks.table import chain_tables, image_tables, tables
 
 COMPARISON, CHAIN, IMAGE, SCALE, SIGNALS = "comparison", "chain", "images", "scale", "signals"
 TABLES: dict[str, Callable[[Any], str]] = {
