@@ -131,7 +131,7 @@ test: setup
 	@$(PY) -m tests $(TESTS)
 
 mutants: setup
-	@RUNTIME=embedded exec $(HOLD) $(PY) -m deploy.mutants $(MODULES)
+	@RUNTIME=embedded exec $(HOLD) $(PY) -m tests.mutants $(MODULES)
 
 bench: setup
 	@exec $(HOLD) $(PY) -m tests.benchmarks $(BENCH)

@@ -28,7 +28,6 @@ ELSEWHERE = (
     "deploy/package",
     "deploy/trials",
     "deploy/promises",
-    "deploy/mutants",
 )
 """Folders that are installed otherwise, or that an installed arm does not need."""
 

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from deploy.mutants import __main__ as command
-from deploy.mutants import bench as benches
-from deploy.mutants.bench import Bench
-from deploy.mutants.guards import GUARDS
-from deploy.mutants.mutations import Mutant, mutants
+from tests.mutants import __main__ as command
+from tests.mutants import bench as benches
+from tests.mutants.bench import Bench
+from tests.mutants.guards import GUARDS
+from tests.mutants.mutations import Mutant, mutants
 
 ROOT = Path(__file__).parents[2]
 CLAMP = '''
@@ -74,8 +74,8 @@ def test_modules_and_their_tests_exist() -> None:
 def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Bench]:
     monkeypatch.setattr(benches, "_ALLOWANCE", 1.0)
     checkout = tmp_path / "checkout"
-    (checkout / "deploy" / "mutants").mkdir(parents=True)
-    for name in ("pyproject.toml", "deploy/mutants/runner.py"):
+    (checkout / "tests" / "mutants").mkdir(parents=True)
+    for name in ("pyproject.toml", "tests/mutants/runner.py"):
         shutil.copy(ROOT / name, checkout / name)
     (checkout / "conftest.py").write_text(
         'from hypothesis import settings\n\nsettings.register_profile("mutants")\n'
@@ -136,7 +136,7 @@ def test_unknown_module_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
 INTERRUPTED = """
 import os, signal, sys
 import libcst
-from deploy.mutants import __main__ as command
+from tests.mutants import __main__ as command
 
 write = libcst.Name._codegen_impl
 

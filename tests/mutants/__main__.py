@@ -19,11 +19,11 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from deploy.mutants.bench import Bench
-from deploy.mutants.guards import GUARDS, SIMULATION
-from deploy.mutants.mutations import Mutant, mutants
 from deploy.supervision import interruption
 from deploy.supervision.processes import ROOT
+from tests.mutants.bench import Bench
+from tests.mutants.guards import GUARDS, SIMULATION
+from tests.mutants.mutations import Mutant, mutants
 
 EQUIVALENT = Path(__file__).with_name("equivalent.toml")
 _BENCHES = 2 * (os.cpu_count() or 1)  # many tests wait

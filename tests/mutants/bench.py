@@ -15,8 +15,8 @@ from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 
-from deploy.mutants.guards import REACTIVE_NODE
-from deploy.mutants.mutations import Mutant
+from tests.mutants.guards import REACTIVE_NODE
+from tests.mutants.mutations import Mutant
 
 MARK = "REACTIVE_ARM_MUTANTS"
 """An environment variable that all processes of a bench inherit."""
@@ -43,7 +43,7 @@ class Bench:
         path = [str(self._directory / REACTIVE_NODE.removesuffix("/reactive_node"))]
         path += [folder for folder in [os.environ.get("PYTHONPATH")] if folder]
         self._runner = subprocess.Popen(
-            [sys.executable, str(self._directory / "deploy/mutants/runner.py")],
+            [sys.executable, str(self._directory / "tests/mutants/runner.py")],
             cwd=self._directory,
             env=os.environ | {MARK: self._mark, "PYTHONPATH": os.pathsep.join(path)},
             stdin=subprocess.PIPE,
