@@ -125,7 +125,7 @@ simulate: setup
 	@RUNTIME=embedded exec $(HOLD) $(PY) -m deploy.trials.simulation --hours $(HOURS) $(if $(SEED),--seed $(SEED)) $(if $(SCHEDULE),--schedule "$(SCHEDULE)") $(SIMULATE)
 
 replay: setup
-	@RUNTIME=embedded exec $(HOLD) $(PY) -m deploy.trials.replay $(if $(RECORD),"$(RECORD)") $(REPLAY)
+	@RUNTIME=embedded exec $(HOLD) $(PY) -m tests.replay $(if $(RECORD),"$(RECORD)") $(REPLAY)
 
 test: setup
 	@$(PY) -m tests $(TESTS)

@@ -11,7 +11,7 @@ EMBEDDED_ONLY = (
     "tests/commands/test_fleet.py",
     "tests/mutants",
     "tests/security/attacks",
-    "tests/trials/replay",
+    "tests/replay",
     "tests/trials/simulation",
 )
 """Tests of the embedded rclpy, and of what runs only on it."""

@@ -16,8 +16,7 @@ ROOT = Path(__file__).parents[2]
 
 HERE = command.Part("", "", ["tests/system", "-x"])
 EMBEDDED = (
-    "tests/commands/test_fleet.py tests/mutants tests/security/attacks tests/trials/replay"
-    " tests/trials/simulation"
+    "tests/commands/test_fleet.py tests/mutants tests/security/attacks tests/replay tests/trials/simulation"
 )
 IGNORED = "--ignore=tests/mutants"
 ONE = "tests/trials/simulation/test_experiment.py::test"

@@ -143,6 +143,6 @@ def test_record_of_a_real_arm_replays_equal_in_virtual_time(site: Site) -> None:
     assert command.wait() == 0
     path = command.await_line(SUMMARY)[1]
     assert site.do("stop")[0] == 0
-    replay = ("-m", "deploy.trials.replay", path)
+    replay = ("-m", "tests.replay", path)
     code, shown = site.do_command("env", "RUNTIME=embedded", str(ROOT / "deploy/commands/venv.sh"), *replay)
     assert code == 0, shown

@@ -84,7 +84,7 @@ def test_ctrl_c_gives_the_verdict_so_far_or_ends(tmp_path: Path) -> None:
     assert errors == ""
 
 
-@pytest.mark.parametrize("module", ["deploy.trials.simulation", "deploy.trials.replay"])
+@pytest.mark.parametrize("module", ["deploy.trials.simulation", "tests.replay"])
 def test_a_missing_simulation_is_one_line(module: str) -> None:
     code = (
         "import runpy, sys; sys.modules['rclpy_simulation'] = None; "

@@ -13,9 +13,9 @@ from rclpy.serialization import deserialize_message
 from rclpy_simulation.host import SECOND
 
 from deploy.promises.observations import time_sent
-from deploy.trials.replay.record import Message
 from interfaces import topics
 from interfaces.topics import Topic
+from tests.replay.record import Message
 
 COUNT, FEW = 0.1, 5
 """The numbers of messages may differ by this part, and by this number. So many may be lost in any record."""

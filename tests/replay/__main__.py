@@ -1,7 +1,7 @@
 """`make replay`: feed a record through these services in virtual time, and show what differs.
 
 Exit codes: 0 if the replayed output equals the recorded one within the bounds of
-:mod:`deploy.trials.replay.comparison`, 1 if it differs, 2 if nothing can be compared, or the record or the
+:mod:`tests.replay.comparison`, 1 if it differs, 2 if nothing can be compared, or the record or the
 command line has an error.
 """
 
@@ -19,12 +19,12 @@ import yaml
 from deploy.supervision import interruption, parameter_file
 from deploy.supervision.errors import DeploymentError
 from deploy.supervision.recorder import Recorder, qos_profiles
-from deploy.trials.replay import chains
-from deploy.trials.replay.job import Job, Outcome, run_all
-from deploy.trials.replay.record import Record, load
-from deploy.trials.replay.report import report
 from interfaces import topics
 from interfaces.service import UserError
+from tests.replay import chains
+from tests.replay.job import Job, Outcome, run_all
+from tests.replay.record import Record, load
+from tests.replay.report import report
 
 
 def main(arguments: Sequence[str]) -> int:

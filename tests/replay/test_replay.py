@@ -29,13 +29,13 @@ from deploy.promises.marks import STEP
 from deploy.promises.observations import FAULTS
 from deploy.supervision.errors import DeploymentError
 from deploy.supervision.recorder import Recorder
-from deploy.trials.replay import chains
-from deploy.trials.replay.comparison import compare
-from deploy.trials.replay.record import Message, Record, load
 from interfaces import topics
 from interfaces.robot_model import BASE, LINK1, frame_id
+from tests.replay import chains
+from tests.replay.comparison import compare
+from tests.replay.record import Message, Record, load
 
-ROOT = Path(__file__).parents[3]
+ROOT = Path(__file__).parents[2]
 RECORD = Path(__file__).parent / "arm.mcap"
 SECOND = 10**9
 BY_NAME = {topic.full_name("/"): topic for topic in topics.CONTRACT}
@@ -54,7 +54,7 @@ def replay(
 ) -> subprocess.CompletedProcess[str]:
     """Replay in a subprocess, which handles signals; modules of the directory come first."""
     return subprocess.run(
-        [sys.executable, "-m", "deploy.trials.replay", str(record), *options],
+        [sys.executable, "-m", "tests.replay", str(record), *options],
         cwd=directory,
         env={**os.environ, "PYTHONPATH": str(ROOT), **environment},
         capture_output=True,

@@ -12,13 +12,13 @@ from typing import NamedTuple
 from rclpy_simulation.host import SECOND
 
 from deploy.supervision import interruption
-from deploy.trials.replay import chains
-from deploy.trials.replay.chains import Chain
-from deploy.trials.replay.comparison import BOUNDS, Comparison, Interval, compare
-from deploy.trials.replay.lives import lives
-from deploy.trials.replay.playback import Playback, replay
-from deploy.trials.replay.record import Message, Record
 from interfaces.topics import CONFIGURATION, EFFECTOR_TWIST, ENGINES, Topic
+from tests.replay import chains
+from tests.replay.chains import Chain
+from tests.replay.comparison import BOUNDS, Comparison, Interval, compare
+from tests.replay.lives import lives
+from tests.replay.playback import Playback, replay
+from tests.replay.record import Message, Record
 
 START = 2 * SECOND
 """After the begin of the record or of a process, in which nothing is compared: processes discover each other

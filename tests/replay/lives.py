@@ -13,7 +13,6 @@ from rclpy.serialization import deserialize_message
 from rclpy_simulation.host import SECOND
 
 from deploy.promises.observations import FAULTS, PROCESSES
-from deploy.trials.replay.record import Message, Record, text
 from interfaces.service.health import reported_parameters
 from interfaces.service.parameters import declarations
 from interfaces.topics import (
@@ -30,6 +29,7 @@ from interfaces.topics import (
     Topic,
 )
 from services import engine_controller, operator_watchdog, robot_state
+from tests.replay.record import Message, Record, text
 
 AHEAD = SECOND // 2
 """By which a process that is older than the record starts before it, to discover its inputs [ns]."""

@@ -11,8 +11,6 @@ from std_msgs.msg import Header, String
 from deploy.promises.history import CONTROLLER, WATCHDOG
 from deploy.promises.marks import is_babble
 from deploy.promises.observations import time_sent
-from deploy.trials.replay.lives import Latch, begins_away, latch, lives, read_reports
-from deploy.trials.replay.record import Message, Record, text
 from interfaces.robot_model import BASE, frame_id
 from interfaces.service.health import reported_refusals
 from interfaces.topics import (
@@ -32,6 +30,8 @@ from interfaces.topics import (
     Topic,
     is_latched,
 )
+from tests.replay.lives import Latch, begins_away, latch, lives, read_reports
+from tests.replay.record import Message, Record, text
 
 Chain = tuple[str, ...]
 CHAINS: tuple[Chain, ...] = (

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 from rclpy_simulation.host import SECOND
 
-from deploy.trials.replay.comparison import Comparison, Difference
-from deploy.trials.replay.job import Outcome
-from deploy.trials.replay.record import Record
+from tests.replay.comparison import Comparison, Difference
+from tests.replay.job import Outcome
+from tests.replay.record import Record
 
 SHOWN = 3  # differences of each topic
 _TITLES = ("topic", "recorded", "replayed", "differ", "value by", "time by", "", "bounds")
