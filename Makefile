@@ -7,7 +7,7 @@ MANIFEST ?=
 WEB ?=
 # The page has a run of its own. Only CI attacks an arm with keys and one fail-safe at a time, breaks the line between
 # two hosts, and compares costs.
-LEFT_OUT := tests/operator/page tests/security/attacks tests/trials/simulation/test_attacks.py tests/system/test_two_hosts.py tests/benchmarks/test_ratios.py
+LEFT_OUT := tests/operator/page tests/security/attacks tests/simulation/test_attacks.py tests/system/test_two_hosts.py tests/benchmarks/test_ratios.py
 TESTS ?= tests interfaces/reactive_node $(LEFT_OUT:%=--ignore=%)
 MINUTES ?= 5
 SEED ?=
@@ -122,7 +122,7 @@ chaos: setup
 	@exec $(HOLD) $(PY) -m deploy.trials.chaos --minutes $(MINUTES) $(if $(SEED),--seed $(SEED)) $(CHAOS)
 
 simulate: setup
-	@RUNTIME=embedded exec $(HOLD) $(PY) -m deploy.trials.simulation --hours $(HOURS) $(if $(SEED),--seed $(SEED)) $(if $(SCHEDULE),--schedule "$(SCHEDULE)") $(SIMULATE)
+	@RUNTIME=embedded exec $(HOLD) $(PY) -m tests.simulation --hours $(HOURS) $(if $(SEED),--seed $(SEED)) $(if $(SCHEDULE),--schedule "$(SCHEDULE)") $(SIMULATE)
 
 replay: setup
 	@RUNTIME=embedded exec $(HOLD) $(PY) -m tests.replay $(if $(RECORD),"$(RECORD)") $(REPLAY)

@@ -12,7 +12,7 @@ EMBEDDED_ONLY = (
     "tests/mutants",
     "tests/security/attacks",
     "tests/replay",
-    "tests/trials/simulation",
+    "tests/simulation",
 )
 """Tests of the embedded rclpy, and of what runs only on it."""
 TRANSFORMS = ("interfaces/reactive_node/tests/test_transforms.py",)

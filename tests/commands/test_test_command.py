@@ -15,11 +15,9 @@ from tests import order
 ROOT = Path(__file__).parents[2]
 
 HERE = command.Part("", "", ["tests/system", "-x"])
-EMBEDDED = (
-    "tests/commands/test_fleet.py tests/mutants tests/security/attacks tests/replay tests/trials/simulation"
-)
+EMBEDDED = "tests/commands/test_fleet.py tests/mutants tests/security/attacks tests/replay tests/simulation"
 IGNORED = "--ignore=tests/mutants"
-ONE = "tests/trials/simulation/test_experiment.py::test"
+ONE = "tests/simulation/test_experiment.py::test"
 
 
 @pytest.mark.parametrize(
@@ -69,7 +67,7 @@ def arguments(words: str) -> dict[str, str]:
     ("words", "on_ros", "on_embedded"),
     [
         ("tests/system -x", "-x tests/system", None),
-        ("tests/trials/simulation -x", None, "-x tests/trials/simulation"),
+        ("tests/simulation -x", None, "-x tests/simulation"),
         ("tests -x", "-x tests", f"-x {EMBEDDED}"),
         (f"tests {IGNORED}", f"{IGNORED} tests", f"{IGNORED} {EMBEDDED.replace('tests/mutants ', '')}"),
         (f"{ONE} tests/page", "tests/page", ONE),

@@ -1,7 +1,7 @@
 """Two controllers of one arm, as after a start on two hosts that were cut from each other: their recipes.
 
 The recipes of both and of the drive run in virtual time, amid hosts and a network that fail as they may.
-tests/trials/simulation/test_two_controllers.py has whole processes, and a tenth of the speed.
+tests/simulation/test_two_controllers.py has whole processes, and a tenth of the speed.
 
     deploy/commands/venv.sh -m tests.component.test_two_controllers 1000
 

@@ -116,7 +116,7 @@ GUARDS: dict[str, tuple[str, ...]] = {
 }
 """Paths of modules, and of the tests that run for each mutant of the module, quick ones first."""
 
-_EXPERIMENT = "tests/trials/simulation/test_experiment.py::test_"
+_EXPERIMENT = "tests/simulation/test_experiment.py::test_"
 SIMULATION = (
     f"{_EXPERIMENT}a_quiet_experiment_has_output_from_every_program",
     f"{_EXPERIMENT}the_promises_hold_in_the_scenarios_of_the_chaos_monkey",

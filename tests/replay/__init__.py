@@ -1,3 +1,3 @@
 """Replay: feeds a record through these services in virtual time, and compares what they publish."""
 
-import deploy.trials.simulation  # noqa: F401 (first: it reports a missing simulation)
+import tests.simulation  # noqa: F401 (first: it reports a missing simulation)

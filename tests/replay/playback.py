@@ -21,15 +21,15 @@ from rclpy_simulation.host import BOOT, SECOND
 from deploy.promises.history import WATCHDOG
 from deploy.supervision import manifest
 from deploy.supervision.environment import NAMESPACE
-from deploy.trials.simulation.arm import ROBOT
-from deploy.trials.simulation.machine import simulated_services
-from deploy.trials.simulation.viewer import view
 from interfaces.service.epoch import EPOCH
 from interfaces.topics import DIAGNOSTICS, Topic
 from tests.replay import chains
 from tests.replay.chains import Chain
 from tests.replay.lives import AHEAD, ReplayedLife, Suspension, lives, origin
 from tests.replay.record import Message, Record
+from tests.simulation.arm import ROBOT
+from tests.simulation.machine import simulated_services
+from tests.simulation.viewer import view
 
 LEAD = 2 * SECOND  # ns from the beginning of the simulation to that of the record or of a process
 NETWORK = Network(latency=Delay(0.0002, 0.0002), discovery=Delay(0.01, 0.01), matching=Delay(0.002, 0.002))

@@ -12,14 +12,14 @@ from rclpy_simulation import Delay, Network
 from rclpy_simulation.host import SECOND
 from std_msgs.msg import Float64
 
-from deploy.trials.simulation.arm import ROBOT
-from deploy.trials.simulation.machine import simulated_services
-from deploy.trials.simulation.viewer import view
 from interfaces.service.health import reported_refusals
 from interfaces.topics import CONFIGURATION, DIAGNOSTICS, EFFECTOR_TWIST, JOINT_STATES, L1
 from tests.replay import chains
 from tests.replay.playback import replay
 from tests.replay.record import Message, Record
+from tests.simulation.arm import ROBOT
+from tests.simulation.machine import simulated_services
+from tests.simulation.viewer import view
 
 START = 3 * SECOND  # in which processes discover each other [ns]
 SERVICES = {"twist": EFFECTOR_TWIST, "robot_state": JOINT_STATES}

@@ -1,6 +1,6 @@
 """Bugs planted by hand in the two services that turn the engines off: does the simulation find each of them?
 
-    .venv/bin/python -m tests.trials.simulation.bugs
+    .venv/bin/python -m tests.simulation.bugs
 
 runs an hour of `make simulate` with each bug and each of three seeds, and says when a promise is violated.
 """
@@ -22,9 +22,9 @@ from deploy.promises.history import CONTROLLER, DRIVE, WATCHDOG
 from deploy.supervision import parameter_file
 from deploy.supervision.manifest import Program
 from deploy.supervision.processes import ROOT
-from deploy.trials.simulation import arm, plan
-from deploy.trials.simulation.faults import FAULT_KINDS
-from deploy.trials.simulation.outcome import simulate
+from tests.simulation import arm, plan
+from tests.simulation.faults import FAULT_KINDS
+from tests.simulation.outcome import simulate
 
 SEEDS = ("1", "2", "3")
 EVERY = 5.0  # s between two random faults, as by default

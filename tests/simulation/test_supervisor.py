@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 import pytest
 from rclpy_simulation import Delay, Process, Simulation
 
-from deploy.trials.simulation.supervisor import Supervisor
+from tests.simulation.supervisor import Supervisor
 
 
 class Programs:

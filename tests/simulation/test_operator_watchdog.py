@@ -12,8 +12,8 @@ from rclpy_simulation import Network, Simulation
 from std_msgs.msg import Bool
 
 from deploy.promises.observations import values
-from deploy.trials.simulation.machine import simulated_services
 from interfaces import topics
+from tests.simulation.machine import simulated_services
 
 RATE = 20.0  # Hz of a switch
 HELD = 2.0  # s between two silences

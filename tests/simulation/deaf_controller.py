@@ -15,5 +15,5 @@ def step(latch: Latch, event: Event, given: Parameters, drive_timeout: float) ->
 
 
 if __name__ == "__main__":
-    engine_controller.step = step
+    engine_controller.step = step  # type: ignore[assignment]  # nobody relies on its defaults here
     service.run("engine_controller", engine_controller.wire)

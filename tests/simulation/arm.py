@@ -19,11 +19,11 @@ from deploy.supervision.processes import MARK
 from deploy.supervision.run_directory import SETTINGS, scenario_parameters, with_parameters
 from deploy.supervision.system import SERVICE_GRACE
 from deploy.trials.chaos.nested_faults import NestedFaults
-from deploy.trials.simulation.calibration import Calibration, load
-from deploy.trials.simulation.machine import simulated_services
-from deploy.trials.simulation.supervisor import Supervisor
 from interfaces.service import UserError
 from interfaces.sources import scenario_file
+from tests.simulation.calibration import Calibration, load
+from tests.simulation.machine import simulated_services
+from tests.simulation.supervisor import Supervisor
 
 PROGRAMS = tuple(each for each in manifest.programs() if each.name != manifest.PAGE)
 """All but the page, which serves HTTP on threads of its own."""

@@ -8,9 +8,9 @@ from deploy.promises.findings import percentile
 from deploy.trials.chaos import schedule
 from deploy.trials.chaos.schedule_file import Experiment
 from deploy.trials.chaos.testbed import SCENARIO
-from deploy.trials.simulation.arm import NAMES
-from deploy.trials.simulation.calibration import load
-from deploy.trials.simulation.outcome import simulate
+from tests.simulation.arm import NAMES
+from tests.simulation.calibration import load
+from tests.simulation.outcome import simulate
 
 S1_BOUND = 0.6  # s: a silence is sampled every 500 ms, from a moment that differs
 L1_BOUNDS = (0.1, 0.3)  # s, of median and 99th percentile: the longest of some 36 restarts varies

@@ -19,8 +19,8 @@ from deploy.promises.history import CONTROLLER, SWITCH, WATCHDOG
 from deploy.trials.chaos import testbed
 from deploy.trials.chaos.schedule import AWAKE, DAY, FIRST_FAULT, SETTLE, PlannedFault
 from deploy.trials.chaos.schedule_file import Experiment
-from deploy.trials.simulation import people
-from deploy.trials.simulation.arm import NAMES, simulated_arm
+from tests.simulation import people
+from tests.simulation.arm import NAMES, simulated_arm
 
 FAULTS = {"kill": 0.0, "raise": 0.0, "stop": 15.0, "hang": 15.0, "slow": 1.0}
 """The kinds, with their durations [s]."""

@@ -2,7 +2,7 @@
 
 ``make chaos CHAOS='--scenario briefly'`` makes a record, and this module reads it ::
 
-    python -m deploy.trials.simulation.calibration .run/chaos/<date>/record.mcap > calibration.json
+    python -m tests.simulation.calibration .run/chaos/<date>/record.mcap > calibration.json
 """
 
 from __future__ import annotations

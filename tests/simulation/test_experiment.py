@@ -21,12 +21,12 @@ from deploy.trials.chaos import schedule
 from deploy.trials.chaos.schedule import AWAKE, DAY, PlannedFault
 from deploy.trials.chaos.schedule_file import Experiment
 from deploy.trials.chaos.testbed import SCENARIO, sources
-from deploy.trials.simulation import arm, people, plan
-from deploy.trials.simulation.faults import BAD_LINE, FAULT_KINDS
-from deploy.trials.simulation.outcome import Outcome, simulate
 from interfaces import topics
 from interfaces.service import instance
 from services.examples import speed_guard
+from tests.simulation import arm, people, plan
+from tests.simulation.faults import BAD_LINE, FAULT_KINDS
+from tests.simulation.outcome import Outcome, simulate
 
 LENGTH = 30.0  # s: four faults, and the time in which the arm recovers from the last one
 EVERY = 2.5  # s between two faults
@@ -84,7 +84,7 @@ def test_a_quiet_experiment_has_output_from_every_program() -> None:
 
 def test_equal_experiments_give_equal_records_in_any_interpreter() -> None:
     program = (
-        "from deploy.trials.simulation import plan; from deploy.trials.simulation.outcome import simulate; "
+        "from tests.simulation import plan; from tests.simulation.outcome import simulate; "
         f"print(simulate(plan.experiment('equal', {LENGTH}, 1.0, list(plan.FAULT_KINDS))).digest)"
     )
     runs = [
@@ -118,7 +118,7 @@ ASLEEP = 4.0  # s
 
 def with_a_bug(monkeypatch: pytest.MonkeyPatch) -> None:
     broken = [
-        Program(each.name, "tests.trials.simulation.deaf_controller", ())
+        Program(each.name, "tests.simulation.deaf_controller", ())
         if each.name == "engine_controller"
         else each
         for each in arm.PROGRAMS

@@ -21,13 +21,13 @@ from rclpy_simulation.process import running_process
 from deploy.promises.history import CONTROLLER, DRIVE, SWITCH, WATCHDOG
 from deploy.promises.observations import values
 from deploy.supervision.run_directory import scenario_parameters
-from deploy.trials.simulation import arm
-from deploy.trials.simulation.arm import CONTROL, ROBOT
-from deploy.trials.simulation.calibration import load
-from deploy.trials.simulation.machine import simulated_services
 from interfaces import topics
 from interfaces.topics import DRIVE_TIMEOUT, OFF, ON
-from tests.trials.simulation.bugs import Bug, planted
+from tests.simulation import arm
+from tests.simulation.arm import CONTROL, ROBOT
+from tests.simulation.bugs import Bug, planted
+from tests.simulation.calibration import load
+from tests.simulation.machine import simulated_services
 
 LENGTH = 120.0  # s of an experiment
 KNOWN = 20.0  # s after a cut until both hosts surely know each other again

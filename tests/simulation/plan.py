@@ -9,10 +9,10 @@ from typing import Any
 from deploy.supervision import parameter_file
 from deploy.trials.chaos.schedule import random_faults
 from deploy.trials.chaos.schedule_file import Experiment
-from deploy.trials.simulation import people
-from deploy.trials.simulation.arm import NO_PARAMETERS
-from deploy.trials.simulation.attacks import attacked
-from deploy.trials.simulation.faults import FAULT_KINDS
+from tests.simulation import people
+from tests.simulation.arm import NO_PARAMETERS
+from tests.simulation.attacks import attacked
+from tests.simulation.faults import FAULT_KINDS
 
 LENGTH = 600.0  # s of an experiment, which begins with the start of the arm; the last one may differ
 QUIET = 15.0  # s at the end of an experiment, in which the arm recovers from the last fault

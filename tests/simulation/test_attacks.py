@@ -11,13 +11,13 @@ from deploy.promises.history import CONTROLLER, FALSE_PRESENCE, STUCK_DRIVE
 from deploy.supervision import parameter_file
 from deploy.trials.chaos.schedule import PlannedFault
 from deploy.trials.chaos.schedule_file import Experiment
-from deploy.trials.simulation import __main__ as command_line
-from deploy.trials.simulation import attacks, people, plan
-from deploy.trials.simulation.attacks import FAIL_SAFES, judged
-from deploy.trials.simulation.faults import ATTACK_KINDS, FAULT_KINDS
-from deploy.trials.simulation.outcome import Outcome, simulate
-from deploy.trials.simulation.summary import Summary
 from interfaces import topics
+from tests.simulation import __main__ as command_line
+from tests.simulation import attacks, people, plan
+from tests.simulation.attacks import FAIL_SAFES, judged
+from tests.simulation.faults import ATTACK_KINDS, FAULT_KINDS
+from tests.simulation.outcome import Outcome, simulate
+from tests.simulation.summary import Summary
 
 from .bugs import BUGS, CASES, PROFILES, QUICK_BUGS, planted
 

@@ -10,7 +10,7 @@ from dataclasses import replace
 from typing import TypeVar
 
 from deploy.trials.chaos.schedule_file import Experiment
-from deploy.trials.simulation.outcome import Outcome, simulate
+from tests.simulation.outcome import Outcome, simulate
 
 T = TypeVar("T")
 MARGIN = 15.0  # s after the first evidence: the checkers need to see what follows

@@ -14,9 +14,9 @@ from deploy.promises.history import ALL, FALSE_PRESENCE, HOLD, NO_TARGET, OPERAT
 from deploy.supervision.run_directory import KEY, with_parameters
 from deploy.trials.chaos import clock
 from deploy.trials.chaos.faults import PARAMETERS, Undo
-from deploy.trials.simulation import people
-from deploy.trials.simulation.arm import CONTROL, NAMES, ROBOT, SimulatedArm
 from interfaces import topics
+from tests.simulation import people
+from tests.simulation.arm import CONTROL, NAMES, ROBOT, SimulatedArm
 
 CLOCK_TOLERANCE = 0.045  # s between the clocks of the hosts (deploy/SAFETY.md, A3)
 BAD_LINE = (0.2, Delay(0.05, 0.2))
@@ -173,4 +173,4 @@ ATTACK_KINDS: dict[str, FaultKind] = {
         lambda arm, target, duration: None, (NO_TARGET,)
     ),  # the checkers take it from the record
 }
-"""Faults that only an attack injects (:mod:`deploy.trials.simulation.attacks`)."""
+"""Faults that only an attack injects (:mod:`tests.simulation.attacks`)."""

@@ -14,13 +14,13 @@ from deploy.promises.promises import CHECKERS
 from deploy.supervision.errors import DeploymentError
 from deploy.trials.chaos.schedule import PlannedFault
 from deploy.trials.chaos.schedule_file import Experiment
-from deploy.trials.simulation import people
-from deploy.trials.simulation.arm import NAMES, ROBOT, SimulatedArm, simulated_arm
-from deploy.trials.simulation.attacks import alone
-from deploy.trials.simulation.calibration import Calibration
-from deploy.trials.simulation.faults import ATTACK_KINDS, FAULT_KINDS
-from deploy.trials.simulation.observer import Observer
-from deploy.trials.simulation.viewer import view
+from tests.simulation import people
+from tests.simulation.arm import NAMES, ROBOT, SimulatedArm, simulated_arm
+from tests.simulation.attacks import alone
+from tests.simulation.calibration import Calibration
+from tests.simulation.faults import ATTACK_KINDS, FAULT_KINDS
+from tests.simulation.observer import Observer
+from tests.simulation.viewer import view
 
 KINDS = FAULT_KINDS | ATTACK_KINDS
 

@@ -12,8 +12,8 @@ from multiprocessing.pool import IMapIterator
 
 from deploy.supervision import interruption
 from deploy.trials.chaos.schedule_file import Experiment
-from deploy.trials.simulation.outcome import simulate
-from deploy.trials.simulation.summary import Summary
+from tests.simulation.outcome import simulate
+from tests.simulation.summary import Summary
 
 POLL = 0.2  # s between two looks for Ctrl-C
 

@@ -13,11 +13,11 @@ from deploy.promises.history import CONTROLLER, DRIVE, WATCHDOG, History, Sample
 from deploy.supervision.plugin import SCENARIO
 from deploy.trials.chaos.schedule import PlannedFault
 from deploy.trials.chaos.schedule_file import Experiment
-from deploy.trials.simulation import people
-from deploy.trials.simulation.outcome import Outcome, simulate
 from interfaces import topics
 from interfaces.sources import scenario_file
 from services import engine_controller
+from tests.simulation import people
+from tests.simulation.outcome import Outcome, simulate
 
 from .bugs import BUGS, planted
 

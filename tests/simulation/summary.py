@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 
 from deploy.promises.findings import Evidence, Finding, percentile
 from deploy.promises.promises import CHECKERS
-from deploy.trials.simulation.outcome import Outcome
+from tests.simulation.outcome import Outcome
 
 
 @dataclass

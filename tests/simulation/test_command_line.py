@@ -14,15 +14,15 @@ from deploy.supervision.processes import ROOT
 from deploy.trials.chaos.schedule import PlannedFault
 from deploy.trials.chaos.schedule_file import Experiment, load, save
 from deploy.trials.chaos.testbed import SCENARIO
-from deploy.trials.simulation import plan
-from deploy.trials.simulation.faults import FAULT_KINDS
-from deploy.trials.simulation.outcome import simulate
-from deploy.trials.simulation.summary import Summary
+from tests.simulation import plan
+from tests.simulation.faults import FAULT_KINDS
+from tests.simulation.outcome import simulate
+from tests.simulation.summary import Summary
 
 
 def make_simulate(run: Path, *arguments: str, **environment: str) -> subprocess.Popen[str]:
     return subprocess.Popen(
-        [sys.executable, "-m", "deploy.trials.simulation", *arguments],
+        [sys.executable, "-m", "tests.simulation", *arguments],
         cwd=ROOT,
         env={**os.environ, "REACTIVE_ARM_RUN_DIR": str(run), **environment},
         stdout=subprocess.PIPE,
@@ -84,7 +84,7 @@ def test_ctrl_c_gives_the_verdict_so_far_or_ends(tmp_path: Path) -> None:
     assert errors == ""
 
 
-@pytest.mark.parametrize("module", ["deploy.trials.simulation", "tests.replay"])
+@pytest.mark.parametrize("module", ["tests.simulation", "tests.replay"])
 def test_a_missing_simulation_is_one_line(module: str) -> None:
     code = (
         "import runpy, sys; sys.modules['rclpy_simulation'] = None; "

@@ -23,14 +23,14 @@ from deploy.supervision.run_directory import make_directory
 from deploy.trials.chaos import schedule_file
 from deploy.trials.chaos.plan import names, number
 from deploy.trials.chaos.schedule_file import Experiment
-from deploy.trials.simulation import plan, systematic
-from deploy.trials.simulation.attacks import FAIL_SAFES
-from deploy.trials.simulation.faults import FAULT_KINDS
-from deploy.trials.simulation.outcome import Outcome, simulate
-from deploy.trials.simulation.shrink import shrink
-from deploy.trials.simulation.summary import Summary
-from deploy.trials.simulation.workers import summaries
 from interfaces.service import UserError
+from tests.simulation import plan, systematic
+from tests.simulation.attacks import FAIL_SAFES
+from tests.simulation.faults import FAULT_KINDS
+from tests.simulation.outcome import Outcome, simulate
+from tests.simulation.shrink import shrink
+from tests.simulation.summary import Summary
+from tests.simulation.workers import summaries
 
 BAR = 40  # characters
 

@@ -7,9 +7,9 @@ from pathlib import Path
 import yaml
 
 from deploy.supervision.reaction import reaction
-from deploy.trials.simulation import people
 from interfaces import topics
 from interfaces.sources.scenario_file import load
+from tests.simulation import people
 
 operator = partial(people.operator, reaction=reaction({}))
 

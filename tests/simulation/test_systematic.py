@@ -9,9 +9,9 @@ import pytest
 
 from deploy.trials.chaos.schedule import DAY
 from deploy.trials.chaos.schedule_file import Experiment
-from deploy.trials.simulation import systematic
-from deploy.trials.simulation.arm import NAMES
-from deploy.trials.simulation.outcome import simulate
+from tests.simulation import systematic
+from tests.simulation.arm import NAMES
+from tests.simulation.outcome import simulate
 
 
 class Day(NamedTuple):

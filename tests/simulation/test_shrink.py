@@ -10,9 +10,9 @@ from deploy.trials.chaos import schedule_file
 from deploy.trials.chaos.schedule import PlannedFault
 from deploy.trials.chaos.schedule_file import Experiment
 from deploy.trials.chaos.testbed import SCENARIO
-from deploy.trials.simulation.outcome import simulate
-from deploy.trials.simulation.shrink import minimal, shrink
-from tests.trials.simulation.test_experiment import ASLEEP, BRIEF, with_a_bug
+from tests.simulation.outcome import simulate
+from tests.simulation.shrink import minimal, shrink
+from tests.simulation.test_experiment import ASLEEP, BRIEF, with_a_bug
 
 
 @pytest.mark.parametrize("needed", [set(), {0}, {3}, {2, 7}, {0, 5, 9}, set(range(10))])
