@@ -119,7 +119,7 @@ stop:
 	@exec $(HOLD) deploy/commands/python.sh deploy.commands.stop "$$PYTHON"
 
 chaos: setup
-	@exec $(HOLD) $(PY) -m deploy.trials.chaos --minutes $(MINUTES) $(if $(SEED),--seed $(SEED)) $(CHAOS)
+	@exec $(HOLD) $(PY) -m tests.chaos --minutes $(MINUTES) $(if $(SEED),--seed $(SEED)) $(CHAOS)
 
 simulate: setup
 	@RUNTIME=embedded exec $(HOLD) $(PY) -m tests.simulation --hours $(HOURS) $(if $(SEED),--seed $(SEED)) $(if $(SCHEDULE),--schedule "$(SCHEDULE)") $(SIMULATE)

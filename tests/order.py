@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 LONGEST = (
-    "tests/trials/chaos/test_promises.py",
-    "tests/trials/chaos/test_partition.py",
-    "tests/trials/chaos/test_quick.py",
+    "tests/chaos/test_promises.py",
+    "tests/chaos/test_partition.py",
+    "tests/chaos/test_quick.py",
     "tests/system",
     "tests/component/test_service_life.py",
     "interfaces/reactive_node/tests/test_signals_operations.py",

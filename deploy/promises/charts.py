@@ -1,6 +1,6 @@
 """Pictures of a record as SVG: the timeline of an arm, and histograms of durations.
 
-`deploy/trials/chaos/example.svg` is the `report.svg` of an older `make chaos CHAOS="--scenario variously"`.
+`tests/chaos/example.svg` is the `report.svg` of an older `make chaos CHAOS="--scenario variously"`.
 """
 
 from __future__ import annotations

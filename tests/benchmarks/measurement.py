@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import Any
 
 from deploy.supervision import interruption
-from deploy.trials.chaos.cost import proportional_set_size
 from reactive_node.domains import reserved_domain
 from tests.benchmarks.alternatives import Alternative
 from tests.benchmarks.link import (
@@ -31,6 +30,7 @@ from tests.benchmarks.link import (
     WATCHDOG,
     Job,
 )
+from tests.chaos.cost import proportional_set_size
 
 _SILENCE = 20.0  # s without a report that an alternative may take
 _GRACE = 3.0  # s to end

@@ -20,12 +20,12 @@ from deploy.supervision.environment import NAMESPACE
 from deploy.supervision.processes import ROOT
 from deploy.supervision.rclpy_choice import sourced_rclpy
 from deploy.supervision.system import System
-from deploy.trials.chaos.arm import RealArm
-from deploy.trials.chaos.cost import Cost
 from reactive_node.domains import reserved_domain
 from tests.benchmarks.alternatives import Alternative
 from tests.benchmarks.measurement import MeasurementFailed, Scenario, measure_subscribers
 from tests.benchmarks.table import Results, table
+from tests.chaos.arm import RealArm
+from tests.chaos.cost import Cost
 
 SIZES = (1, 2, 5, 10, 20, 30)
 OWN_DOMAINS = "arms, each in a ROS domain of its own"

@@ -10,12 +10,12 @@ import pytest
 
 from deploy.supervision.rclpy_choice import sourced_rclpy
 from deploy.supervision.system import System
-from deploy.trials.chaos.arm import RealArm
-from deploy.trials.chaos.cost import Cost
 from tests.benchmarks import __main__ as command
 from tests.benchmarks import measurement, scale
 from tests.benchmarks.alternatives import Alternative
 from tests.benchmarks.measurement import MeasurementFailed
+from tests.chaos.arm import RealArm
+from tests.chaos.cost import Cost
 
 pytestmark = pytest.mark.timeout(120)
 

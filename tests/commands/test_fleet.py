@@ -18,8 +18,8 @@ from deploy.security.keystore import Keystore
 from deploy.supervision import processes
 from deploy.supervision.environment import CYCLONEDDS, RANGE, set_middleware
 from deploy.supervision.errors import DeploymentError
-from deploy.trials.chaos.partition import CONTROL, ROBOT, missing, namespaces
 from reactive_node.domains import reserved_domain
+from tests.chaos.partition import CONTROL, ROBOT, missing, namespaces
 from tests.environment import user_environment
 from tests.system.sites import Command, Site
 

@@ -58,7 +58,7 @@ def test_new_service_is_green_at_once(checkout: Path) -> None:
     assert make(checkout, "trial_guard") == ""
 
     tests = [f"tests/component/test_{name}.py" for name in ("trial_guard", "contract", "readme", "topics")]
-    tests += ["tests/supervision/test_manifest.py", "tests/trials/chaos/test_schedule.py"]
+    tests += ["tests/supervision/test_manifest.py", "tests/chaos/test_schedule.py"]
     for command in (
         ("ruff", "check", "."),
         ("ruff", "format", "--check", "services", "interfaces", "tests/component"),

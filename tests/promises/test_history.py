@@ -83,7 +83,7 @@ manifest.programs = lambda: programs
 
 from deploy.promises.history import DEPENDENTS, OUTPUTS
 from deploy.promises.liveness import STREAMS
-from deploy.trials.chaos.schedule import everything, kill_each
+from tests.chaos.schedule import everything, kill_each
 
 assert OUTPUTS["dead_mans_switch"] is shared
 assert "guard" not in OUTPUTS  # its own topic reports single events: its health shows that it works

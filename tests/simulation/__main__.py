@@ -20,10 +20,10 @@ from deploy.promises.text_report import text
 from deploy.supervision import interruption, parameter_file, processes
 from deploy.supervision.errors import DeploymentError
 from deploy.supervision.run_directory import make_directory
-from deploy.trials.chaos import schedule_file
-from deploy.trials.chaos.plan import names, number
-from deploy.trials.chaos.schedule_file import Experiment
 from interfaces.service import UserError
+from tests.chaos import schedule_file
+from tests.chaos.plan import names, number
+from tests.chaos.schedule_file import Experiment
 from tests.simulation import plan, systematic
 from tests.simulation.attacks import FAIL_SAFES
 from tests.simulation.faults import FAULT_KINDS

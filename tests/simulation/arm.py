@@ -18,9 +18,9 @@ from deploy.supervision.errors import DeploymentError
 from deploy.supervision.processes import MARK
 from deploy.supervision.run_directory import SETTINGS, scenario_parameters, with_parameters
 from deploy.supervision.system import SERVICE_GRACE
-from deploy.trials.chaos.nested_faults import NestedFaults
 from interfaces.service import UserError
 from interfaces.sources import scenario_file
+from tests.chaos.nested_faults import NestedFaults
 from tests.simulation.calibration import Calibration, load
 from tests.simulation.machine import simulated_services
 from tests.simulation.supervisor import Supervisor

@@ -42,9 +42,9 @@ from deploy.promises.history import (
 from deploy.promises.marks import STEP
 from deploy.supervision import parameter_file
 from deploy.supervision.reaction import BEAT, Reaction
-from deploy.trials.chaos.schedule import PlannedFault
-from deploy.trials.chaos.schedule_file import Experiment
 from interfaces import topics
+from tests.chaos.schedule import PlannedFault
+from tests.chaos.schedule_file import Experiment
 
 FAIL_SAFES = ("F1", "F2", "F3")
 SHARE = 0.8  # of the silences that are long enough

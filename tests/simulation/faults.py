@@ -12,9 +12,9 @@ from rclpy_simulation import Delay, Process
 from deploy.promises import marks
 from deploy.promises.history import ALL, FALSE_PRESENCE, HOLD, NO_TARGET, OPERATOR, PARTITION, STUCK_DRIVE
 from deploy.supervision.run_directory import KEY, with_parameters
-from deploy.trials.chaos import clock
-from deploy.trials.chaos.faults import PARAMETERS, Undo
 from interfaces import topics
+from tests.chaos import clock
+from tests.chaos.faults import PARAMETERS, Undo
 from tests.simulation import people
 from tests.simulation.arm import CONTROL, NAMES, ROBOT, SimulatedArm
 

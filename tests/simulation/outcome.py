@@ -12,8 +12,8 @@ from deploy.promises.findings import Finding
 from deploy.promises.history import OPERATOR, PROGRAMS, SILENCE, History, InjectedFault
 from deploy.promises.promises import CHECKERS
 from deploy.supervision.errors import DeploymentError
-from deploy.trials.chaos.schedule import PlannedFault
-from deploy.trials.chaos.schedule_file import Experiment
+from tests.chaos.schedule import PlannedFault
+from tests.chaos.schedule_file import Experiment
 from tests.simulation import people
 from tests.simulation.arm import NAMES, ROBOT, SimulatedArm, simulated_arm
 from tests.simulation.attacks import alone

@@ -8,9 +8,9 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from deploy.supervision.reaction import Reaction
-from deploy.trials.chaos import babbler
-from deploy.trials.chaos.testbed import sources
 from interfaces import topics
+from tests.chaos import babbler
+from tests.chaos.testbed import sources
 
 NAP = 1.5, 4.5  # s beyond the bound of S1: just long enough for an attack on the fail-safes
 RATE = 5.0  # Hz, of each source: the least with which L2 can be checked

@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from deploy.supervision import parameter_file
-from deploy.trials.chaos.schedule import random_faults
-from deploy.trials.chaos.schedule_file import Experiment
+from tests.chaos.schedule import random_faults
+from tests.chaos.schedule_file import Experiment
 from tests.simulation import people
 from tests.simulation.arm import NO_PARAMETERS
 from tests.simulation.attacks import attacked

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TypeVar
 
-from deploy.trials.chaos.schedule_file import Experiment
+from tests.chaos.schedule_file import Experiment
 from tests.simulation.outcome import Outcome, simulate
 
 T = TypeVar("T")

@@ -16,9 +16,9 @@ from pathlib import Path
 from rclpy_simulation import Process
 
 from deploy.promises.history import CONTROLLER, SWITCH, WATCHDOG
-from deploy.trials.chaos import testbed
-from deploy.trials.chaos.schedule import AWAKE, DAY, FIRST_FAULT, SETTLE, PlannedFault
-from deploy.trials.chaos.schedule_file import Experiment
+from tests.chaos import testbed
+from tests.chaos.schedule import AWAKE, DAY, FIRST_FAULT, SETTLE, PlannedFault
+from tests.chaos.schedule_file import Experiment
 from tests.simulation import people
 from tests.simulation.arm import NAMES, simulated_arm
 

@@ -9,9 +9,9 @@ import pytest
 
 from deploy.promises.history import CONTROLLER, FALSE_PRESENCE, STUCK_DRIVE
 from deploy.supervision import parameter_file
-from deploy.trials.chaos.schedule import PlannedFault
-from deploy.trials.chaos.schedule_file import Experiment
 from interfaces import topics
+from tests.chaos.schedule import PlannedFault
+from tests.chaos.schedule_file import Experiment
 from tests.simulation import __main__ as command_line
 from tests.simulation import attacks, people, plan
 from tests.simulation.attacks import FAIL_SAFES, judged

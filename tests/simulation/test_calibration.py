@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from deploy.promises.findings import percentile
-from deploy.trials.chaos import schedule
-from deploy.trials.chaos.schedule_file import Experiment
-from deploy.trials.chaos.testbed import SCENARIO
+from tests.chaos import schedule
+from tests.chaos.schedule_file import Experiment
+from tests.chaos.testbed import SCENARIO
 from tests.simulation.arm import NAMES
 from tests.simulation.calibration import load
 from tests.simulation.outcome import simulate

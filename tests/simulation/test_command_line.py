@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 
 from deploy.supervision.processes import ROOT
-from deploy.trials.chaos.schedule import PlannedFault
-from deploy.trials.chaos.schedule_file import Experiment, load, save
-from deploy.trials.chaos.testbed import SCENARIO
+from tests.chaos.schedule import PlannedFault
+from tests.chaos.schedule_file import Experiment, load, save
+from tests.chaos.testbed import SCENARIO
 from tests.simulation import plan
 from tests.simulation.faults import FAULT_KINDS
 from tests.simulation.outcome import simulate

@@ -17,13 +17,13 @@ from rclpy_simulation.host import BOOT, SECOND
 from deploy.promises.history import ALL, NO_TARGET, OPERATOR
 from deploy.supervision.manifest import Program
 from deploy.supervision.processes import ROOT
-from deploy.trials.chaos import schedule
-from deploy.trials.chaos.schedule import AWAKE, DAY, PlannedFault
-from deploy.trials.chaos.schedule_file import Experiment
-from deploy.trials.chaos.testbed import SCENARIO, sources
 from interfaces import topics
 from interfaces.service import instance
 from services.examples import speed_guard
+from tests.chaos import schedule
+from tests.chaos.schedule import AWAKE, DAY, PlannedFault
+from tests.chaos.schedule_file import Experiment
+from tests.chaos.testbed import SCENARIO, sources
 from tests.simulation import arm, people, plan
 from tests.simulation.faults import BAD_LINE, FAULT_KINDS
 from tests.simulation.outcome import Outcome, simulate

@@ -6,10 +6,10 @@ from pathlib import Path
 import pytest
 
 from deploy.supervision.errors import DeploymentError
-from deploy.trials.chaos import schedule_file
-from deploy.trials.chaos.schedule import PlannedFault
-from deploy.trials.chaos.schedule_file import Experiment
-from deploy.trials.chaos.testbed import SCENARIO
+from tests.chaos import schedule_file
+from tests.chaos.schedule import PlannedFault
+from tests.chaos.schedule_file import Experiment
+from tests.chaos.testbed import SCENARIO
 from tests.simulation.outcome import simulate
 from tests.simulation.shrink import minimal, shrink
 from tests.simulation.test_experiment import ASLEEP, BRIEF, with_a_bug

@@ -7,8 +7,8 @@ from unittest import mock
 
 import pytest
 
-from deploy.trials.chaos.schedule import DAY
-from deploy.trials.chaos.schedule_file import Experiment
+from tests.chaos.schedule import DAY
+from tests.chaos.schedule_file import Experiment
 from tests.simulation import systematic
 from tests.simulation.arm import NAMES
 from tests.simulation.outcome import simulate

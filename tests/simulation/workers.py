@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 from multiprocessing.pool import IMapIterator
 
 from deploy.supervision import interruption
-from deploy.trials.chaos.schedule_file import Experiment
+from tests.chaos.schedule_file import Experiment
 from tests.simulation.outcome import simulate
 from tests.simulation.summary import Summary
 

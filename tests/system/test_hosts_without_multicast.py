@@ -18,7 +18,7 @@ from rclpy.utilities import get_rmw_implementation_identifier
 from deploy.supervision import manifest
 from deploy.supervision.environment import RANGE, set_middleware
 from deploy.supervision.processes import ROOT
-from deploy.trials.chaos.partition import BRIDGE, CONTROL, NETWORK, ROBOT, missing, namespaces
+from tests.chaos.partition import BRIDGE, CONTROL, NETWORK, ROBOT, missing, namespaces
 from tests.system.sites import LIMIT, STEADY, Command, Site
 
 NAMES = f"127.0.0.1 localhost\n{NETWORK}.1 {ROBOT}.example\n{NETWORK}.2 {CONTROL}.example\n"

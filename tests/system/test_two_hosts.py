@@ -23,9 +23,9 @@ from deploy.supervision import manifest
 from deploy.supervision.environment import set_middleware
 from deploy.supervision.rclpy_choice import sourced_rclpy
 from deploy.supervision.reaction import reaction
-from deploy.trials.chaos import clock
-from deploy.trials.chaos.faults import INJECTED
-from deploy.trials.chaos.partition import BRIDGE, CONTROL, NETWORK, ROBOT, missing, namespaces
+from tests.chaos import clock
+from tests.chaos.faults import INJECTED
+from tests.chaos.partition import BRIDGE, CONTROL, NETWORK, ROBOT, missing, namespaces
 from tests.system.sites import LIMIT, ROOT, Command, Site
 
 TABLET = "tablet"

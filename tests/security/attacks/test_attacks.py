@@ -25,8 +25,8 @@ from deploy.security import rights
 from deploy.security.keystore import Keystore
 from deploy.supervision.manifest import VIRTUAL_JOINTS
 from deploy.supervision.system import System
-from deploy.trials.chaos import clock
-from deploy.trials.chaos.faults import INJECTED
+from tests.chaos import clock
+from tests.chaos.faults import INJECTED
 from tests.operator.page.clients import Hand
 from tests.security.attacks.conftest import PROGRAMS, MakePeer, Peer, Refused, SecureSite, until
 from tests.system.sites import Site

@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from deploy.trials.chaos.partition import BRIDGE, CONTROL, NETWORK, ROBOT, missing, namespaces
+from tests.chaos.partition import BRIDGE, CONTROL, NETWORK, ROBOT, missing, namespaces
 
 from . import chromium
 from .arm import GONE, Arm, hold_with_engines_on

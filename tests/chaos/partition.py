@@ -19,10 +19,10 @@ from typing import Any
 from deploy.promises.history import OPERATOR, SWITCH
 from deploy.supervision import manifest, processes
 from deploy.supervision.system import System
-from deploy.trials.chaos.arm import RealArm
-from deploy.trials.chaos.faults import FAULT_KINDS, FaultKind, Undo
-from deploy.trials.chaos.schedule import PlannedFault
-from deploy.trials.chaos.testbed import SCENARIO, Testbed
+from tests.chaos.arm import RealArm
+from tests.chaos.faults import FAULT_KINDS, FaultKind, Undo
+from tests.chaos.schedule import PlannedFault
+from tests.chaos.testbed import SCENARIO, Testbed
 
 ROBOT, CONTROL, BRIDGE = "robot", "operator", "switch"
 NETWORK = "10.86.86"  # of the namespaces only

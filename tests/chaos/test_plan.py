@@ -5,10 +5,10 @@ from pathlib import Path
 import pytest
 
 from deploy.supervision.errors import DeploymentError
-from deploy.trials.chaos import clock, plan
-from deploy.trials.chaos.schedule import PlannedFault
-from deploy.trials.chaos.schedule_file import Experiment, save
-from deploy.trials.chaos.testbed import SCENARIO, Testbed
+from tests.chaos import clock, plan
+from tests.chaos.schedule import PlannedFault
+from tests.chaos.schedule_file import Experiment, save
+from tests.chaos.testbed import SCENARIO, Testbed
 
 PARAMETERS = {"/engine_controller": {"ros__parameters": {"presence_timeout": 5.0}}}
 

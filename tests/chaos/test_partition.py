@@ -12,8 +12,8 @@ from deploy.promises.findings import HOLDS
 from deploy.promises.history import History, InjectedFault, between
 from deploy.promises.promises import CHECKERS
 from deploy.supervision import processes
-from deploy.trials.chaos.partition import missing, namespaces
 from interfaces.topics import ENGINES_STATE, OFF, ON, OPERATOR_HEARTBEAT
+from tests.chaos.partition import missing, namespaces
 
 from .chaos_runs import chaos_run
 
@@ -78,7 +78,7 @@ PREPARED = """
 import signal, sys
 from contextlib import ExitStack
 from pathlib import Path
-from deploy.trials.chaos.partition import TwoHosts
+from tests.chaos.partition import TwoHosts
 
 with ExitStack() as stack:
     TwoHosts(Path(sys.argv[1])).prepare(stack)

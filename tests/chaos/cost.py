@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from deploy.promises.marks import BABBLER
-from deploy.trials.chaos.arm import RealArm
+from tests.chaos.arm import RealArm
 
 
 @dataclass(frozen=True)

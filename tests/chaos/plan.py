@@ -12,11 +12,11 @@ from typing import NamedTuple
 from deploy.promises import marks
 from deploy.supervision import parameter_file
 from deploy.supervision.errors import DeploymentError
-from deploy.trials.chaos import clock, partition, schedule, schedule_file
-from deploy.trials.chaos.faults import FAULT_KINDS
-from deploy.trials.chaos.schedule import Schedule
-from deploy.trials.chaos.testbed import SCENARIO, Testbed, sources
 from reactive_node.domains import DOMAINS
+from tests.chaos import clock, partition, schedule, schedule_file
+from tests.chaos.faults import FAULT_KINDS
+from tests.chaos.schedule import Schedule
+from tests.chaos.testbed import SCENARIO, Testbed, sources
 
 RANDOM = "monkey"  # the scenario of random faults
 FLEET_RATE = 10.0  # Hz, of each source; many arms share the machine

@@ -46,14 +46,14 @@ from deploy.supervision.environment import KEYSTORE, NAMESPACE, SECURITY
 from deploy.supervision.errors import DeploymentError
 from deploy.supervision.run_directory import scenario_parameters, with_parameters
 from deploy.supervision.system import System
-from deploy.trials.chaos import clock
-from deploy.trials.chaos.arm import RealArm, file_suffix
-from deploy.trials.chaos.faults import FAULT_KINDS, INJECTED, Undo
-from deploy.trials.chaos.observer import OBSERVER
-from deploy.trials.chaos.schedule import AWAKE, DAY, FIRST_FAULT, PlannedFault, Schedule
 from interfaces import topics
 from interfaces.service import enclave
 from reactive_node.domains import reserved_domain
+from tests.chaos import clock
+from tests.chaos.arm import RealArm, file_suffix
+from tests.chaos.faults import FAULT_KINDS, INJECTED, Undo
+from tests.chaos.observer import OBSERVER
+from tests.chaos.schedule import AWAKE, DAY, FIRST_FAULT, PlannedFault, Schedule
 
 Action = Callable[[], tuple[float, Undo] | None]
 """Returns when and how to end what it began, or ``None``."""
@@ -242,7 +242,7 @@ class Testbed:
             *self.observe_within,
             sys.executable,
             "-m",
-            "deploy.trials.chaos.observer",
+            "tests.chaos.observer",
             str(self.record),
             *arms,
         ]

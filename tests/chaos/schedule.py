@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from deploy.promises.history import ALL, NO_TARGET, PROGRAMS
 from deploy.promises.limits import HUNG
 from deploy.promises.marks import STEP
-from deploy.trials.chaos.faults import FAULT_KINDS
+from tests.chaos.faults import FAULT_KINDS
 
 DAY = 45.0  # s after which the operator's scenario repeats
 AWAKE = 30.0  # s of each day in which the operator holds the switch

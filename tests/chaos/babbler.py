@@ -1,8 +1,8 @@
 """A babbling publisher: it sends too much, or nonsense. Its messages and its process carry a mark. ::
 
-python -m deploy.trials.chaos.babbler flood     10,000 heartbeats a second
-python -m deploy.trials.chaos.babbler babble    NaN and random bytes on every topic
-python -m deploy.trials.chaos.babbler pretend   presences of an operator who is not there
+python -m tests.chaos.babbler flood     10,000 heartbeats a second
+python -m tests.chaos.babbler babble    NaN and random bytes on every topic
+python -m tests.chaos.babbler pretend   presences of an operator who is not there
 """
 
 from __future__ import annotations

@@ -26,10 +26,10 @@ from deploy.supervision.environment import set_middleware
 from deploy.supervision.errors import DeploymentError
 from deploy.supervision.run_directory import make_directory
 from deploy.supervision.system import System
-from deploy.trials.chaos import plan
-from deploy.trials.chaos.arm import file_suffix
-from deploy.trials.chaos.cost import Cost
 from interfaces.service import UserError
+from tests.chaos import plan
+from tests.chaos.arm import file_suffix
+from tests.chaos.cost import Cost
 
 KEPT = 10  # records
 

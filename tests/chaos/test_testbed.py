@@ -15,7 +15,7 @@ import pytest
 
 from deploy.promises.history import OUTPUTS
 from deploy.supervision.errors import DeploymentError
-from deploy.trials.chaos.testbed import START_TIMEOUT, Testbed
+from tests.chaos.testbed import START_TIMEOUT, Testbed
 
 ARMS = tuple(f"/arm{number}" for number in range(1, 31))
 
@@ -74,7 +74,7 @@ def test_topics_that_were_seen_before_are_not_awaited(fleet: Any, monkeypatch: p
 
 def test_observer_that_cannot_join_is_reported(tmp_path: Path) -> None:
     done = subprocess.run(
-        ["unshare", "--net", "--map-root-user", sys.executable, "-m", "deploy.trials.chaos"],
+        ["unshare", "--net", "--map-root-user", sys.executable, "-m", "tests.chaos"],
         env={**os.environ, "REACTIVE_ARM_RUN_DIR": str(tmp_path / "run")},
         capture_output=True,
         text=True,

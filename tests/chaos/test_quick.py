@@ -10,10 +10,10 @@ from deploy.promises.findings import HOLDS
 from deploy.promises.promises import CHECKERS
 from deploy.supervision import parameter_file
 from deploy.supervision.processes import ROOT
-from deploy.trials.chaos.schedule import PlannedFault
-from deploy.trials.chaos.schedule_file import Experiment, save
-from deploy.trials.chaos.testbed import SCENARIO
 from interfaces.topics import TURN_ON
+from tests.chaos.schedule import PlannedFault
+from tests.chaos.schedule_file import Experiment, save
+from tests.chaos.testbed import SCENARIO
 
 from .chaos_runs import ChaosRun, chaos_run
 

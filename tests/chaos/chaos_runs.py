@@ -11,7 +11,7 @@ from deploy.promises.findings import Finding
 from deploy.promises.history import History
 from deploy.promises.promises import CHECKERS
 from deploy.supervision import processes
-from deploy.trials.chaos.arm import file_suffix
+from tests.chaos.arm import file_suffix
 from tests.environment import user_environment
 
 TIMEOUT = 150.0  # s
@@ -47,7 +47,7 @@ def fast_dds_files() -> set[Path]:
 
 def unleash(run: Path, *options: str) -> tuple[str, int]:
     process = subprocess.Popen(
-        [sys.executable, "-m", "deploy.trials.chaos", *options],
+        [sys.executable, "-m", "tests.chaos", *options],
         cwd=processes.ROOT,
         env=user_environment() | {"REACTIVE_ARM_RUN_DIR": str(run)},
         stdout=subprocess.PIPE,

@@ -19,8 +19,8 @@ from deploy.promises.history import ALL, NO_TARGET, PROGRAMS
 from deploy.promises.marks import BABBLER
 from deploy.supervision import parameter_file, processes
 from deploy.supervision.run_directory import KEY, with_parameters
-from deploy.trials.chaos import clock
-from deploy.trials.chaos.arm import RealArm
+from tests.chaos import clock
+from tests.chaos.arm import RealArm
 
 INJECTED = Path(__file__).parent / "inject"
 """On the PYTHONPATH of an arm under test; the faults `hang`, `raise` and `hog` need it."""
@@ -159,7 +159,7 @@ def step_clock(arm: RealArm, target: str) -> None:
 def _babbler(mode: str) -> Callable[[RealArm, str], Undo]:
     def start(arm: RealArm, target: str) -> Undo:
         process = subprocess.Popen(
-            [sys.executable, "-m", "deploy.trials.chaos.babbler", mode],
+            [sys.executable, "-m", "tests.chaos.babbler", mode],
             cwd=processes.ROOT,
             env=arm.environment() | {"SUPERVISOR_PROCESS_NAME": BABBLER},
             stdout=subprocess.DEVNULL,

@@ -22,7 +22,7 @@ from typing import Any
 import yaml
 
 from deploy.supervision.errors import DeploymentError
-from deploy.trials.chaos.schedule import PlannedFault, Schedule
+from tests.chaos.schedule import PlannedFault, Schedule
 
 
 @dataclass(frozen=True)

@@ -11,9 +11,9 @@ import pytest
 from deploy.promises.history import ALL
 from deploy.supervision import processes
 from deploy.supervision.system import System
-from deploy.trials.chaos.arm import RealArm
-from deploy.trials.chaos.cost import Cost
-from deploy.trials.chaos.faults import FAULT_KINDS
+from tests.chaos.arm import RealArm
+from tests.chaos.cost import Cost
+from tests.chaos.faults import FAULT_KINDS
 
 BUSY = 0.5  # s
 ERROR = 0.1  # s of the kernel's count, of starting and of ending

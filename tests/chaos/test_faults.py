@@ -26,11 +26,11 @@ from deploy.supervision.environment import NAMESPACE
 from deploy.supervision.run_directory import ALL as ALL_NODES
 from deploy.supervision.run_directory import KEY
 from deploy.supervision.system import System
-from deploy.trials.chaos import process_monitor
-from deploy.trials.chaos.arm import RealArm
-from deploy.trials.chaos.faults import FAULT_KINDS, PARAMETERS, Undo
-from deploy.trials.chaos.process_monitor import STALL, ProcessMonitor, Rounds
 from interfaces import topics
+from tests.chaos import process_monitor
+from tests.chaos.arm import RealArm
+from tests.chaos.faults import FAULT_KINDS, PARAMETERS, Undo
+from tests.chaos.process_monitor import STALL, ProcessMonitor, Rounds
 
 
 class StoppedArm(RealArm):

@@ -3,7 +3,7 @@
 It runs in a process that the system does not know. Faults arrive on standard input, a JSON object a line; the
 end of standard input ends the record. ::
 
-    python -m deploy.trials.chaos.observer RECORD NAMESPACE=DOMAIN=RUN_DIRECTORY ...
+    python -m tests.chaos.observer RECORD NAMESPACE=DOMAIN=RUN_DIRECTORY ...
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ from deploy.promises.history import LOSS, NO_TARGET, OVERLOAD, InjectedFault, Li
 from deploy.promises.marks import is_babble
 from deploy.promises.observations import FAULTS, PROCESSES
 from deploy.supervision.recorder import Recorder, clocks, record
-from deploy.trials.chaos.process_monitor import SCAN_PERIOD, ProcessMonitor, Rounds
 from interfaces.service import UserError, enclave, middleware
 from reactive_node import ReactiveNode
+from tests.chaos.process_monitor import SCAN_PERIOD, ProcessMonitor, Rounds
 
 OBSERVER = "observer"
 

@@ -21,8 +21,8 @@ from deploy.promises.marks import STEP
 from deploy.promises.observations import FAULTS, PROCESSES, load, values
 from deploy.supervision import processes
 from deploy.supervision.recorder import Recorder, qos_profiles
-from deploy.trials.chaos import __main__ as chaos
 from interfaces import topics
+from tests.chaos import __main__ as chaos
 
 
 def recorded(path: Path, *lives: Life, seconds: int = 20) -> bytes:
@@ -75,7 +75,7 @@ def test_health_without_a_pid_says_nothing_about_processes(pid: str) -> None:
     ],
 )
 def test_impossible_options_are_refused(tmp_path: Path, options: str, code: int, reason: str) -> None:
-    command = [sys.executable, "-m", "deploy.trials.chaos", *options.split()]
+    command = [sys.executable, "-m", "tests.chaos", *options.split()]
     environment = {**os.environ, "REACTIVE_ARM_RUN_DIR": str(tmp_path)}
     end = subprocess.run(
         command, cwd=processes.ROOT, env=environment, capture_output=True, text=True, timeout=60
@@ -91,7 +91,7 @@ def test_ctrl_c_ends_the_judgement(tmp_path: Path) -> None:
     script = (
         "import os, signal, sys; signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT});"
         "os.kill(os.getpid(), signal.SIGINT);"
-        f"import deploy.trials.chaos.__main__ as chaos; sys.exit(chaos.main(['--replay', {str(path)!r}]))"
+        f"import tests.chaos.__main__ as chaos; sys.exit(chaos.main(['--replay', {str(path)!r}]))"
     )
     end = subprocess.run(
         [sys.executable, "-c", script], cwd=processes.ROOT, capture_output=True, text=True, timeout=60

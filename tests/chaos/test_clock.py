@@ -14,9 +14,9 @@ from typing import IO
 import pytest
 
 from deploy.promises.observations import time_sent
-from deploy.trials.chaos import clock
-from deploy.trials.chaos.clock import LARGEST, Clock
-from deploy.trials.chaos.faults import INJECTED
+from tests.chaos import clock
+from tests.chaos.clock import LARGEST, Clock
+from tests.chaos.faults import INJECTED
 
 needs_library = pytest.mark.skipif(bool(clock.missing()), reason=f"platform: {clock.missing()}")
 

@@ -9,8 +9,8 @@ from deploy.promises.findings import HOLDS
 from deploy.promises.history import PROGRAMS, SILENCE, Sample, between, running
 from deploy.promises.marks import STEP
 from deploy.promises.promises import CHECKERS
-from deploy.trials.chaos.clock import missing
 from interfaces.topics import DRIVE_TIMEOUT, ENGINES, OPERATOR_HEARTBEAT, OPERATOR_PRESENCE
+from tests.chaos.clock import missing
 
 from .chaos_runs import ChaosRun, chaos_run
 

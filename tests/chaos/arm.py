@@ -12,8 +12,8 @@ from deploy.promises.marks import BABBLER
 from deploy.supervision import processes
 from deploy.supervision.errors import DeploymentError
 from deploy.supervision.system import System
-from deploy.trials.chaos.clock import Clock
-from deploy.trials.chaos.nested_faults import NestedFaults
+from tests.chaos.clock import Clock
+from tests.chaos.nested_faults import NestedFaults
 
 PID_TIMEOUT = 2.0  # s to wait for a program that is being restarted
 

@@ -6,8 +6,8 @@ import pytest
 
 from deploy.promises.history import PROGRAMS
 from deploy.promises.limits import HUNG, MEDIAN
-from deploy.trials.chaos import schedule
-from deploy.trials.chaos.faults import FAULT_KINDS
+from tests.chaos import schedule
+from tests.chaos.faults import FAULT_KINDS
 
 
 def test_only_the_same_seed_gives_the_same_schedule() -> None:

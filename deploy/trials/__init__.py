@@ -1,1 +1,0 @@
-"""Trials of the promises: chaos with real processes, simulation in virtual time, replay of records."""
