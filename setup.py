@@ -26,7 +26,6 @@ ELSEWHERE = (
     "deploy/simulation_kit",
     "deploy/tools",
     "deploy/package",
-    "deploy/promises",
 )
 """Folders that are installed otherwise, or that an installed arm does not need."""
 

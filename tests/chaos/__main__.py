@@ -15,12 +15,6 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from deploy.promises import observations
-from deploy.promises.charts import framed, timeline
-from deploy.promises.findings import HOLDS, count, overall
-from deploy.promises.html_report import html, verdict
-from deploy.promises.promises import CHECKERS, overloads
-from deploy.promises.text_report import text
 from deploy.supervision import interruption, processes
 from deploy.supervision.environment import set_middleware
 from deploy.supervision.errors import DeploymentError
@@ -30,6 +24,12 @@ from interfaces.service import UserError
 from tests.chaos import plan
 from tests.chaos.arm import file_suffix
 from tests.chaos.cost import Cost
+from tests.promises import observations
+from tests.promises.charts import framed, timeline
+from tests.promises.findings import HOLDS, count, overall
+from tests.promises.html_report import html, verdict
+from tests.promises.promises import CHECKERS, overloads
+from tests.promises.text_report import text
 
 KEPT = 10  # records
 

@@ -8,12 +8,12 @@ from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from typing import Any
 
-from deploy.promises.marks import BABBLER
 from deploy.supervision import processes
 from deploy.supervision.errors import DeploymentError
 from deploy.supervision.system import System
 from tests.chaos.clock import Clock
 from tests.chaos.nested_faults import NestedFaults
+from tests.promises.marks import BABBLER
 
 PID_TIMEOUT = 2.0  # s to wait for a program that is being restarted
 

@@ -23,10 +23,10 @@ from rclpy.serialization import serialize_message
 from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import Bool, Float64, Header, String
 
-from deploy.promises.marks import BABBLER, GARBAGE, TEXT, nan
 from deploy.supervision.environment import namespace_of
 from interfaces import topics
 from interfaces.service import enclave, middleware
+from tests.promises.marks import BABBLER, GARBAGE, TEXT, nan
 
 RATES = {"flood": 10_000.0, "babble": 200.0, "pretend": 2.0}  # Hz; of babble, over all topics
 PRETENDED_AGE = 1.2  # s of a presence: too old for `turn_on`, young enough to leave the engines on

@@ -6,13 +6,13 @@ import subprocess
 import sys
 from pathlib import Path
 
-from deploy.promises import observations
-from deploy.promises.findings import Finding
-from deploy.promises.history import History
-from deploy.promises.promises import CHECKERS
 from deploy.supervision import processes
 from tests.chaos.arm import file_suffix
 from tests.environment import user_environment
+from tests.promises import observations
+from tests.promises.findings import Finding
+from tests.promises.history import History
+from tests.promises.promises import CHECKERS
 
 TIMEOUT = 150.0  # s
 

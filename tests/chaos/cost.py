@@ -8,8 +8,8 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from deploy.promises.marks import BABBLER
 from tests.chaos.arm import RealArm
+from tests.promises.marks import BABBLER
 
 
 @dataclass(frozen=True)

@@ -14,13 +14,13 @@ from typing import NamedTuple
 
 import yaml
 
-from deploy.promises import marks
-from deploy.promises.history import ALL, NO_TARGET, PROGRAMS
-from deploy.promises.marks import BABBLER
 from deploy.supervision import parameter_file, processes
 from deploy.supervision.run_directory import KEY, with_parameters
 from tests.chaos import clock
 from tests.chaos.arm import RealArm
+from tests.promises import marks
+from tests.promises.history import ALL, NO_TARGET, PROGRAMS
+from tests.promises.marks import BABBLER
 
 INJECTED = Path(__file__).parent / "inject"
 """On the PYTHONPATH of an arm under test; the faults `hang`, `raise` and `hog` need it."""

@@ -26,13 +26,13 @@ from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 
-from deploy.promises.history import LOSS, NO_TARGET, OVERLOAD, InjectedFault, Life
-from deploy.promises.marks import is_babble
-from deploy.promises.observations import FAULTS, PROCESSES
 from deploy.supervision.recorder import Recorder, clocks, record
 from interfaces.service import UserError, enclave, middleware
 from reactive_node import ReactiveNode
 from tests.chaos.process_monitor import SCAN_PERIOD, ProcessMonitor, Rounds
+from tests.promises.history import LOSS, NO_TARGET, OVERLOAD, InjectedFault, Life
+from tests.promises.marks import is_babble
+from tests.promises.observations import FAULTS, PROCESSES
 
 OBSERVER = "observer"
 

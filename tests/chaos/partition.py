@@ -16,13 +16,13 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from deploy.promises.history import OPERATOR, SWITCH
 from deploy.supervision import manifest, processes
 from deploy.supervision.system import System
 from tests.chaos.arm import RealArm
 from tests.chaos.faults import FAULT_KINDS, FaultKind, Undo
 from tests.chaos.schedule import PlannedFault
 from tests.chaos.testbed import SCENARIO, Testbed
+from tests.promises.history import OPERATOR, SWITCH
 
 ROBOT, CONTROL, BRIDGE = "robot", "operator", "switch"
 NETWORK = "10.86.86"  # of the namespaces only

@@ -9,7 +9,6 @@ from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
-from deploy.promises import marks
 from deploy.supervision import parameter_file
 from deploy.supervision.errors import DeploymentError
 from reactive_node.domains import DOMAINS
@@ -17,6 +16,7 @@ from tests.chaos import clock, partition, schedule, schedule_file
 from tests.chaos.faults import FAULT_KINDS
 from tests.chaos.schedule import Schedule
 from tests.chaos.testbed import SCENARIO, Testbed, sources
+from tests.promises import marks
 
 RANDOM = "monkey"  # the scenario of random faults
 FLEET_RATE = 10.0  # Hz, of each source; many arms share the machine

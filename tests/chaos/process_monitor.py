@@ -10,9 +10,9 @@ import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from deploy.promises.history import Life
-from deploy.promises.marks import BABBLER
 from deploy.supervision import processes
+from tests.promises.history import Life
+from tests.promises.marks import BABBLER
 
 STALL = 0.1  # s; the kernel schedules each thread within this time, or the machine is overloaded (A4)
 SCAN_PERIOD = 0.02  # s

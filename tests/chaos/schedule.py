@@ -8,10 +8,10 @@ import random
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from deploy.promises.history import ALL, NO_TARGET, PROGRAMS
-from deploy.promises.limits import HUNG
-from deploy.promises.marks import STEP
 from tests.chaos.faults import FAULT_KINDS
+from tests.promises.history import ALL, NO_TARGET, PROGRAMS
+from tests.promises.limits import HUNG
+from tests.promises.marks import STEP
 
 DAY = 45.0  # s after which the operator's scenario repeats
 AWAKE = 30.0  # s of each day in which the operator holds the switch

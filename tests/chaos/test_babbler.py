@@ -11,12 +11,12 @@ from geometry_msgs.msg import Point, PointStamped
 from rclpy.serialization import deserialize_message, serialize_message
 from std_msgs.msg import Header
 
-from deploy.promises.marks import TEXT, is_babble, nan
 from interfaces import topics
 from interfaces.robot_model import forward_kinematics
 from services import engine_controller
 from tests.chaos import babbler
 from tests.chaos.babbler import nonsense
+from tests.promises.marks import TEXT, is_babble, nan
 
 
 @pytest.mark.parametrize("topic", topics.CONTRACT, ids=lambda topic: topic.name)

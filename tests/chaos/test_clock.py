@@ -13,10 +13,10 @@ from typing import IO
 
 import pytest
 
-from deploy.promises.observations import time_sent
 from tests.chaos import clock
 from tests.chaos.clock import LARGEST, Clock
 from tests.chaos.faults import INJECTED
+from tests.promises.observations import time_sent
 
 needs_library = pytest.mark.skipif(bool(clock.missing()), reason=f"platform: {clock.missing()}")
 

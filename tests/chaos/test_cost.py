@@ -8,12 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from deploy.promises.history import ALL
 from deploy.supervision import processes
 from deploy.supervision.system import System
 from tests.chaos.arm import RealArm
 from tests.chaos.cost import Cost
 from tests.chaos.faults import FAULT_KINDS
+from tests.promises.history import ALL
 
 BUSY = 0.5  # s
 ERROR = 0.1  # s of the kernel's count, of starting and of ending

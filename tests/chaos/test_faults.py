@@ -19,8 +19,6 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from std_msgs.msg import Float64
 
-from deploy.promises.history import ALL, NO_TARGET, Life
-from deploy.promises.marks import BABBLER
 from deploy.supervision import processes
 from deploy.supervision.environment import NAMESPACE
 from deploy.supervision.run_directory import ALL as ALL_NODES
@@ -31,6 +29,8 @@ from tests.chaos import process_monitor
 from tests.chaos.arm import RealArm
 from tests.chaos.faults import FAULT_KINDS, PARAMETERS, Undo
 from tests.chaos.process_monitor import STALL, ProcessMonitor, Rounds
+from tests.promises.history import ALL, NO_TARGET, Life
+from tests.promises.marks import BABBLER
 
 
 class StoppedArm(RealArm):

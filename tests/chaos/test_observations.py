@@ -16,13 +16,13 @@ from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 from std_msgs.msg import Bool, Float64, String
 
-from deploy.promises.history import NO_TARGET, OVERLOAD, InjectedFault, Life
-from deploy.promises.marks import STEP
-from deploy.promises.observations import FAULTS, PROCESSES, load, values
 from deploy.supervision import processes
 from deploy.supervision.recorder import Recorder, qos_profiles
 from interfaces import topics
 from tests.chaos import __main__ as chaos
+from tests.promises.history import NO_TARGET, OVERLOAD, InjectedFault, Life
+from tests.promises.marks import STEP
+from tests.promises.observations import FAULTS, PROCESSES, load, values
 
 
 def recorded(path: Path, *lives: Life, seconds: int = 20) -> bytes:

@@ -8,12 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from deploy.promises.findings import HOLDS
-from deploy.promises.history import History, InjectedFault, between
-from deploy.promises.promises import CHECKERS
 from deploy.supervision import processes
 from interfaces.topics import ENGINES_STATE, OFF, ON, OPERATOR_HEARTBEAT
 from tests.chaos.partition import missing, namespaces
+from tests.promises.findings import HOLDS
+from tests.promises.history import History, InjectedFault, between
+from tests.promises.promises import CHECKERS
 
 from .chaos_runs import chaos_run
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import pytest
 
-from deploy.promises.effects import TRANSPORT
-from deploy.promises.findings import HOLDS
-from deploy.promises.history import PROGRAMS, SILENCE, Sample, between, running
-from deploy.promises.marks import STEP
-from deploy.promises.promises import CHECKERS
 from interfaces.topics import DRIVE_TIMEOUT, ENGINES, OPERATOR_HEARTBEAT, OPERATOR_PRESENCE
 from tests.chaos.clock import missing
+from tests.promises.effects import TRANSPORT
+from tests.promises.findings import HOLDS
+from tests.promises.history import PROGRAMS, SILENCE, Sample, between, running
+from tests.promises.marks import STEP
+from tests.promises.promises import CHECKERS
 
 from .chaos_runs import ChaosRun, chaos_run
 

@@ -6,14 +6,14 @@ from pathlib import Path
 
 import pytest
 
-from deploy.promises.findings import HOLDS
-from deploy.promises.promises import CHECKERS
 from deploy.supervision import parameter_file
 from deploy.supervision.processes import ROOT
 from interfaces.topics import TURN_ON
 from tests.chaos.schedule import PlannedFault
 from tests.chaos.schedule_file import Experiment, save
 from tests.chaos.testbed import SCENARIO
+from tests.promises.findings import HOLDS
+from tests.promises.promises import CHECKERS
 
 from .chaos_runs import ChaosRun, chaos_run
 

@@ -4,10 +4,10 @@ from itertools import pairwise
 
 import pytest
 
-from deploy.promises.history import PROGRAMS
-from deploy.promises.limits import HUNG, MEDIAN
 from tests.chaos import schedule
 from tests.chaos.faults import FAULT_KINDS
+from tests.promises.history import PROGRAMS
+from tests.promises.limits import HUNG, MEDIAN
 
 
 def test_only_the_same_seed_gives_the_same_schedule() -> None:

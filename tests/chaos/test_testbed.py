@@ -13,9 +13,9 @@ from typing import Any
 
 import pytest
 
-from deploy.promises.history import OUTPUTS
 from deploy.supervision.errors import DeploymentError
 from tests.chaos.testbed import START_TIMEOUT, Testbed
+from tests.promises.history import OUTPUTS
 
 ARMS = tuple(f"/arm{number}" for number in range(1, 31))
 

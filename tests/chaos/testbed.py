@@ -28,17 +28,6 @@ from typing import Any
 
 import yaml
 
-from deploy.promises.history import (
-    LOSS,
-    NO_TARGET,
-    OPERATOR,
-    OUTPUTS,
-    PROGRAMS,
-    SILENCE,
-    InjectedFault,
-    target_name,
-)
-from deploy.promises.marks import BABBLER
 from deploy.security import rights
 from deploy.security.keystore import Keystore
 from deploy.supervision import interruption, manifest, processes
@@ -54,6 +43,17 @@ from tests.chaos.arm import RealArm, file_suffix
 from tests.chaos.faults import FAULT_KINDS, INJECTED, Undo
 from tests.chaos.observer import OBSERVER
 from tests.chaos.schedule import AWAKE, DAY, FIRST_FAULT, PlannedFault, Schedule
+from tests.promises.history import (
+    LOSS,
+    NO_TARGET,
+    OPERATOR,
+    OUTPUTS,
+    PROGRAMS,
+    SILENCE,
+    InjectedFault,
+    target_name,
+)
+from tests.promises.marks import BABBLER
 
 Action = Callable[[], tuple[float, Undo] | None]
 """Returns when and how to end what it began, or ``None``."""

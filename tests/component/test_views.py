@@ -9,8 +9,8 @@ from typing import Any
 
 import yaml
 
-from deploy.promises.observations import FAULTS
 from interfaces import robot_model, topics
+from tests.promises.observations import FAULTS
 
 VIEWS = Path(__file__).parents[2] / "deploy" / "views"
 TOPICS = {f"/{topic.name.lstrip('/')}": topic for topic in topics.CONTRACT}

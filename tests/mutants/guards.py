@@ -107,12 +107,12 @@ GUARDS: dict[str, tuple[str, ...]] = {
         "tests/supervision/test_sentinel_wiring.py",
         "tests/component/test_readme.py",
     ),
-    "deploy/promises/history.py": ("tests/promises/test_history.py", *_CHECKERS),
-    "deploy/promises/effects.py": ("tests/promises/test_effects.py", *_CHECKERS),
-    "deploy/promises/promises.py": ("tests/promises/test_checkers.py", "tests/promises/test_reports.py"),
-    "deploy/promises/safety.py": _CHECKERS,
-    "deploy/promises/drive.py": ("tests/promises/test_drive.py",),
-    "deploy/promises/liveness.py": _CHECKERS,
+    "tests/promises/history.py": ("tests/promises/test_history.py", *_CHECKERS),
+    "tests/promises/effects.py": ("tests/promises/test_effects.py", *_CHECKERS),
+    "tests/promises/promises.py": ("tests/promises/test_checkers.py", "tests/promises/test_reports.py"),
+    "tests/promises/safety.py": _CHECKERS,
+    "tests/promises/drive.py": ("tests/promises/test_drive.py",),
+    "tests/promises/liveness.py": _CHECKERS,
 }
 """Paths of modules, and of the tests that run for each mutant of the module, quick ones first."""
 

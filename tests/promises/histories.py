@@ -9,9 +9,9 @@ from dataclasses import replace
 from functools import cache
 from typing import Any
 
-from deploy.promises.history import PROGRAMS, History, InjectedFault, Life, Sample
 from interfaces import topics
 from interfaces.robot_model import forward_kinematics
+from tests.promises.history import PROGRAMS, History, InjectedFault, Life, Sample
 
 END = 60.0
 RATES: dict[str, float] = {

@@ -8,11 +8,11 @@ from typing import Any
 
 import pytest
 
-from deploy.promises.findings import HOLDS, VIOLATED
-from deploy.promises.history import NO_TARGET, History, InjectedFault, Life, between
-from deploy.promises.promises import CHECKERS
 from interfaces.robot_model import forward_kinematics
 from interfaces.topics import CONFIGURATION, OFF, ON, TURN_OFF
+from tests.promises.findings import HOLDS, VIOLATED
+from tests.promises.history import NO_TARGET, History, InjectedFault, Life, between
+from tests.promises.promises import CHECKERS
 
 from .histories import END, added, change, faulty, good, killed, silent, succeeded, with_value
 

@@ -7,8 +7,11 @@ from dataclasses import replace
 
 import pytest
 
-from deploy.promises.findings import HOLDS, UNKNOWN, VIOLATED, percentile
-from deploy.promises.history import (
+from interfaces import topics
+from interfaces.robot_model import forward_kinematics
+from interfaces.topics import OFF, ON, TURN_OFF
+from tests.promises.findings import HOLDS, UNKNOWN, VIOLATED, percentile
+from tests.promises.history import (
     ALL,
     DEPENDENTS,
     NEEDED_AT_START,
@@ -20,11 +23,8 @@ from deploy.promises.history import (
     Life,
     Sample,
 )
-from deploy.promises.promises import CHECKERS, meaning
-from deploy.promises.text_report import text
-from interfaces import topics
-from interfaces.robot_model import forward_kinematics
-from interfaces.topics import OFF, ON, TURN_OFF
+from tests.promises.promises import CHECKERS, meaning
+from tests.promises.text_report import text
 
 from .histories import END, added, change, faulty, good, killed, silent, succeeded, value_at, with_value
 

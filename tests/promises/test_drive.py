@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import pytest
 
-from deploy.promises.drive import joints_stand_in_time
-from deploy.promises.findings import HOLDS, Evidence, Finding
-from deploy.promises.history import NO_TARGET, OVERLOAD, History, InjectedFault, Sample
-from deploy.promises.promises import CHECKERS
 from interfaces import topics
+from tests.promises.drive import joints_stand_in_time
+from tests.promises.findings import HOLDS, Evidence, Finding
+from tests.promises.history import NO_TARGET, OVERLOAD, History, InjectedFault, Sample
+from tests.promises.promises import CHECKERS
 
 from .histories import good, silent
 

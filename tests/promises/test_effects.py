@@ -5,8 +5,9 @@ from collections.abc import Sequence
 
 import pytest
 
-from deploy.promises.effects import MISSED, Effect, Why, disturbed_for, effects, undisturbed
-from deploy.promises.history import (
+from interfaces import topics
+from tests.promises.effects import MISSED, Effect, Why, disturbed_for, effects, undisturbed
+from tests.promises.history import (
     ALL,
     CONTROLLER,
     DEPENDENTS,
@@ -24,7 +25,6 @@ from deploy.promises.history import (
     Life,
     Sample,
 )
-from interfaces import topics
 
 HEARTBEATS = {SWITCH, *DEPENDENTS[SWITCH]}
 Row = tuple[set[str], float, float, str]

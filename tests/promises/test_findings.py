@@ -8,9 +8,10 @@ from typing import Any
 
 import pytest
 
-from deploy.promises.effects import TRANSPORT
-from deploy.promises.findings import Evidence, Finding
-from deploy.promises.history import (
+from interfaces.topics import ALIVE, DRIVE_TIMEOUT, INCAPACITATED, MISSED, OFF, ON, TURN_OFF, TURN_ON
+from tests.promises.effects import TRANSPORT
+from tests.promises.findings import Evidence, Finding
+from tests.promises.history import (
     ALL,
     BAD_LINE,
     CONTROLLER,
@@ -27,9 +28,8 @@ from deploy.promises.history import (
     Life,
     Sample,
 )
-from deploy.promises.marks import STEP
-from deploy.promises.promises import CHECKERS
-from interfaces.topics import ALIVE, DRIVE_TIMEOUT, INCAPACITATED, MISSED, OFF, ON, TURN_OFF, TURN_ON
+from tests.promises.marks import STEP
+from tests.promises.promises import CHECKERS
 
 TOPICS = {
     "heartbeats": "operator_heartbeat",

@@ -7,7 +7,9 @@ import sys
 
 import pytest
 
-from deploy.promises.history import (
+from deploy.supervision import processes
+from interfaces import topics
+from tests.promises.history import (
     ALL,
     BAD_LINE,
     CONDITIONS,
@@ -30,9 +32,7 @@ from deploy.promises.history import (
     merged,
     target_name,
 )
-from deploy.promises.liveness import STREAMS
-from deploy.supervision import processes
-from interfaces import topics
+from tests.promises.liveness import STREAMS
 
 EXPECTED = {
     "config_l1": topics.L1,
@@ -81,8 +81,8 @@ new = [manifest.Program(name, "services.velocity", ()) for name in ("guard", "ac
 programs = (*manifest.programs(), *new)
 manifest.programs = lambda: programs
 
-from deploy.promises.history import DEPENDENTS, OUTPUTS
-from deploy.promises.liveness import STREAMS
+from tests.promises.history import DEPENDENTS, OUTPUTS
+from tests.promises.liveness import STREAMS
 from tests.chaos.schedule import everything, kill_each
 
 assert OUTPUTS["dead_mans_switch"] is shared

@@ -5,12 +5,12 @@ from dataclasses import replace
 from html import unescape
 from xml.etree import ElementTree
 
-from deploy.promises.charts import framed, timeline
-from deploy.promises.findings import Finding, count, how_often
-from deploy.promises.history import ALL, NO_TARGET, History, InjectedFault
-from deploy.promises.html_report import html
-from deploy.promises.promises import CHECKERS, overloads
-from deploy.promises.text_report import text
+from tests.promises.charts import framed, timeline
+from tests.promises.findings import Finding, count, how_often
+from tests.promises.history import ALL, NO_TARGET, History, InjectedFault
+from tests.promises.html_report import html
+from tests.promises.promises import CHECKERS, overloads
+from tests.promises.text_report import text
 
 from .histories import END, faulty, good, killed, silent, with_value
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from deploy.promises.promises import CHECKERS
+from tests.promises.promises import CHECKERS
 
 ROOT = Path(__file__).resolve().parents[2]
 CASE = (ROOT / "deploy" / "SAFETY.md").read_text(encoding="utf-8")

@@ -13,9 +13,9 @@ from pathlib import Path
 
 import pytest
 
-from deploy.promises.history import ALL, NO_TARGET, OPERATOR, History, InjectedFault
-from deploy.promises.promises import CHECKERS
 from interfaces.topics import OFF, TURN_OFF
+from tests.promises.history import ALL, NO_TARGET, OPERATOR, History, InjectedFault
+from tests.promises.promises import CHECKERS
 
 from .histories import added, faulty, good, killed, silent, with_value
 

@@ -8,9 +8,6 @@ from rclpy.serialization import deserialize_message, serialize_message
 from rclpy_simulation.host import SECOND
 from std_msgs.msg import Header, String
 
-from deploy.promises.history import CONTROLLER, WATCHDOG
-from deploy.promises.marks import is_babble
-from deploy.promises.observations import time_sent
 from interfaces.robot_model import BASE, frame_id
 from interfaces.service.health import reported_refusals
 from interfaces.topics import (
@@ -30,6 +27,9 @@ from interfaces.topics import (
     Topic,
     is_latched,
 )
+from tests.promises.history import CONTROLLER, WATCHDOG
+from tests.promises.marks import is_babble
+from tests.promises.observations import time_sent
 from tests.replay.lives import Latch, begins_away, latch, lives, read_reports
 from tests.replay.record import Message, Record, text
 

@@ -12,9 +12,9 @@ from typing import Any, NamedTuple
 from rclpy.serialization import deserialize_message
 from rclpy_simulation.host import SECOND
 
-from deploy.promises.observations import time_sent
 from interfaces import topics
 from interfaces.topics import Topic
+from tests.promises.observations import time_sent
 from tests.replay.record import Message
 
 COUNT, FEW = 0.1, 5

@@ -12,7 +12,6 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.serialization import deserialize_message
 from rclpy_simulation.host import SECOND
 
-from deploy.promises.observations import FAULTS, PROCESSES
 from interfaces.service.health import reported_parameters
 from interfaces.service.parameters import declarations
 from interfaces.topics import (
@@ -29,6 +28,7 @@ from interfaces.topics import (
     Topic,
 )
 from services import engine_controller, operator_watchdog, robot_state
+from tests.promises.observations import FAULTS, PROCESSES
 from tests.replay.record import Message, Record, text
 
 AHEAD = SECOND // 2

@@ -18,11 +18,11 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy_simulation import Delay, Network, Process, Simulation
 from rclpy_simulation.host import BOOT, SECOND
 
-from deploy.promises.history import WATCHDOG
 from deploy.supervision import manifest
 from deploy.supervision.environment import NAMESPACE
 from interfaces.service.epoch import EPOCH
 from interfaces.topics import DIAGNOSTICS, Topic
+from tests.promises.history import WATCHDOG
 from tests.replay import chains
 from tests.replay.chains import Chain
 from tests.replay.lives import AHEAD, ReplayedLife, Suspension, lives, origin

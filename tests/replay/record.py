@@ -12,12 +12,12 @@ from mcap_files import McapFile, UnreadableError
 from rclpy.serialization import deserialize_message
 from rclpy_simulation.host import SECOND
 
-from deploy.promises.observations import FAULTS, PROCESSES, clock_offsets, read_event, time_sent
 from deploy.supervision.errors import DeploymentError
 from deploy.supervision.recorder import METADATA
 from interfaces import topics
 from interfaces.service.health import healths
 from interfaces.topics import Topic
+from tests.promises.observations import FAULTS, PROCESSES, clock_offsets, read_event, time_sent
 
 _OUTPUTS = (
     topics.EFFECTOR_POSITION,

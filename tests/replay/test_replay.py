@@ -24,13 +24,13 @@ from rclpy.serialization import deserialize_message, serialize_message
 from std_msgs.msg import Float64, Header, String
 from tf2_msgs.msg import TFMessage
 
-from deploy.promises.history import NO_TARGET, InjectedFault
-from deploy.promises.marks import STEP
-from deploy.promises.observations import FAULTS
 from deploy.supervision.errors import DeploymentError
 from deploy.supervision.recorder import Recorder
 from interfaces import topics
 from interfaces.robot_model import BASE, LINK1, frame_id
+from tests.promises.history import NO_TARGET, InjectedFault
+from tests.promises.marks import STEP
+from tests.promises.observations import FAULTS
 from tests.replay import chains
 from tests.replay.comparison import compare
 from tests.replay.record import Message, Record, load

@@ -13,10 +13,6 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from deploy.promises.findings import count, how_often
-from deploy.promises.history import STUCK_DRIVE
-from deploy.promises.html_report import html, verdict
-from deploy.promises.text_report import text
 from deploy.supervision import interruption, parameter_file, processes
 from deploy.supervision.errors import DeploymentError
 from deploy.supervision.run_directory import make_directory
@@ -24,6 +20,10 @@ from interfaces.service import UserError
 from tests.chaos import schedule_file
 from tests.chaos.plan import names, number
 from tests.chaos.schedule_file import Experiment
+from tests.promises.findings import count, how_often
+from tests.promises.history import STUCK_DRIVE
+from tests.promises.html_report import html, verdict
+from tests.promises.text_report import text
 from tests.simulation import plan, systematic
 from tests.simulation.attacks import FAIL_SAFES
 from tests.simulation.faults import FAULT_KINDS

@@ -12,7 +12,6 @@ import yaml
 from rclpy_simulation import Delay, Network, Process, Simulation
 from rclpy_simulation.host import BOOT, SECOND
 
-from deploy.promises.history import SWITCH, Life
 from deploy.supervision import manifest
 from deploy.supervision.errors import DeploymentError
 from deploy.supervision.processes import MARK
@@ -21,6 +20,7 @@ from deploy.supervision.system import SERVICE_GRACE
 from interfaces.service import UserError
 from interfaces.sources import scenario_file
 from tests.chaos.nested_faults import NestedFaults
+from tests.promises.history import SWITCH, Life
 from tests.simulation.calibration import Calibration, load
 from tests.simulation.machine import simulated_services
 from tests.simulation.supervisor import Supervisor

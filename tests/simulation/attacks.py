@@ -19,8 +19,13 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
 
-from deploy.promises.effects import REDISCOVERY
-from deploy.promises.history import (
+from deploy.supervision import parameter_file
+from deploy.supervision.reaction import BEAT, Reaction
+from interfaces import topics
+from tests.chaos.schedule import PlannedFault
+from tests.chaos.schedule_file import Experiment
+from tests.promises.effects import REDISCOVERY
+from tests.promises.history import (
     ALL,
     BAD_LINE,
     CONTROLLER,
@@ -39,12 +44,7 @@ from deploy.promises.history import (
     last_sent,
     running,
 )
-from deploy.promises.marks import STEP
-from deploy.supervision import parameter_file
-from deploy.supervision.reaction import BEAT, Reaction
-from interfaces import topics
-from tests.chaos.schedule import PlannedFault
-from tests.chaos.schedule_file import Experiment
+from tests.promises.marks import STEP
 
 FAIL_SAFES = ("F1", "F2", "F3")
 SHARE = 0.8  # of the silences that are long enough

@@ -18,10 +18,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 from unittest import mock
 
-from deploy.promises.history import CONTROLLER, DRIVE, WATCHDOG
 from deploy.supervision import parameter_file
 from deploy.supervision.manifest import Program
 from deploy.supervision.processes import ROOT
+from tests.promises.history import CONTROLLER, DRIVE, WATCHDOG
 from tests.simulation import arm, plan
 from tests.simulation.faults import FAULT_KINDS
 from tests.simulation.outcome import simulate

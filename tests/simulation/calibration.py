@@ -22,11 +22,11 @@ from mcap_files import McapFile
 from rclpy.serialization import deserialize_message
 from rclpy_simulation import Delay
 
-from deploy.promises import observations
-from deploy.promises.findings import percentile
-from deploy.promises.history import SOURCES, History, Life
-from deploy.promises.promises import CHECKERS
 from deploy.supervision.errors import DeploymentError
+from tests.promises import observations
+from tests.promises.findings import percentile
+from tests.promises.history import SOURCES, History, Life
+from tests.promises.promises import CHECKERS
 
 PATH = Path(__file__).with_name("calibration.json")
 

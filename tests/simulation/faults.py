@@ -9,12 +9,12 @@ from typing import Any, NamedTuple
 
 from rclpy_simulation import Delay, Process
 
-from deploy.promises import marks
-from deploy.promises.history import ALL, FALSE_PRESENCE, HOLD, NO_TARGET, OPERATOR, PARTITION, STUCK_DRIVE
 from deploy.supervision.run_directory import KEY, with_parameters
 from interfaces import topics
 from tests.chaos import clock
 from tests.chaos.faults import PARAMETERS, Undo
+from tests.promises import marks
+from tests.promises.history import ALL, FALSE_PRESENCE, HOLD, NO_TARGET, OPERATOR, PARTITION, STUCK_DRIVE
 from tests.simulation import people
 from tests.simulation.arm import CONTROL, NAMES, ROBOT, SimulatedArm
 

@@ -8,10 +8,10 @@ from typing import Any
 
 from rclpy_simulation import Simulation
 
-from deploy.promises.history import History, InjectedFault, Life, Sample
-from deploy.promises.marks import is_babble
-from deploy.promises.observations import values
 from interfaces import topics
+from tests.promises.history import History, InjectedFault, Life, Sample
+from tests.promises.marks import is_babble
+from tests.promises.observations import values
 
 RECEPTION = 0.0005  # s after sending
 _UNREAD = (topics.JOINT_STATES, topics.TF, topics.ROBOT_DESCRIPTION)

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from deploy.promises.findings import Finding
-from deploy.promises.history import OPERATOR, PROGRAMS, SILENCE, History, InjectedFault
-from deploy.promises.promises import CHECKERS
 from deploy.supervision.errors import DeploymentError
 from tests.chaos.schedule import PlannedFault
 from tests.chaos.schedule_file import Experiment
+from tests.promises.findings import Finding
+from tests.promises.history import OPERATOR, PROGRAMS, SILENCE, History, InjectedFault
+from tests.promises.promises import CHECKERS
 from tests.simulation import people
 from tests.simulation.arm import NAMES, ROBOT, SimulatedArm, simulated_arm
 from tests.simulation.attacks import alone

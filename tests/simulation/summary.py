@@ -8,8 +8,8 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
-from deploy.promises.findings import Evidence, Finding, percentile
-from deploy.promises.promises import CHECKERS
+from tests.promises.findings import Evidence, Finding, percentile
+from tests.promises.promises import CHECKERS
 from tests.simulation.outcome import Outcome
 
 

@@ -15,10 +15,10 @@ from pathlib import Path
 
 from rclpy_simulation import Process
 
-from deploy.promises.history import CONTROLLER, SWITCH, WATCHDOG
 from tests.chaos import testbed
 from tests.chaos.schedule import AWAKE, DAY, FIRST_FAULT, SETTLE, PlannedFault
 from tests.chaos.schedule_file import Experiment
+from tests.promises.history import CONTROLLER, SWITCH, WATCHDOG
 from tests.simulation import people
 from tests.simulation.arm import NAMES, simulated_arm
 

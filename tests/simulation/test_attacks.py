@@ -7,11 +7,11 @@ import random
 
 import pytest
 
-from deploy.promises.history import CONTROLLER, FALSE_PRESENCE, STUCK_DRIVE
 from deploy.supervision import parameter_file
 from interfaces import topics
 from tests.chaos.schedule import PlannedFault
 from tests.chaos.schedule_file import Experiment
+from tests.promises.history import CONTROLLER, FALSE_PRESENCE, STUCK_DRIVE
 from tests.simulation import __main__ as command_line
 from tests.simulation import attacks, people, plan
 from tests.simulation.attacks import FAIL_SAFES, judged

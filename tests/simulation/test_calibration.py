@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from deploy.promises.findings import percentile
 from tests.chaos import schedule
 from tests.chaos.schedule_file import Experiment
 from tests.chaos.testbed import SCENARIO
+from tests.promises.findings import percentile
 from tests.simulation.arm import NAMES
 from tests.simulation.calibration import load
 from tests.simulation.outcome import simulate

@@ -9,13 +9,13 @@ from itertools import pairwise
 import pytest
 import yaml
 
-from deploy.promises.history import CONTROLLER, DRIVE, WATCHDOG, History, Sample, between
 from deploy.supervision.plugin import SCENARIO
 from interfaces import topics
 from interfaces.sources import scenario_file
 from services import engine_controller
 from tests.chaos.schedule import PlannedFault
 from tests.chaos.schedule_file import Experiment
+from tests.promises.history import CONTROLLER, DRIVE, WATCHDOG, History, Sample, between
 from tests.simulation import people
 from tests.simulation.outcome import Outcome, simulate
 

@@ -14,7 +14,6 @@ import pytest
 import yaml
 from rclpy_simulation.host import BOOT, SECOND
 
-from deploy.promises.history import ALL, NO_TARGET, OPERATOR
 from deploy.supervision.manifest import Program
 from deploy.supervision.processes import ROOT
 from interfaces import topics
@@ -24,6 +23,7 @@ from tests.chaos import schedule
 from tests.chaos.schedule import AWAKE, DAY, PlannedFault
 from tests.chaos.schedule_file import Experiment
 from tests.chaos.testbed import SCENARIO, sources
+from tests.promises.history import ALL, NO_TARGET, OPERATOR
 from tests.simulation import arm, people, plan
 from tests.simulation.faults import BAD_LINE, FAULT_KINDS
 from tests.simulation.outcome import Outcome, simulate

@@ -11,8 +11,8 @@ import rclpy
 from rclpy_simulation import Network, Simulation
 from std_msgs.msg import Bool
 
-from deploy.promises.observations import values
 from interfaces import topics
+from tests.promises.observations import values
 from tests.simulation.machine import simulated_services
 
 RATE = 20.0  # Hz of a switch

@@ -18,11 +18,11 @@ from rclpy_simulation import Network, Process
 from rclpy_simulation.host import BOOT, SECOND
 from rclpy_simulation.process import running_process
 
-from deploy.promises.history import CONTROLLER, DRIVE, SWITCH, WATCHDOG
-from deploy.promises.observations import values
 from deploy.supervision.run_directory import scenario_parameters
 from interfaces import topics
 from interfaces.topics import DRIVE_TIMEOUT, OFF, ON
+from tests.promises.history import CONTROLLER, DRIVE, SWITCH, WATCHDOG
+from tests.promises.observations import values
 from tests.simulation import arm
 from tests.simulation.arm import CONTROL, ROBOT
 from tests.simulation.bugs import Bug, planted

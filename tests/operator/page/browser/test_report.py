@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
-from deploy.promises.html_report import html
-from deploy.promises.promises import CHECKERS
 from tests.promises.histories import good, killed
+from tests.promises.html_report import html
+from tests.promises.promises import CHECKERS
 
 LEGIBLE = 12  # px
 TOO_WIDE = """

@@ -9,10 +9,10 @@ from __future__ import annotations
 import itertools
 import math
 
-from deploy.promises.effects import MISSED, disturbing, effects
-from deploy.promises.findings import Evidence, Finding
-from deploy.promises.history import SWITCH, History, between, gaps
 from interfaces import topics
+from tests.promises.effects import MISSED, disturbing, effects
+from tests.promises.findings import Evidence, Finding
+from tests.promises.history import SWITCH, History, between, gaps
 
 
 def joints_stand_in_time(history: History) -> Finding:

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 
-from deploy.promises.charts import COLORS, LEFT, STYLE, histograms, timeline
-from deploy.promises.findings import UNKNOWN, VIOLATED, Finding, count, overall
-from deploy.promises.history import ALL, NO_TARGET, History, InjectedFault, Life, target_name
-from deploy.promises.limits import DURATIONS
-from deploy.promises.promises import meaning
+from tests.promises.charts import COLORS, LEFT, STYLE, histograms, timeline
+from tests.promises.findings import UNKNOWN, VIOLATED, Finding, count, overall
+from tests.promises.history import ALL, NO_TARGET, History, InjectedFault, Life, target_name
+from tests.promises.limits import DURATIONS
+from tests.promises.promises import meaning
 
 SHOWN = 10  # pieces of evidence of a promise
 EFFECT = 5.0  # s after a fault in which the end of a process is its effect, unless another fault follows

@@ -10,8 +10,8 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from html import escape
 
-from deploy.promises.findings import VIOLATED, Finding, percentile
-from deploy.promises.history import (
+from tests.promises.findings import VIOLATED, Finding, percentile
+from tests.promises.history import (
     ALL,
     LOSS,
     NO_TARGET,

@@ -7,7 +7,8 @@ import math
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterator, Sequence
 
-from deploy.promises.effects import (
+from interfaces import topics
+from tests.promises.effects import (
     BEFORE,
     FLOWING,
     KILLING,
@@ -22,8 +23,8 @@ from deploy.promises.effects import (
     effects,
     undisturbed,
 )
-from deploy.promises.findings import Evidence, Finding, count, percentile
-from deploy.promises.history import (
+from tests.promises.findings import Evidence, Finding, count, percentile
+from tests.promises.history import (
     ALL,
     DEPENDENTS,
     KINEMATICS,
@@ -34,9 +35,8 @@ from deploy.promises.history import (
     InjectedFault,
     between,
 )
-from deploy.promises.limits import GAP, GONE, HUNG, MEDIAN, SLOWEST
-from deploy.promises.positions import PublishedValues, may_lack_values
-from interfaces import topics
+from tests.promises.limits import GAP, GONE, HUNG, MEDIAN, SLOWEST
+from tests.promises.positions import PublishedValues, may_lack_values
 
 SAMPLES = 3  # the least number of cases for a median
 

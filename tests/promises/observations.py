@@ -13,8 +13,12 @@ from mcap_files import McapFile, UnreadableError
 from rclpy.serialization import deserialize_message
 from std_msgs.msg import String
 
-from deploy.promises.effects import Effect, Why, effects, undisturbed
-from deploy.promises.history import (
+from deploy.supervision.errors import DeploymentError
+from deploy.supervision.recorder import METADATA
+from interfaces import topics
+from interfaces.service.health import reported_parameters
+from tests.promises.effects import Effect, Why, effects, undisturbed
+from tests.promises.history import (
     ALL,
     NO_TARGET,
     OVERLOAD,
@@ -24,11 +28,7 @@ from deploy.promises.history import (
     Sample,
     merged,
 )
-from deploy.promises.marks import is_babble
-from deploy.supervision.errors import DeploymentError
-from deploy.supervision.recorder import METADATA
-from interfaces import topics
-from interfaces.service.health import reported_parameters
+from tests.promises.marks import is_babble
 
 PROCESSES, FAULTS = "/chaos/processes", "/chaos/faults"  # topics
 LATE = 0.1  # s; a message that takes longer shows an overload

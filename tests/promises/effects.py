@@ -13,11 +13,11 @@ from collections.abc import Collection, Iterable, Iterator
 from enum import StrEnum, auto
 from typing import NamedTuple
 
-from deploy.promises import history as names
-from deploy.promises.history import ALL, CONTROLLER, SENTINEL, SOURCES, SWITCH, VELOCITY, WATCHDOG, History
-from deploy.promises.limits import GAP, HUNG, SLOWEST
-from deploy.promises.marks import SPREAD, STEP
 from interfaces import topics
+from tests.promises import history as names
+from tests.promises.history import ALL, CONTROLLER, SENTINEL, SOURCES, SWITCH, VELOCITY, WATCHDOG, History
+from tests.promises.limits import GAP, HUNG, SLOWEST
+from tests.promises.marks import SPREAD, STEP
 
 
 class Why(StrEnum):
@@ -69,7 +69,7 @@ class Effect(NamedTuple):
     """What a fault, a recorded condition or a start does to programs."""
 
     programs: Collection[str]
-    """:data:`~deploy.promises.history.ALL` stands for every program."""
+    """:data:`~tests.promises.history.ALL` stands for every program."""
     begin: float
     end: float
     """[s]. Both times are excluded."""

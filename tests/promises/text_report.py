@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from deploy.promises.findings import VIOLATED, Finding, percentile
-from deploy.promises.limits import DURATIONS
-from deploy.promises.promises import meaning
 from deploy.supervision.columns import table
+from tests.promises.findings import VIOLATED, Finding, percentile
+from tests.promises.limits import DURATIONS
+from tests.promises.promises import meaning
 
 SHOWN = 5  # pieces of evidence of a promise
 HEADER = ("", "PROMISE", "VERDICT", "CASES", "UNKNOWN", "MEASURED")

@@ -7,9 +7,9 @@ import math
 from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
 
-from deploy.promises.effects import DISCOVERY, LONGEST_PAUSE, MISSED, Effect, Why, undisturbed
-from deploy.promises.history import SOURCES, History, Sample, last_sent
 from interfaces import topics
+from tests.promises.effects import DISCOVERY, LONGEST_PAUSE, MISSED, Effect, Why, undisturbed
+from tests.promises.history import SOURCES, History, Sample, last_sent
 
 ROUNDING = 1e-8  # m
 PRECISION = 4e-15  # of the lengths, 18 times the precision of float64: the rounding of links beyond 1000 km

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from deploy.promises import drive, liveness, safety
-from deploy.promises.findings import Finding, count
-from deploy.promises.history import OVERLOAD, History, merged
+from tests.promises import drive, liveness, safety
+from tests.promises.findings import Finding, count
+from tests.promises.history import OVERLOAD, History, merged
 
 CHECKERS: dict[str, Callable[[History], Finding]] = {
     "S1": safety.engines_off_in_time,

@@ -8,7 +8,9 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Iterator, Sequence
 from operator import itemgetter
 
-from deploy.promises.effects import (
+from interfaces import topics
+from interfaces.topics import DRIVE_TIMEOUT, INCAPACITATED, OFF, ON, TURN_OFF, TURN_ON
+from tests.promises.effects import (
     BAD_TRANSPORT,
     BEFORE,
     LONGEST_PAUSE,
@@ -22,8 +24,8 @@ from deploy.promises.effects import (
     effects,
     undisturbed,
 )
-from deploy.promises.findings import Evidence, Finding, count, how_often
-from deploy.promises.history import (
+from tests.promises.findings import Evidence, Finding, count, how_often
+from tests.promises.history import (
     ALL,
     CONTROLLER,
     SILENCE,
@@ -39,9 +41,7 @@ from deploy.promises.history import (
     merged,
     running,
 )
-from deploy.promises.positions import PublishedValues, may_lack_values
-from interfaces import topics
-from interfaces.topics import DRIVE_TIMEOUT, INCAPACITATED, OFF, ON, TURN_OFF, TURN_ON
+from tests.promises.positions import PublishedValues, may_lack_values
 
 FAIL_SAFES = {
     WATCHDOG: (Why.SILENT, Why.SUSPENDED, Why.DEAF, Why.DELAYED, *MISSED),
