@@ -150,8 +150,8 @@ check: setup
 	@$(PY) -m mypy
 	@$(PY) -m mypy --config-file deploy/mypy_ros.ini
 	@$(PY) -m mypy --config-file deploy/runtime/pyproject.toml
-	@$(PY) -m mypy --config-file deploy/simulation_kit/pyproject.toml
+	@$(PY) -m mypy --config-file tests/simulation_kit/pyproject.toml
 	@$(PY) -m mypy --config-file deploy/tools/pyproject.toml
-	@PYTHONPATH="interfaces/reactive_node/src:deploy/runtime/src:deploy/simulation_kit/src:deploy/tools/src:$$PYTHONPATH" .venv/bin/lint-imports --no-logo --no-cache
+	@PYTHONPATH="interfaces/reactive_node/src:deploy/runtime/src:tests/simulation_kit/src:deploy/tools/src:$$PYTHONPATH" .venv/bin/lint-imports --no-logo --no-cache
 	@.venv/bin/shellcheck deploy/commands/python.sh deploy/commands/venv.sh .ci/run .ci/run-on-ros
 	@$(PY) -m yamllint --strict deploy

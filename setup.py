@@ -23,7 +23,6 @@ SHARE = f"share/{PACKAGE}"
 ELSEWHERE = (
     "interfaces/reactive_node",
     "deploy/runtime",
-    "deploy/simulation_kit",
     "deploy/tools",
     "deploy/package",
 )

@@ -7,12 +7,12 @@ import importlib.util
 EMBEDDED_ONLY = (
     "deploy/runtime/tests/interop",
     "deploy/runtime/tests/runtime",
-    "deploy/simulation_kit",
     "tests/commands/test_fleet.py",
     "tests/mutants",
     "tests/security/attacks",
     "tests/replay",
     "tests/simulation",
+    "tests/simulation_kit",
 )
 """Tests of the embedded rclpy, and of what runs only on it."""
 TRANSFORMS = ("interfaces/reactive_node/tests/test_transforms.py",)

@@ -39,7 +39,7 @@ REQUIREMENTS = ROOT / "deploy" / "requirements"
 PIP = [str(PYTHON), "-m", "pip", "install", "--no-deps", "--no-input", "--progress-bar=off"]
 SOURCES = [ROOT / "interfaces" / "reactive_node" / "src", ROOT / "deploy" / "tools" / "src"]
 """Packages of this checkout that Python finds after those of an installed ROS 2."""
-EMBEDDED = [ROOT / "deploy" / "runtime" / "src", ROOT / "deploy" / "simulation_kit" / "src"]
+EMBEDDED = [ROOT / "deploy" / "runtime" / "src", ROOT / "tests" / "simulation_kit" / "src"]
 """Packages that Python finds first if RUNTIME=embedded."""
 FAST_DDS = "rmw_fastrtps_cpp"
 SCRIPTS = {

@@ -16,7 +16,7 @@ ROOT = Path(__file__).parents[2]
 FOLDERS = {
     "reactive-node": ROOT / "interfaces" / "reactive_node",
     "rclpy-cyclonedds": ROOT / "deploy" / "runtime",
-    "rclpy-simulation": ROOT / "deploy" / "simulation_kit",
+    "rclpy-simulation": ROOT / "tests" / "simulation_kit",
     "ros2-python-tools": ROOT / "deploy" / "tools",
 }
 EMBEDDED = ("rclpy-cyclonedds", "rclpy-simulation")

@@ -14,7 +14,7 @@ ROOT = Path(__file__).parents[2]
 FILES = ("system", "build", "develop", "embedded", "ros")
 PROJECTS = {
     "deploy/runtime": ("system", "embedded"),
-    "deploy/simulation_kit": ("develop",),
+    "tests/simulation_kit": ("develop",),
     "deploy/tools": ("system", "ros"),
 }
 OWN = "rclpy-cyclonedds"

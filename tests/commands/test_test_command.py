@@ -15,7 +15,10 @@ from tests import order
 ROOT = Path(__file__).parents[2]
 
 HERE = command.Part("", "", ["tests/system", "-x"])
-EMBEDDED = "tests/commands/test_fleet.py tests/mutants tests/security/attacks tests/replay tests/simulation"
+EMBEDDED = (
+    "tests/commands/test_fleet.py tests/mutants tests/security/attacks tests/replay"
+    " tests/simulation tests/simulation_kit"
+)
 IGNORED = "--ignore=tests/mutants"
 ONE = "tests/simulation/test_experiment.py::test"
 

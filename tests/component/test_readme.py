@@ -57,7 +57,7 @@ def test_shown_recipe_is_the_one_of_the_service(page: str) -> None:
 def test_shown_simulation_is_a_part_of_the_tested_example() -> None:
     shown, tested = (
         {line.partition("  #")[0] for line in programs_of(page)[-1].splitlines()}
-        for page in ("README.md", "deploy/simulation_kit/README.md")
+        for page in ("README.md", "tests/simulation_kit/README.md")
     )
     assert shown <= tested
 

@@ -9,7 +9,7 @@ import sys
 from typing import Any
 
 import pytest
-from deploy.simulation_kit.tests import programs
+from tests.simulation_kit.tests import programs
 
 from rclpy_simulation import Simulation
 

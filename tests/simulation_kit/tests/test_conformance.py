@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-CONFORMANCE = Path(__file__).parents[2] / "runtime" / "tests" / "conformance"
+CONFORMANCE = Path(__file__).parents[3] / "deploy" / "runtime" / "tests" / "conformance"
 NAMES = ("between_nodes", "events", "executors", "lifecycle", "parameter_client", "services", "timers")
 
 
@@ -25,7 +25,7 @@ def main() -> None:
 
 
 def test_conformance_holds_in_a_simulated_process() -> None:
-    command = [sys.executable, "-m", "deploy.simulation_kit.tests.test_conformance"]
+    command = [sys.executable, "-m", "tests.simulation_kit.tests.test_conformance"]
     result = subprocess.run(command, capture_output=True, text=True)
     assert result.returncode == 0, result.stdout + result.stderr
 

@@ -1,6 +1,6 @@
 """A talker and a listener that note what DDS does: they run for real and simulated, and must note the same.
 
-``python -m deploy.simulation_kit.tests.programs talker`` (or ``listener``) runs one of them.
+``python -m tests.simulation_kit.tests.programs talker`` (or ``listener``) runs one of them.
 """
 
 from __future__ import annotations

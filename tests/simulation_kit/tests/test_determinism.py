@@ -6,7 +6,7 @@ import os
 import subprocess
 import sys
 
-from deploy.simulation_kit.tests import busy
+from tests.simulation_kit.tests import busy
 
 
 def test_a_seed_gives_the_same_run_in_each_interpreter() -> None:
