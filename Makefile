@@ -152,6 +152,6 @@ check: setup
 	@$(PY) -m mypy --config-file deploy/runtime/pyproject.toml
 	@$(PY) -m mypy --config-file tests/simulation_kit/pyproject.toml
 	@$(PY) -m mypy --config-file deploy/tools/pyproject.toml
-	@PYTHONPATH="interfaces/reactive_node/src:deploy/runtime/src:tests/simulation_kit/src:deploy/tools/src:$$PYTHONPATH" .venv/bin/lint-imports --no-logo --no-cache
+	@PYTHONPATH="interfaces/reactive_node/src:deploy/ground/src:deploy/runtime/src:tests/simulation_kit/src:deploy/tools/src:$$PYTHONPATH" .venv/bin/lint-imports --no-logo --no-cache
 	@.venv/bin/shellcheck deploy/commands/python.sh deploy/commands/venv.sh .ci/run .ci/run-on-ros
 	@$(PY) -m yamllint --strict deploy

@@ -22,6 +22,7 @@ EXECUTABLES = (*(program.name for program in manifest.programs()), ARM)
 SHARE = f"share/{PACKAGE}"
 ELSEWHERE = (
     "interfaces/reactive_node",
+    "deploy/ground",
     "deploy/runtime",
     "deploy/tools",
     "deploy/package",
