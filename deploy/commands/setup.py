@@ -36,7 +36,8 @@ PYTHON = VENV / "bin" / "python"
 STAMP = VENV / "made-from"
 LOG = VENV / "setup.log"
 REQUIREMENTS = ROOT / "deploy" / "requirements"
-PIP = [str(PYTHON), "-m", "pip", "install", "--no-deps", "--no-input", "--progress-bar=off"]
+_OPTIONS = ("--require-hashes", "--no-deps", "--no-input", "--progress-bar=off")
+PIP = [str(PYTHON), "-m", "pip", "install", *_OPTIONS]
 SOURCES = [ROOT / "interfaces" / "reactive_node" / "src", ROOT / "deploy" / "tools" / "src"]
 """Packages of this checkout that Python finds after those of an installed ROS 2."""
 EMBEDDED = [ROOT / "deploy" / "runtime" / "src", ROOT / "tests" / "simulation_kit" / "src"]
@@ -156,7 +157,7 @@ def make(ros: str) -> None:
     if ros:
         print(f"  rclpy of ROS 2: {Path(ros).parent}")
     elif has_wheels():
-        step("ROS 2's rclpy from PyPI", [*PIP, "--require-hashes", *_requirements("ros.txt")])
+        step("ROS 2's rclpy from PyPI", [*PIP, *_requirements("ros.txt")])
     _write_pth(embedded=not ros)
     for name, program in SCRIPTS.items():
         script = VENV / "bin" / name
