@@ -9,7 +9,7 @@ from __future__ import annotations
 import importlib.util
 
 import pytest
-from deploy.runtime.tests.conftest import call, executor, make_node, node, other_context
+from deploy.ground.tests.conftest import call, executor, make_node, node, other_context
 
 __all__ = ["call", "executor", "make_node", "node", "other_context"]
 

@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import errno
 import os
+import pickle
 import shutil
+import tempfile
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import suppress
 from pathlib import Path
-from typing import IO, Any, cast
+from typing import IO, Any, NoReturn, cast
 
+from mcap.records import ChunkIndex
 from mcap.writer import Writer
 
 SAVE_PERIOD = 0.5
@@ -33,6 +38,8 @@ class FileWriter(Writer):
         """
         self._stream = _Stream(path)
         super().__init__(cast(IO[bytes], self._stream), **options)
+        self._indices = _Indices(path.parent, self._stream.fail)
+        vars(self)["_Writer__chunk_indices"] = self._indices  # in the place of a list
         self.start(profile="ros2", library=library)
         self.flush()  # type: ignore[no-untyped-call]
 
@@ -52,12 +59,47 @@ class FileWriter(Writer):
     def is_open(self) -> bool:
         return self._stream.is_open
 
+    @property
+    def size(self) -> int:
+        """The bytes of the file so far, without the current chunk."""
+        return self._stream.tell()
+
     def close(self) -> None:
         """Complete the file; without effect after a failure or another call. Raises OSError."""
         if self.is_open:
             self.finish()  # type: ignore[no-untyped-call]
             self.save()
-            self._stream.close()
+        self.abandon()
+
+    def abandon(self) -> None:
+        """Close the file as it is; without effect on a closed one."""
+        self._stream.close()
+        self._indices.close()
+
+
+class _Indices:
+    """The places of all chunks, which the end of the file needs: in weeks, they are too many for memory."""
+
+    def __init__(self, directory: Path, fail: Callable[[OSError], NoReturn]) -> None:
+        self._file = tempfile.TemporaryFile(buffering=0, dir=directory)  # noqa: SIM115
+        self._fail = fail
+
+    def append(self, index: ChunkIndex) -> None:
+        try:
+            rest = memoryview(pickle.dumps(index))
+            while rest:
+                rest = rest[self._file.write(rest) :]
+        except OSError as error:
+            self._fail(error)
+
+    def __iter__(self) -> Iterator[ChunkIndex]:
+        self._file.seek(0)
+        with suppress(EOFError):
+            while True:
+                yield pickle.load(self._file)
+
+    def close(self) -> None:
+        self._file.close()
 
 
 class _Stream:
@@ -90,7 +132,7 @@ class _Stream:
                 rest = rest[self._file.write(rest) :]
             rest.release()
         except OSError as error:
-            self._fail(error)
+            self.fail(error)
         self._written += len(self._pending)
         self._pending = bytearray()
 
@@ -102,13 +144,13 @@ class _Stream:
                     self._synced.result()
                 self._synced = self._disk.submit(os.fdatasync, self._file.fileno())
             except OSError as error:
-                self._fail(error)
+                self.fail(error)
 
     def close(self) -> None:
         self._disk.shutdown()
         self._file.close()
 
-    def _fail(self, error: OSError) -> None:
+    def fail(self, error: OSError) -> NoReturn:
         """Remove the record that is not whole, close the file, and raise an error for the user."""
         os.ftruncate(self._file.fileno(), self._written)
         self.close()

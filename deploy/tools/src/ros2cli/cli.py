@@ -7,6 +7,8 @@ import signal
 import sys
 from typing import TYPE_CHECKING, NoReturn, cast
 
+from ros2cli import terminal
+
 if TYPE_CHECKING:
     from io import TextIOWrapper
     from types import FrameType
@@ -22,6 +24,7 @@ def main() -> int:
         signal.signal(signal.SIGTERM, _end)
         signal.signal(signal.SIGINT, _end)  # a script's background jobs ignore it
         cast("TextIOWrapper", sys.stdout).reconfigure(line_buffering=True)
+        terminal.protect()
         return _run()
     except KeyboardInterrupt:
         return signal.SIGINT

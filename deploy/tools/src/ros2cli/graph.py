@@ -14,6 +14,7 @@ import click
 if TYPE_CHECKING:
     from rclpy.node import Node
     from rclpy.task import Future
+    from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 NODE_NAME_PREFIX = "_ros2cli"
 _PERIOD = 0.02
@@ -67,6 +68,10 @@ def node(
         raise click.ClickException(
             str(error).rpartition("\n")[0]
         ) from None  # without the mark below the name
+    except UnicodeDecodeError as error:
+        raise click.ClickException(
+            f"The name {error.object!r} on this graph is not UTF-8: rclpy shows no other until it ends"
+        ) from None
     finally:
         rclpy.try_shutdown()
 
@@ -84,6 +89,27 @@ def default_spin_time() -> float:
     return 3.2 if is_secure or "fastrtps" in rclpy.get_rmw_implementation_identifier() else 0.5
 
 
+def publishers(node: Node, topic: str) -> list[TopicEndpointInfo]:
+    """Return the publishers of a topic; none while rclpy cannot read the name of a node."""
+    try:
+        found: list[TopicEndpointInfo] = node.get_publishers_info_by_topic(topic)
+    except UnicodeDecodeError:
+        return []
+    return found
+
+
+def _size(node: Node) -> tuple[int, int]:
+    """Return how many nodes and topics there are; 0 while rclpy cannot read the name of one."""
+    sizes = []
+    for names in (node.get_node_names, lambda: node.get_topic_names_and_types(no_demangle=True)):
+        try:
+            sizes.append(len(names()))
+        except UnicodeDecodeError:
+            sizes.append(0)
+    nodes, topics = sizes
+    return nodes, topics
+
+
 def discover(node: Node, spin_time: float, until: Callable[[Node], bool] | None = None) -> None:
     """Look for ``spin_time`` [s], and longer while more nodes and topics appear; ``until`` as in `node`."""
     began = time.monotonic()
@@ -92,7 +118,7 @@ def discover(node: Node, spin_time: float, until: Callable[[Node], bool] | None 
         spin_time > 0 and now < min(changed + _CALM, began + spin_time + _LONGEST)
     ):
         time.sleep(min(_PERIOD, spin_time))
-        found = len(node.get_node_names()), len(node.get_topic_names_and_types(no_demangle=True))
+        found = _size(node)
         if found != known:
             changed, known = time.monotonic(), found
         elif until and until(node) and time.monotonic() >= changed + _CALM:
@@ -119,6 +145,33 @@ def is_hidden(name: str) -> bool:
     from rclpy.topic_or_service_is_hidden import topic_or_service_is_hidden
 
     return topic_or_service_is_hidden(name)
+
+
+def topics(node: Node, *, include_hidden: bool) -> list[tuple[str, list[str]]]:
+    """Return the topics that have a publisher or subscription, each with its types."""
+    return [it for it in node.get_topic_names_and_types() if include_hidden or not is_hidden(it[0])]
+
+
+def message_class(node: Node, topic: str, *, blocking: bool = False) -> Any | None:
+    """Return the class of a topic's messages; print a warning if nobody publishes or subscribes to it yet.
+
+    :param blocking: wait for the topic; otherwise return ``None``.
+    :raises RuntimeError: if the name is invalid, or the type is unknown or not the only one.
+    """
+    name = full_topic_name(node, topic)
+    types = dict(node.get_topic_names_and_types()).get(name)
+    if types is None:
+        print(f"WARNING: topic [{topic}] does not appear to be published yet")
+    while types is None:
+        if not blocking:
+            return None
+        time.sleep(_PERIOD)
+        types = dict(node.get_topic_names_and_types()).get(name)
+    if len(types) > 1:
+        raise RuntimeError(
+            f"Cannot echo topic '{topic}', as it contains more than one type: [{', '.join(types)}]"
+        )
+    return interface_class("message", types[0], f"The message type '{types[0]}' is invalid")
 
 
 def node_names(node: Node, *, include_hidden: bool) -> list[NodeName]:
@@ -174,7 +227,13 @@ def spinning(
     from rclpy.executors import SingleThreadedExecutor
     from rclpy.task import Future
 
-    # The executor is shut down first, which ends the thread.
-    with concurrent.futures.ThreadPoolExecutor(1) as threads, SingleThreadedExecutor() as executor:
+    end = Future()
+    if until:
+        until.add_done_callback(end.set_result)
+    # The thread ends first: rclpy would wait forever if it were shut down just before it begins to wait.
+    with SingleThreadedExecutor() as executor, concurrent.futures.ThreadPoolExecutor(1) as threads:
         executor.add_node(node)
-        yield threads.submit(executor.spin_until_future_complete, until or Future(), timeout)
+        try:
+            yield threads.submit(executor.spin_until_future_complete, end, timeout)
+        finally:
+            end.set_result(None)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 import sys
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -177,13 +176,16 @@ def values_argument(name: str, help: str) -> Callable[[_Verb], _Verb]:
 
 
 def parsed_yaml(text: str) -> Any:
-    """Parse YAML; ClickException with one line if it is malformed."""
-    import yaml
+    """Parse YAML, except for scalars without quotes: their types are those of the fields.
+
+    :raises ClickException: if the text is malformed.
+    """
+    import ros_yaml
 
     try:
-        return yaml.safe_load(text)
-    except yaml.YAMLError as error:
-        raise click.ClickException(f"The value is no valid YAML: {' '.join(str(error).split())}") from None
+        return ros_yaml.load_plain(text)
+    except ros_yaml.YamlError as error:
+        raise click.ClickException(f"The value is no valid YAML: {error}") from None
 
 
 def fill(message: Any, values: str, **options: Any) -> list[Callable[[Any], None]]:
@@ -206,33 +208,3 @@ def check(message: Any) -> None:
         serialize_message(message)
     except SystemError as error:
         raise ValueError(error.__cause__) from None  # the error of the C code
-
-
-def regular_expression(context: click.Context, parameter: click.Parameter, value: str | None) -> str | None:
-    """Check the value of an option that is a regular expression."""
-    try:
-        re.compile(value or "")
-    except re.error as error:
-        raise click.BadParameter(f"'{value}' is no regular expression: {error}", context, parameter) from None
-    return value
-
-
-def storage_option(verb: _Verb) -> _Verb:
-    """Add the option ``--storage``, which has only one choice."""
-    return click.option(
-        "-s", "--storage", type=click.Choice(["mcap"]), default="mcap", expose_value=False, help="Only mcap."
-    )(verb)
-
-
-def bag_argument(verb: _Verb) -> _Verb:
-    """Add the argument ``bag_path`` and the option ``--storage``."""
-    return click.argument("bag_path", type=click.Path(exists=True))(storage_option(verb))
-
-
-def qos_overrides_option(verb: _Verb) -> _Verb:
-    """Add the option ``--qos-profile-overrides-path``."""
-    return click.option(
-        "--qos-profile-overrides-path",
-        type=click.Path(exists=True),
-        help="YAML file with QoS profiles for topics.",
-    )(verb)

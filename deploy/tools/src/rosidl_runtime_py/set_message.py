@@ -7,9 +7,11 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-from rosidl_parser.definition import AbstractNestedType, NamespacedType
+from rosidl_parser.definition import AbstractGenericString, AbstractNestedType, NamespacedType
+
+import ros_yaml
 from rosidl_runtime_py.convert import get_message_slot_types
-from rosidl_runtime_py.import_message import import_message_from_namespaced_type
+from rosidl_runtime_py.utilities import get_message
 
 _HEADER = ("std_msgs", "msg", "Header")
 _TIME = ("builtin_interfaces", "msg", "Time")
@@ -50,11 +52,25 @@ def set_message_fields(
             given = isinstance(value, type(current))
             setattr(msg, name, value if given else message(type(current), value))
         elif isinstance(slot, AbstractNestedType) and isinstance(slot.value_type, NamespacedType):
-            element = import_message_from_namespaced_type(slot.value_type)
+            element = get_message("/".join(slot.value_type.namespaced_name()))
             setattr(msg, name, [message(element, fields) for fields in value])
         else:
-            setattr(msg, name, _converted(value, current))
+            element = slot.value_type if isinstance(slot, AbstractNestedType) else slot
+            setattr(msg, name, _converted(_typed(value, element), current))
     return later
+
+
+def _typed(value: Any, type_: Any) -> Any:
+    """Return a value with each scalar without quotes as what it is in a field of this type."""
+    if isinstance(value, list):
+        return [_typed(each, type_) for each in value]
+    if not isinstance(value, ros_yaml.Plain):
+        return value
+    if isinstance(type_, AbstractGenericString):
+        return str(value)
+    if value.isdecimal() and not value.startswith("0"):  # uint64 exceeds the integers of parameters
+        return int(value)
+    return ros_yaml.typed(value)
 
 
 def _converted(value: Any, current: Any) -> Any:

@@ -10,6 +10,7 @@ from geometry_msgs.msg import (
     TransformStamped,
     Vector3Stamped,
 )
+
 from tf2_geometry_msgs.tf2_geometry_msgs import (
     do_transform_point,
     do_transform_polygon_stamped,

@@ -5,8 +5,6 @@ from __future__ import annotations
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
-
 from geometry_msgs.msg import (
     Point,
     Point32,
@@ -23,6 +21,8 @@ from geometry_msgs.msg import (
     Vector3,
     Vector3Stamped,
 )
+from numpy.typing import ArrayLike, NDArray
+
 from tf2_py._matrices import Matrix, matrix_of, rotation_of, translation_of
 from tf2_ros import ConvertRegistration, TransformRegistration
 

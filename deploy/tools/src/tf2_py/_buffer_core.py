@@ -11,6 +11,7 @@ from rclpy.constants import S_TO_NS
 from rclpy.logging import get_logger
 from rclpy.time import Time
 from std_msgs.msg import Header
+
 from tf2_py import _frame_graph
 from tf2_py._exceptions import InvalidArgumentException, LookupException, TransformException
 from tf2_py._input import TimeLike, nanoseconds, problem_of, reason_against

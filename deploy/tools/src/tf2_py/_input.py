@@ -6,6 +6,7 @@ import math
 from typing import Protocol, TypeAlias
 
 from rclpy.constants import S_TO_NS
+
 from tf2_py._matrices import Quaternion, Vector
 
 

@@ -8,8 +8,8 @@ from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
-
 from rclpy.constants import S_TO_NS
+
 from tf2_py._matrices import Matrix, Vector, rotation_of
 
 Twist: TypeAlias = tuple[Vector, Vector]

@@ -17,6 +17,7 @@ from rclpy.node import Node
 from rclpy.task import Future
 from rclpy.time import Time
 from tf2_msgs.srv import FrameGraph
+
 from tf2_py import BufferCore, TransformException
 from tf2_ros.buffer_interface import NO_WAIT, BufferInterface
 

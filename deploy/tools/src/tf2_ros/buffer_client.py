@@ -16,6 +16,7 @@ from rclpy.task import Future
 from rclpy.time import Time
 from tf2_msgs.action import LookupTransform
 from tf2_msgs.msg import TF2Error
+
 from tf2_py import (
     ConnectivityException,
     ExtrapolationException,

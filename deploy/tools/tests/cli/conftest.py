@@ -10,8 +10,7 @@ from contextlib import contextmanager
 from typing import Any
 
 import pytest
-from deploy.runtime.tests.nodes import spinning
-
+from deploy.ground.tests.nodes import spinning
 from geometry_msgs.msg import PointStamped
 from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor
 from rclpy.context import Context

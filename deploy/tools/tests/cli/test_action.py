@@ -8,7 +8,6 @@ from typing import Any
 
 import pytest
 from deploy.tools.tests.cli.conftest import in_domain
-
 from rclpy.action import ActionServer, CancelResponse, GoalResponse
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.context import Context

@@ -5,9 +5,15 @@ from __future__ import annotations
 import signal
 import subprocess
 import sys
+import threading
+import time
 from typing import Any
 
 import pytest
+import rclpy
+from rclpy import executors
+
+from ros2cli import graph
 
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 2), (signal.SIGTERM, 15)])
@@ -33,6 +39,27 @@ def test_signal_ends_a_command_without_a_traceback(
     process.send_signal(number)
     _, err = process.communicate(timeout=30)
     assert (err, process.returncode) == ("", code)
+
+
+@pytest.mark.own
+def test_spinning_ends_a_thread_that_is_about_to_wait(
+    domain_id: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begins = threading.Event()
+    count = executors.NumberOfEntities
+
+    def count_late(*arguments: int) -> Any:
+        begins.set()
+        time.sleep(0.2)  # the scope ends meanwhile; if a busy machine is later still, the test shows nothing
+        return count(*arguments)
+
+    monkeypatch.setattr(executors, "NumberOfEntities", count_late)  # between rclpy's look and its wait
+    rclpy.init(args=[], domain_id=domain_id)
+    node = rclpy.create_node("x")
+    with graph.spinning(node):
+        assert begins.wait(10)
+    node.destroy_node()
+    rclpy.shutdown()
 
 
 INTERRUPTED = """
@@ -86,12 +113,7 @@ def test_help_ends_with_0(ros2: Any, arguments: list[str]) -> None:
 
 
 @pytest.mark.own
-def test_help_and_bags_import_only_what_they_need() -> None:
-    program = "import sys; from ros2cli.commands import ros2, {}; print(*sys.modules)"
-
-    def modules(name: str) -> set[str]:
-        command = [sys.executable, "-c", program.format(name)]
-        return set(subprocess.check_output(command, text=True, timeout=30).split())
-
-    assert not {"rclpy", "numpy", "mcap", "yaml"} & modules("topic")
-    assert not {"rclpy", "numpy", "mcap"} & modules("bag_info")
+def test_help_imports_only_what_it_needs() -> None:
+    program = "import sys; from ros2cli.commands import ros2, topic; print(*sys.modules)"
+    modules = subprocess.check_output([sys.executable, "-c", program], text=True, timeout=30).split()
+    assert not {"rclpy", "numpy", "yaml"} & {*modules}

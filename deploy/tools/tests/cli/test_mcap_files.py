@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import errno
+import gc
+import itertools
 import os
+import sys
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -171,6 +174,41 @@ def test_saved_messages_survive_the_writer(tmp_path: Path) -> None:
         assert file.is_complete
 
 
+def test_file_that_grows_has_what_it_had_when_it_was_opened(tmp_path: Path) -> None:
+    path = tmp_path / "growing.mcap"
+    writer = FileWriter(path, "test")
+    write(writer)
+    writer.save()
+    with McapFile(path) as file:
+        write(writer)  # on a new channel
+        writer.save()
+        assert len([*file.messages()]) == file.counts.total() == 1 + MESSAGES
+    writer.close()
+    assert len(numbers(path)) == 2 * MESSAGES
+
+
+def test_chunks_of_weeks_are_not_kept_in_memory(tmp_path: Path) -> None:
+    path = tmp_path / "weeks.mcap"
+    writer = FileWriter(path, "test")
+    channels = [writer.register_channel(f"/{number}", "cdr", 0) for number in range(20)]
+    times = iter(range(2_000))
+
+    def save(count: int) -> int:
+        for time in itertools.islice(times, count):
+            for channel in channels:
+                writer.add_message(channel, T0 + time, b"", T0)
+            writer.save()
+        gc.collect()
+        return sys.getallocatedblocks()
+
+    before = save(1_000)
+    assert save(1_000) - before < 1_000  # half a block for each chunk, which has 20 places
+    writer.close()
+    with McapFile(path) as file:
+        found = [message.log_time for _, message in file.messages(["/19"], begin=T0 + 1_998)]
+    assert found == [T0 + 1_998, T0 + 1_999]
+
+
 def test_each_save_waits_for_the_disk_on_another_thread(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -196,17 +234,17 @@ def test_each_save_waits_for_the_disk_on_another_thread(
 class FullDisk:
     """In place of a file: takes some bytes, then no more."""
 
-    def __init__(self, file: Any, room: int) -> None:
-        self._file, self._room = file, room
+    def __init__(self, file: Any) -> None:
+        self._file, self.room = file, sys.maxsize
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._file, name)
 
     def write(self, data: Any) -> int:
-        if not self._room:
+        if not self.room:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-        taken = self._file.write(data[: self._room])
-        self._room -= taken
+        taken = self._file.write(data[: self.room])
+        self.room -= taken
         return int(taken)
 
 
@@ -215,11 +253,14 @@ def test_full_disk_is_one_line_and_keeps_what_is_whole(
     room: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = tmp_path / "x.mcap"
-    writer = FileWriter(path, "test", compression=CompressionType.NONE)
+    disk = FullDisk(path.open("xb", buffering=0))
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "open", lambda *_, **options: disk)
+        writer = FileWriter(path, "test", compression=CompressionType.NONE)
     write(writer, 10)
     writer.save()
     size = path.stat().st_size
-    monkeypatch.setattr(writer._stream, "_file", FullDisk(writer._stream._file, room))
+    disk.room = room
     write(writer, 10_000)
     with pytest.raises(OSError, match=r"No space left on device, [\d.]+ MB are free") as error:
         writer.save()

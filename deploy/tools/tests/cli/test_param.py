@@ -1,8 +1,13 @@
 from __future__ import annotations
 
+from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
+from rclpy.context import Context
+from rclpy.node import Node
+from rclpy.parameter import Parameter
 
 DUMP = """\
 /arm/lab:
@@ -72,6 +77,72 @@ def test_refused_value_is_explained(lab: Any, ros2: Any) -> None:
 
 def test_dump_is_a_parameter_file(lab: Any, ros2: Any) -> None:
     assert ros2("param", "dump", "/arm/lab", "--no-daemon").stdout == DUMP
+
+
+ODD = {
+    "joint": "y",
+    "other": "1e5",
+    "many": ["n", "inf", "~"],
+    "tiny": 5e-324,
+    "a": 1,
+    "a.b": "both",
+    "a.b.c": 2.0,
+    "dots..": "end",
+    ".dot": True,
+}
+"""Parameters whose names and values PyYAML and rcl would read differently, or not at all."""
+FREE = {"typed": Parameter.Type.STRING, "many_typed": Parameter.Type.DOUBLE_ARRAY}
+"""Parameters that are declared by type alone."""
+
+
+@pytest.fixture
+def odd(lab: Any) -> Iterator[None]:
+    for name, value in {**ODD, **FREE}.items():
+        lab.declare_parameter(name, value)
+    yield
+    for name in {**ODD, **FREE}:
+        lab.undeclare_parameter(name)
+
+
+@pytest.mark.own  # that of ROS 2 dumps nothing here
+def test_a_dump_is_loaded_as_the_same(odd: None, lab: Any, ros2: Any, tmp_path: Path) -> None:
+    file = tmp_path / "dump.yaml"
+    file.write_text(ros2("param", "dump", "/arm/lab", "--no-daemon").stdout)
+    assert file.read_text().startswith("# many_typed: no parameter file can hold its value\n# typed: ")
+    context = Context()
+    context.init(["--ros-args", "--params-file", str(file)])
+    options = {"automatically_declare_parameters_from_overrides": True, "start_parameter_services": False}
+    loaded = Node("lab", namespace="/arm", context=context, **options)
+    found = {name: each.value for name, each in loaded.get_parameters_by_prefix("").items()}
+    loaded.destroy_node()
+    context.shutdown()
+    kept = {"length": 2.0, "names": ["a", "b"], "limits.speed": 3, "use_sim_time": False}
+    assert found == {**ODD, **kept, "start_type_description_service": True}
+
+
+@pytest.mark.own  # that of ROS 2 reads PyYAML's dialect
+@pytest.mark.parametrize(
+    ("name", "text", "value"),
+    [
+        ("joint", "n", "n"),
+        ("joint", "1e5", "1e5"),
+        ("joint", "010", "010"),
+        ("joint", "a: b", "a: b"),
+        ("joint", "'quoted'", "quoted"),
+        ("joint", "", ""),
+        ("typed", "inf", "inf"),
+        ("tiny", "1e5", 1e5),
+        ("a", "0x10", 16),
+        (".dot", "n", False),
+        ("many", "[a, 'y']", ["a", "y"]),
+    ],
+)
+def test_set_reads_a_value_as_a_parameter_file_does(
+    odd: None, lab: Any, ros2: Any, name: str, text: str, value: object
+) -> None:
+    done = ros2("param", "set", "/arm/lab", name, text, "--no-daemon")
+    assert (done.stdout, done.stderr) == ("Set parameter successful\n", "")
+    assert lab.get_parameter(name).value == value
 
 
 def test_describe_shows_type_and_constraints(lab: Any, ros2: Any) -> None:

@@ -3,7 +3,6 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-
 from rclpy.node import Node
 from std_srvs.srv import Trigger
 

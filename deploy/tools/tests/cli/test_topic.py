@@ -5,8 +5,7 @@ import signal
 from typing import Any
 
 import pytest
-from deploy.runtime.tests.host import wait_until
-
+from deploy.ground.tests.host import wait_until
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Float64, Header, String
 
@@ -150,6 +149,30 @@ def test_pub_once_waits_for_a_subscription(lab: Any, ros2: Any) -> None:
     assert rest == "publishing #1: std_msgs.msg.Float64(data=1.0)\n\n"
     wait_until(lambda: received == [1.0])
     lab.destroy_subscription(subscription)
+
+
+@pytest.mark.own  # that of ROS 2 reads PyYAML's dialect
+@pytest.mark.parametrize(
+    ("type_", "values", "shown"),
+    [
+        ("std_msgs/String", "data: y", "String(data='y')"),
+        ("std_msgs/String", "data: 1:30", "String(data='1:30')"),
+        ("std_msgs/String", "data: 010", "String(data='010')"),
+        ("std_msgs/Bool", "data: n", "Bool(data=False)"),
+        ("std_msgs/Float64", "data: 1e5", "Float64(data=100000.0)"),
+        ("std_msgs/Float64", "data: .inf", "Float64(data=inf)"),
+        ("std_msgs/UInt64", "data: 18446744073709551615", "UInt64(data=18446744073709551615)"),
+        ("std_msgs/Int32", "data: 0x10", "Int32(data=16)"),
+        ("std_msgs/Header", "frame_id: on", "frame_id='on')"),
+        (
+            "sensor_msgs/JointState",
+            "{name: [y, 1e5], position: [1, 2e0]}",
+            "name=['y', '1e5'], position=",
+        ),
+    ],
+)
+def test_pub_reads_a_value_by_the_type_of_its_field(ros2: Any, type_: str, values: str, shown: str) -> None:
+    assert shown in ros2("topic", "pub", "-1", "-w", "0", "/x", type_, values).stdout
 
 
 def test_pub_repeats_and_sets_the_stamp(lab: Any, ros2: Any) -> None:

@@ -26,8 +26,9 @@ def test_names_that_programs_import_are_there(module: str) -> None:
 
 def test_imported_name_is_the_original() -> None:
     pytest.importorskip("tf2_msgs.msg", reason=NO_TF2_MSGS)
+    from geometry_msgs.msg import TransformStamped
+
     import tf2_geometry_msgs
     import tf2_ros
-    from geometry_msgs.msg import TransformStamped
 
     assert tf2_ros.TransformStamped is tf2_geometry_msgs.TransformStamped is TransformStamped

@@ -5,8 +5,14 @@ from typing import Any
 
 import pytest
 from deploy.runtime.tests.nodes import MakeNode, SpinUntil
-
 from geometry_msgs.msg import PointStamped
+from rclpy.clock import ROSClock
+from rclpy.clock_type import ClockType
+from rclpy.node import Node
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.time import Time
+from std_msgs.msg import String
+
 from message_filters import (
     ApproximateTimeSynchronizer,
     Cache,
@@ -14,12 +20,6 @@ from message_filters import (
     Subscriber,
     TimeSynchronizer,
 )
-from rclpy.clock import ROSClock
-from rclpy.clock_type import ClockType
-from rclpy.node import Node
-from rclpy.qos import QoSProfile, ReliabilityPolicy
-from rclpy.time import Time
-from std_msgs.msg import String
 
 
 def at(seconds: float) -> Time:

@@ -6,39 +6,24 @@ from collections import OrderedDict
 from typing import Any
 
 import pytest
-
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from geometry_msgs.msg import PointStamped, Polygon, PoseWithCovariance, TwistStamped
-from rosidl_parser.definition import NamespacedType, UnboundedSequence, UnboundedString
-from rosidl_runtime_py import (
-    get_action_interfaces,
-    get_interface_packages,
-    get_interface_path,
-    get_interfaces,
-    get_message_interfaces,
-    get_message_slot_types,
-    get_service_interfaces,
-    import_message_from_namespaced_type,
-    message_to_csv,
-    message_to_ordereddict,
-    message_to_yaml,
-    set_message_fields,
-)
-from rosidl_runtime_py.utilities import (
-    get_action,
-    get_interface,
-    get_message,
-    get_message_namespaced_type,
-    get_namespaced_type,
-    get_service,
-    is_action,
-    is_message,
-    is_service,
-)
+from geometry_msgs.msg import PointStamped, PoseWithCovariance, TwistStamped
 from sensor_msgs.msg import CameraInfo, CompressedImage, JointState
 from std_msgs.msg import Bool, Byte, ByteMultiArray, Float32, Float64, Header, String, UInt8MultiArray
 from std_srvs.srv import SetBool
+
+from rosidl_runtime_py import (
+    get_action_interfaces,
+    get_interface_path,
+    get_message_interfaces,
+    get_service_interfaces,
+    message_to_csv,
+    message_to_yaml,
+    set_message_fields,
+)
+from rosidl_runtime_py.convert import message_to_ordereddict
+from rosidl_runtime_py.utilities import get_action, get_message, get_service
 
 try:
     from example_interfaces.action import Fibonacci
@@ -126,13 +111,6 @@ def test_csv_of_messages() -> None:
     assert message_to_csv(STATUS) == "b'\\x01',arm,slow: yes,,a,1,"
 
 
-def test_slot_types_by_the_names_of_fields() -> None:
-    types = get_message_slot_types(KeyValue())
-    assert types == {"key": UnboundedString(), "value": UnboundedString()}
-    (element,) = [get_message_slot_types(Polygon())["points"]]
-    assert element == UnboundedSequence(NamespacedType(["geometry_msgs", "msg"], "Point32"))
-
-
 def test_fields_are_set_from_plain_values() -> None:
     message = PointStamped()
     assert set_message_fields(message, {"header": {"frame_id": "base"}, "point": {"x": 1}}) == []
@@ -183,6 +161,10 @@ def test_messages_by_name(name: str) -> None:
     assert get_message(name) is String
 
 
+def test_message_of_the_feedback_of_an_action_by_name() -> None:
+    assert get_message(f"{PACKAGE}/action/Fibonacci_FeedbackMessage") is Fibonacci.Impl.FeedbackMessage
+
+
 @pytest.mark.parametrize(
     ("name", "error"),
     [
@@ -197,39 +179,20 @@ def test_unknown_messages_are_errors(name: str, error: type[Exception]) -> None:
         get_message(name)
 
 
-def test_services_actions_and_interfaces_by_name() -> None:
+def test_services_and_actions_by_name() -> None:
     assert get_service("std_srvs/SetBool") is SetBool
     assert get_action(f"{PACKAGE}/Fibonacci") is Fibonacci
-    assert get_interface("std_srvs/srv/SetBool") is SetBool
     with pytest.raises(ValueError, match="Expected the full name of a service, got 'std_msgs/msg/String'"):
         get_service("std_msgs/msg/String")
     with pytest.raises(ValueError, match="Expected the full name of an action, got"):
         get_action("std_srvs/srv/SetBool")
 
 
-def test_kinds_of_interfaces_are_told_apart() -> None:
-    assert [is_message(one) for one in (String, SetBool, Fibonacci)] == [True, False, False]
-    assert [is_service(one) for one in (String, SetBool, Fibonacci)] == [False, True, False]
-    assert [is_action(one) for one in (String, SetBool, Fibonacci)] == [False, False, True]
-
-
-def test_namespaced_types_of_names() -> None:
-    assert get_namespaced_type("std_msgs/String") == NamespacedType(["std_msgs"], "String")
-    assert get_message_namespaced_type("std_msgs/String") == NamespacedType(["std_msgs", "msg"], "String")
-    feedback = NamespacedType([PACKAGE, "action"], "Fibonacci_FeedbackMessage")
-    assert import_message_from_namespaced_type(feedback) is Fibonacci.Impl.FeedbackMessage
-
-
 def test_interfaces_of_packages_are_listed() -> None:
-    assert {"std_msgs", PACKAGE} <= get_interface_packages().keys()
-    assert "rosidl_parser" not in get_interface_packages()
-    assert sorted(get_interfaces(["std_srvs"])["std_srvs"]) == ["srv/Empty", "srv/SetBool", "srv/Trigger"]
     assert "msg/String" in get_message_interfaces()["std_msgs"]
     assert "std_srvs" not in get_message_interfaces()
-    assert "srv/SetBool" in get_service_interfaces(["std_srvs"])["std_srvs"]
-    assert "action/Fibonacci" in get_action_interfaces([PACKAGE])[PACKAGE]
-    with pytest.raises(LookupError, match="Unknown package 'nothing'"):
-        get_interfaces(["nothing"])
+    assert sorted(get_service_interfaces()["std_srvs"]) == ["srv/Empty", "srv/SetBool", "srv/Trigger"]
+    assert "action/Fibonacci" in get_action_interfaces()[PACKAGE]
 
 
 @pytest.mark.parametrize("name", ["std_msgs/msg/String", "std_msgs/msg/String.msg"])

@@ -13,7 +13,6 @@ from deploy.runtime.tests.nodes import Call, SpinUntil
 pytest.importorskip("tf2_msgs.msg", reason="platform: no tf2_msgs here, as with ROS 2's wheels")
 
 from deploy.tools.tests.transforms import transform
-
 from geometry_msgs.msg import PointStamped, TransformStamped
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
@@ -24,6 +23,7 @@ from rclpy.parameter import Parameter
 from rclpy.time import Time
 from std_msgs.msg import Header
 from tf2_msgs.srv import FrameGraph
+
 from tf2_ros import (
     Buffer,
     BufferCore,

@@ -7,12 +7,12 @@ import random
 from typing import Any
 
 import pytest
-
 from builtin_interfaces.msg import Duration as DurationMsg
 from builtin_interfaces.msg import Time as TimeMsg
 from geometry_msgs.msg import Quaternion, TransformStamped, Vector3
 from rclpy.duration import Duration
 from rclpy.time import Time
+
 from tf2_py import (
     BufferCore,
     ConnectivityException,

@@ -8,7 +8,6 @@ import pytest
 
 pytest.importorskip("tf2_msgs.msg", reason="platform: no tf2_msgs here, as with ROS 2's wheels")
 
-import tf2_geometry_msgs
 from geometry_msgs.msg import (
     Point,
     Point32,
@@ -24,6 +23,8 @@ from geometry_msgs.msg import (
     Vector3Stamped,
 )
 from std_msgs.msg import Header
+
+import tf2_geometry_msgs
 from tf2_ros import Buffer, convert
 
 HALF = math.sqrt(0.5)

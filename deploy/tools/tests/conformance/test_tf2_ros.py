@@ -10,7 +10,6 @@ from deploy.runtime.tests.nodes import MakeNode, SpinUntil
 pytest.importorskip("tf2_msgs.msg", reason="platform: no tf2_msgs here, as with ROS 2's wheels")
 
 from deploy.tools.tests.transforms import transform
-
 from rclpy.action import ActionServer
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.context import Context
@@ -21,6 +20,7 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 from rclpy.time import Time
 from tf2_msgs.action import LookupTransform
 from tf2_msgs.msg import TF2Error, TFMessage
+
 from tf2_ros import (
     Buffer,
     BufferClient,

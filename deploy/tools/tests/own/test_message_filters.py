@@ -6,9 +6,9 @@ import subprocess
 import sys
 
 import pytest
+from sensor_msgs.msg import Imu
 
 from message_filters import SimpleFilter, TimeSynchronizer
-from sensor_msgs.msg import Imu
 
 pytestmark = pytest.mark.own
 

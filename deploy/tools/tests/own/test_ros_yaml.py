@@ -12,11 +12,11 @@ import pytest
 import yaml
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-
-import ros_yaml
 from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.parameter import PARAMETER_SEPARATOR_STRING
+
+import ros_yaml
 
 NODE = "/reader"
 OWN = ("use_sim_time", "start_type_description_service")

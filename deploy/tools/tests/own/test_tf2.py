@@ -12,12 +12,12 @@ from deploy.runtime.tests.nodes import MakeNode, SpinUntil
 pytest.importorskip("tf2_msgs.msg", reason="platform: no tf2_msgs here, as with ROS 2's wheels")
 
 from deploy.tools.tests.transforms import transform
-
-import tf2_geometry_msgs
 from geometry_msgs.msg import Vector3, Vector3Stamped
 from rclpy.duration import Duration, Infinite
 from rclpy.node import Node
 from rclpy.time import Time
+
+import tf2_geometry_msgs
 from tf2_ros import Buffer, BufferClient, StaticTransformBroadcaster, TransformBroadcaster, TransformListener
 
 pytestmark = pytest.mark.own

@@ -59,11 +59,6 @@ _COMMANDS = [
         {"info": "action:info", "list": "action:list_actions", "send_goal": "action_send_goal:send_goal"},
     ),
     Command(
-        "bag",
-        "Various rosbag related sub-commands",
-        {"info": "bag_info:info", "play": "bag_play:play", "record": "bag_record:record"},
-    ),
-    Command(
         "interface",
         "Show information about ROS interfaces",
         {"list": "interface:list_interfaces", "show": "interface:show"},

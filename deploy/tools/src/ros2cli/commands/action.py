@@ -32,10 +32,22 @@ def list_actions(spin_time: float, use_sim_time: bool, show_types: bool, count_a
 @click.option("-c", "--count", is_flag=True, help="Only display the number of action clients and servers.")
 def info(spin_time: float, use_sim_time: bool, action_name: str, show_types: bool, count: bool) -> None:
     """Print information about an action."""
-    from ros2action.api import get_action_clients_and_servers
+    from rclpy import action
 
     with graph.node(spin_time, use_sim_time=use_sim_time) as node:
-        clients, servers = get_action_clients_and_servers(node=node, action_name=action_name)
+        full_name = graph.full_topic_name(node, action_name)
+        nodes = graph.node_names(node, include_hidden=True)
+        clients, servers = (
+            [
+                (one.full_name, actions[full_name])
+                for one in nodes
+                if full_name in (actions := dict(ask(node, one.name, one.namespace)))
+            ]
+            for ask in (
+                action.get_action_client_names_and_types_by_node,
+                action.get_action_server_names_and_types_by_node,
+            )
+        )
     click.echo(f"Action: {action_name}")
     for title, owners in (("Action clients", clients), ("Action servers", servers)):
         click.echo(f"{title}: {len(owners)}")

@@ -32,6 +32,7 @@ def send_goal(action_name: str, action_type: str, goal: str, feedback: bool) -> 
     """
     from action_msgs.msg import GoalStatus
     from rclpy.action import ActionClient
+
     from rosidl_runtime_py import message_to_yaml, set_message_fields
 
     class_ = graph.interface_class("action", action_type, "The passed action type is invalid")

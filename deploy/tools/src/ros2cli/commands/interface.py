@@ -7,7 +7,7 @@ import sys
 
 import click
 
-from ros2cli.definition import message_type
+from mcap_files.definition import message_type
 
 
 @click.command("list")

@@ -52,15 +52,21 @@ def get(node_name: str, parameter_name: str, hide_type: bool, **options: Any) ->
 @click.argument("value")
 def set_parameter(node_name: str, parameter_name: str, value: str, **options: Any) -> None:
     """Set parameter."""
-    from rcl_interfaces.msg import Parameter
-    from rclpy.parameter import get_parameter_value
+    from rclpy.parameter import Parameter
 
-    try:
-        parameter = Parameter(name=parameter_name, value=get_parameter_value(value))
-        check(parameter)
-    except Exception as error:
-        raise click.ClickException(f"'{value}' cannot be the value of a parameter: {error}") from None
+    import ros_yaml
+
     with parameters.client(node_name, **options) as client:
+        described = parameters.response(client, client.describe_parameters([parameter_name])).descriptors
+        is_text = [each.type for each in described] == [Parameter.Type.STRING.value]
+        try:
+            plain = ros_yaml.load_plain(value)
+            is_value = plain is not None and (type(plain) is str or not is_text)
+            given = ros_yaml.typed(plain) if is_value else value  # a text needs no quotes
+            parameter = Parameter(parameter_name, value=given).to_parameter_msg()
+            check(parameter)
+        except Exception as error:
+            raise click.ClickException(f"'{value}' cannot be the value of a parameter: {error}") from None
         (result,) = parameters.response(client, client.set_parameters([parameter])).results
     outcome = "Set parameter successful" if result.successful else "Setting parameter failed"
     click.echo(f"{outcome}: {result.reason}" if result.reason else outcome, err=not result.successful)
@@ -71,22 +77,33 @@ def set_parameter(node_name: str, parameter_name: str, value: str, **options: An
 @click.argument("node_name")
 def dump(node_name: str, **options: Any) -> None:
     """Show all of the parameters of a node in a YAML file format."""
-    import yaml
+    from rclpy.parameter import parameter_value_to_python
 
-    from rclpy.parameter import PARAMETER_SEPARATOR_STRING, parameter_value_to_python
+    import ros_yaml
 
     with parameters.client(node_name, **options) as client:
         names = sorted(parameters.response(client, client.list_parameters()).result.names)
-        values = parameters.response(client, client.get_parameters(names)).values
+        # One by one: for a parameter that was declared without a value, a node answers nothing at all.
+        found = {name: parameters.response(client, client.get_parameters([name])).values for name in names}
     tree: dict[str, Any] = {}
-    for name, value in zip(names, values, strict=False):
-        *branches, leaf = name.split(PARAMETER_SEPARATOR_STRING)
-        place = tree
-        for branch in branches:
-            place = place.setdefault(branch, {})
-        place[leaf] = parameter_value_to_python(value)
+    for name, values in found.items():
+        value = parameter_value_to_python(values[0]) if values else None
+        if value in (None, []) or (isinstance(value, list) and isinstance(value[0], bytes)):
+            click.echo(f"# {name}: no parameter file can hold its value")
+        else:
+            _place(tree, name, value)
     document = {parameters.full_name(node_name): {"ros__parameters": tree}}
-    click.echo(yaml.dump(document, default_flow_style=False))
+    click.echo(ros_yaml.dump(document))
+
+
+def _place(tree: dict[str, Any], name: str, value: Any) -> None:
+    """Put a parameter into a tree, below its prefix unless that is a parameter or no word."""
+    branch, _, leaf = name.partition(".")
+    below = tree.setdefault(branch, {}) if branch and leaf and not leaf.startswith(".") else None
+    if isinstance(below, dict):
+        _place(below, leaf, value)
+    else:
+        tree[name] = value
 
 
 @click.command

@@ -6,7 +6,6 @@ import click
 
 from ros2cli import graph
 from ros2cli.options import strategy_options
-from ros2topic.api import get_topic_names_and_types
 
 
 @click.command("list")
@@ -30,7 +29,7 @@ def list_topics(
     with graph.node(spin_time, use_sim_time=use_sim_time) as node:
         topics = [
             (name, ", ".join(types), node.count_publishers(name), node.count_subscribers(name))
-            for name, types in get_topic_names_and_types(node=node, include_hidden_topics=bool(hidden))
+            for name, types in graph.topics(node, include_hidden=bool(hidden))
         ]
     if count_topics:
         click.echo(len(topics))

@@ -17,7 +17,6 @@ from ros2cli.options import (
     qos_profile,
     strategy_options,
 )
-from ros2topic.api import get_msg_class
 
 if TYPE_CHECKING:
     from rclpy.event_handler import QoSMessageLostInfo
@@ -75,7 +74,7 @@ def echo(
     with graph.node(spin_time, until=published, use_sim_time=use_sim_time) as node:
         chosen = qos_profile(options) if has_qos_policies(options) else _matching(node, topic_name, options)
         if message_type is None:
-            class_ = get_msg_class(node, topic_name, include_hidden_topics=True)
+            class_ = graph.message_class(node, topic_name)
             if class_ is None:
                 raise click.ClickException("Could not determine the type for the passed topic")
         else:
@@ -104,7 +103,7 @@ def _matching(node: Node, topic: str, options: dict[str, Any]) -> QoSProfile:
 
     profile = copy(QoSPresetProfiles.get_from_short_key(options["qos_profile"]))
     name = graph.full_topic_name(node, topic)
-    offers = [info.qos_profile for info in node.get_publishers_info_by_topic(name)]
+    offers = [info.qos_profile for info in graph.publishers(node, name)]
     if not offers:
         return profile
     reliable = sum(offer.reliability == ReliabilityPolicy.RELIABLE for offer in offers)

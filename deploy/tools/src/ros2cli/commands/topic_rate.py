@@ -11,7 +11,6 @@ import click
 
 from ros2cli import expression, graph
 from ros2cli.options import POSITIVE_INT, direct_options
-from ros2topic.api import get_msg_class
 
 if TYPE_CHECKING:
     from rclpy.clock import Clock
@@ -47,7 +46,7 @@ def hz(
     wanted = expression.condition(condition)
     published = graph.is_published(topic_name)
     with graph.node(spin_time, until=published, use_sim_time=use_sim_time) as node:
-        class_ = get_msg_class(node, topic_name, blocking=True, include_hidden_topics=True)
+        class_ = graph.message_class(node, topic_name, blocking=True)
         clock = Clock(clock_type=ClockType.SYSTEM_TIME) if wall_time else node.get_clock()
         rate = _Rate(clock, window)
 
@@ -116,7 +115,7 @@ def bw(topic_name: str, window: int, spin_time: float, use_sim_time: bool) -> No
 
     published = graph.is_published(topic_name)
     with graph.node(spin_time, until=published, use_sim_time=use_sim_time) as node:
-        class_ = get_msg_class(node, topic_name, blocking=True, include_hidden_topics=True)
+        class_ = graph.message_class(node, topic_name, blocking=True)
         bandwidth = _Bandwidth(node.get_clock(), window)
         node.create_subscription(class_, topic_name, bandwidth.count, qos_profile_sensor_data, raw=True)
         click.echo(f"Subscribed to [{topic_name}]")

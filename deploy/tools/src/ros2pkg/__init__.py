@@ -1,1 +1,0 @@
-"""What tools ask about packages, with the names of ROS 2's `ros2pkg`."""
