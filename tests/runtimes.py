@@ -15,8 +15,6 @@ EMBEDDED_ONLY = (
     "tests/simulation_kit",
 )
 """Tests of the embedded rclpy, and of what runs only on it."""
-TRANSFORMS = ("interfaces/reactive_node/tests/test_transforms.py",)
-"""Tests that need tf2_msgs, which ROS 2's wheels do not have."""
 EVENTS = ("interfaces/reactive_node/tests/test_events_executor.py",)
 """Tests of an executor that ROS 2 has, but the embedded rclpy has not."""
 
@@ -25,4 +23,4 @@ def left_out_here() -> tuple[str, ...]:
     """Return the files and folders whose tests cannot run on the rclpy of this process."""
     if importlib.util.find_spec("rosidl_runtime_embedded"):
         return EVENTS
-    return EMBEDDED_ONLY if importlib.util.find_spec("tf2_msgs") else EMBEDDED_ONLY + TRANSFORMS
+    return EMBEDDED_ONLY

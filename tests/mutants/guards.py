@@ -73,7 +73,6 @@ GUARDS: dict[str, tuple[str, ...]] = {
             "events",
             "calls",
             "services",
-            "transforms",
             "actions",
             "end",
         )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import pytest
 from rclpy.context import Context
@@ -13,7 +14,9 @@ from rclpy.node import Node
 from interfaces.reactive_node.tests.simulated import Simulation
 from reactive_node import ReactiveNode
 from reactive_node.executor import create_executor
-from reactive_node.testing import MakeNode, SpinUntil
+
+if TYPE_CHECKING:  # the conftest of the repository imports this plugin later
+    from reactive_node.testing import MakeNode, SpinUntil
 
 EXECUTORS = [lambda context: SingleThreadedExecutor(context=context)]
 if importlib.util.find_spec("rclpy.experimental"):

@@ -1,10 +1,13 @@
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from builtin_interfaces.msg import Time
 from rclpy.parameter import Parameter
 from rosgraph_msgs.msg import Clock
 
-from reactive_node.testing import MakeNode, SpinUntil
+if TYPE_CHECKING:
+    from reactive_node.testing import MakeNode, SpinUntil
 
 
 class Simulation:

@@ -127,3 +127,41 @@ def test_call_completes_with_node(node: ReactiveNode) -> None:
     node.destroy_node()
 
     assert completed == [True]
+
+
+def test_calls_that_wait_share_one_timer(node: ReactiveNode, peer: Node, spin_until: SpinUntil) -> None:
+    timers = len([*node.timers])
+    responses: list[Any] = []
+    call = node.create_call(SetBool, "switch")
+    for _ in range(1000):
+        call(SetBool.Request()).subscribe(responses.append, scheduler=node.scheduler)
+    spin_until(lambda: len([*node.timers]) > timers)
+    assert len([*node.timers]) == timers + 1
+
+    peer.create_service(SetBool, "switch", answer)
+    spin_until(lambda: responses and len([*node.timers]) == timers)
+
+
+def test_each_call_waits_for_its_own_server(node: ReactiveNode, peer: Node, spin_until: SpinUntil) -> None:
+    responses: list[str] = []
+    for name in ("one", "two"):
+        call = node.create_call(SetBool, name)
+        call(SetBool.Request()).subscribe(lambda _, name=name: responses.append(name))
+    peer.create_service(SetBool, "two", answer)
+    spin_until(lambda: responses == ["two"])
+    peer.create_service(SetBool, "one", answer)
+    spin_until(lambda: responses == ["two", "one"])
+
+
+def test_calls_that_are_abandoned_on_other_threads_end_the_timer(
+    node: ReactiveNode, spin_until: SpinUntil
+) -> None:
+    timers = len([*node.timers])
+    call = node.create_call(SetBool, "switch")
+    for _ in range(20):
+        calls = [call(SetBool.Request()).subscribe(scheduler=node.scheduler) for _ in range(10)]
+        threads = [threading.Thread(target=each.dispose) for each in calls]
+        for thread in threads:
+            thread.start()
+        spin_until(lambda: not any(thread.is_alive() for thread in threads))  # noqa: B023
+    spin_until(lambda: len([*node.timers]) == timers)

@@ -18,9 +18,9 @@ def test_domain_is_reserved_once_at_a_time(monkeypatch: pytest.MonkeyPatch) -> N
 @pytest.mark.parametrize("offset", [0, 10, 35, 249])
 def test_domain_with_participants_is_not_free(offset: int) -> None:
     with reserved_domain() as free, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as participant:
-        assert not domains._has_participants(free)
+        assert not domains.has_participants(free)
         participant.bind(("127.0.0.1", 7400 + 250 * free + offset))
-        assert domains._has_participants(free)
+        assert domains.has_participants(free)
 
 
 def test_error_inside_reservation_is_raised() -> None:

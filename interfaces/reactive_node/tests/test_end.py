@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import importlib.util
 from collections.abc import Callable
 
 import pytest
@@ -29,8 +28,6 @@ OBSERVABLES: dict[str, Create] = {
     "call with timeout": lambda node: node.create_call(SetBool, "switch", timeout=1.0)(SetBool.Request()),
     "action": lambda node: node.create_action_call(Fibonacci, "action")(Fibonacci.Goal()),
 }
-if importlib.util.find_spec("tf2_msgs"):  # ROS 2's wheels do not have it
-    OBSERVABLES["transform"] = lambda node: node.create_transform_observable("map", "arm")
 each_kind = pytest.mark.parametrize("create", OBSERVABLES.values(), ids=OBSERVABLES)
 
 

@@ -14,7 +14,7 @@ from reactivex.scheduler import ImmediateScheduler
 from reactivex.subject import Subject
 from std_msgs.msg import Float64
 
-from reactive_node import ReactiveNode
+from reactive_node import ReactiveNode, message_reader
 from reactive_node.end import End
 from reactive_node.message_reader import MessageReader
 from reactive_node.testing import SpinFor, SpinUntil
@@ -230,21 +230,58 @@ def test_volatile_publisher_of_latched_topic_is_heard_if_wanted(
     assert deaf == [1.0, 3.0]
 
 
+def test_burst_to_both_readers_comes_once(
+    node: ReactiveNode, peer: Node, spin_until: SpinUntil, spin_for: SpinFor
+) -> None:
+    many = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    received: list[float] = []
+    node.create_observable(Float64, "topic", many, every_publisher=True).subscribe(
+        lambda message: received.append(message.data)
+    )
+    latched, by_hand = (
+        peer.create_publisher(Float64, "topic", many),
+        peer.create_publisher(Float64, "topic", 10),
+    )
+    spin_until(lambda: latched.get_subscription_count() == 2 and by_hand.get_subscription_count() == 1)
+
+    for number in range(60):
+        latched.publish(Float64(data=float(number)))
+    spin_until(lambda: len(received) >= 60)
+    spin_for(0.2)
+
+    assert received == [float(number) for number in range(60)]
+
+
 @pytest.mark.parametrize("timestamped", [False, True])
-def test_what_two_readers_deliver_comes_once(readers: Readers, timestamped: bool) -> None:
+@pytest.mark.parametrize("first", [0, 1])
+def test_what_two_readers_deliver_comes_once(readers: Readers, timestamped: bool, first: int) -> None:
     received: list[Any] = []
     readers.observable(LATCHED, every_publisher=True, timestamped=timestamped).subscribe(
         lambda item: received.append(int(item.value if timestamped else item))
     )
-    readers.receive(0, "1", 1)
     readers.find_volatile_publisher()
-    for time in range(2, 19):
-        readers.receive(0, str(time), time)
-    for time in range(3, 19):
-        readers.receive(1, str(time), time)
-    assert received == [*range(1, 19)]
-    readers.receive(1, "2", 2)  # forgotten: only the last sixteen are known
-    assert received == [*range(1, 19), 2]
+    for reader in (first, 1 - first):
+        for time in range(1000):  # a burst
+            readers.receive(reader, str(time), time)
+    assert received == [*range(1000)]
+
+
+def test_messages_of_one_source_time_are_different_ones(readers: Readers) -> None:
+    received: list[str] = []
+    readers.observable(LATCHED, every_publisher=True).subscribe(received.append)
+    readers.find_volatile_publisher()
+    for reader, message in ((1, "latched"), (1, "by hand"), (0, "latched"), (1, "again")):
+        readers.receive(reader, message, 7)
+    assert received == ["latched", "by hand", "again"]
+
+
+def test_messages_without_a_pair_are_forgotten(readers: Readers, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("time.monotonic_ns", lambda: now)
+    pairs = message_reader.Pairs()
+    for second in range(1000):
+        now = second * 10**9
+        assert not pairs.completes(now, -1)
+    assert len(pairs) <= 12
 
 
 def test_one_reader_delivers_no_copies(readers: Readers) -> None:

@@ -8,13 +8,11 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import suppress
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import pytest
 import rclpy
-from geometry_msgs.msg import TransformStamped
 from rclpy.action import ActionServer
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -28,7 +26,6 @@ try:
 except ModuleNotFoundError:  # ROS 2's wheels
     from test_msgs.action import Fibonacci
 
-HAS_TRANSFORMS = find_spec("tf2_msgs") is not None  # not with ROS 2's wheels
 README = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
 README = README.replace("example_interfaces", Fibonacci.__module__.partition(".")[0])
 BLOCKS = re.findall(r"^```python\n(.*?)^```$", README, re.DOTALL | re.MULTILINE)
@@ -50,7 +47,7 @@ def listings(domain_id: int) -> Iterator[dict[str, Any]]:
     names: dict[str, Any] = {}
     try:
         for block in BLOCKS:
-            if not NAME.match(block) and (HAS_TRANSFORMS or "create_transform_observable" not in block):
+            if not NAME.match(block):
                 exec(block, names)
         yield names
     finally:
@@ -81,7 +78,7 @@ def test_listings_print_data_and_completion(
     assert capsys.readouterr().out == "Completed\n"
 
 
-def test_listings_use_action_service_transform_and_latest(
+def test_listings_use_action_service_and_latest(
     listings: dict[str, Any], capsys: pytest.CaptureFixture[str]
 ) -> None:
     peer = listings["peer"] = Node("peer")
@@ -92,13 +89,6 @@ def test_listings_use_action_service_transform_and_latest(
 
     server = ActionServer(peer, Fibonacci, "fibonacci", execute)
     client = peer.create_client(SetBool, "switch")
-    tool = TransformStamped(child_frame_id="tool")
-    tool.header.frame_id = "map"
-    tool.transform.translation.x = 1.5
-    if HAS_TRANSFORMS:
-        from tf2_ros import StaticTransformBroadcaster
-
-        StaticTransformBroadcaster(peer).sendTransform(tool)
     publisher = peer.create_publisher(String, "topic", 10)
     counts: list[int] = []
     peer.create_subscription(Int64, "count", lambda message: counts.append(message.data), 10)
@@ -115,18 +105,11 @@ def test_listings_use_action_service_transform_and_latest(
             if response is None and client.service_is_ready():
                 response = client.call_async(SetBool.Request(data=True))
             printed += capsys.readouterr().out
-            if (
-                counts
-                and "Sequence" in printed
-                and ("Tool" in printed or not HAS_TRANSFORMS)
-                and response is not None
-                and response.done()
-            ):
+            if counts and "Sequence" in printed and response is not None and response.done():
                 break
     server.destroy()
 
     assert "Sequence: [0, 1, 1, 2]" in printed
-    assert ("Tool: 1.5 m" in printed) == HAS_TRANSFORMS
     assert response is not None
     assert response.result().success is True
     assert counts[0] == len("hello")
@@ -154,11 +137,10 @@ def test_program_publishes_alarm_until_signal(
         spin_until(lambda: alarms == [True])
 
         program.send_signal(number)
-        if find_spec("rclpy._dds") is None:
-            # ROS 2's rclpy wakes the executor before it ends the context. The executor may then wait again.
-            with suppress(subprocess.TimeoutExpired):
-                program.wait(timeout=3)
-            program.send_signal(number)
+        # ROS 2's rclpy wakes the executor before it ends the context. The executor may then wait again.
+        with suppress(subprocess.TimeoutExpired):
+            program.wait(timeout=3)
+        program.send_signal(number)
         _, errors = program.communicate(timeout=10)
     finally:
         program.kill()

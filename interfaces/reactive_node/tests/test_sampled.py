@@ -18,7 +18,7 @@ from reactivex.subject import Subject
 from std_msgs.msg import Float64, String
 
 from reactive_node import ReactiveNode
-from reactive_node.sampled_reader import Unattended, sampled_messages
+from reactive_node.sampled_reader import Polled, sampled_messages
 from reactive_node.testing import SpinUntil, VirtualTime
 
 NOW = None  # an item of the ticks
@@ -93,6 +93,20 @@ def test_tick_of_a_buffer_reads_all_messages_once(
     ticks.on_next(NOW)
     assert received == numbers
     assert len(set(reads)) < len(numbers), "a tick reads many"
+
+
+def test_reader_that_may_have_lost_messages_is_known(node: ReactiveNode, ticks: Subject[None]) -> None:
+    waiting: list[Any] = []
+    subscription = mock.MagicMock(topic_name="/topic")
+    subscription.handle.take_message.side_effect = lambda *_: waiting.pop() if waiting else None
+    full: list[int] = []
+    with mock.patch.object(node, "create_subscription", return_value=subscription):
+        topic = node.create_buffered_observable(Float64, "topic", ticks, on_full=lambda: full.append(reads))
+        topic.subscribe()
+        for reads in (0, 999, 1000, 5, 1000):
+            waiting[:] = [(Float64(), {})] * reads
+            ticks.on_next(NOW)
+    assert full == [1000, 1000]
 
 
 def test_period_ticks_at_once_and_by_the_scheduler_of_the_node(
@@ -271,7 +285,7 @@ def test_other_thread_may_dispose_while_it_is_read(node: ReactiveNode, talker: T
         reader.join()
 
 
-def test_refused_message_is_told_and_the_next_one_read(ticks: Subject[None]) -> None:
+def test_refused_message_is_reported_and_the_next_one_read(ticks: Subject[None]) -> None:
     """Not every middleware refuses the same messages, so a reader of the test does."""
     taken = mock.Mock(side_effect=[RuntimeError("no String"), (String(data="good"), {"source_timestamp": 0})])
     subscription = mock.MagicMock(topic_name="/text", handle=mock.MagicMock(take_message=taken))
@@ -307,7 +321,7 @@ def test_flood_wakes_no_executor(
     (subscription,) = (each for each in node.subscriptions if each.topic_name == "/topic")
     subscription.callback = lambda _: pytest.fail("the executor has taken a message")
     talker.say(*map(float, range(10)))
-    executor.spin_once(timeout_sec=0.1)  # the embedded runtime notices here that it need not wait
+    executor.spin_once(timeout_sec=0.1)
     used = time.process_time()
     spins = 0
     end = time.monotonic() + 0.5
@@ -319,7 +333,7 @@ def test_flood_wakes_no_executor(
 
 
 def test_no_executor_may_run_an_unattended_entity() -> None:
-    group = Unattended()
+    group = Polled()
     assert not group.can_execute(mock.Mock())
     assert not group.beginning_execution(mock.Mock())
 

@@ -170,7 +170,7 @@ def test_timeouts_of_thirty_thousand_items_do_not_accumulate(
         items.on_next(item)
 
     assert len(seen) == 30_000
-    assert len(scheduler._heap) < 200
+    assert scheduler.kept < 200
 
 
 def test_actions_left_by_many_cancellations_run_in_order(
@@ -367,6 +367,33 @@ def test_simulated_time_may_begin_and_end_while_action_waits(
     assert ran == ["real again"]
     simulation.set(simulation.node.get_clock().now().nanoseconds / 1e9 + 5.0)
     spin_until(lambda: len(ran) == 2)
+
+
+def test_steady_scheduler_follows_no_simulated_time(simulation: Simulation, spin_until: SpinUntil) -> None:
+    """Simulated time starts late, runs, jumps a day both ways and stands still: supervision goes on."""
+    node, began = simulation.node, time.monotonic()
+    ticks: list[Any] = []
+    rx.timer(0.0, 0.02, node.steady_scheduler).timestamp().subscribe(
+        ticks.append, scheduler=node.steady_scheduler
+    )
+    spin_until(lambda: len(ticks) >= 3)  # before the first time
+    for at in (1000.0, 1000.1, 1000.0 + 86_400.0, 1000.2, 1000.2, 0.5):
+        simulation.set(at)
+        count = len(ticks)
+        spin_until(lambda count=count: len(ticks) >= count + 3)
+    ages = [(tick.timestamp - ticks[0].timestamp).total_seconds() for tick in ticks]
+    assert ages == sorted(ages)
+    assert 0.0 <= ages[-1] <= time.monotonic() - began
+    assert len(ticks) <= (time.monotonic() - began) / 0.02 + 1, "no tick is made up"
+
+
+def test_steady_scheduler_ends_with_its_node(make_node: MakeNode, spin_for: SpinFor) -> None:
+    node = make_node("ended")
+    ran: list[bool] = []
+    node.steady_scheduler.schedule_relative(0.01, lambda *_: ran.append(True))
+    node.destroy_node()
+    spin_for(0.05)
+    assert ran == []
 
 
 def test_ended_node_runs_no_action(make_node: MakeNode, spin_for: SpinFor) -> None:

@@ -1,9 +1,11 @@
 from __future__ import annotations
 
+import math
 from datetime import UTC, datetime, timedelta
 from typing import Any
 
 import pytest
+import reactivex as rx
 from rclpy.clock import ClockType
 from rclpy.parameter import Parameter
 from reactivex.disposable import BooleanDisposable
@@ -45,16 +47,16 @@ def test_heap_is_cleaned_when_most_of_many_items_are_cancelled(node: ReactiveNod
     for item in items[:64]:
         item.dispose()
     items[0].dispose()  # again
-    assert len(scheduler._heap) == 100
+    assert scheduler.kept == 100
     items[64].dispose()
-    assert len(scheduler._heap) == 35
+    assert scheduler.kept == 35
 
     more = [scheduler.schedule_relative(60.0, lambda *_: None) for _ in range(165)]
     for item in more[:100]:
         item.dispose()
-    assert len(scheduler._heap) == 200  # half of them are still to run
+    assert scheduler.kept == 200  # half of them are still to run
     more[100].dispose()
-    assert len(scheduler._heap) == 99
+    assert scheduler.kept == 99
 
 
 @pytest.mark.parametrize(("late", "runs"), [(50_000_000, 6), (50_000_001, 1)])
@@ -84,7 +86,7 @@ def test_action_that_disposes_itself_leaves_nothing_in_the_heap(
     periodic = node.scheduler.schedule_periodic(0.001, once)
     spin_until(lambda: ran)
 
-    assert node.scheduler._heap == []
+    assert node.scheduler.kept == 0
 
 
 def test_ended_node_keeps_no_actions(make_node: MakeNode) -> None:
@@ -95,11 +97,11 @@ def test_ended_node_keeps_no_actions(make_node: MakeNode) -> None:
     scheduler.dispose()
     assert len([*node.timers]) == timers - 1
     scheduler.schedule(lambda *_: None)
-    assert scheduler._heap == []
+    assert scheduler.kept == 0
     node.destroy_node()
     node.scheduler.schedule(lambda *_: None)
 
-    assert node.scheduler._heap == []
+    assert node.scheduler.kept == 0
 
 
 def test_timer_waits_for_the_next_action_and_then_for_none(node: ReactiveNode, spin_until: SpinUntil) -> None:
@@ -134,9 +136,9 @@ def test_only_cancelled_items_of_the_heap_count_for_its_cleaning(
     items = [scheduler.schedule_relative(60.0, lambda *_: None) for _ in range(100)]
     for item in items[:64]:
         item.dispose()
-    assert len(scheduler._heap) == 100
+    assert scheduler.kept == 100
     items[64].dispose()
-    assert len(scheduler._heap) == 35
+    assert scheduler.kept == 35
 
 
 def test_no_timer_waits_without_actions(node: ReactiveNode, spin_until: SpinUntil) -> None:
@@ -185,3 +187,26 @@ def test_periodic_action_keeps_its_rate_from_the_first_simulated_time(
         spin_for(0.02)
 
     assert ran == [1244.0, 1254.0]
+
+
+@pytest.mark.parametrize("seconds", [1e9, 1e10, 1e15])
+def test_delay_longer_than_a_timer_of_ros_disturbs_no_other(
+    node: ReactiveNode, spin_until: SpinUntil, seconds: float
+) -> None:
+    ticks: list[int] = []
+    node.scheduler.schedule_relative(seconds, lambda *_: None)
+    rx.interval(0.01).subscribe(ticks.append, scheduler=node.scheduler)
+    spin_until(lambda: len(ticks) > 3)
+
+
+@pytest.mark.parametrize("seconds", [math.inf, math.nan])
+def test_delay_that_is_no_number_is_refused_and_leaves_nothing(node: ReactiveNode, seconds: float) -> None:
+    for schedule in (node.scheduler.schedule_relative, node.scheduler.schedule_periodic):
+        with pytest.raises((ValueError, OverflowError)):
+            schedule(seconds, lambda *_: None)
+    assert node.scheduler.kept == 0
+
+
+def test_timer_of_a_far_action_runs_once_a_day_at_most(node: ReactiveNode) -> None:
+    node.scheduler.schedule_relative(1e15, lambda *_: None)
+    assert [timer.timer_period_ns for timer in node.timers if not timer.is_canceled()] == [86_400 * 10**9]

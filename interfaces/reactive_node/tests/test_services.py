@@ -99,7 +99,7 @@ def test_requests_may_be_answered_in_any_order(
     assert (first.result().message, second.result().message) == ("first", "second")
 
 
-def test_equal_requests_of_two_clients_are_told_apart(
+def test_equal_requests_of_two_clients_are_distinguished(
     node: ReactiveNode, peer: Node, caller: Caller, spin_until: SpinUntil
 ) -> None:
     requests_seen: list[SetBool.Request] = []

@@ -1,4 +1,4 @@
-"""The problems of SIGNALS.md run as they stand, and its pictures are those of its programs."""
+"""The problems of SIGNALS.md run as they stand."""
 
 from __future__ import annotations
 
@@ -31,16 +31,3 @@ def test_problems_run_as_tests(files: Path) -> None:
 
     assert run.returncode == 0, run.stdout
     assert run.stdout.splitlines()[-1].startswith("3 passed")
-
-
-def test_pictures_are_up_to_date(files: Path, tmp_path: Path) -> None:
-    drawn = tmp_path / "drawn"
-    command = [sys.executable, PROJECT / "pictures" / "draw.py", drawn]
-    paths = os.pathsep.join([str(files), *filter(None, [os.environ.get("PYTHONPATH")])])
-
-    subprocess.run(command, cwd=files, env=os.environ | {"PYTHONPATH": paths}, check=True)
-
-    names = re.findall(r"\(pictures/(\w+\.svg)\)", PAGE)
-    assert len(names) == 3
-    for name in names:
-        assert (drawn / name).read_text() == (PROJECT / "pictures" / name).read_text()

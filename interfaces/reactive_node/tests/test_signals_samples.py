@@ -7,8 +7,11 @@ from itertools import zip_longest
 from typing import Any
 
 import pytest
+from builtin_interfaces.msg import Time
+from geometry_msgs.msg import PointStamped
 from hypothesis import given
 from hypothesis import strategies as st
+from std_msgs.msg import Header
 
 from interfaces.reactive_node.tests.arrivals import (
     LATENESS,
@@ -38,6 +41,7 @@ from reactive_node.signals import (
     of_time,
     slerp,
 )
+from reactive_node.stamps import by_header
 from reactive_node.testing import VirtualTime
 
 GAP = 0.06  # s
@@ -485,3 +489,24 @@ def test_value_is_held_while_nothing_is_known_of_the_publisher(scheduler: Virtua
     signal = constant(1.0).certain_while(hold(scheduler.hot(), lateness=LATENESS))
 
     assert {each.mark for each in answers(scheduler, signal)} == {HELD}
+
+
+@pytest.mark.parametrize("silence", [Nothing(), Unchanged(), Held()])
+def test_message_without_a_stamp_is_no_sample(scheduler: VirtualTime, silence: Silence) -> None:
+    refused: list[Refused] = []
+    messages = scheduler.hot(*((k / 10, by_header(PointStamped(header=header(k)))) for k in range(1, 20)))
+    values = messages.map(lambda it: it._replace(value=it.value.header.frame_id))
+    signal = interpolate(
+        lambda a, b, ratio: a, values, lateness=0.1, gap=0.2, silence=silence, refused=refused.append
+    )
+    found = answers(scheduler, signal, 0.1, 2.0)
+
+    assert {it.value for it in found if it.is_certain} <= {str(k) for k in range(10, 20)}
+    assert {it.reason for it in refused} == {"it has no stamp"}
+    assert len(refused) == 9
+
+
+def header(tenth: int) -> Header:
+    """Return a header of a driver that learns the time after a second."""
+    sec, rest = divmod(tenth, 10) if tenth >= 10 else (0, 0)
+    return Header(stamp=Time(sec=sec, nanosec=rest * 10**8), frame_id=str(tenth))

@@ -75,3 +75,7 @@ def test_timestamp_can_be_copied_and_pickled(duplicate: Callable[[Any], Any]) ->
 
 def test_ros_time_of_nanoseconds_is_exact() -> None:
     assert stamps.time_message(1_700_000_000_123_456_789) == Time(sec=1_700_000_000, nanosec=123_456_789)
+
+
+def test_header_that_nobody_has_filled_in_has_no_stamp() -> None:
+    assert stamps.by_header(PointStamped()).nanoseconds == stamps.UNSTAMPED

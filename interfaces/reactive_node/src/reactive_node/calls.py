@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from typing import Any
 
@@ -10,28 +11,53 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.task import Future
 from reactivex import Observable, abc
-from reactivex.disposable import CompositeDisposable, Disposable
+from reactivex.disposable import CompositeDisposable, Disposable, SingleAssignmentDisposable
 
 _SERVER_POLL = 0.05  # [s]: ROS has no event for a server that appears
 _STEADY = Clock(clock_type=ClockType.STEADY_TIME)
 
 
-def server_ready(node: Node, is_ready: Callable[[], bool], scheduler: abc.SchedulerBase) -> Observable[None]:
-    """Emit while there is a server. It asks in real time, even while ROS time is simulated."""
+class Servers:
+    """Looks for the servers for which calls wait, by one timer for all calls of a node.
 
-    def subscribe(observer: abc.ObserverBase[None], _: abc.SchedulerBase | None = None) -> abc.DisposableBase:
-        def poll() -> None:
-            if is_ready():
-                observer.on_next(None)
+    It looks in real time, even while ROS time is simulated. Without a call that waits, there is no timer.
+    """
 
-        timer = node.create_timer(_SERVER_POLL, poll, clock=_STEADY)
+    def __init__(self, node: Node, scheduler: abc.SchedulerBase) -> None:
+        self._scheduler = scheduler
+        self._lock = threading.RLock()  # any thread may dispose
 
-        def end() -> None:
-            node.destroy_timer(timer)
+        def subscribe(
+            observer: abc.ObserverBase[None], _: abc.SchedulerBase | None = None
+        ) -> abc.DisposableBase:
+            timer = node.create_timer(_SERVER_POLL, lambda: observer.on_next(None), clock=_STEADY)
+            return Disposable(lambda: node.destroy_timer(timer))
 
-        return CompositeDisposable(scheduler.schedule(lambda *_: poll()), Disposable(end))
+        self._looks: Observable[None] = Observable(subscribe).share()
 
-    return Observable(subscribe)
+    def ready(self, is_ready: Callable[[], bool]) -> Observable[None]:
+        """Emit when there is a server, at once or later; all that wait for it share each look."""
+        later = self._looks.filter(lambda _: is_ready()).share()
+
+        def subscribe(
+            observer: abc.ObserverBase[None], _: abc.SchedulerBase | None = None
+        ) -> abc.DisposableBase:
+            waiting = SingleAssignmentDisposable()
+
+            def look(*_: Any) -> None:
+                if is_ready():
+                    observer.on_next(None)
+                    return
+                with self._lock:
+                    waiting.disposable = later.subscribe(observer)
+
+            def leave() -> None:
+                with self._lock:
+                    waiting.dispose()
+
+            return CompositeDisposable(self._scheduler.schedule(look), Disposable(leave))
+
+        return Observable(subscribe).take(1)
 
 
 def response(client: Client, request: Any, scheduler: abc.SchedulerBase) -> Observable[Any]:

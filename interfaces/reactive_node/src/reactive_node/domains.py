@@ -21,16 +21,16 @@ def reserved_domain() -> Iterator[int]:
                 owner.bind(f"\0reactive-node-domain-{domain}")
             except OSError:
                 continue
-            if not _has_participants(domain):
+            if not has_participants(domain):
                 yield domain
                 return
     raise RuntimeError(f"no free ROS domain on this host: {DOMAINS[0]} to {DOMAINS[-1]} are all in use")
 
 
-def _has_participants(domain: int) -> bool:
+def has_participants(domain: int) -> bool:
     """Whether a socket has one of the 250 ports of the domain (RTPS 9.6.1).
 
-    The first ports do not tell: participants keep theirs after those with lower indices have ended.
+    The first ports do not show it: participants keep theirs after those with lower indices have ended.
     """
     for port in range(7400 + 250 * domain, 7400 + 250 * (domain + 1)):
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:

@@ -19,7 +19,7 @@ class End(AsyncSubject[None]):
         return rx.defer(lambda _: rx.never() if self.is_stopped else source).take_until(self)
 
     def come(self) -> None:
-        """Tell all observers, even if some of them raise; the first of their errors is raised afterwards."""
+        """Complete all observers, even if some of them raise; the first of their errors is raised then."""
         with self.lock:
             observers, self.observers = self.observers, []
             self.on_next(None)

@@ -7,13 +7,13 @@ import threading
 import time
 from collections.abc import Callable
 from contextlib import ExitStack
-from typing import TYPE_CHECKING, Any
+from functools import cached_property
+from typing import Any
 
 import reactivex as rx
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.duration import Duration
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
-from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
@@ -23,29 +23,34 @@ from reactivex.subject import BehaviorSubject
 
 from reactive_node import calls
 from reactive_node.end import End
+from reactive_node.groups import forget_the_gone
 from reactive_node.message_reader import MessageReader
 from reactive_node.sampled_reader import BUFFER, SampledReader, keep_last
 from reactive_node.scheduler import NodeScheduler
 from reactive_node.services import Requests
 from reactive_node.shared_reader import SharedReader
-
-if TYPE_CHECKING:
-    from reactive_node.transforms import Transforms
+from reactive_node.strangers import TolerantNode
 
 _DELIVERY = 0.1  # [s], for all readers together: one of them may be dead
 
 
-class ReactiveNode(Node):
-    """A node whose topics, parameters, events, calls and transforms are observables; it publishes others."""
+class ReactiveNode(TolerantNode):
+    """A node whose topics, parameters, events and calls are observables; it publishes others."""
 
     def __init__(self, node_name: str, **options: Any) -> None:
         """Create a node; the options are those of :class:`rclpy.node.Node`."""
         super().__init__(node_name, **options)
+        forget_the_gone(self.default_callback_group)
         self._end = End()
         self._sinks = CompositeDisposable()
-        self._transforms: Transforms | None = None
         self.scheduler = NodeScheduler(self)
         """Schedules on the executor and clock of this node; for ``observable.subscribe(…, scheduler=…)``."""
+        self._servers = calls.Servers(self, self.scheduler)
+
+    @cached_property
+    def steady_scheduler(self) -> NodeScheduler:
+        """Schedules on the executor of this node by the steady clock, even while ROS time is simulated."""
+        return NodeScheduler(self, steady=True)
 
     def create_observable(
         self,
@@ -68,7 +73,8 @@ class ReactiveNode(Node):
         kept. A reader of its own might get fewer: none whose lifespan has passed, none of a publisher that
         has gone, no more than each publisher keeps. With BEST_AVAILABLE durability it gets none.
 
-        :param timestamped: whether items are :class:`Timestamp` s of a message and its DDS source time.
+        :param timestamped: whether items are :class:`Timestamp` s of a message and its DDS source time, a
+            time of day.
         :param item: turns each message (or Timestamp) into the item, once for all observers and at less cost
             than the operator ``map``; ``None`` drops it.
         :param every_publisher: whether a transient-local topic also delivers the messages of volatile
@@ -120,13 +126,18 @@ class ReactiveNode(Node):
         topic: str,
         ticks: float | Observable[Any],
         qos_profile: QoSProfile | int = 10,
+        *,
+        on_full: Callable[[], Any] = lambda: None,
         **options: Any,
     ) -> Observable[Any]:
         """Return at each tick all messages that have come since the tick before; the reader keeps 1000.
 
         All else, errors included, is as of :meth:`create_sampled_observable`.
+
+        :param on_full: is called at each tick that has read 1000 messages: more may have come, and are lost.
         """
-        return self._read_at(ticks, msg_type, topic, keep_last(qos_profile, BUFFER), **options)
+        qos = keep_last(qos_profile, BUFFER)
+        return self._read_at(ticks, msg_type, topic, qos, on_full=on_full, **options)
 
     def _read_at(
         self,
@@ -137,6 +148,7 @@ class ReactiveNode(Node):
         *,
         timestamped: bool = False,
         item: Callable[[Any], Any] | None = None,
+        on_full: Callable[[], Any] = lambda: None,
         **options: Any,
     ) -> Observable[Any]:
         if not isinstance(ticks, Observable):
@@ -156,6 +168,7 @@ class ReactiveNode(Node):
             timestamped=timestamped,
             item=item,
             most=qos.depth,
+            on_full=on_full,
         )
         return Observable(reader.subscribe)
 
@@ -208,25 +221,11 @@ class ReactiveNode(Node):
             callbacks: dict[str, Any] = {event: callback}
             events = SubscriptionEventCallbacks(**callbacks)
             return self.create_subscription(
-                msg_type, topic, lambda _: None, qos_profile, event_callbacks=events
+                msg_type, topic, lambda _: None, qos_profile, event_callbacks=events, raw=True
             )
 
         reader = SharedReader(self, create_reader, scheduler=self.scheduler, end=self._end)
         return Observable(reader.subscribe)
-
-    def create_transform_observable(self, target_frame: str, source_frame: str) -> Observable[Any]:
-        """Return the transforms that turn coordinates in the source frame into those in the target frame.
-
-        Items are ``geometry_msgs/msg/TransformStamped``: the latest one as soon as it is known, then each
-        new one, with the latest time for which all transforms in between are known. All observers share one
-        buffer and the readers of ``/tf`` and ``/tf_static``. An invalid name of a frame is an error of the
-        observable. It completes when the node ends. Only this needs the package ``tf2_ros``.
-        """
-        if self._transforms is None:
-            from reactive_node.transforms import Transforms  # here: tf2 is optional
-
-            self._transforms = Transforms(self.create_observable, self.get_clock())
-        return self._end.limit(self._transforms.between(target_frame, source_frame))
 
     def create_call(
         self, srv_type: Any, srv_name: str, *, timeout: float | None = None, **options: Any
@@ -240,12 +239,12 @@ class ReactiveNode(Node):
         :param options: further arguments of :meth:`rclpy.node.Node.create_client`.
         """
         client = self.create_client(srv_type, srv_name, **options)
-        ready = calls.server_ready(self, client.service_is_ready, self.scheduler)
+        ready = self._servers.ready(client.service_is_ready)
         late = rx.throw(TimeoutError(f"no response of {srv_name} within {timeout} s"))
 
         def call(request: Any) -> Observable[Any]:
             response = calls.response(client, request, self.scheduler)
-            result = self._end.limit(ready.take(1).flat_map(lambda _: response))
+            result = self._end.limit(ready.flat_map(lambda _: response))
             return result if timeout is None else result.timeout(timeout, late, self.scheduler)
 
         return call
@@ -269,11 +268,11 @@ class ReactiveNode(Node):
 
         client = ActionClient(self, action_type, action_name, **options)
         self._sinks.add(Disposable(client.destroy))
-        ready = calls.server_ready(self, client.server_is_ready, self.scheduler)
+        ready = self._servers.ready(client.server_is_ready)
 
         def act(goal: Any) -> Observable[Any]:
             execution = actions.execution(client, action_name, goal, self.scheduler)
-            return self._end.limit(ready.take(1).flat_map(lambda _: execution))
+            return self._end.limit(ready.flat_map(lambda _: execution))
 
         return act
 
@@ -395,6 +394,8 @@ class ReactiveNode(Node):
             stack.callback(super().destroy_node)
             if not self._end.is_stopped:
                 stack.callback(self.scheduler.dispose)
+                if "steady_scheduler" in vars(self):
+                    stack.callback(self.steady_scheduler.dispose)
                 stack.callback(self._sinks.dispose)
                 for sink in reversed(self._sinks.to_list()):  # each, even if another one raises
                     stack.callback(sink.dispose)

@@ -22,8 +22,8 @@ from reactive_node.stamps import Timestamp
 BUFFER = 1000  # messages that a reader keeps for a tick that reads all of them
 
 
-class Unattended(CallbackGroup):
-    """Keeps its entities out of the wait set of an executor."""
+class Polled(CallbackGroup):
+    """The group of a reader that is read at ticks: an executor would wake for each message."""
 
     def can_execute(self, entity: Any) -> bool:
         return False
@@ -50,6 +50,7 @@ def sampled_messages(
     *,
     timestamped: bool = False,
     most: int = 1,
+    on_full: Callable[[], Any] = lambda: None,
 ) -> Observable[Any]:
     """Return the messages that a reader holds at each tick, those that have come since the tick before.
 
@@ -57,6 +58,7 @@ def sampled_messages(
         ``event_callbacks``.
     :param timestamped: whether items are :class:`Timestamp` s instead of messages.
     :param most: as many messages as a tick reads.
+    :param on_full: is called at each tick that has read that many.
     """
 
     def subscribe(
@@ -64,7 +66,7 @@ def sampled_messages(
     ) -> abc.DisposableBase:
         # No QoS events: with Fast DDS, unread messages would end each wait for them at once.
         events = SubscriptionEventCallbacks(use_default_callbacks=False)
-        subscription = create(callback_group=Unattended(), event_callbacks=events)
+        subscription = create(callback_group=Polled(), event_callbacks=events)
         lock = threading.Lock()
         is_live = True
 
@@ -91,6 +93,7 @@ def sampled_messages(
                 if timestamped:  # without Timestamp(), which takes a datetime: it has no nanoseconds
                     message = tuple.__new__(Timestamp, (message, info["source_timestamp"]))
                 observer.on_next(message)
+            on_full()
 
         def destroy() -> None:
             nonlocal is_live
@@ -116,10 +119,13 @@ class SampledReader(SharedReader):
         timestamped: bool,
         item: Callable[[Any], Any] | None,
         most: int,
+        on_full: Callable[[], Any],
     ) -> None:
         """For the parameters see :func:`sampled_messages` and :class:`SharedReader`."""
         super().__init__(node, create, scheduler=scheduler, end=end, item=item)
-        self._messages = sampled_messages(node, create, ticks, timestamped=timestamped, most=most)
+        self._messages = sampled_messages(
+            node, create, ticks, timestamped=timestamped, most=most, on_full=on_full
+        )
 
     def _begin(self, scheduler: abc.SchedulerBase | None) -> None:
         reading = self._reading = SingleAssignmentDisposable()  # the ticks may end while it begins

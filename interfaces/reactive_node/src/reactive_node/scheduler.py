@@ -27,6 +27,7 @@ from reactive_node import stamps
 _TState = TypeVar("_TState")
 _CATCH_UP = 50_000_000  # [ns]: a periodic action that is less late keeps its rate
 _NOT_HEARD = Time(clock_type=ClockType.ROS_TIME)  # simulated time before the first message on /clock
+_LONGEST_SLEEP = 86_400 * 10**9  # [ns]: ROS adds it to the time of day, in 64 bits
 _FEW = 64  # cancelled items in the heap that are not worth a clean-up
 
 
@@ -61,9 +62,11 @@ class NodeScheduler(PeriodicScheduler):
 
     _before_jump: int  # [ns]
 
-    def __init__(self, node: Node) -> None:
+    def __init__(self, node: Node, *, steady: bool = False) -> None:
+        """:param steady: whether its time follows the steady clock even while ROS time is simulated."""
         super().__init__()
         self._node = node
+        self._is_steady = steady
         self._lock = threading.RLock()
         self._heap: list[tuple[int, int, _Item]] = []  # due time [ns], order of scheduling, item
         self._cancelled = 0  # number of cancelled items in the heap
@@ -74,7 +77,8 @@ class NodeScheduler(PeriodicScheduler):
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._use_clock(self._time_is_simulated())
         if not self._simulated:
-            self._offset = node.get_clock().now().nanoseconds - self._read()
+            begin = time.time_ns() if steady else node.get_clock().now().nanoseconds
+            self._offset = begin - self._read()
         self._jumps = node.get_clock().create_jump_callback(
             JumpThreshold(min_forward=Duration(nanoseconds=1), min_backward=Duration(nanoseconds=-1)),
             pre_callback=self._time_will_jump,
@@ -87,8 +91,19 @@ class NodeScheduler(PeriodicScheduler):
     def now(self) -> datetime:
         return stamps.from_nanoseconds(self._read())
 
+    @property
+    def is_simulated(self) -> bool:
+        """Whether ROS time is simulated; otherwise it is the time of day."""
+        clock = self._node.get_clock()
+        return isinstance(clock, ROSClock) and bool(clock.ros_time_is_active)
+
+    @property
+    def kept(self) -> int:
+        """How many actions it keeps: those that wait, and cancelled ones until the next clean-up."""
+        return len(self._heap)
+
     def time_of_stamps(self) -> int:
-        """Return the time by the node's clock, by which stamps count [ns]; it may be set."""
+        """Return the ROS time, by which the stamps of headers count [ns]; it may be set."""
         return int(self._node.get_clock().now().nanoseconds)
 
     def schedule(
@@ -210,7 +225,7 @@ class NodeScheduler(PeriodicScheduler):
         if self._armed_for is not None and self._armed_for <= due:
             return  # at worst it fires early and is armed again
         self._armed_for = due
-        self._timer.timer_period_ns = max(0, due - self._read())
+        self._timer.timer_period_ns = min(max(0, due - self._read()), _LONGEST_SLEEP)
         self._timer.reset()  # wakes a waiting executor
 
     # The clock
@@ -226,8 +241,7 @@ class NodeScheduler(PeriodicScheduler):
         return now + self._offset
 
     def _time_is_simulated(self) -> bool:
-        clock = self._node.get_clock()
-        return isinstance(clock, ROSClock) and bool(clock.ros_time_is_active)
+        return self.is_simulated and not self._is_steady
 
     def _time_will_jump(self) -> None:
         self._before_jump = self._read()

@@ -1,7 +1,10 @@
 """Times of messages as ``datetime``.
 
-DDS source times and stamps count by the time of day, even while ROS time is simulated. That clock may be set,
-and may differ between hosts. Where safety depends on an age, take only the age at arrival from it.
+There are three clocks. DDS source times count by the time of day, even while ROS time is simulated. The
+stamps of headers count by ROS time, which is the time of day or that of a simulation;
+:func:`reactive_node.ros_time.in_ros_time` turns the one into the other. Both may be set, and may differ
+between hosts. The steady clock of a host is never set: where safety depends on an age, take only the age at
+arrival from the others.
 """
 
 from __future__ import annotations
@@ -13,6 +16,7 @@ from typing import Any, Generic, NamedTuple, TypeVar
 from builtin_interfaces.msg import Time
 
 __all__ = [
+    "UNSTAMPED",
     "Timestamp",
     "stamped",
     "time_message",
@@ -24,6 +28,8 @@ __all__ = [
     "to_nanoseconds",
 ]
 
+UNSTAMPED = -1
+"""In the place of a stamp that is 0 [ns]: a simulation, and virtual time, may begin at 0."""
 _T = TypeVar("_T")
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 _MICROSECOND = timedelta(microseconds=1)
@@ -64,9 +70,9 @@ def stamped(value: _T, nanoseconds: int) -> Timestamp[_T]:
 
 
 def by_header(message: Any) -> Timestamp[Any]:
-    """Return a message with the time in its header."""
+    """Return a message with the stamp of its header, a ROS time; :data:`UNSTAMPED` if nobody has set it."""
     stamp = message.header.stamp
-    return stamped(message, stamp.sec * 10**9 + stamp.nanosec)
+    return stamped(message, stamp.sec * 10**9 + stamp.nanosec or UNSTAMPED)
 
 
 def now() -> datetime:

@@ -19,25 +19,10 @@ from rclpy.subscription import Subscription
 from rclpy.timer import Timer
 from rclpy.waitable import Waitable
 
+from reactive_node import request_memory
+
 CreateTask = Callable[..., Any]
 """Runs a coroutine by the executor."""
-
-
-class Turn:
-    """The future that ends a turn of EventsExecutor, each turn the same: one of rclpy's would cost more."""
-
-    def __init__(self) -> None:
-        self._end: Callable[[Any], None] = lambda _: None
-
-    def add_done_callback(self, end: Callable[[Any], None]) -> None:
-        """Keep what ends this turn, or the next one if this has ended."""
-        self._end = end
-
-    def remove_done_callback(self, end: Callable[[Any], None]) -> None:
-        """Keep it: between two turns, there is one to end as well."""
-
-    def end(self) -> None:
-        self._end(self)
 
 
 class _NoNode:
@@ -184,12 +169,20 @@ class _Timer:
 class _Server:
     def __init__(self, service: Service, create_task: CreateTask) -> None:
         self.handle = service.handle
-        self.srv_type = service.srv_type
         self._service = service
+        self._is_of_parameters = service.srv_type.__module__.startswith("rcl_interfaces.")
         self._create_task = create_task
         self.callback = self._call  # an attribute of the object: EventsExecutor holds no reference to it
 
+    @property
+    def srv_type(self) -> Any:
+        """The type of the service: EventsExecutor asks for it just before it takes requests."""
+        if self._is_of_parameters:
+            request_memory.limit()
+        return self._service.srv_type
+
     def _call(self, request: Any, response: Any) -> Any:
+        request_memory.free()
         return self._service.callback(request, response) if _lives(self._service) else None
 
     def send_response(self, response: Any, header: Any) -> None:
@@ -197,6 +190,8 @@ class _Server:
             self._create_task(self._send_later(response, header))
         elif response is not None or _lives(self._service):
             self._service.send_response(response, header)
+        if self._is_of_parameters:  # the next request may be on its way
+            request_memory.limit()
 
     async def _send_later(self, response: Any, header: Any) -> None:
         self._service.send_response(await response, header)
@@ -208,7 +203,7 @@ class _Event:
     def __init__(self, handler: EventHandler, create_task: CreateTask) -> None:
         self._handler = handler
         self._create_task = create_task
-        self._changes: list[str] | None = None  # the names of the numbers that tell of a change
+        self._changes: list[str] | None = None  # the names of the numbers that count changes
 
     def take(self) -> None:
         try:
@@ -233,6 +228,7 @@ class _Event:
 class _Waitable:
     def __init__(self, waitable: Waitable, create_task: CreateTask) -> None:
         self._waitable = waitable
+        self._create_task = create_task
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._waitable, name)
@@ -246,4 +242,4 @@ class _Waitable:
 
     async def execute(self, taken_data: Any) -> None:
         if taken_data is not None:
-            await self._waitable.execute(taken_data)
+            self._create_task(self._waitable.execute(taken_data))

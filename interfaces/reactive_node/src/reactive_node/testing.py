@@ -32,7 +32,7 @@ _T = TypeVar("_T")
 MakeNode = Callable[..., Any]
 """The fixture ``make_node``: ``(name="node", kind=ReactiveNode, **options) -> node``."""
 SpinUntil = Callable[..., None]
-"""The fixture ``spin_until``: ``(condition, seconds=10.0) -> None``."""
+"""The fixture ``spin_until``: ``(condition, seconds=60.0) -> None``."""
 SpinFor = Callable[[float], None]
 """The fixture ``spin_for``: ``(seconds) -> None``."""
 
@@ -55,7 +55,7 @@ class Recording(Generic[_T]):
 
 
 class VirtualTime(TestScheduler):
-    """RxPY's ``TestScheduler`` in seconds: time begins at 0 and passes only while it is told to.
+    """RxPY's ``TestScheduler`` in seconds: time begins at 0 and passes only while it is advanced.
 
     A recipe under test is subscribed with :meth:`record`, its inputs are made with :meth:`hot`.
     """
@@ -161,7 +161,7 @@ def make_node(context: Context, executor: Executor) -> Iterator[MakeNode]:
 def spin_until(executor: Executor) -> SpinUntil:
     """Spins the test's executor until a condition is true; fails after ``seconds``."""
 
-    def spin(condition: Callable[[], object], seconds: float = 10.0) -> None:
+    def spin(condition: Callable[[], object], seconds: float = 60.0) -> None:
         deadline = time.monotonic() + seconds
         while not condition():
             assert time.monotonic() < deadline, f"the condition was not true within {seconds} s"

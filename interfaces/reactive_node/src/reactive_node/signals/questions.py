@@ -84,6 +84,6 @@ class Events(Source):
         return self.is_complete and not self._asked
 
     def restart(self, now: int) -> None:
-        """Ask from an earlier time on [ns]: the clock was set back."""
+        """Ask from another time on [ns]: the clock was set."""
         super().restart(now)
         self._asked.clear()

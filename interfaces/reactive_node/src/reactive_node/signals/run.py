@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from typing import Any, Protocol
 
@@ -13,6 +14,7 @@ from reactive_node.scheduler import NodeScheduler
 from reactive_node.signals.source import SECOND, Memory, Source
 
 _SET = SECOND  # a clock that jumps by more was set
+_FASTEST = 20  # times as fast as the steady clock: a simulation that gains more was set
 _SHORTEST = 1e-6  # s, the resolution of Rx's clocks
 
 
@@ -39,7 +41,7 @@ class Questions(Protocol):
         """Return whether nothing will be asked any more; all sources may be complete."""
 
     def restart(self, now: int, /) -> None:
-        """Ask from an earlier time on [ns]: the clock was set back."""
+        """Ask from a time on [ns]: the clock was set."""
 
 
 class Run:
@@ -59,20 +61,24 @@ class Run:
         self._questions: Questions
         self._timer = SerialDisposable()
         self._armed_for: int | None = None  # [ns]
-        self._latest = 0  # [ns]
-        self._ahead: int | None = None  # the clock of the stamps, of that of the scheduler [ns]
+        self._latest = 0  # the latest time by the clock of the stamps [ns]
+        self._before: tuple[int, int] | None = None  # by that clock, and by the steady one [ns]
 
     def now(self) -> int:
         """Return the present time by the clock of the stamps [ns]; begin again if it was set."""
         scheduler = self._scheduler
-        now = steady = stamps.to_nanoseconds(scheduler.now)
         if isinstance(scheduler, NodeScheduler):
-            now = scheduler.time_of_stamps()
-        ahead, self._ahead = self._ahead, now - steady
-        if now < self._latest - _SET or (ahead is not None and abs(self._ahead - ahead) > _SET):
+            now, steady = scheduler.time_of_stamps(), time.monotonic_ns()
+            slowest, fastest = (0, _FASTEST) if scheduler.is_simulated else (1, 1)
+        else:
+            now = steady = stamps.to_nanoseconds(scheduler.now)
+            slowest = fastest = 1
+        latest, (before, steady_before) = self._latest, self._before or (now, steady)
+        gained, passed = now - before, steady - steady_before
+        if now < latest - _SET or not slowest * passed - _SET <= gained <= fastest * passed + _SET:
             self._restart(now)
-            self._latest = now
-        self._latest = max(self._latest, now)
+            latest = now
+        self._latest, self._before = max(latest, now), (now, steady)
         return now
 
     def node(self, signal: Any) -> Any:
@@ -82,7 +88,7 @@ class Run:
         return self._nodes[signal]
 
     def add(self, memory: Memory) -> None:
-        """Feed a source, and tell a memory what to forget."""
+        """Feed a source, and let a memory forget."""
         self._memories.append(memory)
         if isinstance(memory, Source):
             self._sources.append(memory)
@@ -132,10 +138,10 @@ class Run:
 
     def _arm(self, now: int) -> None:
         """Look again when the next answer is due at the latest: a source that is silent does not call."""
-        time = self._questions.next()
-        if time is None:
+        asked = self._questions.next()
+        if asked is None:
             return
-        due = time + self._longest_wait()
+        due = asked + self._longest_wait()
         if self._armed_for is not None and self._armed_for <= due:
             return  # it looks early, and then is armed again
         self._armed_for = due

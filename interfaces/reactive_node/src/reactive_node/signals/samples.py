@@ -161,6 +161,10 @@ class _Held(Source):
         self._values: list[Any] = []
         run.add(self)
 
+    def __len__(self) -> int:
+        """How many samples it keeps."""
+        return len(self._times)
+
     def take(self, time: int, value: Any) -> None:
         if self._times and time <= self._times[-1]:
             self.refuse(Refused(time, value, "another sample has the same time"))

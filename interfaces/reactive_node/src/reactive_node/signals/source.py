@@ -9,7 +9,7 @@ from typing import Any
 from reactivex import Observable
 
 from reactive_node.signals.answers import Refused
-from reactive_node.stamps import Timestamp
+from reactive_node.stamps import UNSTAMPED, Timestamp
 
 SECOND = 1_000_000_000  # ns
 _FAR = 1 << 62  # ns, more than any time
@@ -37,7 +37,7 @@ class Memory:
         """Drop what only times before this one need [ns]."""
 
     def restart(self, now: int) -> None:
-        """Begin at an earlier time [ns]: the clock was set back."""
+        """Begin at another time [ns]: the clock was set."""
 
 
 class Source(Memory):
@@ -78,7 +78,9 @@ class Source(Memory):
         now = self._now()
         self.settle(now)
         self._arrivals += 1
-        if time > now + self.lateness:
+        if time == UNSTAMPED:
+            self.refuse(Refused(time, value, "it has no stamp"))
+        elif time > now + self.lateness:
             self.refuse(Refused(time, value, f"it is {(time - now) / SECOND:.3f} s ahead of the clock"))
         else:
             is_newest = self.newest is None or time > self.newest.nanoseconds
@@ -112,7 +114,7 @@ class Source(Memory):
             self._refused(sample)
 
     def restart(self, now: int) -> None:
-        """Begin at an earlier time [ns]: the clock was set back."""
+        """Begin at another time [ns]: the clock was set."""
         self.settled = now - self.lateness
         if self.newest is not None:
             self.newest = self.newest._replace(nanoseconds=min(self.newest.nanoseconds, self.settled))
