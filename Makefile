@@ -9,6 +9,7 @@ WEB ?=
 # two hosts, and compares costs.
 LEFT_OUT := tests/operator/page tests/security/attacks tests/simulation/test_attacks.py tests/system/test_two_hosts.py tests/benchmarks/test_ratios.py
 TESTS ?= tests interfaces/reactive_node $(LEFT_OUT:%=--ignore=%)
+ALL_TESTS := tests interfaces/reactive_node deploy/ground deploy/tools
 MINUTES ?= 5
 SEED ?=
 HOURS ?= 1
@@ -67,7 +68,7 @@ export ROS_SECURITY_STRATEGY := Enforce
 export ROS_SECURITY_KEYSTORE := $(or $(ROS_SECURITY_KEYSTORE),$(CURDIR)/.keystore)
 endif
 
-.PHONY: help setup tables run start unit stop status logs record terminal fleet chaos simulate replay test mutants check bench new-service keystore
+.PHONY: help setup tables run start unit stop status logs record terminal fleet chaos simulate replay test test-all mutants check bench new-service keystore
 
 help:
 	@echo "make run      start the system, show it in this terminal, stop it with Ctrl-C"
@@ -87,15 +88,16 @@ help:
 	@echo "make chaos    break a system on purpose and check its promises  (MINUTES=5 SEED= CHAOS=--help for more)"
 	@echo "make simulate the same in virtual time, hours in minutes  (HOURS=1 SEED= SCHEDULE=file SIMULATE=--help for more)"
 	@echo "make replay   feed a record through these services and show what differs  (RECORD= REPLAY=--help for more)"
-	@echo "make test     test the arm                        (TESTS=tests/component for a part, TESTS=deploy/runtime"
-	@echo "                                                  for its rclpy, TESTS=tests/operator/page for its page)"
+	@echo "make test     test the arm                        (TESTS=tests/component for a part, TESTS=deploy/ground"
+	@echo "                                                  for the grounds of rclpy, TESTS=tests/operator/page for its page)"
+	@echo "make test-all run all tests, for many minutes"
 	@echo "make mutants  change the safety path in every small way: do the tests notice?  (MODULES= for a part)"
 	@echo "make bench    compare the costs with those of the alternatives  (BENCH=\"--rounds 5\", minutes each)"
 	@echo "make tables   write the tables and the graph of the READMEs from the code"
 	@echo "make new-service  write a new guard, its test and its topic  (NAME=torque_guard)"
 	@echo "make check    ruff, mypy, import rules, shellcheck, yamllint"
-	@echo "make setup    only set up .venv                   (PYTHON= chooses the interpreter, 3.11 to 3.13)"
-	@echo "All of them run on ROS 2's own rclpy from PyPI, or on a sourced ROS 2. RUNTIME=embedded takes our lighter one."
+	@echo "make setup    only set up .venv                   (PYTHON= chooses the interpreter, 3.11 to 3.14)"
+	@echo "All of them run on ROS 2's own rclpy from PyPI, or on a sourced ROS 2. RUNTIME=cyclonedds puts it on Cyclone DDS."
 
 setup:
 	@exec $(HOLD) deploy/commands/python.sh deploy.commands.setup "$$PYTHON"
@@ -109,7 +111,7 @@ terminal status logs record:
 
 fleet:
 	@test -e $(STAMP) || { echo ".venv is not set up: make setup" >&2; exit 1; }
-	@RUNTIME=embedded exec $(HOLD) $(PY) -m deploy.commands.fleet $(ARMS)
+	@RUNTIME=cyclonedds exec $(HOLD) $(PY) -m deploy.commands.fleet $(ARMS)
 
 keystore: export ROS_SECURITY_KEYSTORE := $(or $(ROS_SECURITY_KEYSTORE),$(CURDIR)/.keystore)
 keystore: setup
@@ -122,36 +124,35 @@ chaos: setup
 	@exec $(HOLD) $(PY) -m tests.chaos --minutes $(MINUTES) $(if $(SEED),--seed $(SEED)) $(CHAOS)
 
 simulate: setup
-	@RUNTIME=embedded exec $(HOLD) $(PY) -m tests.simulation --hours $(HOURS) $(if $(SEED),--seed $(SEED)) $(if $(SCHEDULE),--schedule "$(SCHEDULE)") $(SIMULATE)
+	@RUNTIME= exec $(HOLD) $(PY) -m tests.simulation --hours $(HOURS) $(if $(SEED),--seed $(SEED)) $(if $(SCHEDULE),--schedule "$(SCHEDULE)") $(SIMULATE)
 
 replay: setup
-	@RUNTIME=embedded exec $(HOLD) $(PY) -m tests.replay $(if $(RECORD),"$(RECORD)") $(REPLAY)
+	@RUNTIME= exec $(HOLD) $(PY) -m tests.replay $(if $(RECORD),"$(RECORD)") $(REPLAY)
 
 test: setup
 	@$(PY) -m tests $(TESTS)
 
+test-all: setup
+	@$(PY) -m tests $(ALL_TESTS)
+
 mutants: setup
-	@RUNTIME=embedded exec $(HOLD) $(PY) -m tests.mutants $(MODULES)
+	@RUNTIME= exec $(HOLD) $(PY) -m tests.mutants $(MODULES)
 
 bench: setup
 	@exec $(HOLD) $(PY) -m tests.benchmarks $(BENCH)
 
 tables: setup
-	@RUNTIME=embedded $(PY) -m deploy.commands.tables
+	@$(PY) -m deploy.commands.tables
 
 new-service: export NAME := $(NAME)
 new-service: setup
-	@RUNTIME=embedded $(PY) -m deploy.commands.new_service "$$NAME"
+	@$(PY) -m deploy.commands.new_service "$$NAME"
 
 check: setup
 	@$(PY) -m ruff check .
 	@$(PY) -m ruff format --check --quiet .
-	@PYTHONPATH=deploy/runtime/src $(PY) -m rosidl_runtime_embedded.stubs --output deploy/runtime/build/stubs
+	@$(PY) -m deploy.commands.stubs .mypy_cache/stubs
 	@$(PY) -m mypy
-	@$(PY) -m mypy --config-file deploy/mypy_ros.ini
-	@$(PY) -m mypy --config-file deploy/runtime/pyproject.toml
-	@$(PY) -m mypy --config-file tests/simulation_kit/pyproject.toml
-	@$(PY) -m mypy --config-file deploy/tools/pyproject.toml
-	@PYTHONPATH="interfaces/reactive_node/src:deploy/ground/src:deploy/runtime/src:tests/simulation_kit/src:deploy/tools/src:$$PYTHONPATH" .venv/bin/lint-imports --no-logo --no-cache
+	@PYTHONPATH="interfaces/reactive_node/src:deploy/ground/src:tests/simulation_kit/src:deploy/tools/src:$$PYTHONPATH" .venv/bin/lint-imports --no-logo --no-cache
 	@.venv/bin/shellcheck deploy/commands/python.sh deploy/commands/venv.sh .ci/run .ci/run-on-ros
 	@$(PY) -m yamllint --strict deploy

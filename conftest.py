@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import importlib
 import os
 import signal
 import time
@@ -13,10 +14,10 @@ from pathlib import Path
 import pytest
 from hypothesis import Phase, settings
 
-from tests import order
-from tests.runtimes import left_out_here
+from tests import order, tiers
+from tests.runtimes import left_out_here, needs_virtual_time
 
-collect_ignore = [*left_out_here()]  # `make test` runs these with RUNTIME=embedded
+collect_ignore: list[str] = []
 
 settings.register_profile("reactive-arm", deadline=None)  # a busy machine is no defect
 # For `make mutants`: whether a test fails, not the smallest example; the same examples each time.
@@ -25,10 +26,17 @@ settings.load_profile("reactive-arm")
 
 MARK = "REACTIVE_ARM_TESTS"
 """An environment variable that all processes of a test session inherit."""
+RESOURCE_TRACKER = "multiprocessing.resource_tracker"
+"""A process of this name ends with the one that has started it, perhaps this one."""
 
 
-def pytest_configure() -> None:
-    """Set what the tests' processes inherit: the mark, the middleware's settings, default signal handling."""
+def pytest_configure(config: pytest.Config) -> None:
+    """Choose the ground of rclpy, which this process keeps; set the mark, the middleware and the signals."""
+    simulated = needs_virtual_time(config.args)
+    if simulated:
+        register(config, "rclpy_simulation.testing")  # before rclpy
+    register(config, "reactive_node.testing")
+    collect_ignore[:] = left_out_here(simulated=simulated)
     os.environ[MARK] = str(uuid.uuid4())
     os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
     if "FASTDDS_DEFAULT_PROFILES_FILE" not in os.environ:  # ROS 2 Kilted warns of the older name
@@ -37,6 +45,11 @@ def pytest_configure() -> None:
     signal.signal(signal.SIGHUP, signal.SIG_DFL)  # nohup ignores it
     signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs ignore it
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # fixtures clean up
+
+
+def register(config: pytest.Config, name: str) -> None:
+    """Register a plugin that a conftest.py may have imported already."""
+    config.pluginmanager.register(importlib.import_module(name), name)
 
 
 def without_shared_memory() -> dict[str, str]:
@@ -67,7 +80,10 @@ def pytest_collection() -> Generator[None, object, object]:
         gc.enable()
 
 
+@pytest.hookimpl(tryfirst=True)  # before `-m` selects
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    for item in items:
+        item.add_marker(tiers.tier(item.path, getattr(item, "fixturenames", ())))
     items.sort(key=lambda item: order.place(item.nodeid))
 
 
@@ -89,8 +105,10 @@ def _started_processes() -> dict[int, str]:
     for entry in Path("/proc").iterdir():
         if entry.name.isdigit() and int(entry.name) != os.getpid():
             try:
-                if mark in (entry / "environ").read_bytes().split(b"\0"):
-                    found[int(entry.name)] = (entry / "cmdline").read_bytes().replace(b"\0", b" ").decode()
+                command = (entry / "cmdline").read_bytes().replace(b"\0", b" ").decode(errors="replace")
+                is_ours = mark in (entry / "environ").read_bytes().split(b"\0")
+                if is_ours and RESOURCE_TRACKER not in command:
+                    found[int(entry.name)] = command
             except OSError:
                 continue
     return found

@@ -27,7 +27,7 @@ from reactive_node import stamps
 try:
     from tf2_msgs.msg import TFMessage
 except ModuleNotFoundError:  # ROS 2's wheels on PyPI do not have it
-    TFMessage = None  # type: ignore[assignment,misc]
+    TFMessage = None
 
 TURN_ON, TURN_OFF = "turn_on", "turn_off"
 ON, OFF = "on", "off"

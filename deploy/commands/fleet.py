@@ -1,8 +1,8 @@
 """`make fleet`: one process watches many arms, and shows a line for each.
 
 It shows the arms of this host that run now, and those that the user names for other hosts: `/arm1` in the
-ROS domain of this shell, `/arm1=5` in domain 5. It runs on the embedded rclpy, which sees arms of both, or on
-that of a sourced ROS 2. With SECURE=yes, it shows the arms that have keys, by the enclave /fleet of their
+ROS domain of this shell, `/arm1=5` in domain 5. It runs on Cyclone DDS, which sees arms of both, or on
+a sourced ROS 2. With SECURE=yes, it shows the arms that have keys, by the enclave /fleet of their
 keystores, else those without.
 """
 
@@ -107,7 +107,7 @@ def _hidden() -> str:
 def _places_of(name: str) -> list[Place]:
     """Return where an arm of another host may be heard.
 
-    On the embedded rclpy without keys it has a tag, else none.
+    On Cyclone DDS without keys it has a tag, else none.
     """
     namespace, _, domain = name.partition("=")
     domain = domain or os.environ.get("ROS_DOMAIN_ID") or "0"

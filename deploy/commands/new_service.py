@@ -175,5 +175,4 @@ def _all_or_nothing(changes: Mapping[Path, str]) -> Iterator[list[str]]:
 
 
 if __name__ == "__main__":
-    os.environ["RUNTIME"] = "embedded"  # it has the types of all topics
     main()

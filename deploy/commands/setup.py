@@ -1,7 +1,7 @@
-"""Brings .venv up to date: what the system and its tests need and, without a sourced ROS 2, both runtimes.
+"""Brings .venv up to date: what the system and its tests need and, without a sourced ROS 2, its rclpy.
 
-ROS 2's own rclpy is installed from PyPI. The embedded rclpy stays in the checkout: where the environment has
-RUNTIME=embedded, Python finds it first, with all its message packages.
+ROS 2's own rclpy is installed from PyPI. Where the environment has RUNTIME=cyclonedds, it stands on the
+ground of Cyclone DDS (deploy/ground).
 
 It runs on the bare interpreter, before anything is installed. A stamp in .venv records its sources. Where the
 right stamp is missing (older requirements, another interpreter, ROS 2 sourced since, an interrupted set-up),
@@ -29,7 +29,7 @@ from pathlib import Path
 from types import FrameType
 
 from deploy.supervision.processes import ROOT, run_directory, using
-from deploy.supervision.rclpy_choice import RUNTIME, sourced_rclpy
+from deploy.supervision.rclpy_choice import CYCLONEDDS, GROUND, RUNTIME, sourced_rclpy
 
 VENV = ROOT / ".venv"
 PYTHON = VENV / "bin" / "python"
@@ -38,11 +38,16 @@ LOG = VENV / "setup.log"
 REQUIREMENTS = ROOT / "deploy" / "requirements"
 _OPTIONS = ("--require-hashes", "--no-deps", "--no-input", "--progress-bar=off")
 PIP = [str(PYTHON), "-m", "pip", "install", *_OPTIONS]
-SOURCES = [ROOT / "interfaces" / "reactive_node" / "src", ROOT / "deploy" / "tools" / "src"]
+SOURCES = [
+    ROOT / "interfaces" / "reactive_node" / "src",
+    ROOT / "deploy" / "ground" / "src",
+    ROOT / "tests" / "simulation_kit" / "src",
+    ROOT / "deploy" / "tools" / "src",
+]
 """Packages of this checkout that Python finds after those of an installed ROS 2."""
-EMBEDDED = [ROOT / "deploy" / "runtime" / "src", ROOT / "tests" / "simulation_kit" / "src"]
-"""Packages that Python finds first if RUNTIME=embedded."""
 FAST_DDS = "rmw_fastrtps_cpp"
+CYCLONEDDS_WHEELS = (3, 13)
+"""The last Python for which PyPI has wheels of Cyclone DDS."""
 SCRIPTS = {
     "supervisord": "-m supervisor.supervisord",
     "supervisorctl": "-m supervisor.supervisorctl",
@@ -89,26 +94,28 @@ def main() -> int:
 def check_runtime(environment: Mapping[str, str], ros: str) -> None:
     """Raise SetupError if `ros`, the rclpy of a sourced ROS 2, rules out the wanted runtime."""
     runtime = environment.get(RUNTIME, "")
-    if runtime not in ("", "embedded"):
-        raise SetupError(f"RUNTIME={runtime}: it is empty for ROS 2's own rclpy, or embedded")
+    if runtime not in ("", CYCLONEDDS):
+        raise SetupError(f"RUNTIME={runtime}: it is empty for the middleware of ROS 2, or {CYCLONEDDS}")
     if runtime and ros:
-        raise SetupError(f"RUNTIME=embedded: ROS 2 is sourced, and its rclpy wins ({ros}); use another shell")
-    if not runtime and not ros and not has_wheels():
+        raise SetupError(
+            f"RUNTIME={runtime}: ROS 2 is sourced, and its rclpy wins ({ros}); use another shell"
+        )
+    if not ros and not has_wheels():
         raise SetupError(
             f"PyPI has ROS 2's rclpy for x86_64 with glibc 2.28 or newer, not for this machine"
             f" ({platform.machine()}, {' '.join(filter(None, platform.libc_ver())) or 'no glibc'}):"
-            " source an installed ROS 2, or use RUNTIME=embedded, which needs x86_64 with glibc 2.17"
+            " source an installed ROS 2"
         )
     if not runtime and not ros and environment.get("ROS_SECURITY_ENABLE") == "true":
         raise SetupError(
-            "ROS_SECURITY_ENABLE=true: PyPI has ROS 2's rclpy without DDS security: use RUNTIME=embedded with"
-            " `apt-get install libddsc0debian`, or source an installed ROS 2"
+            "ROS_SECURITY_ENABLE=true: PyPI has ROS 2's rclpy without DDS security: use RUNTIME=cyclonedds"
+            " with `apt-get install libddsc0t64` (on Debian 12, libddsc0debian), or source an installed ROS 2"
         )
     rmw = environment.get("RMW_IMPLEMENTATION") or FAST_DDS
     if not runtime and not ros and rmw != FAST_DDS:
         raise SetupError(
             f"RMW_IMPLEMENTATION={rmw}: PyPI has ROS 2's rclpy with {FAST_DDS} only: unset it,"
-            " source an installed ROS 2, or use RUNTIME=embedded, which is on Cyclone DDS"
+            " source an installed ROS 2, or use RUNTIME=cyclonedds"
         )
 
 
@@ -152,32 +159,41 @@ def make(ros: str) -> None:
     STAMP.unlink(missing_ok=True)  # no sooner: a refused set-up leaves the old .venv usable
     venv = [sys.executable, "-m", "venv", "--clear", *(["--system-site-packages"] if ros else []), str(VENV)]
     step("a virtual environment", venv, log=None)
-    files = ["system.txt", "build.txt", "develop.txt", *([] if ros else ["embedded.txt"])]
-    step("packages from PyPI", [*PIP, *_requirements(*files)])
+    step("packages from PyPI", [*PIP, *_requirements("system.txt", "build.txt", "develop.txt")])
     if ros:
         print(f"  rclpy of ROS 2: {Path(ros).parent}")
-    elif has_wheels():
+    else:
         step("ROS 2's rclpy from PyPI", [*PIP, *_requirements("ros.txt")])
-    _write_pth(embedded=not ros)
+        step("Cyclone DDS from PyPI", [*PIP, *_of_cyclonedds(), *_requirements("cyclonedds.txt")])
+    _write_pth()
     for name, program in SCRIPTS.items():
         script = VENV / "bin" / name
         script.write_text(f'#!/bin/sh\nexec "${{0%/*}}/python" {program} "$@"\n')
         script.chmod(0o755)
 
 
+def _of_cyclonedds() -> list[str]:
+    """Return pip's options for Cyclone DDS: its C library alone is used, which fits any Python."""
+    if sys.version_info[:2] <= CYCLONEDDS_WHEELS:
+        return []
+    version = ".".join(map(str, CYCLONEDDS_WHEELS))
+    return [f"--python-version={version}", "--only-binary=:all:", f"--target={_site_packages()}"]
+
+
+def _site_packages() -> str:
+    return sysconfig.get_path("purelib", "venv", {"base": str(VENV)})
+
+
 def _requirements(*names: str) -> list[str]:
     return [word for name in names for word in ("-r", str(REQUIREMENTS / name))]
 
 
-def _write_pth(embedded: bool) -> None:
-    """Tell Python of .venv where the packages of this checkout are; it reads the .pth of the wheels later."""
-    chosen = f'import os, sys; os.environ.get("{RUNTIME}") == "embedded" and '
-    first = f"sys.path.__setitem__(slice(0), {list(map(str, EMBEDDED))!r})"
-    without_libraries = 'os.environ.update(_ROS_WHEELS_BOOTSTRAP_COMPLETE="1")'
-    with_workspace = '"AMENT_PREFIX_PATH" in os.environ and __import__("rosidl_runtime_embedded")'
-    lines = [chosen + what for what in (first, without_libraries, with_workspace)] if embedded else []
-    folder = sysconfig.get_path("purelib", "venv", {"base": str(VENV)})
-    Path(folder, "reactive_arm.pth").write_text("".join(f"{line}\n" for line in (*SOURCES, *lines)))
+def _write_pth() -> None:
+    """Write where the packages of this checkout are, and what chooses the ground of rclpy."""
+    chosen = f'import os; "{RUNTIME}" in os.environ and os.environ.update({GROUND}=os.environ["{RUNTIME}"])'
+    hook = f'import os; os.environ.get("{GROUND}") and __import__("rclpy_ground.hook")'
+    lines = (*SOURCES, chosen, hook)
+    Path(_site_packages(), "reactive_arm.pth").write_text("".join(f"{line}\n" for line in lines))
 
 
 def _refuse_while_running() -> None:

@@ -3,7 +3,7 @@
 # interpreter twice: once to find out where their libraries are.
 set -eu
 cd "$(dirname "$0")/../.."
-if [ "${RUNTIME-}" != embedded ] && [ -e .venv/lib/librcl.so ]; then
+if [ -e .venv/lib/librcl.so ]; then
     libraries=$PWD/.venv/lib
     for directory in "$PWD"/.venv/lib/python3.*/site-packages/ros_*.libs; do
         libraries=$libraries:$directory

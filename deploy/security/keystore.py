@@ -1,4 +1,4 @@
-"""A keystore as SROS2 makes it, for ROS 2 and the embedded rclpy. openssl's command line makes the keys.
+"""A keystore as SROS2 makes it, for any rclpy with DDS Security. openssl's command line makes the keys.
 
 ::
 

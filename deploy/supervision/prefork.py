@@ -33,6 +33,7 @@ from types import ModuleType
 from typing import Any, NoReturn
 
 from deploy.supervision import processes
+from deploy.supervision.rclpy_choice import GROUND
 
 LIBRARIES = (
     "json",
@@ -49,8 +50,8 @@ LIBRARIES = (
     "yaml",
 )
 """What the services import from outside of this checkout, at once or later."""
-EMBEDDED = ("rclpy._graph", "rclpy._parameter_files")
-"""What the embedded rclpy imports late."""
+CYCLONEDDS = ("rclpy_ground.cyclonedds.participant", "rclpy_ground.cyclonedds.wakeup")
+"""The modules that the ground of Cyclone DDS imports late."""
 TYPES = (
     "diagnostic_msgs.msg.DiagnosticArray",
     "diagnostic_msgs.msg.DiagnosticStatus",
@@ -128,7 +129,7 @@ class _Late(ModuleType):
 
 def libraries() -> tuple[str, ...]:
     """Return the modules that programs import on the rclpy at hand."""
-    return LIBRARIES + (EMBEDDED if importlib.util.find_spec("rosidl_runtime_embedded") else ())
+    return LIBRARIES + (CYCLONEDDS if os.environ.get(GROUND) else ())
 
 
 def types() -> tuple[str, ...]:

@@ -9,14 +9,17 @@ from pathlib import Path
 from deploy.supervision.processes import ROOT
 
 RUNTIME = "RUNTIME"
-"""Environment variable: "embedded" for the rclpy of this checkout, "" for ROS 2's own."""
+"""Environment variable: what rclpy stands on, "cyclonedds", or "" for the middleware of ROS 2."""
+CYCLONEDDS = "cyclonedds"
+GROUND = "RCLPY_GROUND"
+"""The environment variable of rclpy_ground: in .venv, RUNTIME sets it."""
 
 
 def words() -> str:
     """Name the rclpy of this environment for the user."""
     if file := sourced_rclpy():
         return f"rclpy of the sourced ROS 2 ({file})"
-    return "embedded rclpy" if os.environ.get(RUNTIME) else "rclpy of ROS 2's wheels"
+    return "rclpy of ROS 2's wheels" + (" on Cyclone DDS" if os.environ.get(RUNTIME) else "")
 
 
 def sourced_rclpy() -> str:

@@ -129,7 +129,7 @@ def _on_signal(number: int, frame: FrameType | None) -> None:
 
 def _wake_at_signals(executor: Executor) -> None:
     """Wake the executor at each signal: while the main thread waits in DDS, Python runs no handler."""
-    if (other := signal.set_wakeup_fd(-1)) != -1:  # the embedded rclpy wakes its executors itself
+    if (other := signal.set_wakeup_fd(-1)) != -1:
         signal.set_wakeup_fd(other)
         return
     reading, writing = os.pipe()

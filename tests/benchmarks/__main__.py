@@ -98,7 +98,7 @@ def machine() -> str:
 
 
 def versions() -> str:
-    """Return the versions of the libraries below the embedded rclpy and ReactiveNode."""
+    """Return the versions of the libraries below the ground of Cyclone DDS and ReactiveNode."""
     found = {each.name: each.version for each in metadata.distributions()}
     return ", ".join(f"{name} {found[name]}" for name in ("cyclonedds", "reactivex") if name in found)
 

@@ -10,15 +10,15 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from deploy.supervision.processes import ROOT
-from deploy.supervision.rclpy_choice import RUNTIME
+from deploy.supervision.rclpy_choice import CYCLONEDDS, RUNTIME
 from tests.benchmarks import c_program
 from tests.benchmarks.link import HEARTBEATS, Job
 
 PYTHON = ROOT / "deploy" / "commands" / "venv.sh"
 _CHECK = """
-import importlib.util, sys
-if bool(importlib.util.find_spec("rosidl_runtime_embedded")) == {ros}:
-    sys.exit("this environment has the {other}")
+import os, sys
+if bool(os.environ.get("RCLPY_GROUND")) == {ros}:
+    sys.exit("rclpy stands on {other} here")
 import tests.benchmarks.links.{link}
 """
 
@@ -60,7 +60,7 @@ class Alternative:
     link: str
     """The module of :mod:`tests.benchmarks.links`, or the program of :mod:`tests.benchmarks.c_program`."""
     ros: bool = False
-    """Whether it runs on ROS 2's rclpy: of .venv, or of a sourced ROS 2."""
+    """Whether rclpy stands on the middleware of ROS 2, else on Cyclone DDS."""
     commands: Commands = processes
     build: Callable[[], str] | None = None
     """Compiles its program, and returns why that is not possible here; none if it is in Python."""
@@ -68,13 +68,13 @@ class Alternative:
     @property
     def environment(self) -> dict[str, str]:
         paths = filter(None, (str(ROOT), os.environ.get("PYTHONPATH")))
-        return os.environ | {"PYTHONPATH": os.pathsep.join(paths), RUNTIME: "" if self.ros else "embedded"}
+        return os.environ | {"PYTHONPATH": os.pathsep.join(paths), RUNTIME: "" if self.ros else CYCLONEDDS}
 
     def missing(self) -> str:
         """Return why it cannot be measured here; '' if it can."""
         if self.build:
             return self.build()
-        other = "embedded rclpy" if self.ros else "rclpy of ROS 2"
+        other = "Cyclone DDS" if self.ros else "the middleware of ROS 2"
         command = [str(PYTHON), "-c", _CHECK.format(ros=self.ros, other=other, link=self.link)]
         done = subprocess.run(
             command, env=self.environment, capture_output=True, text=True, start_new_session=True
@@ -96,7 +96,6 @@ CHAINS = (
     Alternative("services", "chain_services", commands=services),
     Alternative("RxPY operators on callbacks, same rclpy", "chain_operators", commands=services),
     Alternative("callbacks, same rclpy", "chain", commands=services),
-    Alternative("RxPY operators, without rclpy", "chain_dds", commands=services),
     Alternative("ROS 2, services", "chain_services", ros=True, commands=services),
     Alternative("ROS 2, callbacks", "chain", ros=True, commands=services),
     Alternative("ROS 2, callbacks on EventsExecutor", "chain_events", ros=True, commands=services),

@@ -27,7 +27,7 @@ LIMIT = 30.0  # s
 
 
 def surroundings(namespace: str, domain: int, **given: str) -> dict[str, str]:
-    environment = {"RUNTIME": "embedded", "REACTIVE_ARM_NAMESPACE": namespace, "ROS_DOMAIN_ID": str(domain)}
+    environment = {"RUNTIME": "cyclonedds", "REACTIVE_ARM_NAMESPACE": namespace, "ROS_DOMAIN_ID": str(domain)}
     environment |= given
     set_middleware(environment)
     return environment

@@ -4,21 +4,17 @@ from __future__ import annotations
 
 import re
 import tomllib
-from pathlib import Path
 
 import pytest
 from packaging.requirements import Requirement
 
-ROOT = Path(__file__).parents[2]
+from deploy.supervision.processes import ROOT
 
-
-FILES = ("system", "build", "develop", "embedded", "ros")
+FILES = ("system", "build", "develop", "cyclonedds", "ros")
 PROJECTS = {
-    "deploy/runtime": ("system", "embedded"),
     "tests/simulation_kit": ("develop",),
     "deploy/tools": ("system", "ros"),
 }
-OWN = "rclpy-cyclonedds"
 """Distributions of this repository, and the files with what they need."""
 
 
@@ -34,8 +30,7 @@ def pins(*names: str) -> dict[str, str]:
 
 def unmet(declared: list[str], pinned: dict[str, str]) -> list[str]:
     requirements = [Requirement(text) for text in declared]
-    others = [each for each in requirements if each.name != OWN]
-    return [str(each) for each in others if pinned.get(each.name.lower(), "none") not in each.specifier]
+    return [str(each) for each in requirements if pinned.get(each.name.lower(), "none") not in each.specifier]
 
 
 def test_the_projects_requirements_are_pinned_in_their_ranges() -> None:

@@ -1,4 +1,4 @@
-"""Which rclpy a command of this checkout gets: ROS 2's own from PyPI, the embedded one, or a sourced one."""
+"""Which rclpy a command of this checkout gets, and what it stands on."""
 
 from __future__ import annotations
 
@@ -11,22 +11,12 @@ import pytest
 
 from deploy.commands import setup
 from deploy.supervision import rclpy_choice
+from deploy.supervision.processes import ROOT
 
-ROOT = Path(__file__).parents[2]
-EMBEDDED = setup.EMBEDDED[0]
-FOLDERS = tuple(map(str, setup.EMBEDDED))
-PACKAGES = sorted(path.parent.name for folder in setup.EMBEDDED for path in folder.glob("*/__init__.py"))
-FIND = f"""
-from importlib.util import find_spec
-specs = {{name: find_spec(name) for name in {PACKAGES}}}
-print(*(name for name, spec in specs.items() if spec and spec.origin.startswith({FOLDERS})))
-"""
 SECURE = {"ROS_SECURITY_ENABLE": "true"}
 CYCLONE = {"RMW_IMPLEMENTATION": "rmw_cyclonedds_cpp"}
 ROS = "/opt/ros/jazzy/lib/python3.12/site-packages/rclpy/__init__.py"
-EMBEDDED_ONLY = pytest.mark.skipif(
-    bool(rclpy_choice.sourced_rclpy()), reason="platform: ROS 2 is sourced, and its rclpy wins"
-)
+MIDDLEWARE = "from rclpy.utilities import get_rmw_implementation_identifier as rmw; print(rmw())"
 
 
 def in_venv(program: str, **environment: str) -> str:
@@ -35,13 +25,14 @@ def in_venv(program: str, **environment: str) -> str:
     return subprocess.check_output(command, env=os.environ | environment, text=True, timeout=30).strip()
 
 
-@EMBEDDED_ONLY
-def test_each_package_of_the_embedded_runtime_comes_from_it() -> None:
-    assert in_venv(FIND, RUNTIME="embedded").split() == PACKAGES
-
-
-def test_no_package_of_the_default_runtime_is_embedded() -> None:
-    assert in_venv(FIND, RUNTIME="") == ""
+@pytest.mark.skipif(bool(rclpy_choice.sourced_rclpy()), reason="platform: a sourced ROS 2 wins")
+@pytest.mark.parametrize("more", [{}, CYCLONE])
+def test_runtime_chooses_what_rclpy_stands_on(more: dict[str, str]) -> None:
+    assert in_venv(MIDDLEWARE, RUNTIME="") == "rmw_fastrtps_cpp"
+    assert in_venv(MIDDLEWARE, RUNTIME="cyclonedds", **more) == "rmw_cyclonedds_cpp"
+    assert (
+        in_venv("import rclpy; rclpy.init(); rclpy.create_node('node')", RUNTIME="cyclonedds", **more) == ""
+    )
 
 
 def test_interpreter_of_the_default_runtime_starts_once_with_its_libraries() -> None:
@@ -61,8 +52,6 @@ def test_rclpy_in_pythonpath_is_a_sourced_ros(tmp_path: Path, monkeypatch: pytes
     monkeypatch.setattr(sys, "path", [str(tmp_path), *sys.path])  # as if pip had installed it
     monkeypatch.setenv("PYTHONPATH", f"{ROOT}{os.pathsep}")
     assert rclpy_choice.sourced_rclpy() == ""
-    monkeypatch.setenv("PYTHONPATH", str(EMBEDDED))
-    assert rclpy_choice.sourced_rclpy() == ""
     monkeypatch.setenv("PYTHONPATH", f"/none{os.pathsep}{tmp_path}")
     assert rclpy_choice.sourced_rclpy() == str(tmp_path / "rclpy" / "__init__.py")
 
@@ -74,15 +63,15 @@ def test_rclpy_in_pythonpath_is_a_sourced_ros(tmp_path: Path, monkeypatch: pytes
             {"RUNTIME": "embeded"},
             "",
             "x86_64",
-            "RUNTIME=embeded: it is empty for ROS 2",
+            "RUNTIME=embeded: it is empty for the middleware of ROS 2",
         ),
         (
-            {"RUNTIME": "embedded"},
+            {"RUNTIME": "cyclonedds"},
             ROS,
             "x86_64",
             f"its rclpy wins ({ROS}); use another shell",
         ),
-        ({}, "", "aarch64", "source an installed ROS 2, or use RUNTIME=embedded, which needs x86_64"),
+        ({}, "", "aarch64", "source an installed ROS 2"),
         (
             CYCLONE,
             "",
@@ -93,12 +82,13 @@ def test_rclpy_in_pythonpath_is_a_sourced_ros(tmp_path: Path, monkeypatch: pytes
             SECURE,
             "",
             "x86_64",
-            "without DDS security: use RUNTIME=embedded with `apt-get install libddsc0debian`, or source an",
+            "use RUNTIME=cyclonedds with `apt-get install libddsc0t64` (on Debian 12, libddsc0debian),"
+            " or source an",
         ),
-        ({"RUNTIME": "embedded"} | SECURE, "", "x86_64", ""),
+        ({"RUNTIME": "cyclonedds"} | SECURE, "", "x86_64", ""),
         (SECURE, ROS, "x86_64", ""),
         ({"RUNTIME": "", "RMW_IMPLEMENTATION": "rmw_fastrtps_cpp"}, "", "x86_64", ""),
-        ({"RUNTIME": "embedded"} | CYCLONE, "", "aarch64", ""),
+        ({"RUNTIME": "cyclonedds"} | CYCLONE, "", "x86_64", ""),
         (CYCLONE, ROS, "aarch64", ""),
     ],
 )
@@ -123,11 +113,3 @@ def test_machine_without_glibc_has_no_wheels(monkeypatch: pytest.MonkeyPatch) ->
     for library in (("glibc", "2.27"), ("", "")):
         monkeypatch.setattr(setup.platform, "libc_ver", lambda library=library: library)
         assert not setup.has_wheels()
-
-
-@EMBEDDED_ONLY
-def test_workspace_messages_are_found_before_rclpy_is_imported(tmp_path: Path) -> None:
-    (tmp_path / "share" / "my_messages" / "msg").mkdir(parents=True)
-    (tmp_path / "share" / "my_messages" / "msg" / "Angle.msg").write_text("float64 value\n")
-    program = "from my_messages.msg import Angle; print(Angle(value=1.5).value)"
-    assert in_venv(program, RUNTIME="embedded", AMENT_PREFIX_PATH=str(tmp_path)) == "1.5"

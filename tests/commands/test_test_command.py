@@ -1,25 +1,21 @@
-"""`make test`: runs of pytest; the later ones have the tests with bounds of time."""
+"""`make test`, `make test-all`: runs of pytest; the later ones have the tests with bounds of time."""
 
 from __future__ import annotations
 
 import importlib.util
-import re
 import subprocess
 from pathlib import Path
 
 import pytest
 
+from deploy.supervision.processes import ROOT
 from tests import __main__ as command
-from tests import order
-
-ROOT = Path(__file__).parents[2]
+from tests import order, tiers
 
 HERE = command.Part("", "", ["tests/system", "-x"])
-EMBEDDED = (
-    "tests/commands/test_fleet.py tests/mutants tests/security/attacks tests/replay"
-    " tests/simulation tests/simulation_kit"
-)
-IGNORED = "--ignore=tests/mutants"
+CYCLONEDDS = "tests/commands/test_fleet.py tests/security/attacks"
+SIMULATED = "tests/replay tests/simulation tests/simulation_kit"
+IGNORED = "--ignore=tests/replay"
 ONE = "tests/simulation/test_experiment.py::test"
 
 
@@ -50,15 +46,44 @@ def test_every_test_runs_once_and_timed_ones_with_few_others(
     assert one == 1
 
 
+def test_an_expression_selects_in_each_phase_and_untimed_leaves_only_the_first(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    commands: list[list[str]] = []
+    monkeypatch.setattr(subprocess, "call", lambda command, env: commands.append(command) or 0)
+    command.run(HERE._replace(arguments=["tests", "-m", "unit or node", "-x"]), tmp_path)
+    assert [each[-5:-1] for each in commands] == [
+        ["-m", f"(unit or node) and {mark}", "tests", "-x"]
+        for mark in ("not timed and not alone", "timed", "alone")
+    ]
+    commands.clear()
+    command.main(["--untimed", "tests/system"])
+    assert [each[-4:-1] for each in commands] == [["-m", "not timed and not alone", "tests/system"]]
+
+
+@pytest.mark.parametrize(
+    ("file", "fixtures", "expected"),
+    [
+        ("tests/component/test_kinematics.py", ["scheduler"], "unit"),
+        ("tests/component/test_effector_wiring.py", ["make_node", "domain_id"], "node"),
+        ("tests/component/test_service_life.py", ["domain_id"], "arm"),
+        ("tests/system/test_demo.py", ["domain_id"], "arm"),
+        ("tests/simulation/test_experiment.py", [], "unit"),
+    ],
+)
+def test_tier_is_that_of_what_a_test_starts(file: str, fixtures: list[str], expected: str) -> None:
+    assert tiers.tier(ROOT / file, fixtures) == expected
+
+
 def test_workers_share_compiled_modules_and_the_runtime(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     environments: list[dict[str, str]] = []
     monkeypatch.setenv("PYTHONDONTWRITEBYTECODE", "1")
     monkeypatch.setattr(subprocess, "call", lambda command, env: environments.append(env) or 0)
-    command.run(HERE._replace(runtime="embedded"), tmp_path)
+    command.run(HERE._replace(runtime="cyclonedds"), tmp_path)
     assert not any("PYTHONDONTWRITEBYTECODE" in environment for environment in environments)
-    assert {environment["RUNTIME"] for environment in environments} == {"embedded"}
+    assert {environment["RUNTIME"] for environment in environments} == {"cyclonedds"}
 
 
 def arguments(words: str) -> dict[str, str]:
@@ -67,33 +92,42 @@ def arguments(words: str) -> dict[str, str]:
 
 
 @pytest.mark.parametrize(
-    ("words", "on_ros", "on_embedded"),
+    ("words", "on_ros", "in_virtual_time", "on_cyclonedds"),
     [
-        ("tests/system -x", "-x tests/system", None),
-        ("tests/simulation -x", None, "-x tests/simulation"),
-        ("tests -x", "-x tests", f"-x {EMBEDDED}"),
-        (f"tests {IGNORED}", f"{IGNORED} tests", f"{IGNORED} {EMBEDDED.replace('tests/mutants ', '')}"),
-        (f"{ONE} tests/page", "tests/page", ONE),
+        ("tests/system -x", "-x tests/system", None, None),
+        ("tests/simulation -x", None, "-x tests/simulation", None),
+        ("tests -x", "-x tests", f"-x {SIMULATED}", f"-x {CYCLONEDDS}"),
+        (
+            f"tests {IGNORED}",
+            f"{IGNORED} tests",
+            f"{IGNORED} {SIMULATED.partition(' ')[2]}",
+            f"{IGNORED} {CYCLONEDDS}",
+        ),
+        (f"{ONE} tests/page", "tests/page", ONE, None),
     ],
 )
 def test_each_test_runs_on_one_rclpy(
-    words: str, on_ros: str | None, on_embedded: str | None, monkeypatch: pytest.MonkeyPatch
+    words: str,
+    on_ros: str | None,
+    in_virtual_time: str | None,
+    on_cyclonedds: str | None,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
     monkeypatch.setattr(command, "sourced_rclpy", lambda: "")
-    expected = {"ROS": on_ros, "Embedded": on_embedded}
+    expected = {"ROS": on_ros, "Virtual": in_virtual_time, "Cyclone": on_cyclonedds}
     assert arguments(words) == {name: text for name, text in expected.items() if text}
 
 
-def test_sourced_ros_runs_no_test_of_the_embedded_rclpy(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_sourced_ros_runs_no_test_of_cyclone_dds(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
     monkeypatch.setattr(command, "sourced_rclpy", lambda: "/opt/ros/rclpy")
-    assert arguments("tests") == {"ROS": "tests"}
+    assert arguments("tests") == {"ROS": "tests", "Virtual": SIMULATED}
 
 
-def test_embedded_rclpy_runs_every_test(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(importlib.util, "find_spec", lambda name: name)
-    assert arguments("tests deploy/runtime") == {"Embedded": "tests deploy/runtime"}
+def test_cyclone_dds_runs_every_test(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("RCLPY_GROUND", "cyclonedds")
+    assert arguments("tests deploy/ground") == {"Cyclone": "tests deploy/ground"}
 
 
 def test_file_without_a_collected_test_is_named(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -131,19 +165,6 @@ def test_a_missing_path_is_named_and_nothing_runs(
     assert command.main(words.split()) == (4 if missing else 0)
     assert bool(commands) != bool(missing)
     assert capsys.readouterr().err == (f"TESTS: {missing}: no such file or directory\n" if missing else "")
-
-
-def test_ci_runs_what_make_test_leaves_out() -> None:
-    left_out = re.search(r"(?m)^LEFT_OUT := (.*)$", (ROOT / "Makefile").read_text())
-    runs = re.findall(r'make test TESTS="([^"]+)"', (ROOT / ".ci/run").read_text())
-    assert left_out
-    for path in left_out[1].split():
-        assert (ROOT / path).exists()
-        assert any(
-            path not in command.ignored(words.split())
-            and any(Path(path).is_relative_to(folder) for folder in command.paths(words.split()))
-            for words in runs
-        )
 
 
 def test_longest_files_begin_first_and_exist() -> None:
@@ -186,6 +207,8 @@ def test_last_line_counts_the_tests_of_all_phases(
 def test_last_line_follows_a_warning_if_not_all_tests_have_run(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(subprocess, "call", lambda command, env: 2)
-    assert command.main(["tests/system"]) == 2
+    calls: list[list[str]] = []
+    monkeypatch.setattr(subprocess, "call", lambda command, env: calls.append(command) or 2)
+    assert command.main(["tests/system", "tests/simulation"]) == 2
+    assert len(calls) == 1  # not even another part
     assert capsys.readouterr().out.splitlines()[1:] == ["Not all tests have run.", str(NOTHING)]

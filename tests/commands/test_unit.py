@@ -19,7 +19,7 @@ def test_the_unit_starts_this_checkout_with_its_environment(tmp_path: Path) -> N
     parameters.parent.mkdir()
     parameters.touch()
     environment = {
-        "RUNTIME": "embedded",
+        "RUNTIME": "cyclonedds",
         "ROS_DOMAIN_ID": "7",
         "REACTIVE_ARM_RUN_DIR": str(tmp_path / UNPLEASANT),
         "WEB": "off",

@@ -21,7 +21,7 @@ from pathlib import Path
 
 from deploy.supervision import interruption
 from deploy.supervision.processes import ROOT
-from tests.mutants.bench import Bench
+from tests.mutants.checkout import CheckoutCopy
 from tests.mutants.guards import GUARDS, SIMULATION
 from tests.mutants.mutations import Mutant, mutants
 
@@ -72,15 +72,15 @@ def test(scores: dict[str, Score], equivalent: dict[str, dict[str, str]]) -> Non
     lock = threading.Lock()
     began = time.monotonic()
 
-    def run(bench: Bench) -> None:
+    def run(copy: CheckoutCopy) -> None:
         while (mutant := work.get()) is not None:
             if failures:
                 continue
             try:
                 score, killed_by_simulation = scores[mutant.module], False
-                killed = bench.kills(mutant, GUARDS[mutant.module])
+                killed = copy.kills(mutant, GUARDS[mutant.module])
                 if not killed:
-                    killed_by_simulation = bench.kills(mutant, SIMULATION)
+                    killed_by_simulation = copy.kills(mutant, SIMULATION)
             except Exception as error:
                 failures.append(error)
                 continue
@@ -102,13 +102,13 @@ def test(scores: dict[str, Score], equivalent: dict[str, dict[str, str]]) -> Non
             with suppress(queue.Full):
                 return work.put(mutant, timeout=_LOOK)
 
-    benches: list[Bench] = []
+    copies: list[CheckoutCopy] = []
     threads: list[threading.Thread] = []
     with tempfile.TemporaryDirectory(prefix="mutants-", ignore_cleanup_errors=True) as directory:
         try:
             for number in range(_BENCHES):
-                benches.append(Bench(ROOT, Path(directory, str(number))))
-                threads.append(threading.Thread(target=run, args=(benches[-1],)))
+                copies.append(CheckoutCopy(ROOT, Path(directory, str(number))))
+                threads.append(threading.Thread(target=run, args=(copies[-1],)))
                 threads[-1].start()
             for module in scores:
                 for mutant in mutants(ROOT, module):
@@ -123,8 +123,8 @@ def test(scores: dict[str, Score], equivalent: dict[str, dict[str, str]]) -> Non
                 raise failures[0]
         finally:
             failures.append(RuntimeError("the end"))  # the threads take no further mutant
-            for bench in benches:
-                bench.close()
+            for copy in copies:
+                copy.close()
             for _ in threads:
                 work.put(None)
             for thread in threads:

@@ -1,8 +1,8 @@
 """Runs the tests for one mutant after another in its working directory: a copy of the checkout.
 
-This is a program of its own and imports nothing of the copy. It loads the libraries once, and forks for each
-request: a line of JSON on standard input, the arguments of pytest. It answers with two lines: the child's
-pid, and then the exit code of pytest.
+This is a program of its own and imports nothing of the copy. It loads the libraries once, those of its
+arguments first, and forks for each request: a line of JSON on standard input, the arguments of pytest. It
+answers with two lines: the child's pid, and then the exit code of pytest.
 """
 
 import contextlib
@@ -26,7 +26,6 @@ LIBRARIES = (
     "geometry_msgs.msg",
     "sensor_msgs.msg",
     "std_msgs.msg",
-    "tf2_msgs.msg",
 )
 
 
@@ -39,7 +38,7 @@ class ExamplesFirst:
 
 def main() -> None:
     sys.path[0] = os.getcwd()
-    pytest, *_ = [importlib.import_module(name) for name in ("pytest", *LIBRARIES)]
+    pytest, *_ = [importlib.import_module(name) for name in ("pytest", *sys.argv[1:], *LIBRARIES)]
     print("ready", flush=True)
     for line in sys.stdin:
         pid = os.fork()

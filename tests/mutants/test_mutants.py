@@ -8,13 +8,13 @@ from pathlib import Path
 
 import pytest
 
+from deploy.supervision.processes import ROOT
 from tests.mutants import __main__ as command
-from tests.mutants import bench as benches
-from tests.mutants.bench import Bench
+from tests.mutants import checkout as module
+from tests.mutants.checkout import CheckoutCopy
 from tests.mutants.guards import GUARDS
 from tests.mutants.mutations import Mutant, mutants
 
-ROOT = Path(__file__).parents[2]
 CLAMP = '''
 def clamp(value, limit=9):
     """Return the lesser one."""
@@ -71,8 +71,8 @@ def test_modules_and_their_tests_exist() -> None:
 
 
 @pytest.fixture
-def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Bench]:
-    monkeypatch.setattr(benches, "_ALLOWANCE", 1.0)
+def copy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[CheckoutCopy]:
+    monkeypatch.setattr(module, "_ALLOWANCE", 1.0)
     checkout = tmp_path / "checkout"
     (checkout / "tests" / "mutants").mkdir(parents=True)
     for name in ("pyproject.toml", "tests/mutants/runner.py"):
@@ -85,7 +85,7 @@ def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Bench]:
         "from clamp import clamp\n\ndef test_clamp():\n    assert (clamp(8), clamp(10)) == (8, 9)\n"
     )
     subprocess.run(["git", "init", "-q", str(checkout)], check=True)
-    made = Bench(checkout, tmp_path / "bench")
+    made = CheckoutCopy(checkout, tmp_path / "copy")
     yield made
     made.close()
     assert (checkout / "clamp.py").read_text() == CLAMP
@@ -95,18 +95,18 @@ def changed(before: str, after: str) -> Mutant:
     return Mutant("clamp.py", 1, "", CLAMP.replace(before, after))
 
 
-def test_mutant_dies_where_a_test_fails_or_hangs(bench: Bench) -> None:
+def test_mutant_dies_where_a_test_fails_or_hangs(copy: CheckoutCopy) -> None:
     tests = ("test_clamp.py",)
 
-    assert bench.kills(changed("value = limit", "value = None"), tests)
-    assert not bench.kills(changed("too much", "too many"), tests)
-    assert bench.kills(changed("value = limit", "while True: pass"), tests)
-    assert not bench.kills(changed("value > limit", "value >= limit"), tests)
+    assert copy.kills(changed("value = limit", "value = None"), tests)
+    assert not copy.kills(changed("too much", "too many"), tests)
+    assert copy.kills(changed("value = limit", "while True: pass"), tests)
+    assert not copy.kills(changed("value > limit", "value >= limit"), tests)
 
 
-def test_tests_that_fail_without_a_mutant_are_an_error(bench: Bench) -> None:
+def test_tests_that_fail_without_a_mutant_are_an_error(copy: CheckoutCopy) -> None:
     with pytest.raises(RuntimeError, match=r"fail without a mutant: missing\.py"):
-        bench.kills(changed("9", "10"), ("missing.py",))
+        copy.kills(changed("9", "10"), ("missing.py",))
 
 
 def score(*survivors: str) -> command.Score:

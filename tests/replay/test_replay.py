@@ -6,13 +6,16 @@ asleep until the watchdog turns the engines off, comes back, and turns them on a
 
 from __future__ import annotations
 
+import ast
 import os
 import re
 import shutil
 import subprocess
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import NamedTuple
 
 import pytest
@@ -22,7 +25,6 @@ from geometry_msgs.msg import TransformStamped, Twist, TwistStamped, Vector3
 from mcap_files import FileWriter, McapFile
 from rclpy.serialization import deserialize_message, serialize_message
 from std_msgs.msg import Float64, Header, String
-from tf2_msgs.msg import TFMessage
 
 from deploy.supervision.errors import DeploymentError
 from deploy.supervision.recorder import Recorder
@@ -375,19 +377,27 @@ def test_only_latched_messages_from_before_the_arm_are_heard() -> None:
 
 
 def transforms(at: float, *arms: str) -> Message:
-    """Return a message of the transforms of the first frames of arms."""
+    """Return a message of the transforms of the first frames of arms, without tf2_msgs."""
     frames = [(frame_id(BASE, arm), frame_id(LINK1, arm)) for arm in arms]
+    return Message(round(at * SECOND), repr(frames).encode())
+
+
+def read_transforms(data: bytes, kind: object) -> SimpleNamespace:
+    frames = ast.literal_eval(data.decode())
     stamped = [
         TransformStamped(header=Header(frame_id=parent), child_frame_id=child) for parent, child in frames
     ]
-    return Message(round(at * SECOND), serialize_message(TFMessage(transforms=stamped)))
+    return SimpleNamespace(transforms=stamped)
 
 
-def test_transforms_belong_to_the_arm_of_their_frames() -> None:
+def test_transforms_belong_to_the_arm_of_their_frames(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(chains, "deserialize_message", read_transforms)
+    monkeypatch.setattr(chains, "is_babble", lambda topic, data: False)
+    monkeypatch.setattr(chains, "TF", replace(topics.TF, type=object))
     sent = [transforms(1.0, "/arm1"), transforms(2.0, "/arm2"), transforms(3.0, "/"), transforms(4.0)]
     record = Record(0, 10 * SECOND, 0, {"/tf": [*sent, Message(5 * SECOND, b"unreadable")]})
     for namespace, at in (("/arm1", 1.0), ("/arm2", 2.0), ("/", 3.0), ("/arm3", None)):
-        messages = chains.recorded(record, namespace, topics.TF)
+        messages = chains.recorded(record, namespace, chains.TF)
         assert [message.sent / SECOND for message in messages] == ([] if at is None else [at])
 
 

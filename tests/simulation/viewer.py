@@ -18,7 +18,8 @@ def view() -> None:
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     node = Node("viewer", namespace=namespace_of(os.environ))
     newest = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
-    for topic in (topics.JOINT_STATES, topics.TF, topics.EFFECTOR_TWIST):
+    shown = (topics.JOINT_STATES, topics.TF, topics.EFFECTOR_TWIST)
+    for topic in (each for each in shown if each in topics.CONTRACT):  # /tf needs tf2_msgs
         node.create_subscription(topic.type, topic.name, lambda _: None, newest)
     while True:
         time.sleep(3600.0)  # nothing is taken from DDS, which is what costs

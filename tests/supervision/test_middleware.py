@@ -40,17 +40,15 @@ def test_settings_of_fast_dds_bring_a_killed_service_back_in_time(file: str) -> 
 
 @pytest.mark.parametrize(
     ("runtime", "namespace", "tagged"),
-    [("embedded", "/arm1", True), ("embedded", "/", False), ("", "/arm1", False)],
+    [("cyclonedds", "/arm1", True), ("cyclonedds", "/", False), ("", "/arm1", False)],
 )
-def test_arm_in_a_namespace_has_a_tag_on_the_embedded_rclpy(
-    runtime: str, namespace: str, tagged: bool
-) -> None:
+def test_arm_in_a_namespace_has_a_tag_on_cyclone_dds(runtime: str, namespace: str, tagged: bool) -> None:
     settings = {"RUNTIME": runtime, "REACTIVE_ARM_NAMESPACE": namespace}
     set_middleware(settings)
     assert (f"<Tag>{namespace}</Tag>" in settings.get("CYCLONEDDS_URI", "")) == tagged
 
 
 def test_user_may_take_the_tag_away() -> None:
-    settings = {"RUNTIME": "embedded", "REACTIVE_ARM_NAMESPACE": "/arm1", "CYCLONEDDS_URI": ""}
+    settings = {"RUNTIME": "cyclonedds", "REACTIVE_ARM_NAMESPACE": "/arm1", "CYCLONEDDS_URI": ""}
     set_middleware(settings)
     assert settings["CYCLONEDDS_URI"] == ""

@@ -188,7 +188,7 @@ def test_supervisord_has_no_dds_and_no_thread_but_those_of_tracing(
 def test_service_prepares_no_type_and_no_pattern_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """For a type, the embedded runtime generates code and a hash; Python compiles a pattern once."""
+    """A type loads a library on its first use; Python compiles a pattern once."""
     use = (
         "import builtins, json, re\n"
         f"OURS = {OURS}\n"

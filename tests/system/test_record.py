@@ -135,7 +135,7 @@ def test_record_of_nothing_is_refused(site: Site) -> None:
 def test_record_of_a_real_arm_replays_equal_in_virtual_time(site: Site) -> None:
     """What simulation and replay show holds for the rclpy of the real arm: both give the same output."""
     if sourced_rclpy():
-        pytest.skip("platform: a sourced ROS 2 leaves no place for the embedded rclpy")
+        pytest.skip("platform: a sourced ROS 2 leaves no choice")
     assert site.do("start", "demo")[0] == 0
     command = record(site)
     time.sleep(15.0)  # the engines have been turned on, and the arm has moved
@@ -144,5 +144,5 @@ def test_record_of_a_real_arm_replays_equal_in_virtual_time(site: Site) -> None:
     path = command.await_line(SUMMARY)[1]
     assert site.do("stop")[0] == 0
     replay = ("-m", "tests.replay", path)
-    code, shown = site.do_command("env", "RUNTIME=embedded", str(ROOT / "deploy/commands/venv.sh"), *replay)
+    code, shown = site.do_command("env", "RUNTIME=", str(ROOT / "deploy/commands/venv.sh"), *replay)
     assert code == 0, shown

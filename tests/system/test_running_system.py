@@ -55,7 +55,7 @@ def test_status_tells_the_runtime_and_the_address_of_the_page(module_site: Site)
     code, printed = module_site.do("status")
     assert code == 0, printed
     where, bound, page, header, *_ = printed.splitlines()
-    expected = "embedded rclpy" if os.environ.get("RUNTIME") else "rclpy of "
+    expected = "rclpy of ROS 2's wheels on Cyclone DDS" if os.environ.get("RUNTIME") else "rclpy of "
     assert where.startswith(expected)
     assert f"ROS domain {module_site.domain}" in where
     assert bound == "Engines stop within 10.5 s (10.45 s if one process dies, 10.05 s if none does)"
@@ -76,8 +76,8 @@ def test_status_works_from_a_shell_of_the_other_runtime(
     module_site: Site, monkeypatch: pytest.MonkeyPatch, wrapped: bool
 ) -> None:
     if sourced_rclpy():
-        pytest.skip("platform: a sourced ROS 2 leaves no place for the embedded rclpy")
-    monkeypatch.setenv("RUNTIME", "" if os.environ.get("RUNTIME") else "embedded")
+        pytest.skip("platform: a sourced ROS 2 leaves no choice")
+    monkeypatch.setenv("RUNTIME", "" if os.environ.get("RUNTIME") else "cyclonedds")
     for name in ("LD_LIBRARY_PATH", "_ROS_WHEELS_BOOTSTRAP_COMPLETE"):  # as in a new shell
         monkeypatch.delenv(name, raising=False)
     python = str(ROOT / "deploy/commands/venv.sh") if wrapped else sys.executable
@@ -314,7 +314,9 @@ def test_a_second_arm_runs_in_a_namespace_of_the_same_domain(module_site: Site, 
         services = status(second, until=lambda row: row[-1] == "ok")
         assert services.keys() == second.programs
         assert {row[-1] for row in services.values()} == {"ok"}
-        fleet = second.begin_command("env", "RUNTIME=embedded", second.python, "-m", "deploy.commands.fleet")
+        fleet = second.begin_command(
+            "env", "RUNTIME=cyclonedds", second.python, "-m", "deploy.commands.fleet"
+        )
         for name, engines in ((module_site.namespace or "/", r"\w+"), ("/second", "off")):
             fleet.await_line(rf"^{name} +{second.domain} +\S+ +\S+ +{engines} +{len(services)} ok +10\.5 s$")
         command.type("quit\n")

@@ -1,6 +1,6 @@
 """An arm on two hosts: network namespaces with host names of their own, and a line between them.
 
-Its processes have keys on an installed ROS 2, and on the embedded rclpy if its Cyclone DDS has security.
+Its processes have keys on an installed ROS 2, and on Cyclone DDS if that has security.
 """
 
 from __future__ import annotations

@@ -8,6 +8,6 @@ from tests.benchmarks.links import callbacks
 
 
 class Connection(callbacks.Connection):
-    """A node on the executor that the embedded rclpy does not have."""
+    """A node on this executor."""
 
     make_executor = importlib.import_module("rclpy.experimental").EventsExecutor

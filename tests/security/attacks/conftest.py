@@ -12,7 +12,7 @@ from contextlib import ExitStack, closing, contextmanager
 from typing import Any
 
 import pytest
-from rclpy._dds import security
+from rclpy_ground.cyclonedds import security
 
 from deploy.security import rights
 from deploy.security.keystore import Keystore
@@ -98,15 +98,15 @@ def until(condition: Callable[[], object], seconds: float = LIMIT) -> None:
         time.sleep(0.05)
 
 
-class EmbeddedSite(Site):
-    """A site whose system runs on the embedded rclpy."""
+class CycloneSite(Site):
+    """A site whose system runs on Cyclone DDS."""
 
     @property
     def environment(self) -> dict[str, str]:
-        return super().environment | {"RUNTIME": "embedded", "_ROS_WHEELS_BOOTSTRAP_COMPLETE": "1"}
+        return super().environment | {"RUNTIME": "cyclonedds"}
 
 
-class SecureSite(EmbeddedSite):
+class SecureSite(CycloneSite):
     """A site whose system joins with keys."""
 
     @property
@@ -138,7 +138,7 @@ def open_site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
     """The same arm without keys, in a domain of its own: what an attack does there shows that it works."""
     with (
         reserved_domain() as domain,
-        closing(EmbeddedSite(tmp_path_factory.mktemp("open") / "run", domain)) as site,
+        closing(CycloneSite(tmp_path_factory.mktemp("open") / "run", domain)) as site,
     ):
         start(site)
         yield site

@@ -18,7 +18,7 @@ from datetime import timedelta
 from pathlib import Path
 
 import pytest
-from rclpy._dds import security
+from rclpy_ground.cyclonedds import security
 
 from deploy.security import keystore as keystores
 from deploy.security import rights
@@ -200,7 +200,7 @@ def unchecked(tmp_path_factory: pytest.TempPathFactory) -> str:
     if not shutil.which("cc") or not Path("/usr/include/dds/security/dds_security_api.h").exists():
         pytest.skip("apt-get install gcc libc6-dev cyclonedds-dev")
     library = security.library({})
-    plugins = security._plugins(library) if library else None
+    plugins = security.plugins_of(library) if library else None
     assert library is not None
     assert plugins is not None
     folder = tmp_path_factory.mktemp("unchecked")

@@ -7,8 +7,9 @@ import random
 import time
 import uuid
 
+from rclpy_simulation import Network, Simulation  # isort: skip - first: it chooses the ground of rclpy
+
 import rclpy
-from rclpy_simulation import Network, Simulation
 from std_msgs.msg import Int64, String
 from std_srvs.srv import Trigger
 

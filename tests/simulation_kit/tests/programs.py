@@ -85,7 +85,7 @@ def talker() -> None:
     events = {
         topic: PublisherEventCallbacks(
             incompatible_qos=lambda info, topic=topic: note["incompatible"].update(
-                {topic: info.last_policy_kind.name}
+                {topic: info.last_policy_kind.name.removeprefix("RMW_QOS_POLICY_")}
             ),
             deadline=lambda info: note.update(deadlines=info.total_count),
             liveliness=lambda info: note.update(lost=info.total_count),
@@ -162,7 +162,9 @@ def listener() -> None:
 
     def events(topic: str) -> SubscriptionEventCallbacks:
         return SubscriptionEventCallbacks(
-            incompatible_qos=lambda info: note["incompatible"].update({topic: info.last_policy_kind.name}),
+            incompatible_qos=lambda info: note["incompatible"].update(
+                {topic: info.last_policy_kind.name.removeprefix("RMW_QOS_POLICY_")}
+            ),
             deadline=on_deadline,
             liveliness=lambda info: on_liveliness(topic, info),
             matched=lambda info: note["matched"].append(info.current_count) if topic == "order" else None,

@@ -21,7 +21,7 @@ pytestmark = pytest.mark.timed  # lifespans and leases of real processes
 
 @pytest.fixture(scope="module")
 def real(module_domain_id: int) -> tuple[Record, Record]:
-    environment = os.environ | {"ROS_DOMAIN_ID": str(module_domain_id)}
+    environment = os.environ | {"ROS_DOMAIN_ID": str(module_domain_id), "RUNTIME": "cyclonedds"}
 
     def start(name: str) -> subprocess.Popen[str]:
         command = [sys.executable, "-m", programs.__name__, name]

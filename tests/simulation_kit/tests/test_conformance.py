@@ -8,15 +8,16 @@ from pathlib import Path
 
 import pytest
 
-CONFORMANCE = Path(__file__).parents[3] / "deploy" / "runtime" / "tests" / "conformance"
-NAMES = ("between_nodes", "events", "executors", "lifecycle", "parameter_client", "services", "timers")
+CONFORMANCE = Path(__file__).parents[3] / "deploy" / "ground" / "tests" / "conformance"
+NAMES = ("between_nodes", "events", "executors", "lifecycle", "services", "timers")
 
 
 def main() -> None:
     from rclpy_simulation import Simulation
 
     files = [str(CONFORMANCE / f"test_{name}.py") for name in NAMES]
-    options = ["-p", "no:faulthandler", "-p", "no:cacheprovider", "-o", "timeout=0", "--capture=sys", "-q"]
+    no_timeouts = ["-o", "timeout=0", "-o", "faulthandler_timeout=0"]
+    options = ["-p", "no:cacheprovider", *no_timeouts, "--capture=sys", "-q"]
     with Simulation(seed=1) as simulation:
         process = simulation.start(lambda: sys.exit(pytest.main([*options, *files])), name="pytest")
         simulation.run_until(lambda: process.ended, 3600.0)

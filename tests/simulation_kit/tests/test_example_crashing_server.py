@@ -6,11 +6,11 @@ import time
 from typing import Any
 
 import pytest
-
 import rclpy
 from rclpy.node import Node
-from rclpy_simulation import Process, Simulation
 from std_srvs.srv import Trigger
+
+from rclpy_simulation import Process, Simulation
 
 WORK = 0.5  # s that the server needs for an answer
 PATIENCE = 2.0  # s that the client waits for it

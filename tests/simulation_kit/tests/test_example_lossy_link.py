@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import pytest
-
 import rclpy
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
-from rclpy_simulation import Delay, Network, Simulation
 from std_msgs.msg import Int64
+
+from rclpy_simulation import Delay, Network, Simulation
 
 BEST_EFFORT = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
 RELIABLE = QoSProfile(depth=10)

@@ -7,13 +7,13 @@ from statistics import median
 from typing import Any
 
 import pytest
-
 import rclpy
 from rclpy.duration import Duration
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
-from rclpy_simulation import Delay, Network, Process, Simulation
 from std_msgs.msg import Int64
+
+from rclpy_simulation import Delay, Network, Process, Simulation
 
 BEST_EFFORT = QoSProfile(depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT)
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -117,6 +117,18 @@ def test_samples_of_a_held_topic_arrive_together(simulation: Simulation, start: 
     simulation.run(1.0)
     assert listener.received == [1, 2, 3]
     assert [time - begin for time in listener.times] == pytest.approx([2.0, 2.0, 3.0], abs=0.1)
+
+
+@pytest.mark.simulation(seed=1, network=Network(latency=EXACT))
+def test_samples_of_a_lost_topic_never_arrive(simulation: Simulation, start: Start) -> None:
+    talker, talking, listener, _ = start(10)
+    simulation.lose(talker.publisher.topic_name.replace("/", "rt/", 1), 2.0)
+    simulation.lose(talker.publisher.topic_name.replace("/", "rt/", 1), 1.5)  # the longer one counts
+    simulation.lose("rt/other", 9.0)
+    for number in (1, 2, 3):
+        publish(simulation, talking, talker, number)
+        simulation.run(1.01)
+    assert listener.received == [3]
 
 
 @pytest.mark.simulation(seed=1)
@@ -340,6 +352,21 @@ def test_a_stop_longer_than_the_lease_ends_the_match_for_a_while(
     talking.proceed()
     simulation.run(20.0)
     assert [count for _, count in listener.matched] == counts
+
+
+@pytest.mark.simulation(seed=2)
+def test_a_reader_that_was_stopped_for_longer_than_the_lease_hears_again(
+    simulation: Simulation, start: Start
+) -> None:
+    talker, talking, listener, listening = start()
+    listening.stop()
+    simulation.run(15.0)
+    assert talker.publisher.get_subscription_count() == 0
+    listening.proceed()
+    simulation.run(20.0)
+    publish(simulation, talking, talker, 1)
+    simulation.run(1.0)
+    assert listener.received == [1]
 
 
 @pytest.mark.simulation(seed=2)

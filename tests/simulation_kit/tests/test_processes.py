@@ -6,6 +6,7 @@ import atexit
 import gc
 import os
 import queue
+import re
 import signal
 import sys
 import threading
@@ -17,10 +18,12 @@ from time import sleep
 from typing import Any
 
 import pytest
-
 import rclpy
-from rclpy_simulation import Delay, Process, Simulation
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.experimental import EventsExecutor
 from std_msgs.msg import Int64
+
+from rclpy_simulation import Delay, Process, Simulation
 
 NOW = Delay(0.0, 0.0)
 
@@ -90,7 +93,7 @@ def test_the_time_of_day_of_a_host_steps_and_drifts(simulation: Simulation) -> N
 
     def program() -> None:
         while True:
-            clocks.append((time.monotonic() - 1000.0, time.time()))
+            clocks.append((round(time.monotonic() - 1000.0, 3), round(time.time(), 3)))
             assert time.gmtime() == time.gmtime(time.time())
             time.sleep(100.0)
 
@@ -125,7 +128,7 @@ def test_threads_of_a_process_wait_for_each_other(simulation: Simulation) -> Non
         producer.start()
         assert producer.is_alive()
         for _ in range(3):
-            items.append((line.get(timeout=5.0), time.monotonic() - 1000.0))
+            items.append((line.get(timeout=5.0), round(time.monotonic() - 1000.0, 3)))
         assert done.wait(1.0)
         producer.join()
         assert not producer.is_alive()
@@ -133,7 +136,7 @@ def test_threads_of_a_process_wait_for_each_other(simulation: Simulation) -> Non
             line.get(timeout=2.5)
         with ThreadPoolExecutor(2) as pool:
             items.extend(pool.map(lambda number: time.sleep(number) or number, [2, 1]))
-        items.append(time.monotonic() - 1000.0)
+        items.append(round(time.monotonic() - 1000.0, 3))
 
     assert run(simulation, program).exit_code == 0
     assert items == [(0, 1.0), (1, 2.0), (2, 3.0), 2, 1, 7.5]
@@ -274,6 +277,60 @@ def test_a_process_can_stop_and_kill_itself(simulation: Simulation) -> None:
     assert process.exit_code == -signal.SIGKILL
 
 
+@pytest.mark.parametrize(
+    ("steps", "read"),
+    [(1, [5.0, 5.0, 5.0]), (2, [0.0, 5.0, 5.0]), (3, [0.0, 0.0, 5.0]), (4, [0.0, 0.0, 0.0])],
+)
+def test_a_process_stops_between_two_readings_of_clocks(
+    simulation: Simulation, steps: int, read: list[float]
+) -> None:
+    times: list[float] = []
+
+    def program() -> None:
+        process.stop_after(steps)
+        times.append(time.monotonic() - 1000.0)
+        begin = time.time()
+        times.append(time.monotonic() - 1000.0)
+        times[1:1] = [begin - began]
+        process.stop_after(0)
+
+    process = simulation.start(program, delay=NOW)
+    began = process.host.time_of_day(process.kernel.now) / 1e9
+    simulation.after(5.0, process.proceed)
+    simulation.run(10.0)
+    assert times == pytest.approx(read, abs=1e-5)
+
+
+def test_a_process_stops_before_it_publishes_and_takes(simulation: Simulation) -> None:
+    sent: list[float] = []
+    taken: list[float] = []
+    simulation.tap(lambda writer, sample: sent.append(simulation.now) if writer.topic == "rt/x" else None)
+
+    def talk_to_itself() -> None:
+        rclpy.init()
+        node = rclpy.create_node("talker")
+        publisher = node.create_publisher(Int64, "x", 10)
+        node.create_subscription(Int64, "x", lambda _: taken.append(simulation.now), 10)
+        publisher.publish(Int64())
+        rclpy.spin(node)
+
+    stops: list[float] = []
+    for steps in range(1, 200):
+        sent.clear()
+        taken.clear()
+        process = simulation.start(talk_to_itself, delay=NOW)
+        process.stop_after(steps)
+        begin = simulation.now
+        simulation.after(5.0, process.proceed)
+        simulation.run(6.0)
+        process.kill()
+        assert len(sent) == len(taken) == 1
+        stops.append((sent[0] - begin > 4.0) + (taken[0] - begin > 4.0))
+        if not stops[-1]:
+            break
+    assert set(stops) == {0, 1, 2}
+
+
 # The end
 
 
@@ -359,16 +416,47 @@ def test_an_uncaught_error_ends_a_process_with_its_traceback(simulation: Simulat
     assert simulation.ends[-1][:3] == ("program", process.pid, 1)
 
 
-def test_each_process_has_its_own_arguments_and_environment(simulation: Simulation) -> None:
+def test_a_traceback_has_no_frames_of_the_kit_as_rcl_has_none(simulation: Simulation) -> None:
+    def program(executor: Any) -> None:
+        rclpy.init()
+        node = rclpy.create_node("failing")
+        node.create_timer(1.0, fail)
+        spinning = executor()
+        spinning.add_node(node)
+        spinning.spin()
+
+    def fail() -> None:
+        try:
+            os.system("true")
+        except RuntimeError as error:
+            raise ExceptionGroup("broken", [error]) from error
+
+    for executor in (SingleThreadedExecutor, EventsExecutor):
+        text = run(simulation, lambda it=executor: program(it)).output.text
+        assert not re.search("/rclpy_(ground|simulation)/", text), text
+        assert text.count('os.system("true")') == 2  # the cause, and the member of the group
+        assert "in program" in text
+
+
+def test_a_traceback_has_the_frames_of_a_kit_that_fails(simulation: Simulation) -> None:
+    text = run(simulation, lambda: Delay(1.0, 2.0).draw(None)).output.text  # type: ignore[arg-type]
+    assert "/rclpy_simulation/network.py" in text
+
+
+def test_each_process_has_its_own_arguments_and_environment(monkeypatch: pytest.MonkeyPatch) -> None:
     def program() -> None:
         time.sleep(1.0)
         print(sys.argv, os.environ, os.getpid())
 
-    one = simulation.start(program, "1", environment={"A": "1"}, name="one", delay=NOW)
-    two = simulation.start(program, "2", name="two", delay=NOW)
-    simulation.run(2.0)
-    assert one.output.text == f"['one', '1'] {{'A': '1'}} {one.pid}\n"
-    assert two.output.text == f"['two', '2'] {{}} {two.pid}\n"
+    monkeypatch.setenv("AMENT_PREFIX_PATH", "/opt/ros/jazzy")  # of the installed ROS 2: all have it
+    monkeypatch.delenv("ROS_DISTRO", raising=False)
+    with Simulation() as simulation:
+        one = simulation.start(program, "1", environment={"A": "1"}, name="one", delay=NOW)
+        two = simulation.start(program, "2", name="two", delay=NOW)
+        simulation.run(2.0)
+    installed = "'AMENT_PREFIX_PATH': '/opt/ros/jazzy'"
+    assert one.output.text == f"['one', '1'] {{{installed}, 'A': '1'}} {one.pid}\n"
+    assert two.output.text == f"['two', '2'] {{{installed}}} {two.pid}\n"
     assert sys.argv[0] != "two"
 
 
@@ -402,7 +490,8 @@ def test_memory_stays_flat_over_many_restarts() -> None:
                 simulation.run(simulation.random.uniform(0.0, 0.3))
                 process.kill()
             simulation.run(2 * simulation.network.lease)
-            gc.collect()
+            while gc.collect():  # finalizers let objects of their process live until the next time
+                pass
             return len(gc.get_objects())
 
         simulation.start(steady)

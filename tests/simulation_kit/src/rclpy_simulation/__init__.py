@@ -1,19 +1,19 @@
-"""A testing kit: rclpy programs in virtual time, on a simulated network, with faults."""
+"""rclpy programs in virtual time, on a simulated network: :class:`Simulation` says how."""
 
 from importlib.util import find_spec
 
-import rclpy
-
-if find_spec("rclpy._dds") is None:
-    raise ImportError(
-        f"rclpy_simulation needs the rclpy of rclpy-cyclonedds, not that of {rclpy.__path__[0]}"
-    )
 if find_spec("greenlet") is None:
     raise ImportError("rclpy_simulation needs greenlet: pip install 'greenlet>=3.1,<4'")
 
-from rclpy_simulation.host import Host
-from rclpy_simulation.network import Delay, Network
-from rclpy_simulation.process import Process
-from rclpy_simulation.simulation import Simulation
+import rclpy_ground
+from rclpy_simulation.ground import GROUND
 
-__all__ = ["Delay", "Host", "Network", "Process", "Simulation"]
+rclpy_ground.install(GROUND)  # before rclpy is imported, as the modules below do
+
+from rclpy_simulation.faults import Fault  # noqa: E402
+from rclpy_simulation.host import Host  # noqa: E402
+from rclpy_simulation.network import Delay, Network  # noqa: E402
+from rclpy_simulation.process import Process  # noqa: E402
+from rclpy_simulation.simulation import Simulation  # noqa: E402
+
+__all__ = ["Delay", "Fault", "Host", "Network", "Process", "Simulation"]

@@ -1,8 +1,8 @@
-"""What simulated programs wait for: conditions, guard conditions and wait sets of ``rclpy._dds``."""
+"""What simulated programs wait for: conditions, guard conditions and wait sets."""
 
 from __future__ import annotations
 
-from rclpy._dds import INFINITY
+from rclpy_ground.interface import INFINITY
 from rclpy_simulation.process import running
 from rclpy_simulation.thread import BUSY_WAITS, Thread
 
@@ -88,7 +88,7 @@ class WaitSet:
         else:
             self._immediate = 0
             thread = self._waiting = running()
-            now = thread.process.kernel.now
+            now = thread.process.present
             try:
                 thread.wait(None if timeout >= INFINITY - now else now + timeout)
             finally:

@@ -1,10 +1,10 @@
-"""What a simulated participant has discovered, as ``rclpy._dds`` shows it."""
+"""What a simulated participant has discovered."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 
-from rclpy._dds.discovery import Endpoint as EndpointInfo
+from rclpy_ground.interface import Endpoint as EndpointInfo
 from rclpy_simulation.conditions import Condition
 from rclpy_simulation.endpoints import Endpoint, Reader, Writer
 

@@ -1,4 +1,4 @@
-"""Simulated writers and readers of ``rclpy._dds``."""
+"""Simulated writers and readers of DDS."""
 
 from __future__ import annotations
 
@@ -6,12 +6,13 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from typing import Any, Protocol
 
-from rclpy._dds import INFINITY, Sample, entities, qos
-from rclpy._dds.discovery import Endpoint as EndpointInfo
-from rclpy._handle import Handle
 from rclpy.duration import Duration
 from rclpy.exceptions import InvalidHandle
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, LivelinessPolicy, QoSProfile, ReliabilityPolicy
+
+from rclpy_ground import interface as qos
+from rclpy_ground.interface import INFINITY, Sample
+from rclpy_ground.interface import Endpoint as EndpointInfo
 from rclpy_simulation.conditions import Condition
 from rclpy_simulation.host import SECOND
 from rclpy_simulation.kernel import Kernel
@@ -20,7 +21,6 @@ from rclpy_simulation.network import Network
 from rclpy_simulation.process import running
 from rclpy_simulation.statuses import Statuses
 from rclpy_simulation.watchdog import Watchdog
-from rosidl_runtime_embedded.pieces import Pieces
 
 # The identifiers of DDS policies (DDS 1.4, 2.3.3).
 _DURABILITY, _DEADLINE, _LIVELINESS, _RELIABILITY = 2, 4, 8, 11
@@ -39,7 +39,7 @@ class Owner(Place, Protocol):
     def remove(self, endpoint: Endpoint) -> None: ...
 
 
-class Endpoint(Handle):
+class Endpoint:
     matched_status = ""
     incompatible_status = ""
 
@@ -138,7 +138,7 @@ class Writer(Endpoint):
             self._lease.renew()
             self._watchdogs.append(self._lease)
 
-    def write(self, data: bytes | Pieces) -> None:
+    def write(self, data: bytes, *, is_request: bool = False) -> None:
         data = bytes(data)
         participant = self.participant
         if self.is_closed:
@@ -146,6 +146,8 @@ class Writer(Endpoint):
         if len(data) < 4:
             raise ValueError(f"invalid CDR of {len(data)} octets: it needs an encapsulation header and data")
         process = participant.process
+        if process.steps_left:
+            process.step()
         if process.ended:
             return
         if len(data) & 3:
@@ -169,6 +171,7 @@ class Writer(Endpoint):
         if link is None:
             place = self.participant
             link = self._links[reader] = Link(place.kernel, place.network, self, reader)
+            reader.replace_link(self, link)
         return link
 
     def _connect(self, other: Reader, link: Link) -> None:
@@ -240,7 +243,6 @@ class Writer(Endpoint):
 class Reader(Endpoint):
     matched_status = "subscription_matched"
     incompatible_status = "requested_incompatible_qos"
-    take_message = entities.Reader.take_message
 
     def __init__(self, *arguments: Any) -> None:
         super().__init__(*arguments)
@@ -259,7 +261,10 @@ class Reader(Endpoint):
             self._queue.append((self.participant.kernel.now + lifespan, sample))
             self.condition.set()
 
-    def take(self, lend: bool = False) -> Sample | None:
+    def take(self) -> Sample | None:
+        process = self.participant.process
+        if process.steps_left:
+            process.step()
         now = self.participant.kernel.now
         while self._queue:
             expiry, sample = self._queue.popleft()
@@ -282,6 +287,13 @@ class Reader(Endpoint):
             link.disconnect_reader()
             self._change_liveliness(other, link.is_alive, -1)
         return link is not None
+
+    def replace_link(self, writer: Writer, link: Link) -> None:
+        """Receive by another link from a writer that had forgotten this reader, but was not forgotten."""
+        if writer in self._writers:
+            self._writers[writer].disconnect_reader()
+            self._writers[writer] = link
+            link.connect_reader()
 
     def note_liveliness(self, writer: Sender, is_alive: bool) -> None:
         """Note that a matched writer has lost its liveliness, or has got it again."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import heapq
 import itertools
+import operator
 import random
 from collections.abc import Callable, MutableMapping
 from typing import Any
@@ -29,7 +30,8 @@ class Kernel:
         self._orders = itertools.count()
         self._pids = itertools.count(1000)
         self._numbers = itertools.count(1)
-        self._state = state
+        self._mappings = [mapping for mapping, _ in state]
+        self._keys = [key for _, key in state]
         self._own: list[Any] = []  # the variables of the code that runs the simulation
         self._loaded = self._own  # those that are in place
         self._runs_program = False
@@ -94,8 +96,7 @@ class Kernel:
         before = self._loaded
         if before is wanted:
             return
-        state = self._state
-        before[:] = [mapping[key] for mapping, key in state]
+        before[:] = map(operator.getitem, self._mappings, self._keys)
         self._loaded = wanted
-        for (mapping, key), value in zip(state, wanted, strict=True):
-            mapping[key] = value
+        for _ in map(operator.setitem, self._mappings, self._keys, wanted):
+            pass

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections import deque
 from typing import Protocol
 
-from rclpy._dds import INFINITY, Sample
+from rclpy_ground.interface import INFINITY, Sample
 from rclpy_simulation.host import Host
 from rclpy_simulation.kernel import Kernel
 from rclpy_simulation.network import Network
-from rclpy_simulation.process import Process, running
+from rclpy_simulation.process import Process, here
 from rclpy_simulation.watchdog import Watchdog
 
 _STOPPED_QUEUE = 256  # samples of a best-effort writer that the kernel of a stopped process keeps
@@ -92,10 +92,13 @@ class Link:
             return
         if self.is_local:  # Cyclone DDS stores it with the reader, without a network
             self._deliver(sample)
-            running().note_empty_wait()  # a program that floods itself lets time pass
+            if here.thread is not None:
+                here.thread.note_empty_wait()  # a program that floods itself lets time pass
             return
         if network.cuts and self._is_cut():
             self._unsent.append(sample)
+            return
+        if network.lost and kernel.now < network.lost.get(self.writer.topic, 0):
             return
         arrival = kernel.now + network.latency.draw(kernel)
         if network.held:
@@ -184,7 +187,7 @@ class Link:
             self._lease = None
 
     def assert_liveliness(self) -> None:
-        """Tell the reader that the writer's application is alive, although it has written nothing."""
+        """Inform the reader that the writer's application is alive, although it has written nothing."""
         if self._has_lease and not (self.network.cuts and self._is_cut()):
             self.kernel.after(self.network.latency.draw(self.kernel), self._renew)
 

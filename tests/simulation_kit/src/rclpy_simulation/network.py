@@ -61,6 +61,8 @@ class Network:
     """Period at which a participant announces itself, so forgotten ones meet again [s]."""
     held: dict[str, int] = field(default_factory=dict)
     """DDS topics whose samples wait, with the time until when [ns]."""
+    lost: dict[str, int] = field(default_factory=dict)
+    """DDS topics whose samples are lost, with the time until when [ns]."""
     cuts: dict[frozenset[str], int] = field(default_factory=dict)
     """Pairs of hosts between which no packet passes, with the time since when [ns]."""
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import io
 from collections import deque
+from collections.abc import Callable
+from typing import Any
 
 _KEPT = 64 * 1024  # characters
 
@@ -15,10 +17,14 @@ class Output(io.TextIOBase):
         self._parts: deque[str] = deque()
         self._length = 0
         self._has_ended = False
+        self.listener: Callable[[str], Any] | None = None
+        """Is called with each text."""
 
     def write(self, text: str) -> int:
         """Add text, unless the process has ended."""
         if not self._has_ended:
+            if self.listener is not None:
+                self.listener(text)
             self._parts.append(text[-_KEPT:])
             self._length += len(self._parts[-1])
             while self._length > _KEPT and len(self._parts) > 1:

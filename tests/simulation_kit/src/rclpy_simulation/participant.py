@@ -1,4 +1,4 @@
-"""Simulated participants of ``rclpy._dds``, and how they discover each other."""
+"""Simulated participants of DDS, and how they discover each other."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ import itertools
 from collections.abc import Callable, Iterator
 from functools import partial
 
-from rclpy._dds import Sample
 from rclpy.qos import QoSProfile
+
+from rclpy_ground.interface import Sample
 from rclpy_simulation.discovery import Discovery
 from rclpy_simulation.endpoints import Endpoint, Reader, Writer
 from rclpy_simulation.host import SECOND
@@ -195,6 +196,11 @@ class Domains:
         self.participants: dict[Participant, None] = {}  # in the order of their creation
         self.taps: list[Callable[[Writer, Sample], None]] = []
         """Are called with every sample that is written."""
+        self.version = 0
+        """Of all endpoints: another one after each change."""
+
+    def create_participant(self, domain_id: int, enclave: str) -> Participant:
+        return Participant(self, domain_id, enclave)
 
     def join(self, participant: Participant) -> None:
         """Let a new participant and the others of its domain discover each other."""
@@ -230,8 +236,9 @@ class Domains:
         self.kernel.after(duration, hear)
 
     def announce(self, participant: Participant) -> None:
-        """Tell the participants that know this one about its endpoints."""
+        """Inform the participants that know this one of its endpoints."""
         participant.version += 1
+        self.version += 1
         for other in self.participants:
             if participant in other.known:
                 self._tell(other, participant)
@@ -244,22 +251,22 @@ class Domains:
     def leave(self, participant: Participant) -> None:
         """Remove a participant that says goodbye. Those that do not hear it find out when its lease ends."""
 
-        def tell(other: Participant) -> None:
+        def inform(other: Participant) -> None:
             self._later(self.network.matching, other, participant, other.forget)
             self._expire(other, participant, lambda: True)
 
-        self._remove(participant, tell)
+        self._remove(participant, inform)
 
     def vanish(self, participant: Participant) -> None:
         """Remove a participant that was killed; the others find out when its lease ends."""
         self._remove(participant, lambda other: self._expire(other, participant, lambda: True))
 
-    def _remove(self, participant: Participant, tell: Callable[[Participant], None]) -> None:
+    def _remove(self, participant: Participant, inform: Callable[[Participant], None]) -> None:
         if participant in self.participants:
             del self.participants[participant]
             for other in self.participants:
                 if participant in other.known:
-                    tell(other)
+                    inform(other)
 
     def fall_silent(self, participant: Participant) -> None:
         """Let the others forget a participant whose process is stopped for longer than its lease."""

@@ -16,6 +16,9 @@ from rclpy_simulation.kernel import Kernel
 from rclpy_simulation.output import Output
 from rclpy_simulation.thread import ProcessExit, Thread, trace
 
+READING = 1000
+"""How long a process takes to read a clock [ns]; other code takes no time."""
+_AHEAD = 1000 * READING  # by which its clock may be ahead of the others [ns]
 _LAST_ENDS = 8
 _UNWILLING = 100  # waits of a killed thread that catches every exception
 _IGNORED = (signal.SIGCHLD, signal.SIGURG, signal.SIGWINCH, signal.SIGPIPE)  # by default, in Python
@@ -78,9 +81,13 @@ class Process:
         self.environment = environment
         """The variables that it was started with."""
         self.began = kernel.now
+        self.input: Any = None
+        """Standard input: ``input.type("text\\n")`` types at the terminal of the program."""
         self.output = Output()
         self.exit_code: int | None = None
         """``None`` while it is alive, the negative signal number if a signal has killed it."""
+        self.start_again: Callable[[], Any] = lambda: None
+        """Starts its program once more, as another process."""
         self.participants: list[Member] = []
         self.handlers: dict[int, Any] = {}
         """The signal handlers by signal."""
@@ -95,6 +102,9 @@ class Process:
         """Whether SIGSTOP has suspended it."""
         self.is_hung = False
         """Whether it runs an endless loop."""
+        self.steps_left = 0
+        """After so many steps of :meth:`stop_after` it stops; 0 for never."""
+        self._read_at = 0  # the last reading of its clock [ns]
         self._main = main
         self._at_end: list[Callable[[], Any]] = []
         self._threads: list[Thread] = []
@@ -114,6 +124,29 @@ class Process:
         """Whether it runs nothing at present: stopped, or in an endless loop."""
         return self.is_stopped or self.is_hung
 
+    # Its clock
+
+    @property
+    def present(self) -> int:
+        """The monotonic time, as its program knows it [ns]."""
+        return max(self.kernel.now, self._read_at)
+
+    def read_clock(self) -> int:
+        """Return the monotonic time [ns]. A reading takes a microsecond, so that no loop of them is endless.
+
+        The process may stop just before.
+        """
+        if self.steps_left:
+            self.step()
+        now = self.kernel.now
+        if self._read_at < now:
+            self._read_at = now
+        else:
+            self._read_at += READING
+            if self._read_at - now >= _AHEAD:
+                running().wait(self._read_at)
+        return self._read_at
+
     # Its life
 
     def begin(self) -> None:
@@ -129,7 +162,7 @@ class Process:
         thread.wake()
 
     def is_about_to_run(self) -> bool:
-        """Tell the listeners that it is about to run; return whether it may: they can kill or stop it."""
+        """Inform the listeners that it is about to run; return whether it may: they can kill or stop it."""
         if listeners := self.processes.listeners:
             for listener in listeners:
                 listener(self)
@@ -228,6 +261,21 @@ class Process:
             for participant in self.participants:
                 participant.fall_silent()
 
+    def stop_after(self, steps: int) -> None:
+        """SIGSTOP inside a callback: just before it reads a clock, publishes or takes for the n-th time.
+
+        :param steps: counts them from now on; 0 takes it back.
+        """
+        self.steps_left = steps
+
+    def step(self) -> None:
+        """Note that it is about to read a clock, to publish or to take."""
+        if here.process is self:  # not the simulation itself
+            self.steps_left -= 1
+            if not self.steps_left:
+                self.stop()
+                self.settle()
+
     def hang(self) -> None:
         """Let it run an endless loop in a callback. DDS, which has threads of its own, continues."""
         self.is_hung = True
@@ -322,3 +370,15 @@ def running_process() -> Process:
     if here.process is None:
         raise RuntimeError("only simulated programs can do this: start them with Simulation.start")
     return here.process
+
+
+def in_process(simulated: Callable[..., Any], real: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a function that does one thing in a simulated process, and the real one elsewhere."""
+
+    def call(*arguments: Any, **options: Any) -> Any:
+        process = here.process
+        if process is None:
+            return real(*arguments, **options)
+        return simulated(process, *arguments, **options)
+
+    return call

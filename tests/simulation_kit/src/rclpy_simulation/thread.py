@@ -12,13 +12,18 @@ from typing import Any, Protocol
 
 from greenlet import GreenletExit, greenlet
 
+import rclpy_ground
+from rclpy_simulation import running_loop
 from rclpy_simulation.host import SECOND
 from rclpy_simulation.kernel import Kernel
+from rclpy_simulation.missing import note_origin
 
 BUSY_WAITS = 1000  # without waiting in between: then a thread is taken for a busy loop
 _BUSY_PAUSE = SECOND // 1000
 _FIRST_IDENT = 1 << 62  # real identifiers of threads are addresses below
-_HERE = str(Path(__file__).parent)
+_OURS = tuple(str(Path(str(module.__file__)).parent) for module in (rclpy_ground, running_loop))
+_FAULTS = (AssertionError, AttributeError, LookupError, NameError)
+"""Errors of which the kit raises none on purpose."""
 
 
 class ProcessExit(BaseException):
@@ -35,6 +40,9 @@ class Owner(Protocol):
     kernel: Kernel
     exit_code: int | None
     interrupts: deque[Callable[[], Any]]
+
+    @property
+    def present(self) -> int: ...
 
     @property
     def is_suspended(self) -> bool: ...
@@ -55,8 +63,8 @@ class Owner(Protocol):
 class Thread:
     """A thread of a simulated process.
 
-    It is a greenlet, which runs until it waits: in a DDS wait set, in ``time.sleep``, or for a condition or
-    event of ``threading``.
+    It is a greenlet, which runs until it waits: in a DDS wait set, in ``time.sleep``, for a lock, for a
+    condition, for standard input, or in an event loop of asyncio.
     """
 
     def __init__(self, process: Owner, work: Callable[[], Any], face: threading.Thread) -> None:
@@ -126,7 +134,11 @@ class Thread:
         if deadline is not None and (self._alarm is None or deadline < self._alarm):
             self._alarm = max(deadline, kernel.now)
             kernel.schedule(self._alarm, self._ring)
-        kernel.hub.switch()
+        left = running_loop.leave()
+        try:
+            kernel.hub.switch()
+        finally:
+            running_loop.enter(left)
         if process.interrupts or process.exit_code is not None:
             process.handle_interrupts(self)
 
@@ -157,7 +169,7 @@ class Thread:
     def wait_until(self, condition: Callable[[], object], timeout: float | None) -> None:
         """Wait until a condition is true, at most ``timeout`` [s]; who makes it true wakes this thread."""
         kernel = self.process.kernel
-        deadline = None if timeout is None else kernel.now + int(timeout * SECOND)
+        deadline = None if timeout is None else self.process.present + int(timeout * SECOND)
         if deadline is not None and deadline <= kernel.now:
             self.note_empty_wait()
         while not condition() and (deadline is None or kernel.now < deadline):
@@ -183,8 +195,21 @@ class Thread:
 
 
 def trace(error: BaseException) -> str:
-    """Return the traceback of a program's error, without the frames of the simulation around the program."""
-    frames = error.__traceback__
-    while frames is not None and frames.tb_frame.f_code.co_filename.startswith(_HERE):
-        frames = frames.tb_next
-    return "".join(traceback.format_exception(type(error), error, frames))
+    """Return the traceback of a program's error as on rcl: there, what is below and around it has no frames.
+
+    Frames of the kit remain where it seems to be the one that fails.
+    """
+    note_origin(error)
+    shown = traceback.TracebackException.from_exception(error)
+    _hide(shown, keeps_last=isinstance(error, _FAULTS))
+    return "".join(shown.format())
+
+
+def _hide(shown: traceback.TracebackException, keeps_last: bool = False) -> None:
+    """Leave out the frames of the kit, of causes and members too."""
+    frames = [frame for frame in shown.stack if not frame.filename.startswith(_OURS)]
+    if frames and not (keeps_last and shown.stack[-1] is not frames[-1]):
+        shown.stack[:] = frames
+    for other in (shown.__cause__, shown.__context__, *(getattr(shown, "exceptions", None) or ())):
+        if other is not None:
+            _hide(other)

@@ -11,20 +11,21 @@ import sys
 import threading
 import time
 import uuid
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from contextlib import suppress
 from pathlib import Path
 
 from tests.mutants.guards import REACTIVE_NODE
 from tests.mutants.mutations import Mutant
+from tests.runtimes import needs_virtual_time
 
 MARK = "REACTIVE_ARM_MUTANTS"
-"""An environment variable that all processes of a bench inherit."""
+"""An environment variable that all processes of a copy inherit."""
 # A mutant may take this multiple of the original's time, and some seconds more.
 _PATIENCE, _ALLOWANCE = 5, 10.0
 
 
-class Bench:
+class CheckoutCopy:
     """Tests mutants in a copy of the checkout: the checkout itself never changes. Used by one thread."""
 
     def __init__(self, root: Path, directory: Path) -> None:
@@ -39,19 +40,31 @@ class Bench:
                 (self._directory / name).parent.mkdir(parents=True, exist_ok=True)
                 shutil.copy(root / name, self._directory / name)
         (self._directory / ".venv").symlink_to(root / ".venv")
-        # Before the installed copy of reactive_node:
-        path = [str(self._directory / REACTIVE_NODE.removesuffix("/reactive_node"))]
+        # Before the copy of the checkout: a folder of PYTHONPATH that has this file stays before .venv.
+        source = self._directory / REACTIVE_NODE.removesuffix("/reactive_node")
+        source.mkdir(parents=True, exist_ok=True)
+        (source / "sitecustomize.py").touch()
+        path = [str(source)]
         path += [folder for folder in [os.environ.get("PYTHONPATH")] if folder]
-        self._runner = subprocess.Popen(
-            [sys.executable, str(self._directory / "tests/mutants/runner.py")],
-            cwd=self._directory,
-            env=os.environ | {MARK: self._mark, "PYTHONPATH": os.pathsep.join(path)},
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-            start_new_session=True,  # Ctrl-C ends it by close()
-        )
-        self._answer()
+        self._environment = os.environ | {MARK: self._mark, "PYTHONPATH": os.pathsep.join(path)}
+        self._runners: dict[bool, subprocess.Popen[str]] = {}
+
+    def _runner(self, *, in_virtual_time: bool) -> subprocess.Popen[str]:
+        """Return the process that runs tests on ROS 2's rclpy, or in virtual time; start it once."""
+        runner = self._runners.get(in_virtual_time)
+        if runner is None:
+            first = ["rclpy_simulation"] if in_virtual_time else []
+            runner = self._runners[in_virtual_time] = subprocess.Popen(
+                [sys.executable, str(self._directory / "tests/mutants/runner.py"), *first],
+                cwd=self._directory,
+                env=self._environment,
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                text=True,
+                start_new_session=True,  # Ctrl-C ends it by close()
+            )
+            _answer(runner)
+        return runner
 
     def kills(self, mutant: Mutant, tests: Sequence[str]) -> bool:
         """Return whether tests fail or hang with a mutant. Raises RuntimeError if they fail without it."""
@@ -79,28 +92,22 @@ class Bench:
         """Return the exit code of pytest; that of a kill after `timeout` [s]."""
         # The test that killed the mutant before comes first: it often kills the next one, too.
         options = ["-x", "-q", "--failed-first", "--hypothesis-profile=mutants"]
-        assert self._runner.stdin is not None
-        print(json.dumps([*options, *tests]), file=self._runner.stdin, flush=True)
-        child = int(self._answer())
+        runner = self._runner(in_virtual_time=needs_virtual_time(tests))
+        assert runner.stdin is not None
+        print(json.dumps([*options, *tests]), file=runner.stdin, flush=True)
+        child = int(_answer(runner))
         timer = threading.Timer(timeout, os.killpg, (child, signal.SIGKILL))
         timer.start()
         try:
-            return int(self._answer())
+            return int(_answer(runner))
         finally:
             timer.cancel()
-            self._end_processes(but=self._runner.pid)
+            self._end_processes(but=[each.pid for each in self._runners.values()])
 
-    def _answer(self) -> str:
-        assert self._runner.stdout is not None
-        line = self._runner.stdout.readline()
-        if not line:
-            raise RuntimeError("the runner of the tests has ended")
-        return line
-
-    def _end_processes(self, but: int = 0) -> None:
+    def _end_processes(self, but: Collection[int] = ()) -> None:
         mark = f"{MARK}={self._mark}".encode()
         for entry in Path("/proc").iterdir():
-            if entry.name.isdigit() and int(entry.name) != but:
+            if entry.name.isdigit() and int(entry.name) not in but:
                 with suppress(OSError):
                     if mark in (entry / "environ").read_bytes().split(b"\0"):
                         os.kill(int(entry.name), signal.SIGKILL)
@@ -108,4 +115,13 @@ class Bench:
     def close(self) -> None:
         """End all processes; a test that runs on another thread fails."""
         self._end_processes()
-        self._runner.communicate()
+        for runner in self._runners.values():
+            runner.communicate()
+
+
+def _answer(runner: subprocess.Popen[str]) -> str:
+    assert runner.stdout is not None
+    line = runner.stdout.readline()
+    if not line:
+        raise RuntimeError("the runner of the tests has ended")
+    return line

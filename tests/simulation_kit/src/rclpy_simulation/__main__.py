@@ -1,0 +1,12 @@
+"""``python -m rclpy_simulation replay``: a bag and your nodes in, a bag out."""
+
+import sys
+from importlib.util import find_spec
+
+if find_spec("mcap_files") is None:
+    sys.exit("replay needs ros2-python-tools: pip install 'rclpy-simulation[replay]'")
+
+from rclpy_simulation.replay.command import main
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
