@@ -2,7 +2,7 @@
 
 A source publishes items, a middle process maps and publishes them again, a sink receives them. Then a source
 floods a sink, and a source starts while a sink waits. `chain` compares the arm's kinematics and velocity, and
-its operator watchdog, with the same in plain callbacks. `images` sends images from one process to another.
+its operator watchdog, with the same in plain callbacks.
 
 Each round measures all alternatives in a random order, so a busy machine affects all alike. CPU time is that
 of whole processes. What cannot be measured here is named with the reason.
@@ -25,30 +25,27 @@ from typing import Any
 from deploy.supervision import interruption
 from deploy.supervision.processes import run_directory
 from tests.benchmarks import scale, signals
-from tests.benchmarks.alternatives import ALTERNATIVES, CHAINS, IMAGES, Alternative
+from tests.benchmarks.alternatives import ALTERNATIVES, CHAINS, Alternative
 from tests.benchmarks.measurement import (
     CHAIN_SCENARIOS,
-    IMAGE_SCENARIOS,
     SCENARIOS,
     WATCHDOG_SCENARIOS,
     MeasurementFailed,
     Scenario,
     measure,
 )
-from tests.benchmarks.table import chain_tables, image_tables, tables
+from tests.benchmarks.table import chain_tables, tables
 
-COMPARISON, CHAIN, IMAGE, SCALE, SIGNALS = "comparison", "chain", "images", "scale", "signals"
+COMPARISON, CHAIN, SCALE, SIGNALS = "comparison", "chain", "scale", "signals"
 TABLES: dict[str, Callable[[Any], str]] = {
     COMPARISON: tables,
     CHAIN: chain_tables,
-    IMAGE: image_tables,
     SCALE: scale.tables,
     SIGNALS: signals.table,
 }
 WORK: dict[str, tuple[Sequence[Alternative], Sequence[Scenario]]] = {
     COMPARISON: (ALTERNATIVES, SCENARIOS),
     CHAIN: (CHAINS, CHAIN_SCENARIOS),
-    IMAGE: (IMAGES, IMAGE_SCENARIOS),
 }
 
 
@@ -110,9 +107,8 @@ def main(arguments: Sequence[str]) -> int:
     kinds = {
         COMPARISON: "this system and its alternatives (the default)",
         CHAIN: "the arm's own services and the same in plain callbacks",
-        IMAGE: "images from one process to another",
         SCALE: "many arms, many subscribers",
-        SIGNALS: "whether signals answer, how exact they are, and what they cost",
+        SIGNALS: "what signals cost, and how exact the speed of a real arm is",
     }
     shown = "; ".join(f"{name}: {meaning}" for name, meaning in kinds.items())
     parser.add_argument("kind", nargs="?", choices=kinds, default=COMPARISON, metavar="KIND", help=shown)
@@ -125,7 +121,7 @@ def main(arguments: Sequence[str]) -> int:
     code = 0
     try:
         if options.kind == SCALE:
-            _scale(results)
+            collect_scale(results)
         elif options.kind == SIGNALS:
             print(machine(), flush=True)
             results |= {name: row for name, *row in signals.measure()}
@@ -153,7 +149,7 @@ def _compare(results: dict[str, Any], kind: str, rounds: int) -> None:
             results[title].setdefault(name, []).append(value)
 
 
-def _scale(results: dict[str, Any]) -> None:
+def collect_scale(results: dict[str, Any]) -> None:
     """Collect the figures of each number of arms and subscribers, by kind."""
     print(machine(), flush=True)
     for kind, number, figures in scale.measure():

@@ -49,11 +49,6 @@ def c_processes(alternative: Alternative, jobs: Sequence[Job]) -> list[list[str]
     return [c_program.command(alternative.link, job) for job in jobs]
 
 
-def c_processes_with_defaults(alternative: Alternative, jobs: Sequence[Job]) -> list[list[str]]:
-    """Return the same commands, with the settings that Cyclone DDS has by itself."""
-    return [c_program.command(alternative.link, job, c_program.DEFAULTS) for job in jobs]
-
-
 @dataclass(frozen=True)
 class Alternative:
     title: str
@@ -102,19 +97,3 @@ CHAINS = (
     Alternative("Cyclone DDS, C program", c_program.SERVICES, commands=c_processes, build=c_program.build),
 )
 """The arm's own chain, from an angle to a speed, and its operator watchdog."""
-IMAGES = (
-    Alternative("ReactiveNode", "image_reactive"),
-    Alternative("callbacks, same rclpy", "image_callbacks"),
-    Alternative("ROS 2, ReactiveNode", "image_reactive", ros=True),
-    Alternative("ROS 2, callbacks", "image_callbacks", ros=True),
-    Alternative(
-        "C program, Cyclone DDS's own settings",
-        c_program.PIPELINE,
-        commands=c_processes_with_defaults,
-        build=c_program.build,
-    ),
-    Alternative(
-        "C program, the runtime's settings", c_program.PIPELINE, commands=c_processes, build=c_program.build
-    ),
-)
-"""Images from one process to another. The programs in C send only the octets of the image."""

@@ -11,11 +11,11 @@ from deploy.supervision.processes import run_directory
 from tests.benchmarks.link import HEARTBEATS, Job
 
 PIPELINE, SERVICES = "pipeline", "services"
-LOOPBACK, LOCALHOST, DEFAULTS = "loopback.xml", "localhost.xml", "defaults.xml"
+LOOPBACK, LOCALHOST = "loopback.xml", "localhost.xml"  # the settings of the ground of Cyclone DDS
 _SOURCES = Path(__file__).with_name("c")
 _CONFIGURATIONS = Path(__file__).with_name("links")
 _PACKAGES = {"cc": "gcc libc6-dev", "idlc": "cyclonedds-tools cyclonedds-dev"}
-"""What compiles it, and the packages of Debian and Ubuntu that bring it."""
+"""The compiler, and the packages of Debian and Ubuntu that bring it."""
 
 
 def build() -> str:
@@ -41,13 +41,10 @@ def build() -> str:
     return ""
 
 
-def command(program: str, job: Job, settings: str = "") -> list[str]:
-    """Return the command of a process of PIPELINE or SERVICES.
-
-    :param settings: a file of Cyclone DDS in ``links/``; by default, those of the embedded runtime.
-    """
+def command(program: str, job: Job) -> list[str]:
+    """Return the command of a process of PIPELINE or SERVICES."""
     numbers = (job.size, job.rate, job.warm_up, job.seconds, job.depth)
-    configuration = _CONFIGURATIONS / (settings or (LOCALHOST if job.topic == HEARTBEATS else LOOPBACK))
+    configuration = _CONFIGURATIONS / (LOCALHOST if job.topic == HEARTBEATS else LOOPBACK)
     words = [job.role, job.topic, *map(str, numbers), job.directory, configuration.read_text()]
     return [str(_directory() / program), *words]
 

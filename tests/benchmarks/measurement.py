@@ -44,7 +44,7 @@ class MeasurementFailed(Exception):
 @dataclass(frozen=True)
 class Scenario:
     name: str
-    """`pipeline`, `flood`, `start`, `subscribers`, `image`, `chain` (angle to speed) or `watchdog`."""
+    """`pipeline`, `flood`, `start`, `subscribers`, `chain` (angle to speed) or `watchdog`."""
     size: int
     """The size of an item [octets]."""
     rate: float
@@ -57,8 +57,6 @@ class Scenario:
     @property
     def key(self) -> str:
         """The beginning of the names of its figures."""
-        if self.name == IMAGE:
-            return f"{self.name}.{self.size}.{self.rate:.0f}"
         return f"{self.name}.{self.rate if self.name in (CHAIN, WATCHDOG) else self.size:.0f}"
 
     @property
@@ -68,11 +66,10 @@ class Scenario:
 
     @property
     def charged(self) -> tuple[str, ...]:
-        return (SOURCE, SINK) if self.name == IMAGE else self.middle or (SINK,)
+        return self.middle or (SINK,)
 
 
 CHAIN = "chain"
-IMAGE = "image"
 SCENARIOS = (
     Scenario("pipeline", 8, 200.0),
     Scenario("pipeline", 1_000, 200.0),
@@ -88,10 +85,6 @@ SCENARIOS = (
 # to its start, so services warm up longer.
 CHAIN_SCENARIOS = tuple(
     Scenario(CHAIN, 8, rate, warm_up=2.0, seconds=2.0) for rate in (100.0, 500.0, 1000.0, 4000.0)
-)
-IMAGE_SCENARIOS = (
-    *(Scenario(IMAGE, 1_000_000, rate) for rate in (20.0, 100.0, 300.0)),
-    *(Scenario(IMAGE, 10_000_000, rate, seconds=3.0) for rate in (4.0, 20.0)),
 )
 WATCHDOG_SCENARIOS = tuple(Scenario(WATCHDOG, 1, rate, warm_up=2.0, seconds=3.0) for rate in (20.0, 10_000.0))
 

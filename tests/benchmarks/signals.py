@@ -1,22 +1,22 @@
-"""Signals: whether they answer, how exact they are, what they cost, and the speed of a real arm."""
+"""Signals: what they cost, and how exact the speed of a real arm is.
+
+That they answer, are exact and need no memory shows in the tests of reactive_node.
+"""
 
 from __future__ import annotations
 
-import hashlib
 import math
 import os
-import random
-import struct
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from datetime import datetime
 from pathlib import Path
 from typing import Any
 
 import rclpy
-import yaml
+import ros_yaml
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from reactivex.disposable import Disposable
@@ -27,20 +27,15 @@ from deploy.supervision.environment import NAMESPACE, set_middleware
 from interfaces.robot_model import forward_kinematics
 from interfaces.sources.scenario_file import load
 from interfaces.topics import EFFECTOR_SPEED, EFFECTOR_TWIST, THETA1, THETA2
-from reactive_node.signals import Answer, Refused, Signal, as_taken, lift, linear
+from reactive_node.signals import Signal, lift, linear
 from reactive_node.stamps import from_nanoseconds, stamped
 from reactive_node.testing import VirtualTime
 from tests.benchmarks.scale import Fleet
 
-MIX, LINE, SPEED, HOUR, COST, DAY = (
-    "50 Hz and 60 Hz, jitter 5 ms, one in fifty 80 ms late, lateness 100 ms",
-    "linear motion, interpolated",
-    "speed of the effector in the demo, live",
-    "an hour with disordered input",
-    "a sample through linear, lift of four, derivative, sample",
-    "24 simulated hours",
-)
+SPEED = "speed of the effector in the demo, live"
+COST = "a sample through linear, lift of four, derivative, sample"
 LATENESS, GAP = 0.1, 0.1  # s
+RATE = 50.0  # Hz of the answers
 LINK1, LINK2 = 2.0, 3.0  # m, of the demo
 SECONDS = 60.0  # s of the live measurement
 NS = 1_000_000_000
@@ -48,13 +43,11 @@ DEMO = Path(__file__).parents[2] / "deploy" / "scenarios" / "demo.yaml"
 
 Row = tuple[str, str, str, str]
 """What was measured, the goal, the result, and what else was seen."""
-Arrivals = list[tuple[float, Any]]
-"""Samples with the times of their arrival [s]."""
 
 
 def measure() -> Iterator[Row]:
     """Yield all rows of the table, and print each."""
-    for row in (mix, line, hour, cost, day, speed):
+    for row in (cost, speed):
         interruption.check()
         found = row()
         print(" | ".join(found), flush=True)
@@ -67,80 +60,10 @@ def table(results: Mapping[str, Sequence[str]]) -> str:
     return "\n".join([head, *(f"| {' | '.join((name, *row))} |" for name, row in results.items())])
 
 
-def arrivals(
-    rate: float, seconds: float, value: Callable[[float], Any], seed: int, late: float = 0.08
-) -> Arrivals:
-    """Return samples with a jitter of 5 ms, one in fifty late [s], in the order of their arrival."""
-    chance = random.Random(seed)
-    times = [k / rate for k in range(1, round(seconds * rate))]
-    delays = (late if chance.random() < 1 / 50 else chance.uniform(0.0, 0.005) for _ in times)
-    return sorted(
-        (t + delay, stamped(value(t), round(t * NS))) for t, delay in zip(times, delays, strict=True)
-    )
-
-
-def mix(seconds: float = 600.0) -> Row:
-    """Ask for values of two topics at common times."""
-    scheduler = VirtualTime()
-    one, other = (
-        linear(scheduler.hot(*arrivals(rate, seconds, math.sin, seed=1)), lateness=LATENESS, gap=GAP)
-        for rate in (50.0, 60.0)
-    )
-    pairs = lift(lambda *values: values)(one, other).sample(0.02)
-    asked = [(at, it) for at, it in scheduler.record(pairs, until=seconds).items if it.time / NS >= 0.1]
-    answered = sum(answer.is_certain for _, answer in asked) / len(asked)
-    waited = sorted(at - answer.time / NS for at, answer in asked)
-    latency = f"latency p50 {1000 * _quantile(waited, 0.5):.0f} ms, longest {1000 * waited[-1]:.0f} ms"
-    return MIX, "100 % answered", f"{answered:.1%}", f"{latency}, of {len(asked)} questions"
-
-
-def line(seconds: float = 60.0) -> Row:
-    """Compare interpolated values with those of a straight movement."""
-    scheduler = VirtualTime()
-    samples = scheduler.hot(*arrivals(50.0, seconds, lambda t: 3.0 - 2.0 * t, seed=1))
-    answers = scheduler.record(linear(samples, lateness=LATENESS, gap=GAP).sample(0.001), until=seconds).items
-    errors = [abs(it.value - (3.0 - 2.0 * it.time / NS)) for _, it in answers if it.is_certain]
-    return LINE, "exact to 1e-9", f"{max(errors):.0e}", f"{len(errors)} values"
-
-
-def effector(
-    topics: Sequence[Any], refused: Callable[[Refused], None] | None = None, lateness: float = LATENESS
-) -> Signal[Any]:
+def effector(topics: Sequence[Any]) -> Signal[Any]:
     """Return the velocity of the effector."""
-    states = (linear(each, lateness=lateness, gap=GAP, refused=refused) for each in topics)
+    states = (linear(each, lateness=LATENESS, gap=GAP) for each in topics)
     return lift(forward_kinematics)(*states).derivative(over=GAP)
-
-
-def hour(seconds: float = 3600.0) -> Row:
-    """Compare the bytes of the answers for input in order, out of order, and in a replay of late input."""
-    values = [lambda t, k=k: 2.0 + math.sin(t / (k + 1)) for k in range(4)]
-
-    def answered(
-        arriving: Sequence[Arrivals], late: Sequence[Refused] = (), lateness: float = LATENESS
-    ) -> tuple[str, list[Refused]]:
-        scheduler, digest = VirtualTime(), hashlib.sha256()
-        refused: list[Refused] = []
-        inputs = [as_taken(scheduler.hot(*each), late) for each in arriving]
-
-        def add(answer: Answer[tuple[float, float]]) -> None:
-            if answer.is_certain and answer.time < (seconds - 2.0) * NS:
-                digest.update(struct.pack("<qdd", answer.time, *answer.value))
-
-        effector(inputs, refused.append, lateness).sample(0.02).subscribe(add, scheduler=scheduler)
-        scheduler.advance_to(seconds)
-        return digest.hexdigest(), refused
-
-    ordered, disordered, late = (
-        [arrivals(10.0, seconds, value, seed=k, late=delay) for k, value in enumerate(values)]
-        for delay in (0.005, 0.08, 0.15)
-    )
-    one, _ = answered(ordered)
-    other, refused = answered(disordered)
-    live, dropped = answered(late)
-    replayed, _ = answered(ordered, dropped, lateness=0.5)
-    same = one == other and live == replayed and not refused
-    more = f"with {len(dropped)} samples later than their bound, the replay has the bytes of the run"
-    return HOUR, "the same bytes", "the same" if same else "DIFFERENT", more
 
 
 class Clock(VirtualTime):
@@ -158,37 +81,17 @@ class Clock(VirtualTime):
         return Disposable()
 
 
-def feed(samples: int, rate: float = 50.0) -> Iterator[int]:
-    """Send samples of four topics through the whole chain; yield how many there were."""
+def cost(samples: int = 100_000) -> Row:
+    """Measure the processor time of a sample; every fourth one gives an answer."""
     clock, topics = Clock(), [Subject[Any]() for _ in range(4)]
-    effector(topics).sample(1 / rate).subscribe(lambda _: None, scheduler=clock)
-    step = round(NS / rate / 4)
+    effector(topics).sample(1 / RATE).subscribe(lambda _: None, scheduler=clock)
+    step = round(NS / RATE / 4)
+    began = time.process_time()
     for k in range(samples):
         clock.time = k * step
         topics[k % 4].on_next(stamped(1.0, clock.time))
-        yield k
-
-
-def cost(samples: int = 100_000) -> Row:
-    """Measure the processor time of a sample; every fourth one gives an answer."""
-    began = time.process_time()
-    for _ in feed(samples):
-        pass
     micros = (time.process_time() - began) / samples * 1e6
     return COST, "≤ 20 µs", f"{micros:.1f} µs", "one answer for four samples"
-
-
-def day(hours: int = 24, rate: float = 10.0) -> Row:
-    """Measure the memory over a day."""
-    in_an_hour = round(4 * 3600 * rate)
-    sizes = [_resident() for k in feed(hours * in_an_hour, rate) if k % in_an_hour == in_an_hour - 1]
-    growth = (sizes[-1] - sizes[0]) / 1e6
-    return (
-        DAY,
-        "flat",
-        f"{growth:+.1f} MB",
-        f"{sizes[-1] / 1e6:.0f} MB after a day, {hours * in_an_hour:,} samples",
-    )
 
 
 def speed(seconds: float = SECONDS) -> Row:
@@ -197,9 +100,9 @@ def speed(seconds: float = SECONDS) -> Row:
     speeds: list[tuple[float, float]] = []
     with tempfile.TemporaryDirectory(prefix="signals-") as directory, ExitStack() as stack:
         # Without the drive, the joints follow the scenario from its origin on.
-        moving = {name: part for name, part in yaml.safe_load(DEMO.read_text()).items() if name != "drive"}
+        moving = {name: part for name, part in ros_yaml.read(DEMO).items() if name != "drive"}
         scenario = Path(directory, "moving.yaml")
-        scenario.write_text(yaml.safe_dump(moving))
+        scenario.write_text(ros_yaml.dump(moving))
         fleet = stack.enter_context(Fleet(Path(directory), shared=True, scenario=str(scenario)))
         fleet.start()
         (arm,) = fleet.arms
@@ -253,11 +156,6 @@ def _errors(found: Sequence[tuple[float, float]], origin: float, peak: float) ->
 
 def _quantile(ordered: Sequence[float], part: float) -> float:
     return ordered[min(len(ordered) - 1, math.ceil(part * len(ordered)) - 1)]
-
-
-def _resident() -> int:
-    """Return the memory of this process [bytes]."""
-    return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
 
 
 _SCENARIO: Mapping[str, Any] = load(DEMO).configuration

@@ -57,25 +57,6 @@ def chain_tables(results: Results) -> str:
     return "\n\n".join([*chain, table("operator watchdog: CPU [% of a core]", results, heartbeats)])
 
 
-def image_tables(results: Results) -> str:
-    rates = {1_000_000: (20, 100, 300), 10_000_000: (4, 20)}
-    work = {f"{size}.{rate}": f"{SIZES[size]}, {rate} Hz" for size in rates for rate in rates[size]}
-    titles = {
-        "p50_ms": "image: latency, p50 [ms]",
-        "p99_ms": "image: latency, p99 [ms]",
-        "cpu_us": "image: CPU of both processes [µs/image]",
-        "delivered": "image: delivered [%]",
-    }
-    return "\n\n".join(
-        table(
-            title,
-            results,
-            {f"image.{key}.{figure}": heading for key, heading in work.items()},
-        )
-        for figure, title in titles.items()
-    )
-
-
 def tables(results: Results) -> str:
     def ordered(title: str, figure: str) -> str:
         return table(title, results, _by_size(figure))

@@ -97,7 +97,7 @@ def test_kinds_are_measured_one_after_the_other(
     monkeypatch.setattr(scale, "fleet", fleet)
     monkeypatch.setattr(scale, "subscribers", lambda: iter([("5", {"publisher_us": 30.0})]))
     results: dict[str, dict[str, dict[str, list[float]]]] = {}
-    command._scale(results)
+    command.collect_scale(results)
     assert results == {
         scale.OWN_DOMAINS: {"1": {"started": [2.0], "cpu": [9.0]}},
         scale.ONE_DOMAIN: {"1": {"started": [2.0], "cpu": [10.0]}},

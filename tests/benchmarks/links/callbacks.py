@@ -19,7 +19,6 @@ from tests.benchmarks.link import Item, Job, Link
 class Connection(Link):
     make_node: Callable[[str], Node] = Node
     make_executor: Callable[[], Executor] = SingleThreadedExecutor
-    message_type: Any = UInt8MultiArray
 
     def __init__(self, job: Job) -> None:
         super().__init__(job)
@@ -30,8 +29,8 @@ class Connection(Link):
         self.qos = QoSProfile(depth=job.depth)
 
     def publisher(self, topic: str) -> Callable[[Item], object]:
-        publisher = self.node.create_publisher(self.message_type, topic, self.qos)
-        message = self.message_type(data=array("B", bytes(self.job.size)))
+        publisher = self.node.create_publisher(UInt8MultiArray, topic, self.qos)
+        message = UInt8MultiArray(data=array("B", bytes(self.job.size)))
 
         def send(item: Item) -> None:
             message.data[:8] = item[:8]
@@ -43,11 +42,11 @@ class Connection(Link):
         def receive(message: Any) -> None:
             on_item(message.data)
 
-        self.node.create_subscription(self.message_type, topic, receive, self.qos)
+        self.node.create_subscription(UInt8MultiArray, topic, receive, self.qos)
 
     def forward(self, source: str, target: str) -> None:
-        publisher = self.node.create_publisher(self.message_type, target, self.qos)
-        self.node.create_subscription(self.message_type, source, publisher.publish, self.qos)
+        publisher = self.node.create_publisher(UInt8MultiArray, target, self.qos)
+        self.node.create_subscription(UInt8MultiArray, source, publisher.publish, self.qos)
 
     def wait(self, seconds: float) -> None:
         self.executor.spin_until_future_complete(Future(), seconds)

@@ -31,7 +31,7 @@ from tests.benchmarks.links import callbacks
 
 
 class Connection(callbacks.Connection):
-    """A node of the chain. The source leaves in shared memory what a speed does not tell: time and number."""
+    """A node of the chain. The source leaves time and number in shared memory: a speed has neither."""
 
     def __init__(self, job: Job) -> None:
         super().__init__(job)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from std_msgs.msg import UInt8MultiArray
+
 from reactive_node import ReactiveNode
 from reactive_node.executor import create_executor
 from tests.benchmarks.links import callbacks
@@ -21,10 +23,10 @@ class Connection(callbacks.Connection):
         def receive(message: Any) -> None:
             on_item(message.data)
 
-        items = self.node.create_observable(self.message_type, topic, self.qos)
+        items = self.node.create_observable(UInt8MultiArray, topic, self.qos)
         items.subscribe(receive, scheduler=self.node.scheduler)
 
     def forward(self, source: str, target: str) -> None:
-        items = self.node.create_observable(self.message_type, source, self.qos)
+        items = self.node.create_observable(UInt8MultiArray, source, self.qos)
         mapped = items.map(lambda message: message)  # a recipe has at least one operator
-        self.node.publish_observable(mapped, self.message_type, target, self.qos)
+        self.node.publish_observable(mapped, UInt8MultiArray, target, self.qos)
