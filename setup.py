@@ -23,7 +23,6 @@ SHARE = f"share/{PACKAGE}"
 ELSEWHERE = (
     "interfaces/reactive_node",
     "deploy/ground",
-    "deploy/runtime",
     "deploy/tools",
     "deploy/package",
 )

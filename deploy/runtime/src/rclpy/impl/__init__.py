@@ -1,1 +1,0 @@
-"""Internal modules, with the same paths as in rclpy."""

@@ -1,5 +1,0 @@
-"""Interfaces of trajectory_msgs, as in ROS 2 Jazzy."""
-
-from rosidl_runtime_embedded import kinds
-
-__getattr__ = kinds(__name__)
