@@ -51,13 +51,14 @@ def sources() -> dict[str, list[str]]:
 setup(
     name=PACKAGE,
     version=version(),
-    packages=[PACKAGE, "reactive_node", "reactive_node.signals", "mcap_files"],
+    packages=[PACKAGE, "reactive_node", "reactive_node.signals", "mcap_files", "ros_yaml"],
     package_dir={
         PACKAGE: "deploy/package/executables",
         "reactive_node": "interfaces/reactive_node/src/reactive_node",
         "mcap_files": "deploy/tools/src/mcap_files",
+        "ros_yaml": "deploy/tools/src/ros_yaml",
     },
-    package_data={"reactive_node": ["py.typed"], "mcap_files": ["py.typed"]},
+    package_data={"reactive_node": ["py.typed"], "mcap_files": ["py.typed"], "ros_yaml": ["py.typed"]},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"deploy/package/share/{PACKAGE}"]),
         (SHARE, ["package.xml"]),

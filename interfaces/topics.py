@@ -22,6 +22,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64, Header, String
 
+from interfaces.limits import LARGEST
 from reactive_node import stamps
 
 try:
@@ -34,7 +35,6 @@ ON, OFF = "on", "off"
 ALIVE, MISSED, INCAPACITATED = "alive", "missed", "incapacitated"
 DRIVE_TIMEOUT = 0.4  # s for which the engines' drive accepts an `on`
 CLOCK_TOLERANCE = 0.05  # s between the clocks of two hosts (deploy/SAFETY.md, A3)
-LARGEST = 1e9  # of all numbers: no square overflows, and a timer waits for no time after the year 9999
 FRAME = "base"
 
 Conversion = Callable[[Any], Any]

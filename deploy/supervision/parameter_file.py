@@ -14,9 +14,8 @@ from typing import Any
 from deploy.supervision import interruption, manifest
 from deploy.supervision.reaction import Reaction, reaction
 from deploy.supervision.run_directory import ALL, KEY
-from interfaces.service import UserError
+from interfaces.service import UserError, yaml_file
 from interfaces.service.parameters import Declaration, declarations
-from interfaces.sources import yaml_file
 
 USE_SIM_TIME = Declaration("use_sim_time", False, None, "", "whether time is simulated", False)
 
@@ -27,7 +26,7 @@ def load(path: str, namespace: str) -> dict[str, Any]:
     :raises UserError: for errors: a line for each, with file, key and reason.
     """
     with interruption.blocking():  # the file may be a silent pipe
-        document = yaml_file.load(path)
+        document = yaml_file.load(path) or {}
     if found := [f"{path}: {key}: {problem}" for key, problem in problems(document, namespace)]:
         raise UserError("\n".join(found))
     try:

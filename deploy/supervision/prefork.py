@@ -47,7 +47,7 @@ LIBRARIES = (
     "rclpy.executors",
     "rclpy.serialization",
     "websockets.server",
-    "yaml",
+    "ros_yaml",
 )
 """What the services import from outside of this checkout, at once or later."""
 CYCLONEDDS = ("rclpy_ground.cyclonedds.participant", "rclpy_ground.cyclonedds.wakeup")

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import reactivex as rx
-import yaml
+import ros_yaml
 from mcap_files import FileWriter
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.qos import QoSProfile
@@ -125,7 +125,7 @@ def qos_profiles(topic: topics.Topic) -> str:
         "liveliness_lease_duration": {"sec": 0, "nsec": 0},
         "avoid_ros_namespace_conventions": False,
     }
-    return str(yaml.safe_dump([profile]))
+    return ros_yaml.dump([profile])
 
 
 def record(

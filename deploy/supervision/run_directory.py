@@ -14,7 +14,7 @@ from deploy.supervision import processes
 from deploy.supervision.errors import DeploymentError
 from deploy.supervision.lock import held
 
-# `make stop` runs without .venv: PyYAML is imported where it is needed.
+# `make stop` runs without .venv: YAML is imported where it is needed.
 
 SETTINGS = "settings"  # in the run directory: where services keep the values that were set by hand
 PAGE_FILE = "page.txt"  # in the settings: the line that tells the address of the page
@@ -73,11 +73,11 @@ class RunDirectory:
 
     def write_parameters(self, parameters: Mapping[str, object]) -> None:
         """Write the parameter file; services read the old one or the new one."""
-        import yaml
+        import ros_yaml
 
         new = self.parameters.with_suffix(".new")
         try:
-            new.write_text(yaml.safe_dump(dict(parameters), sort_keys=False))
+            new.write_text(ros_yaml.dump(dict(parameters)))
             os.replace(new, self.parameters)
         except OSError as error:  # which names no file on a full disk
             raise DeploymentError(f"{self.parameters}: {error.strerror}") from error
@@ -93,12 +93,12 @@ class RunDirectory:
         self.write_parameters(document)
 
     def written_parameters(self) -> dict[str, Any]:
-        import yaml
+        import ros_yaml
 
         try:
-            document: dict[str, Any] = yaml.safe_load(self.parameters.read_text())
+            document: dict[str, Any] = ros_yaml.read(self.parameters)
             document[ALL][KEY]["scenario_epoch"]
-        except (OSError, ValueError, LookupError, TypeError, yaml.YAMLError):
+        except (OSError, ValueError, LookupError, TypeError):
             reason = "was deleted or damaged: make stop, make start"
             raise DeploymentError(f"{self.parameters} {reason}") from None
         return document

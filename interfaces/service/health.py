@@ -21,8 +21,9 @@ from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.exceptions import InvalidHandle
 from rclpy.node import Node
 
+from interfaces.limits import LARGEST
 from interfaces.service.enclave import Keys
-from interfaces.topics import DIAGNOSTICS, LARGEST
+from interfaces.topics import DIAGNOSTICS
 
 PERIOD = 1.0  # [s]
 _PID, _PUBLISHED, _SINCE_OUTPUT = "pid", "published", "seconds_since_output"

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
+from typing import Any
 
 from rclpy.node import Node
-from rclpy.parameter import parameter_dict_from_yaml_file
+from rclpy.parameter import PARAMETER_SEPARATOR_STRING
 from rclpy.utilities import remove_ros_args
 
+from interfaces.service import yaml_file
 from interfaces.service.errors import UserError
 
 
@@ -47,8 +48,15 @@ def _parameters_in_files(arguments: Sequence[str], own: str) -> Iterator[tuple[s
     """Yield '' and the name of each parameter in the section of a node, of the files on a command line."""
     for option, path in pairwise(arguments):
         if option == "--params-file":
-            for node in (own, own[1:]):
-                with suppress(RuntimeError):  # the file has no section of this node
-                    yield from (
-                        ("", name) for name in parameter_dict_from_yaml_file(path, target_nodes=[node])
-                    )
+            document = yaml_file.load(path)
+            for node in (own, own[1:]) if isinstance(document, dict) else ():
+                yield from (("", name) for name in _names(document.get(node, {}).get("ros__parameters", {})))
+
+
+def _names(parameters: Mapping[str, Any], prefix: str = "") -> Iterator[str]:
+    """Yield the names of parameters, which may be nested."""
+    for name, value in parameters.items():
+        if isinstance(value, dict):
+            yield from _names(value, f"{prefix}{name}{PARAMETER_SEPARATOR_STRING}")
+        else:
+            yield f"{prefix}{name}"

@@ -13,16 +13,30 @@ parameter check before a start and the README's table read the same dataclass.
 from __future__ import annotations
 
 import dataclasses
+import reprlib
 from collections.abc import Iterator
 from typing import Any, NamedTuple, TypeVar
 
-T = TypeVar("T", bool, int, float, str)
-_TYPES = {bool: "true or false", int: "an integer", float: "a number with a decimal point", str: "a string"}
+from rclpy.parameter import Parameter
+
+T = TypeVar("T")
+_TYPES = {
+    Parameter.Type.BOOL: "true or false",
+    Parameter.Type.INTEGER: "an integer",
+    Parameter.Type.DOUBLE: "a number with a decimal point",
+    Parameter.Type.STRING: "a string",
+    Parameter.Type.BOOL_ARRAY: "a list of true and false",
+    Parameter.Type.INTEGER_ARRAY: "a list of integers",
+    Parameter.Type.DOUBLE_ARRAY: "a list of numbers with a decimal point",
+    Parameter.Type.STRING_ARRAY: "a list of strings",
+}
+_WITH_RANGE = (Parameter.Type.INTEGER, Parameter.Type.DOUBLE)
 
 
 class Declaration(NamedTuple):
     name: str
     default: Any
+    """Its value where none is given; or its type, and then it has no value where none is given."""
     within: tuple[Any, Any] | None
     """The least and the greatest allowed value; ``None`` if the parameter has no range."""
     unit: str
@@ -30,24 +44,47 @@ class Declaration(NamedTuple):
     settable: bool
     """Whether the value may change while the service runs."""
 
+    @property
+    def type(self) -> Parameter.Type:
+        return self.default if isinstance(self.default, Parameter.Type) else _type_of(self.default)
+
     def problem(self, value: object) -> str:
         """Return why the parameter cannot have this value; empty if it can."""
-        if type(value) is not type(self.default):
-            return f"must be {_TYPES[type(self.default)]}, not {value!r}"
+        if _type_of(value) is not self.type:
+            return f"must be {_TYPES[self.type]}, not {reprlib.repr(value)}"
         if self.within and not self.within[0] <= value <= self.within[1]:
-            return f"must be from {self.within[0]:g} to {self.within[1]:g}, not {value!r}"
+            return f"must be from {self.within[0]:g} to {self.within[1]:g}, not {reprlib.repr(value)}"
         return ""
 
 
 def parameter(
     default: T, within: tuple[T, T] | None, unit: str, meaning: str, *, settable: bool = False
 ) -> T:
-    """Return the dataclass field of a parameter: see :class:`Declaration`."""
+    """Return the dataclass field of a parameter: see :class:`Declaration`.
+
+    A list of values has a tuple as its default, and no range.
+
+    :raises TypeError: if no parameter file can hold a value of that type, for example of an empty list.
+    """
+    declaration = Declaration("", default, within, unit, meaning, settable)
+    if declaration.type not in _TYPES or (within and declaration.type not in _WITH_RANGE):
+        raise TypeError(
+            f"{default!r} cannot be the default of a parameter{' with a range' if within else ''}"
+        )
     field: T = dataclasses.field(
         default=default,
         metadata={"within": within, "unit": unit, "meaning": meaning, "settable": settable},
     )
     return field
+
+
+def _type_of(value: object) -> Parameter.Type:
+    """Return the type of a value; NOT_SET if no parameter file can show it, for example of an empty list."""
+    try:
+        found: Parameter.Type = Parameter.Type.from_parameter_value(None if value in ((), []) else value)
+    except TypeError:
+        return Parameter.Type.NOT_SET
+    return found
 
 
 def declarations(parameters: type) -> Iterator[Declaration]:

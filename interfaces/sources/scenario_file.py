@@ -20,7 +20,7 @@ the sources play nothing. ::
     engines:                                # the commands of the virtual operator
       - {at: 5.0, command: turn_on}
     drive: {rate: 25.0}                     # theta1 and theta2 move only while the engines are on: their time
-                                            # is that of the service `drive`, which tells it at this rate [Hz]
+                                            # is that of the service `drive`, published at this rate [Hz]
     repeat: 60.0                            # everything except the sweeps starts again every 60 s
 
 Every sample of a moving joint gives a position (``combine_latest``). If both joints move, a position shows a
@@ -32,16 +32,18 @@ topic ``effector/twist`` has neither error: a speed guard should listen to that.
 from __future__ import annotations
 
 import math
+import reprlib
 from collections.abc import Callable, Mapping, Set
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
 from interfaces import topics
+from interfaces.limits import LARGEST
+from interfaces.seam import replaceable
+from interfaces.service import yaml_file
 from interfaces.service.errors import UserError
-from interfaces.sources import yaml_file
 from interfaces.sources.timeline import Events, Sweep
-from interfaces.topics import LARGEST
 
 T = TypeVar("T")
 
@@ -62,6 +64,7 @@ class Scenario:
     """The rate [Hz] at which the drive moves the joints; without it, they move by themselves."""
 
 
+@replaceable
 def load(path: str | Path) -> Scenario:
     """Read a scenario from a file.
 
@@ -118,16 +121,16 @@ class _Item:
     def require(self, required: Set[str] = frozenset(), optional: Set[str] = frozenset()) -> None:
         keys = ", ".join(sorted(required | optional))
         if not isinstance(self.value, dict):
-            raise self.error(f"must be a mapping with {keys}, not {self.value!r}")
+            raise self.error(f"must be a mapping with {keys}, not {reprlib.repr(self.value)}")
         for key in self.value:
             if key not in required | optional:
-                raise self.error(f"unknown key {key!r}, must be one of {keys}")
+                raise self.error(f"unknown key {reprlib.repr(key)}, must be one of {keys}")
         for key in sorted(required - self.value.keys()):
             raise self.error(f"missing key {key!r}")
 
     def number(self, least: float = -math.inf, *, above: float = -math.inf, most: float = math.inf) -> float:
         if isinstance(self.value, bool) or not isinstance(self.value, int | float):
-            raise self.error(f"must be a number, not {self.value!r}")
+            raise self.error(f"must be a number, not {reprlib.repr(self.value)}")
         if not -LARGEST <= self.value <= LARGEST:  # this refuses NaN
             raise self.error(f"must be from {-LARGEST:g} to {LARGEST:g}")
         if self.value < least:
@@ -140,7 +143,7 @@ class _Item:
 
     def items(self) -> list[_Item]:
         if not isinstance(self.value, list):
-            raise self.error(f"must be a list, not {self.value!r}")
+            raise self.error(f"must be a list, not {reprlib.repr(self.value)}")
         return [_Item(value, self.path, f"{self.key}[{index}]") for index, value in enumerate(self.value)]
 
     def events(self, parse: Callable[[_Item], tuple[float, T]], repeat: float | None) -> Events[T]:
@@ -224,5 +227,7 @@ def _command(item: _Item) -> tuple[float, str]:
     item.require({"at", "command"})
     command = item["command"]
     if command.value not in (topics.TURN_ON, topics.TURN_OFF):
-        raise command.error(f"must be {topics.TURN_ON} or {topics.TURN_OFF}, not {command.value!r}")
+        raise command.error(
+            f"must be {topics.TURN_ON} or {topics.TURN_OFF}, not {reprlib.repr(command.value)}"
+        )
     return item["at"].number(0.0), command.value

@@ -12,10 +12,10 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-import yaml
+import ros_yaml
 
+from interfaces.service import yaml_file
 from interfaces.service.errors import UserError
-from interfaces.sources import yaml_file
 
 
 class SettingsFile:
@@ -45,7 +45,7 @@ class SettingsFile:
         new = self._path.with_suffix(".new")
         try:
             self._path.parent.mkdir(exist_ok=True)
-            new.write_text(yaml.safe_dump(self.values), encoding="utf-8")
+            new.write_text(ros_yaml.dump(self.values), encoding="utf-8")
             os.replace(new, self._path)
         except OSError as error:
             with suppress(OSError):

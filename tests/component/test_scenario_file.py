@@ -69,6 +69,11 @@ def test_drive_has_a_rate_by_default(tmp_path: Path) -> None:
     assert [loaded(tmp_path, text).drive for text in ("drive: {}", "l1: 2.0")] == [25.0, None]
 
 
+def test_numbers_are_those_of_ros(tmp_path: Path) -> None:
+    assert loaded(tmp_path, "l1: 010").configuration["l1"] == Events(((0.0, 8.0),))
+    assert loaded(tmp_path, "l1: 1e1").configuration["l1"] == Events(((0.0, 10.0),))
+
+
 def test_empty_scenario_drives_nothing(tmp_path: Path) -> None:
     assert loaded(tmp_path, "") == Scenario()
 
@@ -89,9 +94,14 @@ def test_empty_scenario_drives_nothing(tmp_path: Path) -> None:
         ("l1: -1.0", "l1: -1.0 is negative"),
         ("l1: .nan", "l1: must be from -1e+09 to 1e+09"),
         ("l1: .inf", "l1: must be from -1e+09 to 1e+09"),
-        pytest.param("l1: 1" + 400 * "0", "l1: must be from -1e+09 to 1e+09", id="400 digits"),
-        pytest.param("l1: 1" + 300 * ":00" + ".0", "int too large to convert to float", id="300 colons"),
-        pytest.param("l1: " + 2000 * "[", "is nested too deeply", id="2000 brackets"),
+        pytest.param("l1: 1" + 300 * "0", "l1: must be from -1e+09 to 1e+09", id="300 digits"),
+        pytest.param("l1: 1" + 400 * "0", "l1: must be a number, not '1000", id="400 digits"),
+        pytest.param("l1: 1" + 3000 * ":1", "l1: must be a number, not '1:1", id="3000 colons"),
+        pytest.param("l1: 0x" + 5000 * "f", "l1: must be a number, not '0xff", id="5000 digits"),
+        pytest.param("l1: " + 2000 * "[", "line 1, column 36: is nested more than 32", id="2000 brackets"),
+        ("l1: &a [*a]", "line 1, column 9: the alias 'a' is refused: write its content again"),
+        ("l1: 1:30", "l1: must be a number, not '1:30'"),
+        ("l1: ~", "l1: must be a number, not '~'"),
         ("l1: [{at: 1e12, value: 1}]", "l1[0].at: must be from -1e+09 to 1e+09"),
         ("operator: {pressed: [{from: 0, to: 1e12}]}", "operator.pressed[0].to: must be from -1e+09 to"),
         ("theta1: yes", "theta1: must be a number, not True"),
@@ -130,10 +140,10 @@ def test_empty_scenario_drives_nothing(tmp_path: Path) -> None:
             "engines: ends at 9 s, but everything starts again after 5 s",
         ),
         ("repeat: 0", "repeat: must be at least 0.001, not 0"),
-        ("l1: [1", "line 1, column 7: expected ',' or ']', but got '<stream end>'"),
-        ("l1: 2\nl1: 3", "line 2, column 1: the key l1 appears twice"),
-        ("l1: 2024-02-30", "day is out of range for month"),
-        ("l1: \a", "unacceptable character #x0007: special characters are not allowed in"),
+        ("l1: [1", "line 2, column 1: while parsing a flow sequence, did not find expected ',' or ']'"),
+        ("l1: 2\nl1: 3", "line 2, column 1: the key 'l1' appears twice"),
+        ("l1: 2024-02-30", "l1: must be a number, not '2024-02-30'"),
+        ("l1: \a", "line 1: control characters are not allowed"),
     ],
 )
 def test_error_is_one_line_with_file_key_and_reason(tmp_path: Path, text: str, reason: str) -> None:
@@ -143,9 +153,10 @@ def test_error_is_one_line_with_file_key_and_reason(tmp_path: Path, text: str, r
     message = str(raised.value)
     assert message.startswith(f"{tmp_path / 'scenario.yaml'}: {reason}")
     assert "\n" not in message
+    assert len(message) < 300
 
 
-def test_each_wrong_key_of_a_scenario_is_told(tmp_path: Path) -> None:
+def test_each_wrong_key_of_a_scenario_is_reported(tmp_path: Path) -> None:
     with pytest.raises(UserError) as raised:
         loaded(tmp_path, "{l1: -1, l3: 0, l2: 1, drive: 5, repeat: 1, engines: [{at: 2, command: turn_on}]}")
     keys = [line.split(": ")[1] for line in str(raised.value).splitlines()]

@@ -8,6 +8,7 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
 
 from interfaces import topics
+from interfaces.limits import LARGEST
 from tests.promises.effects import DISCOVERY, LONGEST_PAUSE, MISSED, Effect, Why, undisturbed
 from tests.promises.history import SOURCES, History, Sample, last_sent
 
@@ -60,7 +61,7 @@ def may_lack_values(history: History, found: Sequence[Effect], time: float) -> b
 
 def _any_fits(candidates: list[list[float]], x: float, y: float) -> bool:
     """Return whether any combination of the values gives the position, up to rounding."""
-    if not (abs(x) <= topics.LARGEST and abs(y) <= topics.LARGEST):  # this refuses NaN
+    if not (abs(x) <= LARGEST and abs(y) <= LARGEST):  # this refuses NaN
         return False
     l1s, l2s, theta1s, theta2s = candidates
     l2s = sorted(l2s)

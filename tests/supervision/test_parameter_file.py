@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 import pytest
-import yaml
+import ros_yaml
 
 from deploy.supervision import manifest, parameter_file
 from interfaces.service import UserError
@@ -37,7 +37,7 @@ def test_the_parameters_of_every_program_are_known() -> None:
     ],
 )
 def test_a_good_file_has_no_errors(text: str) -> None:
-    assert list(parameter_file.problems(yaml.safe_load(text), "/")) == []
+    assert list(parameter_file.problems(ros_yaml.load(text), "/")) == []
 
 
 ERRORS = """
@@ -64,7 +64,7 @@ dead_mans_switch: {ros__parameters: {rate: fast}}       dead_mans_switch.rate: m
 @pytest.mark.parametrize("error", ERRORS.strip().splitlines())
 def test_an_error_has_its_key_and_reason(error: str) -> None:
     text, reported = re.split("   +", error)
-    (key, problem), *_ = parameter_file.problems(yaml.safe_load(text), "/")
+    (key, problem), *_ = parameter_file.problems(ros_yaml.load(text), "/")
     assert f"{key}: {problem}".startswith(reported)
 
 
@@ -77,10 +77,19 @@ def test_services_are_named_with_the_namespace_or_without(node: str, good: bool)
     assert [key for key, _ in parameter_file.problems(document, "/arm1")] == ([] if good else [node])
 
 
-def test_an_error_of_yaml_is_one_line_with_the_file(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("content", "reason"),
+    [
+        ("a: &a 1\nb: *a", "line 2, column 4: the alias 'a' is refused: write its content again"),
+        ("config_l1: {ros__parameters: {value: 1:1:1}}", "config_l1.value: must be a number with a decimal"),
+        ("kinematics:", "kinematics: must hold ros__parameters"),
+        ("5", "file: must name services"),
+    ],
+)
+def test_an_error_of_yaml_is_one_line_with_the_file(tmp_path: Path, content: str, reason: str) -> None:
     file = tmp_path / "mine.yaml"
-    file.write_text("config_l1: {ros__parameters: {value: 2024-13-45}}")
-    with pytest.raises(UserError, match=f"^{file}: month must be in"):
+    file.write_text(content)
+    with pytest.raises(UserError, match=rf"^{file}: {re.escape(reason)}.*$"):
         parameter_file.load(str(file), "/")
 
 
@@ -152,6 +161,21 @@ def test_values_that_contradict_each_other_are_refused(tmp_path: Path, content: 
     assert str(raised.value) == f"{file}: {reason}"
 
 
+@pytest.mark.parametrize("content", ["", "# velocity:\n#   ros__parameters: {}\n", "{}"])
+def test_a_file_without_content_changes_nothing(tmp_path: Path, content: str) -> None:
+    file = tmp_path / "mine.yaml"
+    file.write_text(content)
+    assert parameter_file.load(str(file), "/") == {}
+
+
+def test_a_long_value_is_shown_in_part(tmp_path: Path) -> None:
+    file = tmp_path / "mine.yaml"
+    file.write_text(f"operator_watchdog: {{ros__parameters: {{strikes: 0x{5000 * 'f'}}}}}")
+    with pytest.raises(UserError) as raised:
+        parameter_file.load(str(file), "/")
+    assert len(str(raised.value)) < len(str(file)) + 120
+
+
 def test_1e3_is_a_number(tmp_path: Path) -> None:
     file = tmp_path / "mine.yaml"
     file.write_text("dead_mans_switch: {ros__parameters: {rate: 1e3}}")
@@ -162,5 +186,5 @@ def test_1e3_is_a_number(tmp_path: Path) -> None:
 def test_a_file_gets_the_full_names_of_the_nodes(tmp_path: Path) -> None:
     file = tmp_path / "mine.yaml"
     parameters = {"ros__parameters": {"value": 1.0}}
-    file.write_text(yaml.safe_dump({"config_l1": parameters, "/arm1/config_l2": parameters}))
+    file.write_text(ros_yaml.dump({"config_l1": parameters, "/arm1/config_l2": parameters}))
     assert parameter_file.load(str(file), "/arm1").keys() == {"/arm1/config_l1", "/arm1/config_l2"}
