@@ -1,4 +1,4 @@
-"""The velocity of the effector, at every time.
+"""The twist of the effector, which is its velocity and its turn, at every time.
 
 User story (ours): as a robot operator, I am able to see how fast the effector moves, and where to, whatever
 the delays of messages are. As a developer, I am able to trust a single value.

@@ -28,7 +28,7 @@ from rclpy.utilities import get_rmw_implementation_identifier
 from reactivex import Observable
 
 from deploy.operator.fleet import HEADER, Arm, Seen, fleet, row, watched
-from deploy.operator.output import accept_any_text, say
+from deploy.operator.output import say, use_plain_output
 from deploy.security.keystore import Keystore
 from deploy.supervision import interruption, processes
 from deploy.supervision.columns import table
@@ -271,7 +271,7 @@ def set_reach(environment: MutableMapping[str, str], named: Collection[str]) -> 
 def main(arguments: Sequence[str]) -> int:
     """Watch the fleet; return the exit code."""
     interruption.install()
-    accept_any_text()
+    use_plain_output()
     parser = argparse.ArgumentParser(prog="make fleet", description=__doc__)
     parser.add_argument("arms", nargs="*", metavar="ARM", help="an arm of another host: /arm1, or /arm1=5")
     named = parser.parse_args(arguments).arms

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NoReturn
 
 from deploy.commands.status import health_of, of_services
 from deploy.commands.stop import stop
-from deploy.operator.output import accept_any_text, say
+from deploy.operator.output import say, use_plain_output
 from deploy.supervision import interruption, manifest, messages, rclpy_choice
 from deploy.supervision.environment import (
     NAMESPACE,
@@ -320,7 +320,7 @@ def _adopt_environment(system: System) -> bool:
 
 def main(arguments: list[str]) -> int:
     interruption.install()
-    accept_any_text()
+    use_plain_output()
     parser = argparse.ArgumentParser(prog="launcher")
     commands = parser.add_subparsers(required=True)
     for name, starts in (("run", run), ("start", start), ("unit", unit), ("become", become)):

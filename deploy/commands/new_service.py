@@ -15,6 +15,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
+from deploy.operator.output import use_plain_output
 from deploy.supervision.processes import ROOT
 
 TOPICS, MANIFEST = Path("interfaces/topics.py"), Path("deploy/supervisord.conf")
@@ -33,6 +34,7 @@ class Refused(Exception):
 
 
 def main() -> None:
+    use_plain_output()
     name = sys.argv[1]
     try:
         check(name)
@@ -83,24 +85,32 @@ def _guard(example: str, name: str) -> str:
 User story (ours): as a robot operator, I find the engines off after a value of
 `{name}/input` was too great.
 """
-    for old, new in (
-        ("Turns the engines off when the effector is too fast.", story),
-        (" when a speed is above the limit [m/s]", " when a value is above the limit"),
-        ("lambda speed: speed > limit", "lambda value: value > limit"),
-        ("when_a_speed_is", "when_a_value_is"),
-        ('"m/s", "greatest speed allowed"', '"", "greatest value allowed"'),
-        ("(topics.EFFECTOR_TWIST).map(lambda velocity: velocity.speed)", f"(topics.{_constant(name)})"),
-        ("services.examples.", "services."),
-        ("speed_guard", name),
-        ("too_fast", "too_great"),
-        ("speeds", "values"),
-    ):
-        example = example.replace(old, new)
-    if "speed" in example.replace(name, ""):
+    guard, rest = _filled(
+        example,
+        {
+            "Turns the engines off when the effector is too fast.": story,
+            " when a speed is above the limit [m/s]": " when a value is above the limit",
+            "lambda speed: speed > limit": "lambda value: value > limit",
+            "when_a_speed_is": "when_a_value_is",
+            '"m/s", "greatest speed allowed"': '"", "greatest value allowed"',
+            "(topics.EFFECTOR_TWIST).map(lambda twist: twist.speed)": f"(topics.{_constant(name)})",
+            "services.examples.": "services.",
+            "speed_guard": name,
+            "too_fast": "too_great",
+            "speeds": "values",
+        },
+    )
+    if "speed" in rest:
         raise Refused(
             f"{EXAMPLE} or {ITS_TEST}: is no template of a guard any more; adapt {Path(__file__).name}"
         )
-    return example
+    return guard
+
+
+def _filled(template: str, words: Mapping[str, str]) -> tuple[str, str]:
+    """Return a template with other words, and what they leave of it. A new word may contain an old one."""
+    places = re.compile("|".join(map(re.escape, words)))
+    return places.sub(lambda found: words[found[0]], template), places.sub("", template)
 
 
 def _with_topic(contract: str, name: str) -> str:
@@ -128,8 +138,8 @@ def _with_topic(contract: str, name: str) -> str:
 def _with_program(manifest: str, name: str) -> str:
     manifest = _once(MANIFEST, manifest, LAST_PROGRAMS, f"{name}, {LAST_PROGRAMS}")
     _, found, last = manifest.rpartition("[program:sentinel]")
-    section = f"{found}{last.rstrip()}\n\n".replace("deploy.supervision.sentinel", f"services.{name}")
-    section = section.replace("sentinel", name)
+    words = {"deploy.supervision.sentinel": f"services.{name}", "sentinel": name}
+    section, _ = _filled(f"{found}{last.rstrip()}\n\n", words)
     return _once(MANIFEST, manifest, LAST_SECTIONS, section + LAST_SECTIONS)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from contextlib import suppress
 
-from deploy.operator.output import say
+from deploy.operator.output import say, use_plain_output
 from deploy.supervision import interruption
 from deploy.supervision.errors import DeploymentError
 from deploy.supervision.system import System
@@ -14,11 +14,11 @@ from deploy.supervision.system import System
 def stop(system: System) -> None:
     """Stop a system and report it, even where no terminal is left to read it."""
 
-    def tell(count: int) -> None:
+    def report(count: int) -> None:
         with suppress(OSError):
             say(f"Stopping {count} processes ..." if count else "Nothing runs.")
 
-    if system.stop(tell):
+    if system.stop(report):
         with suppress(OSError):
             say("All have ended.")
 
@@ -26,6 +26,7 @@ def stop(system: System) -> None:
 def main() -> int:
     """Stop the system of this checkout; the exit code."""
     interruption.install()
+    use_plain_output()
     try:
         stop(System())
     except interruption.Interrupted:

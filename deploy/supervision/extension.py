@@ -25,11 +25,27 @@ from typing import Any
 
 from supervisor import events, loggers
 from supervisor.loggers import RotatingFileHandler
+from supervisor.rpcinterface import make_main_rpcinterface
 from supervisor.states import ProcessStates, SupervisorStates, getProcessStateDescription
 
 from deploy.supervision import manifest, prefork
 from deploy.supervision.run_directory import PARAMETERS
+from interfaces.plain_text import PlainBytes
 
+REPLACED = {
+    "supervisor.loggers.RotatingFileHandler": "a log that cannot be written ends supervisord, or keeps a"
+    " program from its start; no setting names another class",
+    "supervisor.options.ServerOptions.execve": "a new interpreter takes most of a restart;"
+    " a subclass of ServerOptions would need a command of our own in place of `supervisord`",
+    "supervisor.poller.Poller.poll": "supervisord acts on a change with its next look, up to 1 s later;"
+    " an event only follows the change, and none follows a signal",
+}
+"""The names of supervisor that this module replaces, and why no event and no RPC interface can do it.
+
+Read again with each version: a test compares :data:`VERSION` with the one that is installed.
+"""
+VERSION = "4.3.0"
+"""The supervisor that these names belong to."""
 LONGEST_WAIT = 0.1  # s, while the state of a program changes with time
 _CHANGING = (ProcessStates.STARTING, ProcessStates.BACKOFF, ProcessStates.STOPPING)
 _ENDS = (events.ProcessStateExitedEvent, events.ProcessStateBackoffEvent)
@@ -38,7 +54,7 @@ SENTINEL_TIMEOUT = 3.0  # s between its calls
 
 
 class LossyLog(RotatingFileHandler):  # type: ignore[misc]
-    """A log file that drops lines that it cannot write.
+    """A plain log file, which drops lines that it cannot write.
 
     Its base class raises where a file cannot be opened, and then the program does not start; it raises where
     a file cannot be rolled over, which ends supervisord; and it logs errors to the same full disk.
@@ -47,6 +63,7 @@ class LossyLog(RotatingFileHandler):  # type: ignore[misc]
     def __init__(self, filename: str, *arguments: Any) -> None:
         super().__init__(os.devnull, *arguments)  # opens always
         self.baseFilename = filename
+        self.plain = PlainBytes()
         with suppress(OSError):
             self.reopen()
 
@@ -60,6 +77,8 @@ class LossyLog(RotatingFileHandler):  # type: ignore[misc]
         try:
             if self.stream.closed:
                 self.reopen()
+            if isinstance(record.msg, bytes):  # what a program has written
+                record.msg = self.plain(record.msg)
             super().emit(record)
         except OSError:
             self.closed = self.stream.closed  # a failed rollover leaves it closed
@@ -175,11 +194,20 @@ def lock_directory() -> None:
         fcntl.flock(os.open(os.curdir, os.O_RDONLY), fcntl.LOCK_SH)
 
 
+def make_main_interface(supervisord: Any, **shared: str) -> Any:
+    """Return supervisor's own interface, which takes no settings.
+
+    :param shared: what [DEFAULT] gives to all sections.
+    """
+    return make_main_rpcinterface(supervisord)
+
+
 def make_interface(supervisord: Any, **config: str) -> ArmInterface:
     loggers.RotatingFileHandler = LossyLog  # for the programs: each start opens its log
     for handler in supervisord.options.logger.handlers:
         if isinstance(handler, RotatingFileHandler):  # in the foreground, there is a handler for the terminal
             handler.__class__ = LossyLog  # supervisord's own log is open already
+            handler.plain = PlainBytes()
     lock_directory()
     prefork.import_libraries()
     supervisord.options.execve = prefork.executor(os.execve)

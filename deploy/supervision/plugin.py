@@ -13,11 +13,11 @@ from pathlib import Path
 
 from deploy.supervision import manifest, processes
 from deploy.supervision.errors import DeploymentError
-from deploy.supervision.extension import make_interface
+from deploy.supervision.extension import make_interface, make_main_interface
 from deploy.supervision.run_directory import LEAD, scenario_parameters
 from deploy.supervision.system import System
 
-__all__ = ["make_interface"]
+__all__ = ["make_interface", "make_main_interface"]
 
 SCENARIO = processes.ROOT / "deploy" / "scenarios" / "demo.yaml"  # as `make start`
 

@@ -24,7 +24,7 @@ class Parameters:
 
 
 def wire(node: service.ServiceNode) -> None:
-    speeds = node.observe(topics.EFFECTOR_TWIST).map(lambda velocity: velocity.speed)
+    speeds = node.observe(topics.EFFECTOR_TWIST).map(lambda twist: twist.speed)
     engines = node.observe(topics.ENGINES_STATE)
     node.publish(topics.ENGINES, too_fast(speeds, engines, node.declare(Parameters).limit))
 

@@ -71,6 +71,19 @@ def test_new_service_is_green_at_once(checkout: Path) -> None:
     assert not {"speed", "fast", "m/s"} & set(written.replace("_", " ").split())
 
 
+@pytest.mark.parametrize(
+    "name", ["wheel_speeds", "too_fast", "speed_guard_2", "my_sentinel", "speed", "values"]
+)
+def test_a_name_may_contain_a_word_of_the_template(checkout: Path, name: str) -> None:
+    assert make(checkout, name) == ""
+    found = run(checkout, "pytest", "-q", "-p", "no:cacheprovider", f"tests/component/test_{name}.py")
+    assert found.returncode == 0, found.stdout
+    written = (checkout / "deploy" / "supervisord.conf").read_text()
+    assert f"\n[program:{name}]\n" in written
+    assert f" -m services.{name} " in written
+    assert f'"{name}/input"' in (checkout / "interfaces" / "topics.py").read_text()
+
+
 def test_two_services_may_be_added(checkout: Path) -> None:
     assert [make(checkout, name) for name in ("trial_guard", "trial_alarm")] == ["", ""]
     found = run(checkout, "pytest", "-q", "-p", "no:cacheprovider", "tests/component/test_contract.py")
@@ -143,6 +156,7 @@ def test_file_that_cannot_be_written_changes_nothing(checkout: Path, monkeypatch
     monkeypatch.setattr(new_service, "ROOT", checkout)
     monkeypatch.setattr(Path, "write_text", refuse)
     monkeypatch.setattr(sys, "argv", ["new_service", "trial_guard"])
+    monkeypatch.setattr(new_service, "use_plain_output", lambda: None)  # pytest keeps its own output
     with pytest.raises(SystemExit, match=r"supervisord.conf: Permission denied; nothing is written$"):
         new_service.main()
     assert content(checkout) == before
@@ -158,7 +172,7 @@ def test_failure_of_the_tables_takes_everything_back(checkout: Path) -> None:
     assert content(checkout) == before
 
 
-def test_error_in_the_contract_is_told_with_its_line(checkout: Path) -> None:
+def test_error_in_the_contract_is_reported_with_its_line(checkout: Path) -> None:
     contract = checkout / "interfaces" / "topics.py"
     before, _, after = contract.read_text().partition("DRIVE_TIMEOUT = 0.4")
     contract.write_text(f"{before}DRIVE_TIMEOUT = 1 / 0{after}")

@@ -1,7 +1,9 @@
 from __future__ import annotations
 
 import os
+import pty
 import select
+import shutil
 import subprocess
 import sys
 import threading
@@ -11,7 +13,7 @@ from typing import Any
 import pytest
 
 from deploy.operator import output
-from deploy.operator.output import say
+from deploy.operator.output import Area, say
 from deploy.supervision.processes import ROOT
 
 LINES = 5000  # of 100 characters, more than a pipe holds
@@ -77,3 +79,24 @@ def test_pipe_without_reader_is_an_error() -> None:
         process.stdout.close()
         assert process.stderr is not None
         assert b"BrokenPipeError" in process.stderr.read()
+
+
+def test_area_is_drawn_again_in_place_in_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+    keyboard, terminal = pty.openpty()
+    monkeypatch.setattr(shutil, "get_terminal_size", lambda *_, **__: os.terminal_size((9, 24)))
+    with os.fdopen(keyboard, "rb", buffering=0) as shown, os.fdopen(terminal, "w") as output:
+        monkeypatch.setattr(sys, "stdout", output)
+        area = Area()
+        area.show("one\ntwo, which is long")
+        area.show("three")
+        read = b""
+        while b"three" not in read:
+            read += shown.read(100)
+        assert read == b"one\r\ntwo, whi\r\n\x1b[2A\x1b[Jthree\r\n"
+
+
+def test_area_of_a_file_is_appended(capfd: pytest.CaptureFixture[str]) -> None:
+    area = Area()
+    area.show("one")
+    area.show("two")
+    assert capfd.readouterr().out == "one\n\ntwo\n"

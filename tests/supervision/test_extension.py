@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import importlib.metadata
 import json
 import os
+import pkgutil
 import signal
 import threading
 import time
@@ -18,6 +20,7 @@ from supervisor import events, loggers
 from supervisor.poller import Poller
 from supervisor.states import ProcessStates
 
+from deploy.supervision import extension
 from deploy.supervision.extension import LONGEST_WAIT, ArmInterface, LossyLog, make_interface
 
 LIMIT = 10  # bytes of a log until it is rolled over
@@ -59,6 +62,13 @@ def interface_with(**fields: Any) -> tuple[ArmInterface, SimpleNamespace]:
     group = SimpleNamespace(processes={"velocity": velocity})
     options = SimpleNamespace(poller=SimpleNamespace(poll=None))
     return ArmInterface(SimpleNamespace(options=options, process_groups={"arm": group})), velocity
+
+
+def test_supervisor_is_the_one_whose_names_are_replaced() -> None:
+    words = "another supervisor: read what it does with the names in REPLACED, then set VERSION"
+    assert importlib.metadata.version("supervisor") == extension.VERSION, words
+    for name in extension.REPLACED:
+        assert callable(pkgutil.resolve_name(name))
 
 
 def test_a_full_disk_costs_only_the_lines_meanwhile(tmp_path: Path) -> None:
@@ -130,7 +140,7 @@ def test_setting_the_clock_changes_no_uptime(monkeypatch: pytest.MonkeyPatch) ->
         assert 0.0 < state["uptime"] < 60.0
 
 
-def test_tells_how_long_a_program_had_no_process(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_reports_how_long_a_program_had_no_process(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(events, "callbacks", [])
     now = [100.0]
     monkeypatch.setattr(time, "monotonic", lambda: now[0])
