@@ -1,4 +1,4 @@
-"""What the user is told instead of a traceback."""
+"""Errors that are printed without a traceback."""
 
 from __future__ import annotations
 

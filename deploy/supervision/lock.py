@@ -13,7 +13,7 @@ from deploy.supervision import interruption
 
 @contextmanager
 def held(directory: Path, work: str) -> Iterator[None]:
-    """Hold a directory. Wait while another command holds it, and tell the user for which work."""
+    """Hold a directory. Wait while another command holds it, and print for which work."""
     descriptor = os.open(directory, os.O_RDONLY)
     try:
         try:

@@ -9,8 +9,7 @@ A program runs on the host `robot`, unless its section has ``host = operator``. 
 starts the programs of that host alone. Each host has a sentinel with a name of its own.
 
 Each program is a service (:func:`interfaces.service.run`). Its node gets the program's name and the parameter
-file of the arm, the section gets the settings of our programs where it has none. Modules beside the file are
-found.
+file of the arm. Modules beside the file are found.
 """
 
 from __future__ import annotations
@@ -28,13 +27,15 @@ from pathlib import Path
 from tempfile import mkstemp
 from typing import NamedTuple
 
+from deploy.supervision import processes
 from deploy.supervision.errors import DeploymentError
+from deploy.supervision.run_directory import PARAMETERS
+from interfaces import arm_variables
 
 PATH = Path(__file__).resolve().parents[1] / "supervisord.conf"
 VARIABLE = "REACTIVE_ARM_MANIFEST"
 """Environment variable: the manifest of a system, if that is not ours."""
-HOST = "REACTIVE_ARM_HOST"
-"""Environment variable: the host whose programs run here; '' where one host runs all."""
+HOST = arm_variables.HOST
 ROBOT = "robot"
 """The host of the programs that name none."""
 GROUP = "arm"
@@ -46,7 +47,7 @@ PAGE = "operator_page"
 VIRTUAL_JOINTS = ("config_theta1", "config_theta2", "drive")
 """The programs that real joints with a real drive replace."""
 _ELSEWHERE = "elsewhere:"  # begins the sections of programs of other hosts; supervisor ignores them
-_ARGUMENTS = "--ros-args -r __node:={name} --params-file parameters.yaml"
+_ARGUMENTS = "--ros-args -r __node:={name} --params-file {parameters}"
 
 
 class Program(NamedTuple):
@@ -57,6 +58,8 @@ class Program(NamedTuple):
     """The arguments before ``--ros-args``."""
     host: str = ROBOT
     """The host that runs it, if there is more than one."""
+    starts: bool = True
+    """Whether it starts with the system; otherwise the user starts it later (`autostart` of supervisor)."""
 
 
 def path() -> Path:
@@ -68,6 +71,12 @@ def programs(path_: Path | None = None) -> tuple[Program, ...]:
     """Return the programs in the order of the group."""
     manifest = _read(path_ or path())
     return tuple(_program(name, manifest[f"program:{name}"]) for name in _names(manifest))
+
+
+def own() -> set[str]:
+    """Return the names of the programs of the user's file."""
+    ours = {program.name for program in programs(PATH)} | {*sentinels()}
+    return {program.name for program in everywhere()} - ours
 
 
 def everywhere() -> tuple[Program, ...]:
@@ -157,19 +166,32 @@ def _add(manifest: configparser.RawConfigParser, path: Path) -> list[str]:
     os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, (os.environ.get("PYTHONPATH"), folder)))
     own = _read_own(path)
     ours = set(_names(_read(PATH)))
-    shared = {key: value for key, value in manifest[f"program:{SENTINEL}"].items() if key != "command"}
     for section in own.sections():
         kind, _, name = section.partition(":")
         if problem := _problem(kind, name, own[section].get("command", ""), ours):
             raise DeploymentError(f"{path}: [{section}] {problem}")
-        manifest[section] = shared | dict(own[section])
-        manifest[section]["command"] += f" {_ARGUMENTS.format(name=name)}"
+        manifest[section] = _settings(own[section], path)
+        # A program may work in a directory of its own. supervisord fills in each other %.
+        parameters = shlex.quote(str(processes.run_directory() / PARAMETERS)).replace("%", "%%")
+        manifest[section]["command"] += f" {_ARGUMENTS.format(name=name, parameters=parameters)}"
     return [section.partition(":")[2] for section in own.sections()]
+
+
+def _settings(section: configparser.SectionProxy, path: Path) -> dict[str, str]:
+    """Return the settings of a program, in which paths count from the folder of the user's file."""
+    folder = str(path.resolve().parent).replace("%", "%%")
+    settings = {key: value.replace("%(here)s", folder) for key, value in section.items()}
+    directory = settings.get("directory", "")
+    if directory and "%(" not in directory:  # supervisord fills that in
+        settings["directory"] = directory = os.path.join(folder, os.path.expanduser(directory))
+        if not os.path.isdir(plain := directory.replace("%%", "%")):
+            raise DeploymentError(f"{path}: [{section.name}] directory: there is no folder {plain}")
+    return settings
 
 
 def _read_own(path: Path) -> configparser.RawConfigParser:
     try:
-        with path.open(encoding="utf-8") as file:
+        with path.open(encoding="utf-8-sig") as file:  # some editors begin with a byte order mark
             manifest = configparser.RawConfigParser(inline_comment_prefixes=(" ;",))
             manifest.read_file(file, str(path))
     except OSError as error:
@@ -214,4 +236,5 @@ def _program(name: str, section: Mapping[str, str]) -> Program:
     if "--ros-args" in words:
         words = words[: words.index("--ros-args")]
     module = words.index("-m") + 1
-    return Program(name, words[module], tuple(words[module + 1 :]), _host(section))
+    starts = section.get("autostart", "true").lower() in ("true", "yes", "on", "1")
+    return Program(name, words[module], tuple(words[module + 1 :]), _host(section), starts)

@@ -1,4 +1,4 @@
-"""What the user is told about the end of a system."""
+"""Messages about the end of a system."""
 
 from __future__ import annotations
 
@@ -23,6 +23,6 @@ def how_it_ended(run: Path) -> str:
 
 
 def silent_end(run: Path) -> str:
-    """The reason of a program that gave none: it may have no place for its words."""
+    """The reason of a program that gave none: perhaps it could not write one."""
     free = shutil.disk_usage(run).free
     return f"It gave no reason; {free / 1000:.0f} kB are free on the disk of {run}"

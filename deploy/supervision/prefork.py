@@ -39,6 +39,7 @@ LIBRARIES = (
     "json",
     "reactive_node",
     "reactive_node.executor",
+    "reactive_node.ros_time",
     "reactive_node.signals",
     "reactivex.operators",
     "reactivex.operators._multicast",
@@ -46,10 +47,11 @@ LIBRARIES = (
     "reactivex.operators.connectable._refcount",
     "rclpy.executors",
     "rclpy.serialization",
-    "websockets.server",
     "ros_yaml",
+    "unicodedata",
+    "websockets.server",
 )
-"""What the services import from outside of this checkout, at once or later."""
+"""The modules outside of this checkout that the services import."""
 CYCLONEDDS = ("rclpy_ground.cyclonedds.participant", "rclpy_ground.cyclonedds.wakeup")
 """The modules that the ground of Cyclone DDS imports late."""
 TYPES = (
@@ -93,7 +95,7 @@ _names: mmap.mmap  # the command line and the environment of this process, for a
 def import_libraries() -> None:
     """Import what programs need; what cannot be imported is an error of the program that imports it."""
     if (numpy := importlib.util.find_spec("numpy")) and numpy.origin:
-        sys.modules.setdefault("numpy", _Late("numpy", numpy.origin))
+        sys.modules.setdefault("numpy", LazyModule("numpy", numpy.origin))
     gc.disable()  # imports leave next to no garbage, and to look for it takes a fifth of the time
     for name in libraries():
         with suppress(Exception):
@@ -111,7 +113,7 @@ def import_libraries() -> None:
     gc.enable()
 
 
-class _Late(ModuleType):
+class LazyModule(ModuleType):
     """A module that the first look at one of its names imports.
 
     The message packages of ROS 2 import numpy for types with matrices: 17 MB that no service needs.
@@ -171,14 +173,14 @@ def executor(execve: Callable[..., NoReturn]) -> Callable[[str, Sequence[str], M
         is_ours = argv[1:2] == ["-m"] and Path(filename).parent == programs
         if is_ours and is_alike(environment):
             with suppress(OSError):  # a kernel that cannot do this
-                rename(argv, environment)
+                set_command_line(argv, environment)
                 _run(argv, environment)
         execve(filename, argv, environment)
 
     return execute
 
 
-def rename(argv: Sequence[str], environment: Mapping[str, str]) -> None:
+def set_command_line(argv: Sequence[str], environment: Mapping[str, str]) -> None:
     """Give this process another command line and environment in the process table. May raise OSError."""
     global _names
     arguments = b"".join(os.fsencode(word) + b"\0" for word in argv)
@@ -247,9 +249,7 @@ def _exit_code(end: SystemExit) -> int:
 def _end(code: int) -> NoReturn:
     """End as an interpreter does, but without a way back into supervisord's code."""
     try:
-        for thread in threading.enumerate():
-            if thread is not threading.current_thread() and not thread.daemon:
-                thread.join()
+        threading._shutdown()  # type: ignore[attr-defined] # ends pools, joins threads; as multiprocessing does
         atexit._run_exitfuncs()
         sys.stdout.flush()
         sys.stderr.flush()

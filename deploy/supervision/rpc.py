@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import http.client
+import os
 import socket
+import struct
 import xmlrpc.client
 from typing import Any
 
 LIMIT = 5.0  # s that supervisord has to answer, unless the caller says otherwise
+_CREDENTIALS = struct.Struct("@iII")  # unix(7): pid, user, group
 
 
 class NoAnswer(Exception):
@@ -39,6 +42,9 @@ class _UnixConnection(http.client.HTTPConnection):
         self.sock = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         self.sock.settimeout(self._limit)
         self.sock.connect(self._path)
+        peer = self.sock.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS.size)
+        if _CREDENTIALS.unpack(peer)[1] != os.geteuid():  # its pid went to a process of another user
+            raise PermissionError("it belongs to another user")
 
 
 class _UnixTransport(xmlrpc.client.Transport):

@@ -8,16 +8,21 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from datetime import datetime
 from pathlib import Path
+from tempfile import mkdtemp
 from typing import Any
 
-from deploy.supervision import processes
+from deploy.supervision import ownership, processes
 from deploy.supervision.errors import DeploymentError
 from deploy.supervision.lock import held
 
 # `make stop` runs without .venv: YAML is imported where it is needed.
 
 SETTINGS = "settings"  # in the run directory: where services keep the values that were set by hand
-PAGE_FILE = "page.txt"  # in the settings: the line that tells the address of the page
+MEMORY = Path("/dev/shm")  # where files are in memory: the drive keeps its time 25 times a second
+PAGE_FILE = "page.txt"  # in the settings: the line with the address of the page
+ROS_LOGS = "logs/ros"  # in the run directory: log files of a user's program that is no service
+RECORDS = "records"  # in the run directory
+STOP_RECORD = "stop-"  # begins the name of the record of a stop
 PARAMETERS = "parameters.yaml"  # in the run directory: the ROS parameter file of all services
 MANIFEST = "supervisord.conf"  # in the run directory: the manifest of a system, if that is not ours
 ALL, KEY = "/**", "ros__parameters"  # the form of ROS 2's parameter files
@@ -28,8 +33,12 @@ LEAD = 10.0  # s until the scenario begins where nothing waits for the services
 
 class RunDirectory:
     def __init__(self, run: Path | None = None) -> None:
-        """:param run: the directory; by default that of this checkout."""
+        """Raise DeploymentError if another user can write in it, or put another one in its place.
+
+        :param run: the directory; by default that of this checkout.
+        """
         self.run = run or processes.run_directory()
+        ownership.check(run or processes.given_run_directory())
 
     @property
     def logs(self) -> Path:
@@ -42,7 +51,7 @@ class RunDirectory:
 
     @property
     def page(self) -> str:
-        """The line that tells the address of the page, or why there is none; empty if it is switched off."""
+        """The line with the address of the page, or why there is none; empty if it is switched off."""
         with suppress(OSError):
             return (self.run / SETTINGS / PAGE_FILE).read_text(encoding="ascii").strip()
         return ""
@@ -53,23 +62,38 @@ class RunDirectory:
         return self.parameters.exists()
 
     def part_logs(self) -> None:
-        """Write a line into each log, between the last run and the next one."""
+        """Write a line into each log, between the last run and the next one; remove those that only grow."""
+        shutil.rmtree(self.run / ROS_LOGS, ignore_errors=True)
         for path in self.logs.glob("*.log"):
             with suppress(OSError), path.open("ab") as log:  # a full disk
                 if log.tell():
                     log.write(f"{RUN} {datetime.now():%Y-%m-%d %H:%M:%S} {RUN}\n".encode())
 
     def forget_settings(self, programs: Sequence[str]) -> None:
-        """Begin without settings, with an empty file for each program.
+        """Begin without settings, with an empty file for each program; in memory, if it may hold files.
 
         A service that starts late and finds its file is no successor that has lost what was set by hand.
         """
+        self.remove_settings()
         directory = self.run / SETTINGS
-        shutil.rmtree(directory, ignore_errors=True)
-        make_directory(directory)
+        make_directory(self.run, 0o700)
+        try:
+            directory.symlink_to(mkdtemp(prefix="reactive-arm-", dir=MEMORY))
+        except OSError:
+            make_directory(directory)
         for program in programs:
             with suppress(OSError):  # a full disk: the service makes it, and reports what it cannot keep
                 (directory / f"{program}.yaml").write_text("{}\n")
+
+    def remove_settings(self) -> None:
+        """Remove the settings, as far as that is possible."""
+        directory = self.run / SETTINGS
+        if directory.is_symlink():
+            if (target := directory.resolve()).parent == MEMORY:
+                shutil.rmtree(target, ignore_errors=True)
+            with suppress(OSError):
+                directory.unlink()
+        shutil.rmtree(directory, ignore_errors=True)
 
     def write_parameters(self, parameters: Mapping[str, object]) -> None:
         """Write the parameter file; services read the old one or the new one."""
@@ -79,6 +103,8 @@ class RunDirectory:
         try:
             new.write_text(ros_yaml.dump(dict(parameters)))
             os.replace(new, self.parameters)
+        except ros_yaml.YamlError as error:
+            raise DeploymentError(f"{self.parameters}: {error}") from error
         except OSError as error:  # which names no file on a full disk
             raise DeploymentError(f"{self.parameters}: {error.strerror}") from error
 
@@ -107,6 +133,7 @@ class RunDirectory:
     def alone(self) -> Iterator[None]:
         """Hold the logs: only one start or stop at a time. supervisord holds the run directory."""
         make_directory(self.run, 0o700)
+        ownership.check(self.run)  # another user was perhaps faster
         make_directory(self.logs)
         with held(self.logs, "start or stop"):
             yield

@@ -50,7 +50,11 @@ class System(RunDirectory):
         with self.alone():
             self._prepare(parameters)
             self._environment = dict(os.environ)  # also for `start_again`
-            self._start_supervisor()
+            try:
+                self._start_supervisor()
+            except BaseException:
+                self.remove_settings()  # they are in memory, and nothing that runs knows them
+                raise
 
     def start_again(self) -> bool:
         """Start the system as it was after supervisord died; False if it was stopped on purpose."""
@@ -83,14 +87,15 @@ class System(RunDirectory):
             self._supervisor = os.pidfd_open(pid)
         return not processes.await_end([self._supervisor], 0.0)
 
-    def stop(self, tell: Callable[[int], None] = lambda count: None) -> int:
-        """End every process of the system; return their number, which ``tell`` is called with before."""
+    def stop(self, report: Callable[[int], None] = lambda count: None) -> int:
+        """End every process of the system; return their number, which ``report`` is called with before."""
         if not self.logs.exists() and not self.members():
-            tell(0)
+            report(0)
+            self.remove_settings()
             return 0
         with self.alone():
             count = len(self.members())
-            tell(count)
+            report(count)
             with suppress(OSError):  # a read-only checkout
                 self.parameters.unlink()  # a terminal that guards the system does not start it again
             if pid := self.supervisor():
@@ -100,6 +105,7 @@ class System(RunDirectory):
                     processes.await_end(handles, SUPERVISOR_GRACE)
                 processes.close(handles)
             self._end_members()
+            self.remove_settings()
         return count
 
     def programs(self) -> list[Program]:

@@ -2,13 +2,12 @@ from __future__ import annotations
 
 import configparser
 import shlex
-from pathlib import Path
 
 import pytest
 
 from deploy.supervision import manifest
+from deploy.supervision.processes import ROOT
 
-ROOT = Path(__file__).parents[2]
 CONF = configparser.RawConfigParser(inline_comment_prefixes=(" ;",))
 CONF.read(manifest.PATH)
 SECTIONS = {
@@ -24,8 +23,8 @@ def test_all_programs_stop_at_the_same_time_as_one_group() -> None:
 
 def test_a_program_has_its_module_and_arguments() -> None:
     first, *_, last = manifest.programs()
-    assert first == ("config_l1", "services.config_publisher", ("l1",), manifest.ROBOT)
-    assert last == ("sentinel", "deploy.supervision.sentinel", (), manifest.ROBOT)
+    assert first == manifest.Program("config_l1", "services.config_publisher", ("l1",))
+    assert last == manifest.Program("sentinel", "deploy.supervision.sentinel", ())
 
 
 @pytest.mark.parametrize("name", SECTIONS)

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import configparser
 import os
+import shlex
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -12,6 +13,7 @@ import pytest
 
 from deploy.supervision import manifest, parameter_file
 from deploy.supervision.errors import DeploymentError
+from deploy.supervision.processes import run_directory
 from deploy.supervision.reaction import reaction
 from interfaces.service import UserError
 
@@ -40,13 +42,57 @@ def test_without_a_file_the_manifest_is_ours() -> None:
 def test_own_programs_join_ours_with_the_same_settings(own: Path) -> None:
     own.write_text(GUARD + "startsecs = 3  ; mine\nstopwaitsecs = 2\n")
     with manifest.chosen(str(own)):
-        assert manifest.programs() == (*OURS, ("guard", "services.examples.speed_guard", (), manifest.ROBOT))
+        *ours, guard = manifest.programs()
+        assert (tuple(ours), guard) == (OURS, manifest.Program("guard", "services.examples.speed_guard", ()))
         conf = configparser.RawConfigParser()
         conf.read(manifest.path())
-    ours, guard = dict(conf["program:kinematics"]), dict(conf["program:guard"])
-    arguments = "--ros-args -r __node:=guard --params-file parameters.yaml"
+    shared, section = dict(conf["program:kinematics"]), dict(conf["program:guard"])
+    arguments = f"--ros-args -r __node:=guard --params-file {run_directory()}/parameters.yaml"
     command = f"python3 -m services.examples.speed_guard {arguments}"
-    assert guard == ours | {"command": command, "startsecs": "3", "stopwaitsecs": "2"}
+    assert section == shared | {"command": command, "startsecs": "3", "stopwaitsecs": "2"}
+
+
+def test_own_program_with_a_directory_finds_its_parameters(
+    own: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = own.parent / "it's 100%"
+    monkeypatch.setenv("REACTIVE_ARM_RUN_DIR", str(run))
+    own.write_text(GUARD + "directory = /tmp\n")
+    with manifest.chosen(str(own)):
+        conf = configparser.RawConfigParser()
+        conf.read(manifest.path())
+    words = shlex.split(conf["program:guard"]["command"] % {})  # as supervisord reads it
+    assert words[-1] == str(run / "parameters.yaml")
+
+
+@pytest.mark.parametrize("directory", ["100%%/work", "%(here)s/100%%/work", "~/100%%/work"])
+def test_paths_of_own_program_count_from_its_file(
+    own: Path, directory: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("HOME", str(own.parent))
+    (own.parent / "100%" / "work").mkdir(parents=True)
+    own.write_text(GUARD + f"directory = {directory}\n")
+    with manifest.chosen(str(own)):
+        conf = configparser.RawConfigParser()
+        conf.read(manifest.path())
+    assert conf["program:guard"]["directory"] % {} == str(own.parent / "100%" / "work")
+
+
+@pytest.mark.parametrize(
+    ("setting", "starts"), [("", True), ("autostart = true\n", True), ("autostart = False\n", False)]
+)
+def test_own_program_starts_with_the_system_unless_it_says_otherwise(
+    own: Path, setting: str, starts: bool
+) -> None:
+    own.write_text(GUARD + setting)
+    with manifest.chosen(str(own)):
+        assert manifest.programs()[-1].starts is starts
+
+
+def test_own_file_may_begin_with_a_byte_order_mark(own: Path) -> None:
+    own.write_text("\ufeff" + GUARD)
+    with manifest.chosen(str(own)):
+        assert manifest.programs()[-1].name == "guard"
 
 
 def test_virtual_joints_give_way_to_real_ones() -> None:
@@ -67,7 +113,7 @@ def test_modules_beside_the_file_are_found(own: Path) -> None:
     (own.parent / "my_own_guard.py").touch()
     own.write_text("[program:guard]\ncommand = python3 -m my_own_guard fast --ros-args -r a:=b\n")
     with manifest.chosen(str(own)):
-        assert manifest.programs()[-1] == ("guard", "my_own_guard", ("fast",), manifest.ROBOT)
+        assert manifest.programs()[-1] == manifest.Program("guard", "my_own_guard", ("fast",))
         assert os.environ["PYTHONPATH"].split(os.pathsep)[-1] == str(own.parent)
 
 
@@ -87,7 +133,7 @@ def test_parameters_of_own_program_are_known_whatever_its_arguments(own: Path) -
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "shown"),
     [
         ("def wire(", "SyntaxError: '(' was never closed (broken_guard.py, line 1)"),
         ("import no_such_driver", "ModuleNotFoundError: No module named 'no_such_driver'"),
@@ -95,14 +141,14 @@ def test_parameters_of_own_program_are_known_whatever_its_arguments(own: Path) -
         ("raise SystemExit('no GPIO')", "SystemExit: no GPIO"),
     ],
 )
-def test_own_program_that_cannot_be_imported_is_one_line(own: Path, text: str, told: str) -> None:
+def test_own_program_that_cannot_be_imported_is_one_line(own: Path, text: str, shown: str) -> None:
     (own.parent / "broken_guard.py").write_text(text)
     own.write_text("[program:guard]\ncommand = python3 -m broken_guard\n")
     parameters = own.with_name("mine.yaml")
     parameters.write_text("{}")
     with manifest.chosen(str(own)), pytest.raises(UserError) as raised:
         parameter_file.load(str(parameters), "/")
-    assert str(raised.value) == f"broken_guard: cannot be imported: {told}"
+    assert str(raised.value) == f"broken_guard: cannot be imported: {shown}"
 
 
 def test_bound_needs_no_import_of_own_program(own: Path) -> None:
@@ -123,6 +169,7 @@ ERRORS = [
     ("[program:guard]\ncommand = ./guard", "{own}: [program:guard] has no command such as python3 -m MODULE"),
     ("[program:guard]\ncommand = python3 -m", "{own}: [program:guard] has no command such as python3 -m"),
     ("[program:guard]\ncommand = python3 -m gurad", "{own}: [program:guard] runs the module gurad, which is"),
+    (GUARD + "directory = work", "{own}: [program:guard] directory: there is no folder {own.parent}/work"),
     (GUARD + GUARD, "{own}: While reading from '{own}' [line 3]: section 'program:guard' already exists"),
     ("guard", "{own}: File contains no section headers."),
 ]
@@ -130,10 +177,10 @@ ERRORS = [
 
 @pytest.fixture(params=ERRORS, ids=lambda error: repr(error[0][:40]))
 def error(request: pytest.FixtureRequest, own: Path) -> Iterator[str]:
-    """What is told about a file with an error."""
-    text, told = request.param
+    """What is printed about a file with an error."""
+    text, shown = request.param
     own.write_text(text)
-    return told.format(own=own)
+    return shown.format(own=own)
 
 
 def test_error_in_the_file_is_one_line(own: Path, error: str) -> None:

@@ -40,10 +40,11 @@ def run(
         env=os.environ | {"PYTHONPATH": os.pathsep.join([str(ROOT), *path])},
         capture_output=True,
         text=True,
-        timeout=30.0,
+        timeout=150.0,
     )
 
 
+POOL = "from concurrent.futures import ThreadPoolExecutor\nsys.pool = ThreadPoolExecutor(1)\n"
 FORKED = "print(hasattr(sys, 'is_supervisord'), flush=True)"
 
 
@@ -92,6 +93,19 @@ def test_threads_and_exit_handlers_end_before_the_program(tmp_path: Path) -> Non
     assert (done.returncode, done.stdout) == (0, "thread\nexit handler\n")
 
 
+@pytest.mark.parametrize(("end", "code"), [("", 0), ("raise ValueError('a bug')", 1), ("sys.exit(3)", 3)])
+def test_idle_threads_of_a_pool_keep_no_program_alive(tmp_path: Path, end: str, code: int) -> None:
+    work = "sys.pool.submit(print, 'work').result()\natexit.register(print, 'exit')\n"
+    done = run(tmp_path, POOL + work + end)
+    assert (done.returncode, done.stdout) == (code, "work\nexit\n")
+
+
+def test_work_of_a_pool_is_done_before_the_program_ends(tmp_path: Path) -> None:
+    work = "lambda: (threading.Event().wait(0.2), print('late work'))"
+    done = run(tmp_path, f"{POOL}atexit.register(print, 'exit handler')\nsys.pool.submit({work})")
+    assert (done.returncode, done.stdout) == (0, "late work\nexit handler\n")
+
+
 def test_customization_of_the_site_runs_for_each_program(tmp_path: Path) -> None:
     (tmp_path / "sitecustomize.py").write_text("import os; name = os.environ.get('SUPERVISOR_PROCESS_NAME')")
     done = run(tmp_path, "import sitecustomize; print(sitecustomize.name)")
@@ -100,7 +114,10 @@ def test_customization_of_the_site_runs_for_each_program(tmp_path: Path) -> None
 
 @pytest.mark.parametrize(
     ("more", "python"),
-    [("prefork.rename = lambda *_: os.stat('/no/such/kernel')", PYTHON), ("", os.path.realpath(PYTHON))],
+    [
+        ("prefork.set_command_line = lambda *_: os.stat('/no/such/kernel')", PYTHON),
+        ("", os.path.realpath(PYTHON)),
+    ],
     ids=["a kernel that cannot rename", "a Python elsewhere"],
 )
 def test_new_interpreter_runs_where_a_fork_cannot(tmp_path: Path, more: str, python: str) -> None:

@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
@@ -107,3 +108,34 @@ def test_signal_reaches_no_other_process(spawn: Spawn, tmp_path: Path) -> None:
         assert not processes.send_signal(tmp_path, "velocity", pid, signal.SIGKILL)
 
     assert [each.poll() for each in (other_program, other_system, stranger)] == [None, None, None]
+
+
+def _effort(pid: int) -> processes.Effort:
+    found = processes.effort_of(pid, processes.stat_of(pid))
+    assert found is not None
+    return found
+
+
+@pytest.mark.parametrize(
+    ("code", "busy"),
+    [
+        ("loop()", "loop"),
+        ("import threading; threading.Thread(target=loop, daemon=True).start(); signal.pause()", "others"),
+    ],
+)
+def test_effort_of_the_loop_and_of_other_threads_is_distinguished(spawn: Spawn, code: str, busy: str) -> None:
+    loop = "loop = lambda: [None for _ in iter(int, 1)]; "
+    pid = spawn(f"{loop}{READY}{code}").pid
+    deadline = time.monotonic() + 20.0
+    before = _effort(pid)
+    while getattr(_effort(pid), busy) - getattr(before, busy) < 0.5:
+        assert time.monotonic() < deadline, _effort(pid)
+        time.sleep(0.05)
+    after = _effort(pid)
+    other = "others" if busy == "loop" else "loop"
+    assert getattr(after, other) - getattr(before, other) < 0.25
+
+
+def test_a_process_that_is_not_there_makes_no_effort() -> None:
+    assert processes.effort_of(0, []) is None
+    assert processes.effort_of(0, processes.stat_of(os.getpid())) is None
