@@ -154,5 +154,5 @@ check: setup
 	@$(PY) -m deploy.commands.stubs .mypy_cache/stubs
 	@$(PY) -m mypy
 	@PYTHONPATH="interfaces/reactive_node/src:deploy/ground/src:tests/simulation_kit/src:deploy/tools/src:$$PYTHONPATH" .venv/bin/lint-imports --no-logo --no-cache
-	@.venv/bin/shellcheck deploy/commands/python.sh deploy/commands/venv.sh .ci/run .ci/run-on-ros
+	@.venv/bin/shellcheck deploy/commands/*.sh .ci/run .ci/run-on-ros
 	@$(PY) -m yamllint --strict deploy

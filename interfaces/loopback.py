@@ -7,11 +7,14 @@ import socket
 import struct
 from contextlib import suppress
 
+from interfaces.seam import replaceable
+
 LOOPBACK_DOWN = "the network interface lo is down, and services do not hear each other: ip link set lo up"
 
 _SIOCGIFFLAGS, _IFF_UP = 0x8913, 1  # netdevice(7)
 
 
+@replaceable
 def loopback_is_up() -> bool:
     """Whether there is a network interface lo, and it is up."""
     request = struct.pack("16sH22x", b"lo", 0)

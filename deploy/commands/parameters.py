@@ -29,7 +29,7 @@ from deploy.supervision.errors import DeploymentError
 from deploy.supervision.processes import ROOT
 from deploy.supervision.run_directory import ALL, KEY, NOT_YET, scenario_parameters
 from deploy.supervision.system import System
-from interfaces.service import UserError, enclave, instance
+from interfaces.service import UserError, enclave, instance, middleware
 from interfaces.sources import scenario_file
 
 SCENARIOS = ROOT / "deploy" / "scenarios"
@@ -130,10 +130,19 @@ def check_environment(system: System) -> None:
     reach = os.environ.get(RANGE, "")
     if reach.strip().upper() == "OFF":
         raise DeploymentError(f"{RANGE}={reach} keeps the services apart: set LOCALHOST or SUBNET")
+    _check_profiles()
     _check_keys(namespace, int(domain))
     if not system.members():  # the start reports a running system, and replaces orphans
         for program in manifest.programs():
             _check_claim(f"{namespace.rstrip('/')}/{program.name}", int(domain), namespace)
+
+
+def _check_profiles() -> None:
+    """Raise DeploymentError if the user's settings of Fast DDS are nowhere: it would go on without any."""
+    if (profiles := os.environ.get(middleware.PROFILES)) and middleware.is_fast_dds():
+        if not Path(profiles).is_file():
+            raise DeploymentError(f"{middleware.PROFILES}={profiles}: there is no such file")
+        os.environ[middleware.PROFILES] = str(Path(profiles).absolute())  # services work in the run directory
 
 
 def _check_keys(namespace: str, domain: int) -> None:

@@ -28,7 +28,8 @@ from functools import partial
 from pathlib import Path
 from types import FrameType
 
-from deploy.supervision.processes import ROOT, run_directory, using
+from deploy.supervision import interruption, variables
+from deploy.supervision.processes import ROOT, RUN_DIRECTORY, run_directory, running, using
 from deploy.supervision.rclpy_choice import CYCLONEDDS, GROUND, RUNTIME, sourced_rclpy
 
 VENV = ROOT / ".venv"
@@ -48,6 +49,13 @@ SOURCES = [
 FAST_DDS = "rmw_fastrtps_cpp"
 CYCLONEDDS_WHEELS = (3, 13)
 """The last Python for which PyPI has wheels of Cyclone DDS."""
+BEHIND = (
+    "import os, sys; [sys.path.append(sys.path.pop(sys.path.index(each)))"
+    ' for each in map(os.path.abspath, filter(None, os.environ.get("PYTHONPATH", "").split(os.pathsep)))'
+    f" if each in sys.path and not each.startswith({str(ROOT)!r})"
+    ' and not os.path.exists(os.path.join(each, "sitecustomize.py"))]'
+)
+"""Moves the user's own modules behind those that the arm needs: a queue.py would hide Python's."""
 SCRIPTS = {
     "supervisord": "-m supervisor.supervisord",
     "supervisorctl": "-m supervisor.supervisorctl",
@@ -144,6 +152,8 @@ def make(ros: str) -> None:
     if importlib.util.find_spec("ensurepip") is None:  # a separate package on Debian and Ubuntu
         package = f"python{sys.version_info[0]}.{sys.version_info[1]}-venv"
         raise SetupError(f"Python {version} ({sys.executable}) lacks ensurepip: apt-get install {package}")
+    import ensurepip
+
     if ros:
         messages = ("diagnostic_msgs", "geometry_msgs", "sensor_msgs", "std_msgs")
         needed = f"import rclpy, {', '.join(f'{package}.msg' for package in messages)}"
@@ -155,17 +165,21 @@ def make(ros: str) -> None:
                 "Choose its interpreter (make setup PYTHON=/usr/bin/python3), install what is missing, or"
                 " use a shell without ROS 2"
             )
-    print(f"Setting up .venv with Python {version}, once; this takes about half a minute.", flush=True)
+    print(f"Setting up .venv with Python {version}, once; this takes up to three minutes.", flush=True)
     STAMP.unlink(missing_ok=True)  # no sooner: a refused set-up leaves the old .venv usable
     venv = [sys.executable, "-m", "venv", "--clear", *(["--system-site-packages"] if ros else []), str(VENV)]
-    step("a virtual environment", venv, log=None)
+    step(f"a virtual environment with pip {ensurepip.version()}", venv, log=None)
     step("packages from PyPI", [*PIP, *_requirements("system.txt", "build.txt", "develop.txt")])
     if ros:
         print(f"  rclpy of ROS 2: {Path(ros).parent}")
     else:
         step("ROS 2's rclpy from PyPI", [*PIP, *_requirements("ros.txt")])
         step("Cyclone DDS from PyPI", [*PIP, *_of_cyclonedds(), *_requirements("cyclonedds.txt")])
-    _write_pth()
+    _write_pth(behind=not ros)
+    if subprocess.run([PYTHON, "-Ec", "import supervisor"], capture_output=True).returncode:
+        raise SetupError(
+            "pip has not installed into .venv: do its settings (pip config list) lead elsewhere?"
+        )
     for name, program in SCRIPTS.items():
         script = VENV / "bin" / name
         script.write_text(f'#!/bin/sh\nexec "${{0%/*}}/python" {program} "$@"\n')
@@ -188,18 +202,23 @@ def _requirements(*names: str) -> list[str]:
     return [word for name in names for word in ("-r", str(REQUIREMENTS / name))]
 
 
-def _write_pth() -> None:
-    """Write where the packages of this checkout are, and what chooses the ground of rclpy."""
+def _write_pth(behind: bool) -> None:
+    """Write where the packages of this checkout are, and what chooses the ground of rclpy.
+
+    :param behind: whether the modules of PYTHONPATH come behind all others; a sourced ROS 2 is in it.
+    """
     chosen = f'import os; "{RUNTIME}" in os.environ and os.environ.update({GROUND}=os.environ["{RUNTIME}"])'
     hook = f'import os; os.environ.get("{GROUND}") and __import__("rclpy_ground.hook")'
-    lines = (*SOURCES, chosen, hook)
+    lines = (*SOURCES, *([BEHIND] if behind else []), chosen, hook)
     Path(_site_packages(), "reactive_arm.pth").write_text("".join(f"{line}\n" for line in lines))
 
 
 def _refuse_while_running() -> None:
     for run in using(PYTHON.parent):
-        elsewhere = "" if run == run_directory() else f"REACTIVE_ARM_RUN_DIR={shlex.quote(str(run))} "
+        elsewhere = "" if run == run_directory() else f"{RUN_DIRECTORY}={shlex.quote(str(run))} "
         raise SetupError(f"A running system uses this .venv. Stop it before the set-up: {elsewhere}make stop")
+    for pid, words in running(PYTHON.parent):
+        raise SetupError(f"Process {pid} uses this .venv. Await its end before the set-up: {words:.100}")
 
 
 def step(title: str, command: list[str], log: Path | None = LOG) -> None:
@@ -207,7 +226,8 @@ def step(title: str, command: list[str], log: Path | None = LOG) -> None:
     live = sys.stdout.isatty()
     print(f"  {title}", end="" if live else "\n", flush=True)
     lines: list[str] = []
-    environment = os.environ | {"PIP_DISABLE_PIP_VERSION_CHECK": "1"}
+    environment = variables.kept(os.environ) | {"PIP_DISABLE_PIP_VERSION_CHECK": "1"}
+    environment.pop("PYTHONPATH", None)  # what is there is not in .venv
     # A signal waits until the command can be ended.
     mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM, signal.SIGHUP})
     process = subprocess.Popen(
@@ -244,7 +264,7 @@ def step(title: str, command: list[str], log: Path | None = LOG) -> None:
         reasons = [line for line in lines if line.startswith("ERROR")] or lines[-5:]
         if any("Retrying" in line for line in lines):  # pip then blames the requirement
             reasons.append("The package index was not reached: network, proxy, PIP_INDEX_URL?")
-        if (free := shutil.disk_usage(ROOT).free) < ENOUGH_SPACE:  # venv does not tell that the disk is full
+        if (free := shutil.disk_usage(ROOT).free) < ENOUGH_SPACE:  # venv does not report a full disk
             reasons.append(f"{free / 1e6:.0f} MB are free on the disk of {ROOT}")
         where = f" (full log: {log.relative_to(ROOT)})" if log is not None else ""
         raise SetupError(f"Set-up failed at {title}{where}:\n{''.join(reasons).rstrip()}")
@@ -267,6 +287,7 @@ def alone() -> Iterator[None]:
 
 
 def _interrupt(number: int, frame: FrameType | None) -> None:
+    interruption.end_make()
     raise KeyboardInterrupt
 
 

@@ -18,7 +18,7 @@ KEPT = (RUN_DIRECTORY, WEB, MANIFEST)
 START_LIMIT = 90  # s until all services are up
 WATCHDOG = SENTINEL_START_TIMEOUT + 10.0  # s without the sentinel: it has to start, and to see the others
 ESCAPES = str.maketrans({"\\": "\\\\", "%": "%%", "\n": "\\n", "\r": "\\r"})
-"""What stands for a character (systemd.syntax(7)); a newline in a value would end its setting."""
+"""The escape of each character (systemd.syntax(7)); a newline in a value would end its setting."""
 
 UNIT = """\
 # Written by `make unit` in {root}.
@@ -88,7 +88,7 @@ def write(content: str, environment: Mapping[str, str]) -> Path:
 
 
 def _arm(unit: str) -> list[str]:
-    """Return the lines that tell whose unit it is: the checkout and the run directory."""
+    """Return the lines that say whose unit it is: the checkout and the run directory."""
     of_arm = ("# Written by", f'Environment="{RUN_DIRECTORY}=')
     return [line for line in unit.splitlines() if line.startswith(of_arm)]
 

@@ -2,7 +2,8 @@
 # Runs Python of .venv with the libraries of the rclpy that it uses. Without this, the wheels of ROS 2 start each
 # interpreter twice: once to find out where their libraries are.
 set -eu
-cd "$(dirname "$0")/../.."
+CDPATH="" cd -- "$(dirname -- "$0")/../.."
+. deploy/commands/entry.sh
 if [ -e .venv/lib/librcl.so ]; then
     libraries=$PWD/.venv/lib
     for directory in "$PWD"/.venv/lib/python3.*/site-packages/ros_*.libs; do

@@ -7,9 +7,11 @@ import sys
 from collections.abc import Mapping, MutableMapping
 from pathlib import Path
 
-from deploy.supervision import manifest, processes, rclpy_choice
+from deploy.supervision import manifest, processes, rclpy_choice, variables
+from deploy.supervision.run_directory import ROS_LOGS
+from interfaces import arm_variables
 
-NAMESPACE = "REACTIVE_ARM_NAMESPACE"  # environment variable: the ROS namespace of an arm
+NAMESPACE = arm_variables.NAMESPACE
 SECURITY = "ROS_SECURITY_ENABLE"
 """Environment variable of ROS 2: whether DDS is secured."""
 STRATEGY, ENFORCE = "ROS_SECURITY_STRATEGY", "Enforce"
@@ -30,7 +32,7 @@ _NAMES = (
 _BEGINNINGS = ("ROS_", "RMW_", "CYCLONEDDS_", "FASTRTPS_", "FASTDDS_")
 FASTDDS_PROFILES = Path(__file__).resolve().parents[1] / "fastdds.xml"
 CYCLONEDDS = "CYCLONEDDS_URI"
-RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
+RANGE, PEERS = "ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_STATIC_PEERS"
 # Processes of one tag find each other by multicast, so they need neither questions to each port nor a port of
 # their own, of which a domain has a hundred.
 _BY_MULTICAST = (
@@ -54,10 +56,17 @@ def is_secured(environment: Mapping[str, str]) -> bool:
 
 def set_middleware(environment: MutableMapping[str, str]) -> None:
     """Set what the nodes of an arm need from the middleware, where the user has not set it."""
-    environment.setdefault(RANGE, "LOCALHOST")
-    environment.setdefault("FASTRTPS_DEFAULT_PROFILES_FILE", str(FASTDDS_PROFILES))
-    # In LOCALHOST, rmw_fastrtps_cpp always adds shared memory; there, the profile keeps messages out of it.
-    environment.setdefault("FASTDDS_BUILTIN_TRANSPORTS", "UDPv4")
+    if environment.pop("ROS_LOCALHOST_ONLY", "") == "1":  # then rcl ignores both of these, and Fast DDS ours
+        environment[RANGE] = "LOCALHOST"
+        environment.pop(PEERS, None)
+    own = {
+        RANGE: "LOCALHOST",
+        "FASTRTPS_DEFAULT_PROFILES_FILE": str(FASTDDS_PROFILES),
+        # In LOCALHOST, rmw_fastrtps_cpp adds shared memory all the same; there, the profile keeps it out.
+        "FASTDDS_BUILTIN_TRANSPORTS": "UDPv4",
+    }
+    for name, value in own.items():
+        environment[name] = environment.get(name) or value  # an empty one would open the arm to the subnet
     if is_secured(environment):
         environment.setdefault(STRATEGY, ENFORCE)
     elif environment.get(rclpy_choice.RUNTIME) and namespace_of(environment) != "/":
@@ -79,7 +88,7 @@ def tagged(environment: Mapping[str, str]) -> str:
 
 def is_alone(environment: Mapping[str, str]) -> bool:
     """Whether no message of another host comes to the nodes of an environment."""
-    return environment.get(RANGE) == "LOCALHOST" and not environment.get("ROS_STATIC_PEERS")
+    return environment.get(RANGE) == "LOCALHOST" and not environment.get(PEERS)
 
 
 def namespace_of(environment: Mapping[str, str]) -> str:
@@ -90,9 +99,11 @@ def namespace_of(environment: Mapping[str, str]) -> str:
 def of_supervisord(environment: Mapping[str, str], run: Path) -> dict[str, str]:
     """The environment of supervisord and its programs, from that of the command that starts them."""
     result = dict(environment)
+    set_middleware(result)
+    result = variables.kept(result)
     result[processes.MARK] = str(run)
     result[NAMESPACE] = namespace_of(result)
-    set_middleware(result)
+    result["ROS_LOG_DIR"] = str(run / ROS_LOGS)
     result["PYTHONUNBUFFERED"] = "1"
     result["OPENBLAS_NUM_THREADS"] = "1"  # numpy starts no threads: supervisord forks
     _prepend(result, "PATH", str(Path(sys.executable).parent))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ensurepip
 import fcntl
 import os
 import re
@@ -10,6 +11,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import sysconfig
 import threading
 import time
 from contextlib import suppress
@@ -20,21 +22,9 @@ from unittest import mock
 import pytest
 
 from deploy.commands import setup
+from deploy.supervision.processes import ROOT
 
-ROOT = Path(__file__).parents[2]
 STAMP = ".venv/made-from"
-
-
-@pytest.fixture
-def checkout(tmp_path: Path) -> Path:
-    """A checkout with the files of the set-up and of `make stop`."""
-    checkout = tmp_path / "checkout"
-    for name in ("requirements", "supervision", "commands", "operator"):
-        ignored = shutil.ignore_patterns("__pycache__")  # other workers write there
-        shutil.copytree(ROOT / "deploy" / name, checkout / "deploy" / name, ignore=ignored)
-    for name in ("Makefile", "deploy/__init__.py", "deploy/supervisord.conf"):
-        shutil.copyfile(ROOT / name, checkout / name)
-    return checkout
 
 
 def set_up(checkout: Path, **environment: str) -> tuple[int, str]:
@@ -45,7 +35,7 @@ def set_up(checkout: Path, **environment: str) -> tuple[int, str]:
         env=os.environ | environment,
         capture_output=True,
         text=True,
-        timeout=30,
+        timeout=150,
     )
     return done.returncode, done.stderr
 
@@ -68,6 +58,22 @@ def test_a_refused_set_up_leaves_the_old_one(checkout: Path, tmp_path: Path) -> 
     assert code == 1
     assert "made for another Python" in errors
     assert stamp.read_text() == "another shell's environment"
+
+
+def test_a_venv_in_which_a_process_runs_is_kept(checkout: Path) -> None:
+    python = checkout / ".venv/bin/python"
+    python.parent.mkdir(parents=True)
+    python.symlink_to(os.path.realpath(sys._base_executable))
+    command = [".venv/bin/python", "-c", "print()\ninput()"]  # as venv.sh calls it
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+    with subprocess.Popen(command, cwd=checkout, **pipes) as process:
+        assert process.stdout is not None
+        process.stdout.readline()
+        code, errors = set_up(checkout, RUNTIME="")
+        process.communicate(b"\n")
+    words = f"Process {process.pid} uses this .venv. Await its end before the set-up: "
+    assert (code, errors) == (1, f"{words}.venv/bin/python -c print() input()\n")
+    assert python.is_symlink()
 
 
 def test_the_interpreter_is_none_of_an_interrupted_set_up(checkout: Path) -> None:
@@ -119,9 +125,17 @@ def test_make_stop_works_in_a_read_only_checkout(checkout: Path) -> None:
     assert (done.returncode, done.stdout) == (0, "Nothing runs.\n")
 
 
-def test_a_quote_in_a_variable_of_make_is_no_shell_syntax(checkout: Path) -> None:
-    done = subprocess.run(["make", "stop", "PYTHON=it's"], cwd=checkout, capture_output=True, text=True)
-    assert done.stderr.splitlines()[:-1] == ["PYTHON=it's is not a Python 3.11, 3.12 or 3.13"]
+@pytest.mark.parametrize(
+    ("python", "problem"),
+    [
+        ("it's", ": there is no such program"),  # a quote is no shell syntax
+        ("/nowhere/python3", ": there is no such program"),
+        ("/bin/false", " is not a Python 3.11 to 3.14"),
+    ],
+)
+def test_a_python_that_cannot_be_used_is_refused(checkout: Path, python: str, problem: str) -> None:
+    done = subprocess.run(["make", "stop", f"PYTHON={python}"], cwd=checkout, capture_output=True, text=True)
+    assert done.stderr.splitlines()[:-1] == [f"PYTHON={python}{problem}"]
 
 
 @pytest.mark.parametrize(
@@ -151,7 +165,7 @@ def test_a_variable_that_make_would_ignore_is_refused(checkout: Path, words: str
 
 
 @pytest.mark.parametrize(("free", "words"), [(2e9, ""), (3e6, f"3 MB are free on the disk of {ROOT}")])
-def test_a_step_that_fails_on_a_full_disk_tells_the_free_space(
+def test_a_step_that_fails_on_a_full_disk_reports_the_free_space(
     monkeypatch: pytest.MonkeyPatch, free: float, words: str
 ) -> None:
     monkeypatch.setattr(shutil, "disk_usage", lambda path: mock.Mock(free=free))
@@ -219,3 +233,23 @@ def test_a_step_that_outlives_a_killed_set_up_keeps_the_lock(checkout: Path) -> 
         fcntl.flock(directory, fcntl.LOCK_EX)  # the next set-up waits for the end of the step
     finally:
         os.close(directory)
+
+
+def test_a_set_up_names_its_pip_and_checks_the_hashes_of_all_packages(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    steps: list[tuple[str, list[str]]] = []
+    monkeypatch.setattr(setup, "step", lambda title, command, **_: steps.append((title, command)))
+    monkeypatch.setattr(setup, "VENV", tmp_path)
+    monkeypatch.setattr(setup, "STAMP", tmp_path / "made-from")
+    monkeypatch.setattr(setup, "_refuse_while_running", lambda: None)
+    (tmp_path / "bin").mkdir()
+    Path(sysconfig.get_path("purelib", "venv", {"base": str(tmp_path)})).mkdir(parents=True)
+    setup.make("")
+    (title, _), *by_pip = steps
+    assert title == f"a virtual environment with pip {ensurepip.version()}"
+    assert all("--require-hashes" in command for _, command in by_pip)
+    installed = [Path(word).name for _, command in by_pip for word in command if word.endswith(".txt")]
+    assert installed == ["system.txt", "build.txt", "develop.txt", "ros.txt", "cyclonedds.txt"]
+    # PyPI has no Cyclone DDS for the newest Python, and its C library works with any.
+    assert ("--python-version=3.13" in by_pip[-1][1]) == (sys.version_info >= (3, 14))
