@@ -26,6 +26,7 @@ from deploy.supervision.environment import (
     namespace_of,
 )
 from deploy.supervision.errors import DeploymentError
+from deploy.supervision.ownership import name_of
 from deploy.supervision.processes import ROOT
 from deploy.supervision.run_directory import ALL, KEY, NOT_YET, scenario_parameters
 from deploy.supervision.system import System
@@ -164,14 +165,18 @@ def _check_keys(namespace: str, domain: int) -> None:
 
 
 def _check_claim(node: str, domain: int, namespace: str) -> None:
-    if not instance.is_claimed(node, domain):
+    holders = instance.holders(node, domain)
+    if is_secured(os.environ):  # the arm of another user has other keys, and meets ours nowhere
+        holders &= {os.geteuid()}
+    if not holders:
         return
+    others = "" if os.geteuid() in holders else f", started by {name_of(min(holders))}"
     users = (
         f"the system in {run} has {node}"
         for run, environment in processes.systems().items()
         if int(environment.get("ROS_DOMAIN_ID") or 0) == domain and namespace_of(environment) == namespace
     )
     raise DeploymentError(
-        f"ROS domain {domain} is in use: {next(users, f'{node} already runs on this host')}."
+        f"ROS domain {domain} is in use: {next(users, f'{node} already runs on this host{others}')}."
         f" Set ROS_DOMAIN_ID to another domain (0 to 101), or {NAMESPACE}, for example to /arm2."
     )

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from deploy.supervision import manifest, processes
+from deploy.supervision import processes
+from deploy.supervision.processes import Effort
+from deploy.supervision.silence import Silence
 from deploy.supervision.supervisord import Program
-from interfaces.service.health import PERIOD
 
 RECENT = 60.0  # s for which a restart counts as recent
 
@@ -21,8 +22,14 @@ class Observation:
     time: float
     """[s, monotonic clock]"""
     programs: list[Program]
+    last_beat: Mapping[int, float] = field(default_factory=dict)
+    """time of the last sign of life of a process, by pid [s, monotonic clock]"""
     last_health: Mapping[tuple[str, int], float] = field(default_factory=dict)
     """time of the last health report of a process, by program and pid [s, monotonic clock]"""
+    efforts: Mapping[int, Effort] = field(default_factory=dict)
+    """processor times, by pid"""
+    flood: str = ""
+    """why reports may be lost or late; '' if they are not"""
     stopped: frozenset[int] = frozenset()
     """pids of supervised processes that are stopped (SIGSTOP)"""
     duplicates: frozenset[processes.Process] = frozenset()
@@ -51,9 +58,9 @@ class Timeouts:
     period: float = 0.5
     """between two observations"""
     health: float = 2.7
-    """without a report of health of a service, which makes one each second"""
+    """without a sign of life of a service, which gives one each second"""
     start: float = 10.0
-    """of a new process until its first health"""
+    """of a new process until its first sign of life, and of any without a report of health"""
     duplicate: float = 1.0
     """of a duplicate, which has to end itself"""
     first_revival: float = 1.0
@@ -65,68 +72,59 @@ class Policy:
     def __init__(self, timeouts: Timeouts | None = None) -> None:
         self.kill_inhibited_by = ""
         """why silent services are not killed; '' if they are"""
+        self.delayed: list[str] = []
+        """services that are late because the machine or a flood keeps them from running"""
         self.reasons: dict[str, str] = {}
         """the reason of the last action on each program"""
         self.recent_restarts: dict[str, int] = {}
         """restarts of each program within the last minute"""
-        self.hears_itself = True
-        """Whether the sentinel's own reports of health arrive; if not, it cannot judge others"""
         self._timeouts = timeouts or Timeouts()
-        # Of each program: pid, time of its first observation, and how long its first health may take.
-        self._first_seen: dict[str, tuple[int, float, float]] = {}
-        self._deaf_since = math.inf
-        # Processes that have been silent since most services were, and when that was last so.
-        self._silent_with_most: dict[int, float] = {}
+        self._beats = Silence(self._timeouts.health, self._timeouts.start)
+        self._reports = Silence(self._timeouts.start, self._timeouts.start)
+        self._efforts: Mapping[int, Effort] = {}
         self._stopped_since: dict[int, float] = {}
         self._duplicate_since: dict[int, float] = {}
         self._revivals: dict[str, tuple[float, float]] = {}  # delay of the next, and when it is due
         self._restarts: dict[str, list[tuple[float, int]]] = {}  # times and counts; the first is not recent
         self._last_time: float | None = None
         self._paused = 0.0  # [s] that the sentinel could not observe
-        self._last_health: dict[
-            tuple[str, int], tuple[float, float]
-        ] = {}  # by the monotonic and the own clock
+
+    @property
+    def hears_itself(self) -> bool:
+        """Whether the sentinel's own reports of health arrive, as far as it can know."""
+        return self._reports.hears_itself
 
     def decide(self, observation: Observation) -> list[Action]:
-        observation = self._in_own_time(observation)
-        self._count_restarts(observation)
+        step = observation.time - (observation.time if self._last_time is None else self._last_time)
+        self._last_time = observation.time
+        # A paused or overloaded machine delays the services as well: this clock stands still meanwhile.
+        pause = max(0.0, step - self._timeouts.period)
+        self._paused += pause
+        now = observation.time - self._paused
+        self._count_restarts(observation, now)
         running = [program for program in observation.programs if program.state in ("STARTING", "RUNNING")]
-        actions = self._kill_stopped(observation, running)
-        actions += self._kill_silent(observation, [p for p in running if p.pid not in observation.stopped])
-        actions += self._kill_duplicates(observation)
-        actions += self._revive(observation)
+        actions = self._kill_stopped(observation, now, running)
+        actions += self._kill_silent(
+            observation, step, pause, [p for p in running if p.pid not in observation.stopped]
+        )
+        actions += self._kill_duplicates(observation, now)
+        actions += self._revive(observation, now)
         for action in actions:
             self.reasons[action.program] = action.reason
         return actions
 
-    def _in_own_time(self, observation: Observation) -> Observation:
-        """Return the observation on a clock that stands still while the sentinel cannot observe.
-
-        A paused or overloaded machine delays the services' reports as well: they are not silent.
-        """
-        if self._last_time is not None:
-            self._paused += max(0.0, observation.time - self._last_time - self._timeouts.period)
-        self._last_time = observation.time
-        before, self._last_health = self._last_health, {}
-        for process, when in observation.last_health.items():
-            known = before.get(process)
-            self._last_health[process] = known if known and known[0] == when else (when, when - self._paused)
-        last_health = {process: when for process, (_, when) in self._last_health.items()}
-        return replace(observation, time=observation.time - self._paused, last_health=last_health)
-
-    def _count_restarts(self, observation: Observation) -> None:
+    def _count_restarts(self, observation: Observation, now: float) -> None:
         """Count: a program that dies again and again after running for a while never becomes FATAL."""
         for program in observation.programs:
-            counts = self._restarts.setdefault(program.name, [(observation.time, program.restarts)])
+            counts = self._restarts.setdefault(program.name, [(now, program.restarts)])
             if program.restarts != counts[-1][1]:
-                counts.append((observation.time, program.restarts))
-            while len(counts) > 1 and observation.time - counts[1][0] >= RECENT:
+                counts.append((now, program.restarts))
+            while len(counts) > 1 and now - counts[1][0] >= RECENT:
                 del counts[0]
             self.recent_restarts[program.name] = max(0, program.restarts - counts[0][1])
 
-    def _kill_stopped(self, observation: Observation, running: list[Program]) -> list[Action]:
+    def _kill_stopped(self, observation: Observation, now: float, running: list[Program]) -> list[Action]:
         """Kill stopped processes: the kernel reports them, so a failing network cannot mislead the policy."""
-        now = observation.time
         since = {pid: self._stopped_since.get(pid, now) for pid in observation.stopped}
         self._stopped_since = since
         return [
@@ -135,45 +133,39 @@ class Policy:
             if program.pid in since and now - since[program.pid] >= self._timeouts.health
         ]
 
-    def _kill_silent(self, observation: Observation, running: list[Program]) -> list[Action]:
-        silent = []
-        expected = 0  # services whose health is due
-        late = 0  # those of them that are silent now, or will be within the period of reports
-        for program in running:
-            pid, since, start = self._first_seen.get(program.name, (0, 0.0, 0.0))
-            if pid != program.pid:
-                # A new sentinel subtracts the time that the process has had already.
-                start = max(2 * self._timeouts.health, self._timeouts.start - program.uptime)
-                pid, since = program.pid, observation.time
-                self._first_seen[program.name] = (pid, since, start)
-            reported = observation.last_health.get((program.name, pid))
-            silence = observation.time - (since if reported is None else reported)
-            timeout = start if reported is None else self._timeouts.health
-            is_expected = reported is not None or silence >= start
-            expected += is_expected
-            late += is_expected and silence >= timeout - PERIOD
-            if silence >= timeout:
-                silent.append(Action("kill", program.name, pid, f"no health for {silence:.1f} s"))
-        self.kill_inhibited_by = ""
-        itself = [action for action in silent if action.program == manifest.sentinel()]
-        self.hears_itself = not itself
-        if itself:
-            self.kill_inhibited_by = "the sentinel does not hear itself"
-            self._deaf_since = min(self._deaf_since, observation.time)
-            # A deaf sentinel is useless; its successor may hear.
-            return itself if observation.time - self._deaf_since >= self._timeouts.start else []
-        self._deaf_since = math.inf
-        most = bool(silent) and late > 1 and 2 * late > expected
-        if most:
-            self.kill_inhibited_by = f"{late} of {expected} services are silent at once"
-        # After a failure of the network, processes have to discover each other again, as new ones do.
-        known = self._silent_with_most
-        last = {it.pid: observation.time if most else known.get(it.pid, -math.inf) for it in silent}
-        self._silent_with_most = last
-        return [it for it in silent if observation.time - last[it.pid] >= self._timeouts.start]
+    def _kill_silent(
+        self, observation: Observation, step: float, pause: float, running: list[Program]
+    ) -> list[Action]:
+        """Kill processes whose loop does not turn, and those that others do not hear, later."""
+        passed = {
+            each.pid: max(0.0, step - max(pause, self._held_up(each.pid, step, observation)))
+            for each in running
+        }
+        self._efforts = observation.efforts
+        silent = self._beats.judge(running, observation.last_beat, observation.time, passed)
+        heard = {pid: when for (_, pid), when in observation.last_health.items()}
+        mute = self._reports.judge(running, heard, observation.time, passed, observation.flood)
+        self.kill_inhibited_by = self._beats.inhibited_by or self._reports.inhibited_by
+        self.delayed = [program.name for program in self._beats.delayed]
+        reasons = {each.program: f"no report of health for {each.seconds:.1f} s" for each in mute}
+        reasons |= {each.program: f"no sign of life for {each.seconds:.1f} s" for each in silent}
+        return [Action("kill", each.name, each.pid, reasons[each]) for each in running if each in reasons]
 
-    def _kill_duplicates(self, observation: Observation) -> list[Action]:
-        now = observation.time
+    def _held_up(self, pid: int, step: float, observation: Observation) -> float:
+        """Return for how long the machine or a flood kept a loop from running since the last observation [s].
+
+        A loop that got as much of the processor as it waited for counts as free: an endless loop is found on
+        a busy machine as well. In a flood, the threads of DDS hold the locks that the loop waits for.
+        """
+        before, after = self._efforts.get(pid), observation.efforts.get(pid)
+        if before is None or after is None:
+            return 0.0
+        ran, waited = after.loop - before.loop, after.waited - before.waited
+        blocked = max(0.0, step - ran - waited)
+        by_threads = min(after.others - before.others, blocked) if observation.flood else 0.0
+        return max(0.0, waited - ran) + max(0.0, by_threads)
+
+    def _kill_duplicates(self, observation: Observation, now: float) -> list[Action]:
         since = {
             process.pid: self._duplicate_since.get(process.pid, now) for process in observation.duplicates
         }
@@ -184,7 +176,7 @@ class Policy:
             if now - since[duplicate.pid] >= self._timeouts.duplicate
         ]
 
-    def _revive(self, observation: Observation) -> list[Action]:
+    def _revive(self, observation: Observation, now: float) -> list[Action]:
         actions = []
         for program in observation.programs:
             delay, due = self._revivals.get(program.name, (self._timeouts.first_revival, math.nan))
@@ -193,8 +185,8 @@ class Policy:
             elif program.state != "FATAL":
                 self._revivals[program.name] = (delay, math.nan)
             elif math.isnan(due):
-                self._revivals[program.name] = (delay, observation.time + delay)
-            elif observation.time >= due:
+                self._revivals[program.name] = (delay, now + delay)
+            elif now >= due:
                 longer = min(2 * delay, self._timeouts.longest_revival)
                 self._revivals[program.name] = (longer, math.nan)
                 actions.append(Action("revive", program.name, 0, f"FATAL; revived after {delay:g} s"))

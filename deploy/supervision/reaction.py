@@ -39,16 +39,25 @@ class Reaction(NamedTuple):
         return round(min(self._by_strikes, self._by_timeout + self.controller.repeat) + DELAY, 3)
 
     @property
+    def by_strikes_in_time(self) -> bool:
+        """Whether the watchdog alone (F1) acts within the bound of S1; else F2 acts before it."""
+        return self._by_strikes + DELAY <= self.off_within
+
+    @property
     def longest_restart(self) -> float:
         """How long the watchdog may be away while the engines stay on."""
         return round(self.controller.presence_timeout - self.watchdog.lifespan - self.watchdog.sampling, 3)
 
+    def longest_unseen(self, beat: float) -> float:
+        """How old the last report of a present operator may become, by the period of the switch [s]."""
+        return round(self.watchdog.sampling + self.watchdog.reading + beat + DELAY, 3)
+
     @property
     def words(self) -> str:
-        """The bounds in one sentence, without a full stop."""
+        """What happens without a hand, in one sentence without a full stop: the words of the page."""
         return (
-            f"Engines stop within {self.off_within:g} s"
-            f" ({self.off_after_one_death:g} s if one process dies, {self.off_undisturbed:g} s if none does)"
+            f"Let go: engines off within {self.off_undisturbed:g} s,"
+            f" or {self.off_within:g} s if programs crash"
         )
 
     def check(self) -> None:
@@ -73,6 +82,11 @@ class Reaction(NamedTuple):
             raise UserError(
                 f"max_presence_age must be at most {most:g} s, not {controller.max_presence_age:g}: "
                 "a turn_on after the last strike would turn the engines on without an operator"
+            )
+        if controller.max_presence_age < (least := self.longest_unseen(BEAT)):
+            raise UserError(
+                f"max_presence_age must be at least {least:g} s, not {controller.max_presence_age:g}: "
+                "an operator who is present is reported only so often (sampling)"
             )
         if self.longest_restart < RESTART:
             least = watchdog.lifespan + watchdog.sampling + RESTART

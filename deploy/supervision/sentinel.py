@@ -1,15 +1,17 @@
-"""The sentinel: keeps the services alive where supervisord does not notice that they are not.
+"""The sentinel: replaces services that hang, which supervisord does not notice.
 
 User story (ours): as a robot operator, I find a hanging service replaced within five seconds, and a service
 that supervisord has given up started again, without help; I see on /diagnostics why and how each process
 ended; and I am warned while the machine is about to harm the arm (machine.py).
 
-It is a service like the others, and supervised like them. It kills processes that are stopped or report no
-health, kills duplicates of supervised processes, and revives programs that supervisord has given up, with
-growing delay. The sentinel fails passive: where the network or the sentinel itself may have failed, it kills
-no silent service; where supervisord is gone or does not answer, it does nothing at all.
+It is a service like the others, and supervised like them. It kills processes that are stopped or whose loop
+does not turn (interfaces/service/beats.py), later those whose reports of health nobody hears, and duplicates
+of supervised processes; it revives programs that supervisord has given up, with growing delay. The sentinel
+fails passive: where the machine, the network or the sentinel itself may have failed, it kills no silent
+service; where supervisord is gone or does not answer, it does nothing at all. It follows the steady clock:
+simulated time may stand still.
 
-Where systemd has started the arm, the sentinel tells it when all services are up, and each second that it
+Where systemd has started the arm, the sentinel notifies it when all services are up, and each second that it
 observes them and hears itself: systemd restarts an arm whose supervisord hangs.
 """
 
@@ -21,7 +23,7 @@ import signal
 import socket
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import reactivex as rx
@@ -29,16 +31,19 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
 from deploy.supervision import manifest, processes
 from deploy.supervision.errors import DeploymentError
-from deploy.supervision.machine import Machine, figures
+from deploy.supervision.flood import Flood
+from deploy.supervision.machine import FLOOD, Machine, figures
 from deploy.supervision.manifest import SENTINEL
 from deploy.supervision.policy import Action, Observation, Policy, Timeouts
 from deploy.supervision.probe import Probe, is_here
 from deploy.supervision.service_manager import ALIVE, READY, notify
 from deploy.supervision.supervisord import Program, Supervisord
 from interfaces import service
+from interfaces.limits import AWAY, PID, PROCESS, RESTARTS, UPTIME, seconds, whole
 from interfaces.service import ServiceNode, parameter
-from interfaces.service.health import Health, healths, seconds
+from interfaces.service.health import healths
 from interfaces.topics import DIAGNOSTICS
+from reactive_node import stamps
 
 MANY_RESTARTS = 3  # within a minute: a warning
 DISCOVERY = 0.3  # s until other nodes have discovered this one; earlier messages may be lost
@@ -60,7 +65,7 @@ def reported(message: DiagnosticArray, namespace: str) -> list[Program]:
     for status in message.status:
         values = {pair.key: pair.value for pair in status.values}
         name, _, process = status.name.partition(": ")
-        if process == values.get("process") and node.fullmatch(name):
+        if process == values.get(PROCESS) and node.fullmatch(name):
             with suppress(KeyError, ValueError):  # not a report of ours
                 found.append(_program(values, status.hardware_id))
     return found
@@ -68,14 +73,14 @@ def reported(message: DiagnosticArray, namespace: str) -> list[Program]:
 
 def _program(values: Mapping[str, str], host: str) -> Program:
     return Program(
-        name=values["process"],
+        name=values[PROCESS],
         state=values["state"],
-        pid=int(values["pid"]),
-        uptime=seconds(values["uptime"]),
-        restarts=int(values["restarts"]),
+        pid=whole(values[PID]),
+        uptime=seconds(values[UPTIME]),
+        restarts=whole(values[RESTARTS]),
         exit=values["last exit"],
         error="",
-        away=seconds(values["away"]),
+        away=seconds(values[AWAY]),
         host=host,
     )
 
@@ -90,13 +95,13 @@ def _state(program: Program, reason: str, recent_restarts: int, node: str) -> Di
         level = DiagnosticStatus.WARN
         message = f"{program.state}, restarted {recent_restarts} times within a minute"
     values = {
-        "process": program.name,
+        PROCESS: program.name,
         "state": program.state,
-        "pid": program.pid,
-        "restarts": program.restarts,
-        "uptime": f"{program.uptime:.3f}",
+        PID: program.pid,
+        RESTARTS: program.restarts,
+        UPTIME: f"{program.uptime:.3f}",
         "last exit": program.exit,
-        "away": f"{program.away:.3f}",
+        AWAY: f"{program.away:.3f}",
         "why": reason or ("" if good else program.error),
     }
     return DiagnosticStatus(
@@ -120,11 +125,13 @@ def carry_out(action: Action, run: Path, supervisord: Supervisord) -> None:
 
 @dataclass(frozen=True)
 class Parameters:
-    period: float = parameter(0.5, (0.05, 1.0), "s", "period at which the processes are observed")
+    period: float = parameter(0.5, (0.05, 0.5), "s", "period at which the processes are observed")
     health_timeout: float = parameter(
-        2.7, (1.5, 60.0), "s", "a service without health for this long is killed"
+        2.7, (2.7, 3.3), "s", "a service whose loop shows no sign of life for this long is killed"
     )
-    start_timeout: float = parameter(10.0, (1.0, 300.0), "s", "time of a new process until its first health")
+    start_timeout: float = parameter(
+        10.0, (5.0, 300.0), "s", "time of a new process until its first sign of life, and of a mute one"
+    )
 
 
 def wire(node: ServiceNode) -> None:
@@ -135,17 +142,23 @@ def wire(node: ServiceNode) -> None:
     probe, policy, machine = Probe(run, supervisord), Policy(timeouts), Machine(run, timeouts.period)
     own_name, ours = node.get_fully_qualified_name(), {program.name for program in manifest.programs()}
     namespace = node.get_namespace().rstrip("/")
+    flood = Flood(node, {f"{namespace}/{each.name}" for each in manifest.everywhere()})
 
-    def hear(reports: Mapping[str, Health]) -> None:
+    def hear(message: DiagnosticArray) -> None:
+        flood.hear(message)
+        reports = healths(message, namespace)
         probe.hear(reports)
         for program, health in reports.items():
             if program in ours and not is_here(health.host):
                 node.remark(program, f"it runs on host {health.host} as well")
 
     def observe(_: int) -> Observation | None:
-        node.health.standing = machine.warnings(figures(run))
+        warnings = machine.warnings(figures(run))
+        if lost := flood.look():
+            warnings[DIAGNOSTICS.name] = lost
+        node.health.standing = warnings
         try:
-            return probe.observe()
+            return replace(probe.observe(), flood=lost or warnings.get(FLOOD, ""))
         except DeploymentError as error:
             machine.skip()
             node.remark(SENTINEL, str(error))
@@ -157,30 +170,33 @@ def wire(node: ServiceNode) -> None:
             carry_out(action, run, supervisord)
         if policy.kill_inhibited_by:
             node.remark(SENTINEL, f"kills no silent service: {policy.kill_inhibited_by}")
+        for program in policy.delayed:
+            node.remark(program, "its loop is late, because the machine or a flood keeps it from running")
 
     def message(programs: list[Program]) -> DiagnosticArray:
         array = DiagnosticArray(status=states(programs, policy.reasons, policy.recent_restarts, own_name))
-        array.header.stamp = node.get_clock().now().to_msg()
+        array.header.stamp = stamps.to_message(stamps.now())
         return array
 
     # One wake-up for all reports and the processes: a dozen services report each second.
-    looks = rx.timer(0.0, timeouts.period, node.scheduler).share()
-    reports = node.observe_buffered(DIAGNOSTICS, looks).map(lambda array: healths(array, namespace))
+    scheduler = node.steady_scheduler
+    looks = rx.timer(0.0, timeouts.period, scheduler).share()
+    messages = node.observe_buffered(DIAGNOSTICS, looks, flood.overflow)
     attempts = looks.map(observe).share()
     observations = attempts.filter(lambda it: it is not None)
     programs = observations.map(lambda observation: observation.programs)
     changed = programs.distinct_until_changed(lambda each: [program._replace(uptime=0.0) for program in each])
     # A failed attempt ends the repetition: old states must not look fresh.
-    latest = rx.timer(DISCOVERY, 1.0).with_latest_from(attempts).map(lambda pair: pair[1])
+    latest = rx.timer(DISCOVERY, 1.0, scheduler).with_latest_from(attempts).map(lambda pair: pair[1])
     fresh = latest.filter(lambda it: it is not None).share()
     repeated = fresh.map(lambda observation: observation.programs)
     ready = observations.filter(lambda observation: observation.is_complete).take(1)
     alive = fresh.filter(lambda _: policy.hears_itself)
 
-    reports.subscribe(hear, scheduler=node.scheduler)
-    observations.map(policy.decide).subscribe(act, scheduler=node.scheduler)
-    ready.subscribe(lambda _: notify(READY), scheduler=node.scheduler)
-    alive.subscribe(lambda _: notify(ALIVE), scheduler=node.scheduler)
+    messages.subscribe(hear, scheduler=scheduler)
+    observations.map(policy.decide).subscribe(act, scheduler=scheduler)
+    ready.subscribe(lambda _: notify(READY), scheduler=scheduler)
+    alive.subscribe(lambda _: notify(ALIVE), scheduler=scheduler)
     node.publish(DIAGNOSTICS, rx.merge(changed, repeated).map(message))
 
 

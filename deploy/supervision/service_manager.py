@@ -1,4 +1,4 @@
-"""Tells systemd how the arm is: sd_notify(3)."""
+"""Notifies systemd how the arm is: sd_notify(3)."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _ADDRESS = "NOTIFY_SOCKET"  # environment variable
 
 
 def notify(state: str) -> None:
-    """Tell a state to the service manager that has started this system, if there is one; never block."""
+    """Send a state to the service manager that has started this system, if there is one; never block."""
     if address := os.environ.get(_ADDRESS, ""):
         with suppress(OSError), socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as sender:
             sender.setblocking(False)

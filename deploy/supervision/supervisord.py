@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 from deploy.supervision import interruption, manifest, messages, rpc
 from deploy.supervision.errors import DeploymentError
+from interfaces.seam import replaceable
 
 COMMAND = (sys.executable, "-m", "supervisor.supervisord")
 ANSWER_LIMIT = 1.5  # s that it has to answer the sentinel
@@ -65,8 +66,10 @@ def start(run: Path, environment: Mapping[str, str], within: Sequence[str] = ())
                 rpc.call(process.pid, "supervisor.getState")
                 return process.pid
             time.sleep(0.02)
-        reason = output.read_text(errors="replace").strip()
-        raise DeploymentError(f"supervisord does not start:\n{reason or messages.silent_end(run)}")
+        is_slow = process.poll() is None
+        silence = f"It has not answered for {READY_LIMIT:g} s" if is_slow else messages.silent_end(run)
+        reason = output.read_text(errors="replace").strip() or silence
+        raise DeploymentError(f"supervisord does not start:\n{reason}")
     except BaseException:
         process.kill()
         process.wait()
@@ -82,10 +85,12 @@ class Supervisord:
     def programs(self) -> list[Program]:
         return self._programs("arm.programs", rpc.LIMIT)
 
+    @replaceable
     def watch(self) -> list[Program]:
         """The programs for the sentinel; this call is the sentinel's sign of life."""
         return self._programs("arm.watch", ANSWER_LIMIT)
 
+    @replaceable
     def revive(self, program: str) -> None:
         """Start a program that it has given up."""
         self._ask("supervisor.startProcess", _full_name(program), False, timeout=ANSWER_LIMIT)

@@ -22,6 +22,7 @@ from rclpy.exceptions import InvalidHandle
 from rclpy.node import Node
 
 from interfaces.limits import LARGEST
+from interfaces.service.beats import beat
 from interfaces.service.enclave import Keys
 from interfaces.topics import DIAGNOSTICS
 
@@ -142,6 +143,7 @@ class HealthReporter:
         self._publisher.publish(message)
 
     def _on_period(self) -> None:
+        beat()  # first: what follows may wait for DDS
         self._before_report()
         self.report()
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Any, TypeVar
@@ -100,9 +101,11 @@ class ServiceNode(ReactiveNode):
         options = self._reading(topic, timestamped, max_age)
         return self.create_sampled_observable(topic.type, topic.name, ticks, topic.qos, **options)
 
-    def observe_buffered(self, topic: Topic, ticks: float | Observable[Any]) -> Observable[Any]:
+    def observe_buffered(
+        self, topic: Topic, ticks: float | Observable[Any], on_full: Callable[[], Any] = lambda: None
+    ) -> Observable[Any]:
         """Return all good values at each tick: see :meth:`ReactiveNode.create_buffered_observable`."""
-        options = self._reading(topic, False, None)
+        options = self._reading(topic, False, None) | {"on_full": on_full}
         return self.create_buffered_observable(topic.type, topic.name, ticks, topic.qos, **options)
 
     def _reading(self, topic: Topic, timestamped: bool, max_age: float | None) -> dict[str, Any]:

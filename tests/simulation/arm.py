@@ -147,6 +147,6 @@ def simulated_arm(
     given = durations or load()
     network = Network(latency=given.latency, discovery=given.discovery)
     arm: SimulatedArm
-    with simulated_services(seed, network, lambda: arm.supervisor) as simulation:
+    with simulated_services(seed, network, lambda: [arm.supervisor]) as simulation:
         arm = SimulatedArm(simulation, directory, scenario, given.start_up, parameters)
         yield arm

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
+import inspect
 import math
-import signal
-import socket
+import os
+import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
-from unittest import mock
 
 from rclpy_simulation import Network, Process, Simulation
+from rclpy_simulation.host import MIDNIGHT
 from rclpy_simulation.process import running_process
 
 from deploy.supervision import machine as running_machine
@@ -21,65 +21,67 @@ from deploy.supervision import probe, processes
 from deploy.supervision.errors import DeploymentError
 from deploy.supervision.processes import MARK
 from deploy.supervision.supervisord import Supervisord
-from interfaces.service import instance
+from interfaces.loopback import loopback_is_up
+from interfaces.seam import replaced
+from interfaces.service import host, unix_sockets
 from interfaces.service import process as service_process
+from interfaces.service.beats import Beats, beat
 from interfaces.sources import scenario_file
 
 
 @contextmanager
 def simulated_services(
-    seed: str, network: Network, supervisor: Callable[[], Any] = lambda: None
+    seed: str, network: Network, supervisors: Callable[[], Iterable[Any]] = tuple, epoch: int = MIDNIGHT
 ) -> Iterator[Simulation]:
-    """Simulate programs that are services until the end of the ``with``."""
+    """Simulate programs that are services until the end of the ``with``.
+
+    :param supervisors: returns the present ones.
+    :param epoch: the time of day at the beginning [ns since 1970].
+    """
     variables = [(vars(service_process), "_end_of_spin")]
     with (
-        Simulation(seed, network, variables=variables) as simulation,
-        Machine(simulation, supervisor).installed(),
+        Simulation(seed, network, epoch=epoch, variables=variables) as simulation,
+        replaced(Machine(simulation, supervisors).answers()),
     ):
         yield simulation
+
+
+def _host_name() -> str:
+    return running_process().host.name
 
 
 class Machine:
     """The process table and the sockets of the simulated hosts."""
 
-    def __init__(self, simulation: Simulation, supervisor: Callable[[], Any]) -> None:
-        """:param supervisor: returns the present supervisor."""
+    def __init__(self, simulation: Simulation, supervisors: Callable[[], Iterable[Any]]) -> None:
+        """:param supervisors: returns the present ones."""
         self._simulation = simulation
-        self._supervisor = supervisor
+        self._supervisors = supervisors
         self._claims: dict[tuple[str, str], Process] = {}
+        self._beats: dict[int, float] = {}  # the last of each process, by pid
 
-    @contextmanager
-    def installed(self) -> Iterator[None]:
-        """Answer for the kernel and supervisord until the end of the ``with``."""
-        sockets = SimpleNamespace(
-            AF_UNIX=socket.AF_UNIX, SOCK_STREAM=socket.SOCK_STREAM, socket=lambda *_: _Claim(self._claims)
-        )
-        with (
-            mock.patch.object(instance, "socket", sockets),
+    def answers(self) -> dict[Callable[..., Any], Callable[..., Any]]:
+        """Return what the simulation calls in place of the replaceable functions."""
+        return {
+            unix_sockets.bind: lambda address: _Claim(self._claims, address),
+            unix_sockets.owners: self._owners,
+            host.identity: _host_name,
             # Restarted sources read a file of many events again and again.
-            mock.patch("interfaces.sources.player.load", cache(scenario_file.load)),
-            mock.patch.multiple(
-                processes,
-                stat_of=self._stat_of,
-                environment_of=self._environment_of,
-                of_system=self._of_system,
-                open_handles=self._open_handles,
-                close=lambda handles: None,
-            ),
-            mock.patch.object(probe, "is_here", return_value=True),
-            mock.patch.multiple(
-                running_machine,
-                loopback_is_up=lambda: True,
-                shutil=SimpleNamespace(disk_usage=lambda run: SimpleNamespace(free=math.inf)),
-            ),
-            mock.patch.multiple(
-                Supervisord,
-                watch=lambda it: list(self._answering(it.pid).watch()),
-                revive=lambda it, program: self._answering(it.pid).revive(program),
-            ),
-            mock.patch.object(signal, "pidfd_send_signal", self._send),
-        ):
-            yield
+            scenario_file.load: cache(inspect.unwrap(scenario_file.load)),
+            processes.stat_of: self._stat_of,
+            processes.effort_of: lambda pid, stat: None,
+            processes.of_system: self._of_system,
+            processes.send_signal: self._send_signal,
+            probe.is_here: lambda host: True,
+            Beats.__init__: lambda beats, run: None,
+            Beats.take: lambda beats: self._last_beats(),
+            beat: self._beat,
+            loopback_is_up: lambda: True,
+            running_machine.datagrams: lambda: (0, 0),
+            running_machine.disk_free: lambda run: math.inf,
+            Supervisord.watch: lambda it: list(self._answering(it.pid).watch()),
+            Supervisord.revive: lambda it, program: self._answering(it.pid).revive(program),
+        }
 
     def _reachable(self) -> list[Process]:
         """Return the processes of the caller's host, and of hosts that are not cut off.
@@ -96,9 +98,12 @@ class Machine:
         process = self._find(pid)
         return [] if process is None else ["T" if process.is_stopped else "S", str(process.parent_pid)]
 
-    def _environment_of(self, pid: int) -> dict[str, str]:
-        process = self._find(pid)
-        return {} if process is None else dict(process.environment)
+    def _beat(self) -> None:
+        self._beats[running_process().pid] = time.monotonic()
+
+    def _last_beats(self) -> dict[int, float]:
+        """Return those of the processes that the caller can reach."""
+        return {each.pid: self._beats[each.pid] for each in self._reachable() if each.pid in self._beats}
 
     def _of_system(self, run: Path) -> list[processes.Process]:
         return [
@@ -107,41 +112,41 @@ class Machine:
             if each.environment.get(MARK) == str(run)
         ]
 
-    def _open_handles(self, run: Path, pids: Iterable[int]) -> list[int]:
-        return [pid for pid in pids if self._environment_of(pid).get(MARK) == str(run)]
-
-    def _send(self, handle: int, number: int) -> None:
-        process = self._find(handle)
-        if process is None:
-            raise ProcessLookupError
+    def _send_signal(self, run: Path, program: str, pid: int, number: int) -> bool:
+        process = self._find(pid)
+        owner = {MARK: str(run), "SUPERVISOR_PROCESS_NAME": program}
+        if process is None or not owner.items() <= process.environment.items():
+            return False
         process.send_signal(number)
+        return True
+
+    def _owners(self, prefix: str) -> dict[str, int]:
+        """Return the user of each claim of the caller's host that begins so: there is one user."""
+        host = running_process().host.name
+        claims = {name for (where, name), owner in self._claims.items() if where == host and not owner.ended}
+        return {name: os.geteuid() for name in claims if name.startswith(prefix)}
 
     def _answering(self, pid: int) -> Any:
-        supervisor = self._supervisor()
-        if supervisor.pid != pid or not supervisor.is_alive:
-            raise DeploymentError("supervisord does not answer")
-        return supervisor
+        for supervisor in self._supervisors():
+            if supervisor.pid == pid and supervisor.is_alive:
+                return supervisor
+        raise DeploymentError("supervisord does not answer")
 
 
 class _Claim:
     """An abstract unix socket; its process or :meth:`close` frees the address."""
 
-    def __init__(self, claims: dict[tuple[str, str], Process]) -> None:
-        self._claims = claims
-        self._key: tuple[str, str] | None = None
-
-    def bind(self, address: str) -> None:
+    def __init__(self, claims: dict[tuple[str, str], Process], address: str) -> None:
         process = running_process()
-        key = (process.host.name, address)
-        owner = self._claims.get(key)
+        self._claims = claims
+        self._key = process.host.name, address
+        owner = claims.get(self._key)
         if owner is not None and not owner.ended:
             raise OSError("Address already in use")
-        self._claims[key] = process
-        self._key = key
+        claims[self._key] = process
 
     def close(self) -> None:
-        if self._key is not None:
-            self._claims.pop(self._key, None)
+        self._claims.pop(self._key, None)
 
     def __enter__(self) -> _Claim:
         return self

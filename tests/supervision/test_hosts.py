@@ -64,11 +64,15 @@ def test_program_of_the_user_runs_on_the_robot_unless_it_names_a_host(tmp_path: 
     assert {"guard", "alarm"} <= names("operator", str(own))[1]
 
 
-def test_health_of_a_process_of_another_host_is_not_taken_for_ours(tmp_path: Path) -> None:
-    probe = Probe(tmp_path, Supervisord(1))
+def test_health_of_a_process_of_another_host_is_not_taken_for_ours(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    supervisord = Supervisord(os.getppid())
+    monkeypatch.setattr(supervisord, "watch", lambda: [Program("drive", "RUNNING", 7, 0.0, 0, "", "")])
+    probe = Probe(tmp_path, supervisord)
     for host in ("elsewhere", socket.gethostname()):
         probe.hear({"drive": Health(5.0, 7, True, "running", None, host=host)})
-        assert probe._last_health == ({} if host == "elsewhere" else {("drive", 7): 5.0})
+        assert probe.observe().last_health == ({} if host == "elsewhere" else {("drive", 7): 5.0})
 
 
 def test_host_without_programs_is_refused_in_one_line() -> None:

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import math
 import shutil
+import socket
 import subprocess
 import sys
 from pathlib import Path
@@ -9,11 +10,15 @@ from types import SimpleNamespace
 
 import pytest
 
-from deploy.supervision.machine import Figures, Machine, figures
+from deploy.supervision.machine import FLOOD, Figures, Machine, datagrams, figures
 from interfaces.loopback import LOOPBACK_DOWN
 
 PERIOD = 0.5
-DISK = "less than 200 MB are free for /run: a full disk loses logs, records and settings"
+DISK = "less than 200 MB are free for /run: a full disk loses logs and records"
+FLOODED = (
+    "more than 10000 UDP datagrams arrive each second, or more than 100 find no room:"
+    " discovery and messages are late"
+)
 OVERLOAD = "timers come more than 50 ms late: the processor has too much to do"
 
 
@@ -26,6 +31,8 @@ class Looks:
         self.loopback_is_up = True
         self.now = 1000.0
         self.clock_error = 0.0
+        self.rates = (0, 0)  # datagrams a second that arrive, and that are lost
+        self.datagrams = [5_000_000, 70_000]
 
     def look(
         self, times: int = 1, *, late: float = 0.0, pauses: tuple[float, float] = (0.0, 0.0)
@@ -36,8 +43,12 @@ class Looks:
             read = before + pauses[0]
             after = read + pauses[1]
             time_of_day = 1.7e9 + read + self.clock_error
-            self.now = before
-            seen = Figures(self.disk_free, self.loopback_is_up, before, time_of_day, after)
+            passed, self.now = before - self.now, before
+            self.datagrams = [
+                count + round(rate * passed) for count, rate in zip(self.datagrams, self.rates, strict=True)
+            ]
+            clocks = before, time_of_day, after
+            seen = Figures(self.disk_free, self.loopback_is_up, *clocks, *self.datagrams)
             warnings = self.machine.warnings(seen)
         return warnings
 
@@ -86,6 +97,47 @@ def test_a_loopback_interface_that_is_down_is_a_warning(looks: Looks) -> None:
     assert looks.look() == {"loopback": LOOPBACK_DOWN}
     looks.loopback_is_up = True
     assert looks.look() == {}
+
+
+@pytest.mark.parametrize(
+    ("rates", "is_flood"),
+    [((9_990, 98), False), ((10_010, 0), True), ((200, 104), True), ((0, 0), False)],
+)
+def test_many_datagrams_or_lost_ones_for_five_seconds_are_a_flood(
+    looks: Looks, rates: tuple[int, int], is_flood: bool
+) -> None:
+    looks.rates = rates
+    assert looks.look(9) == {}
+    assert looks.look() == ({FLOOD: FLOODED} if is_flood else {})
+
+
+def test_burst_of_a_start_is_no_flood(looks: Looks) -> None:
+    looks.rates = (13_000, 0)
+    assert looks.look(4) == {}
+    looks.rates = (2_000, 0)
+    assert looks.look(20) == {}
+
+
+def test_a_great_flood_is_known_soon_and_ends_with_its_window(looks: Looks) -> None:
+    looks.rates = (100_000, 0)
+    assert looks.look(1) == {}
+    assert looks.look(1) == {FLOOD: FLOODED}
+    looks.rates = (0, 0)
+    assert looks.look(8) == {FLOOD: FLOODED}
+    assert looks.look() == {}
+
+
+def test_datagrams_to_this_kernel_are_counted() -> None:
+    before = datagrams()
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
+        receiver.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1)
+        receiver.bind(("127.0.0.1", 0))
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+            for _ in range(200):
+                sender.sendto(bytes(1000), receiver.getsockname())
+    after = datagrams()
+    assert after[0] - before[0] >= 150
+    assert after[1] - before[1] >= 100
 
 
 def test_three_late_looks_within_ten_seconds_are_an_overload_until_none_is_late(looks: Looks) -> None:

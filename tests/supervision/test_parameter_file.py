@@ -142,6 +142,11 @@ def test_all_errors_of_a_file_are_reported_a_line_for_each(tmp_path: Path) -> No
             "a turn_on after the last strike would turn the engines on without an operator",
         ),
         (
+            "engine_controller: {ros__parameters: {max_presence_age: 0.69}}",
+            "max_presence_age must be at least 0.7 s, not 0.69: "
+            "an operator who is present is reported only so often (sampling)",
+        ),
+        (
             "engine_controller: {ros__parameters: {presence_timeout: 2.0}}",
             "presence_timeout must be at least 2.2 s, not 2: "
             "lifespan, sampling and a restart of the operator watchdog, 1.2 s",

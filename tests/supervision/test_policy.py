@@ -1,13 +1,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from random import Random
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from deploy.supervision.manifest import SENTINEL
 from deploy.supervision.policy import RECENT, Action, Observation, Policy, Timeouts
-from deploy.supervision.processes import Process
+from deploy.supervision.processes import Effort, Process
+from deploy.supervision.reaction import RESTART
+from deploy.supervision.sentinel import Parameters
 from deploy.supervision.supervisord import Program
+from interfaces.service.health import PERIOD
+from interfaces.service.parameters import declarations
 
 TIMEOUTS = Timeouts(period=0.25, health=2.5)  # times without rounding
 PIDS = {name: 100 + index for index, name in enumerate(("a", "b", "c", "d", "e", SENTINEL))}
@@ -22,29 +29,37 @@ class Run:
         self.policy = Policy(TIMEOUTS)
         self.programs = {each.name: each for each in programs}
         self.now = 0.0
+        self.last_beat: dict[int, float] = {}
         self.last_health: dict[tuple[str, int], float] = {}
+        self.efforts: dict[int, Effort] = {}
+        self.flood = ""
 
-    def hear(self, names: Iterable[str]) -> None:
+    def hear(self, names: Iterable[str], mute: Iterable[str] = ()) -> None:
         for name in names:
-            self.last_health[name, self.programs[name].pid] = self.now
+            self.last_beat[PIDS[name]] = self.now
+            if name not in mute:
+                self.last_health[name, PIDS[name]] = self.now
 
     def decide(self, *, stopped: Iterable[str] = (), duplicates: Iterable[Process] = ()) -> list[Action]:
         return self.policy.decide(
             Observation(
                 self.now,
                 [*self.programs.values()],
+                dict(self.last_beat),
                 dict(self.last_health),
+                dict(self.efforts),
+                self.flood,
                 frozenset(PIDS[name] for name in stopped),
                 frozenset(duplicates),
             )
         )
 
     def first(
-        self, until: float, healthy: Iterable[str] = (), **seen: Iterable[str]
+        self, until: float, healthy: Iterable[str] = (), mute: Iterable[str] = (), **seen: Iterable[str]
     ) -> tuple[float, list[Action]]:
         """Observe until there are actions; return when, and the actions."""
         while self.now <= until:
-            self.hear(healthy)
+            self.hear(healthy, mute)
             if actions := self.decide(**seen):  # type: ignore[arg-type]
                 return self.now, actions
             self.now += TIMEOUTS.period
@@ -52,7 +67,7 @@ class Run:
 
 
 def silence_of(seconds: float, name: str) -> Action:
-    return Action("kill", name, PIDS[name], f"no health for {seconds:.1f} s")
+    return Action("kill", name, PIDS[name], f"no sign of life for {seconds:.1f} s")
 
 
 def test_nothing_is_inhibited_before_and_after_a_good_observation() -> None:
@@ -70,7 +85,7 @@ def test_silent_program_is_killed_at_the_timeout_and_the_reason_kept() -> None:
     run.hear("ab")
 
     assert run.first(9.0, healthy="b") == (2.5, [silence_of(2.5, "a")])
-    assert run.policy.reasons == {"a": "no health for 2.5 s"}
+    assert run.policy.reasons == {"a": "no sign of life for 2.5 s"}
 
 
 @pytest.mark.parametrize("state", ["STARTING", "RUNNING"])
@@ -92,6 +107,15 @@ def test_stop_counts_from_its_observation() -> None:
         7.5,
         [Action("kill", "a", PIDS["a"], "stopped for 2.5 s")],
     )
+
+
+def test_pause_of_the_sentinel_counts_for_no_stop() -> None:
+    run = Run(*map(program, "ab"))
+    assert run.first(0.25, healthy="b", stopped="a") == (0.5, [])
+    run.now += 30.0
+    at, actions = run.first(60.0, healthy="b", stopped="a")
+    assert at == 30.5 + 2.5 - 0.5
+    assert [each.program for each in actions] == ["a"]
 
 
 def test_duplicate_is_killed_at_the_timeout() -> None:
@@ -229,9 +253,11 @@ def test_pauses_of_the_sentinel_count_for_no_silence() -> None:
 def test_restarts_within_a_minute_are_recent() -> None:
     run = Run(program("a", restarts=4))
     recent = []
-    for now, restarts in ((0.0, 4), (10.0, 5), (20.0, 6), (69.5, 6), (70.0, 6), (79.5, 6), (80.0, 6)):
-        run.policy._last_time = None  # observed all the time
-        run.now = now
+    for time, restarts in ((0.0, 4), (10.0, 5), (20.0, 6), (69.5, 6), (70.0, 6), (79.5, 6), (80.0, 6)):
+        while run.now < time:
+            run.hear("a")
+            run.decide()
+            run.now += TIMEOUTS.period
         run.programs["a"] = program("a", restarts=restarts)
         run.hear("a")
         run.decide()
@@ -306,3 +332,141 @@ def test_program_that_starts_in_vain_keeps_its_delay() -> None:
     run.now = 5.0
 
     assert run.first(9.0)[0] == 7.0
+
+
+# Reports and floods
+
+
+def report_of(seconds: float, name: str) -> Action:
+    return Action("kill", name, PIDS[name], f"no report of health for {seconds:.1f} s")
+
+
+def test_service_that_is_heard_no_more_is_killed_later_than_one_that_hangs() -> None:
+    run = Run(*(program(name) for name in "abc"))
+    run.hear("abc")
+
+    assert run.first(20.0, healthy="abc", mute="a") == (10.0, [report_of(10.0, "a")])
+
+
+def test_lost_reports_are_no_silence() -> None:
+    run = Run(*(program(name) for name in ("a", "b", "c", SENTINEL)))
+    run.hear(["a", "b", "c", SENTINEL])
+    run.flood = "reports of health are lost"
+
+    assert run.first(100.0, healthy=["a", "b", "c", SENTINEL], mute=["a", SENTINEL])[1] == []
+    assert run.policy.kill_inhibited_by == "reports of health are lost"
+    assert run.policy.hears_itself
+
+
+def test_service_that_is_not_heard_after_a_flood_has_the_start_timeout() -> None:
+    run = Run(*(program(name) for name in "abc"))
+    run.hear("abc")
+    run.flood = "reports of health are lost"
+    assert run.first(30.0, healthy="abc", mute="a")[1] == []
+    run.flood = ""
+    calm = run.now
+
+    when, actions = run.first(100.0, healthy="abc", mute="a")
+    assert (when, [action.program for action in actions]) == (calm - 0.25 + 10.0, ["a"])
+
+
+def test_hung_service_is_killed_in_time_while_reports_are_lost() -> None:
+    run = Run(*(program(name) for name in "abc"))
+    run.hear("abc")
+    run.flood = "reports of health are lost"
+
+    assert run.first(9.0, healthy="bc", mute="bc") == (2.5, [silence_of(2.5, "a")])
+
+
+class Kernel(Run):
+    """Service `a` gives no sign; the kernel gives its loop and its other threads parts of a processor."""
+
+    def first_kill(
+        self, loop: float, waited: float, others: float, flood: str, until: float = 60.0
+    ) -> float | None:
+        self.flood = flood
+        self.hear("abc")
+        while self.now <= until:
+            self.hear("bc")
+            self.efforts = {PIDS["a"]: Effort(*(part * self.now for part in (loop, waited, others)))}
+            if self.decide():
+                return self.now
+            self.now += TIMEOUTS.period
+        return None
+
+
+@pytest.mark.parametrize("flood", ["", "a flood"])
+@pytest.mark.parametrize(
+    ("loop", "waited", "others", "killed"),
+    [
+        (1.0, 0.0, 0.0, 2.5),  # an endless loop
+        (0.5, 0.5, 0.0, 2.5),  # the same, which shares its processor with another
+        (0.5, 0.5, 1.0, 2.5),
+        (0.25, 0.75, 0.0, 5.0),  # with three others
+        (0.0, 0.0, 0.0, 2.5),  # a deadlock
+    ],
+)
+def test_hung_loop_is_found_on_a_busy_machine(
+    loop: float, waited: float, others: float, killed: float, flood: str
+) -> None:
+    assert Kernel(*(program(name) for name in "abc")).first_kill(loop, waited, others, flood) == killed
+
+
+def test_loop_that_waits_for_a_processor_is_not_hung() -> None:
+    run = Kernel(*(program(name) for name in "abc"))
+    assert run.first_kill(0.01, 0.99, 0.0, "") is None
+    assert run.policy.delayed == ["a"]
+    run.hear("abc")
+    assert run.decide() == []
+    assert run.policy.delayed == []
+
+
+def test_loop_that_waits_for_threads_of_dds_is_hung_unless_there_is_a_flood() -> None:
+    def run() -> Kernel:
+        return Kernel(*(program(name) for name in "abc"))
+
+    assert run().first_kill(0.0, 0.0, 1.0, "") == 2.5
+    assert run().first_kill(0.0, 0.0, 1.0, "a flood") is None
+    assert run().first_kill(0.0, 0.0, 0.5, "a flood") == 5.0
+
+
+LIMIT = 5.0  # s: promise L4
+
+
+@settings(max_examples=200, deadline=None)
+@given(
+    period=st.sampled_from([0.05, 0.1, 0.25, 0.3, 0.5]),
+    health=st.floats(2.7, 3.3),
+    phases=st.lists(st.floats(0.0, 1.0), min_size=4, max_size=4),
+    jitter=st.floats(0.0, 0.3),
+    seed=st.randoms(use_true_random=False),
+    hangs=st.floats(12.0, 14.0),
+)
+def test_with_each_legal_timeout_only_the_hung_service_is_replaced_and_in_time(
+    period: float, health: float, phases: list[float], jitter: float, seed: Random, hangs: float
+) -> None:
+    names = ("a", "b", "c", SENTINEL)
+    policy = Policy(Timeouts(period, health))
+    beats = {
+        name: [phase + number + seed.uniform(-jitter, jitter) for number in range(40)]
+        for name, phase in zip(names, phases, strict=True)
+    }
+    beats["a"] = [when for when in beats["a"] if when <= hangs]
+    looks = [number * period for number in range(round(20.0 / period))]
+    for now in looks:
+        last = {
+            PIDS[name]: max(past) for name, times in beats.items() if (past := [t for t in times if t <= now])
+        }
+        actions = policy.decide(Observation(now, [program(name) for name in names], last))
+        if actions:
+            assert [action.program for action in actions] == ["a"]
+            assert now <= hangs + LIMIT - RESTART
+            return
+    pytest.fail("not replaced")
+
+
+def test_timeouts_that_break_l4_or_the_rule_of_most_are_illegal() -> None:
+    within = {each.name: each.within or (0.0, 0.0) for each in declarations(Parameters)}
+    assert within["health_timeout"][1] + within["period"][1] + RESTART <= LIMIT
+    # What fails for most at once is known before the first of them is killed.
+    assert within["health_timeout"][0] >= 2 * PERIOD + within["period"][1]

@@ -19,6 +19,7 @@ from deploy.supervision.supervisord import Program, Supervisord
 
 SERVICES = ("engine_controller", "kinematics", "operator_watchdog", "velocity", SENTINEL)
 PIDS = {name: 100 + index for index, name in enumerate(SERVICES)}
+SUPERVISORD = 9  # the parent of this process may have the pid of another one here
 PERIOD = Timeouts.period
 
 
@@ -33,6 +34,7 @@ class Run:
     def __init__(self) -> None:
         self.policy = Policy()
         self.now = 0.0
+        self.last_beat: dict[int, float] = {}
         self.last_health: dict[tuple[str, int], float] = {}
         self.programs = {name: program(name) for name in SERVICES}
 
@@ -49,12 +51,13 @@ class Run:
             if self.now % 1.0 == 0:
                 for each in self.programs.values():
                     if each.pid and each.name not in silent:
-                        self.last_health[each.name, each.pid] = self.now
+                        self.last_beat[each.pid] = self.last_health[each.name, each.pid] = self.now
             observation = Observation(
                 self.now,
                 [*self.programs.values()],
+                dict(self.last_beat),
                 dict(self.last_health),
-                frozenset(stopped),
+                stopped=frozenset(stopped),
             )
             decided += [(self.now, action) for action in self.policy.decide(observation)]
         return decided
@@ -94,11 +97,11 @@ def test_kills_no_silent_service_when_it_does_not_hear_itself() -> None:
     assert not run.policy.kill_inhibited_by
 
 
-def test_tells_whether_it_hears_itself() -> None:
+def test_reports_whether_it_hears_itself() -> None:
     run = Run()
     run.observe(20.0, silent=["kinematics", "velocity"])
     assert run.policy.hears_itself
-    run.observe(4.0, silent=[SENTINEL])
+    run.observe(11.0, silent=[SENTINEL])
     assert not run.policy.hears_itself
     run.observe(2.0)
     assert run.policy.hears_itself
@@ -107,9 +110,11 @@ def test_tells_whether_it_hears_itself() -> None:
 def test_an_observation_is_complete_when_each_present_process_has_reported() -> None:
     programs = [program("velocity"), program("kinematics")]
     reports = {("velocity", PIDS["velocity"]): 1.0, ("kinematics", 999): 1.0}
-    assert not Observation(2.0, programs, reports).is_complete
-    assert Observation(2.0, programs, reports | {("kinematics", PIDS["kinematics"]): 2.0}).is_complete
-    assert not Observation(2.0, [*programs, program(SENTINEL, "BACKOFF")], reports).is_complete
+    assert not Observation(2.0, programs, last_health=reports).is_complete
+    reports[("kinematics", PIDS["kinematics"])] = 2.0
+    assert Observation(2.0, programs, last_health=reports).is_complete
+    more = [*programs, program(SENTINEL, "BACKOFF")]
+    assert not Observation(2.0, more, last_health=reports).is_complete
 
 
 def test_ends_itself_when_it_does_not_hear_itself_for_long() -> None:
@@ -220,7 +225,7 @@ class Machine:
         self.search_time = 0.0
         self.found: list[Process] = []
         self.programs = [program("velocity"), program("kinematics")]
-        self.states = {each.pid: ["S", str(os.getppid())] for each in self.programs}
+        self.states = {each.pid: ["S", str(SUPERVISORD)] for each in self.programs}
         machine = self
 
         class Asked(Supervisord):
@@ -234,9 +239,10 @@ class Machine:
             return self.found
 
         monkeypatch.setattr("time.monotonic", lambda: self.now)
+        monkeypatch.setattr("os.getppid", lambda: SUPERVISORD)
         monkeypatch.setattr(processes, "stat_of", lambda pid: self.states.get(pid, []))
         monkeypatch.setattr(processes, "of_system", search)
-        self.probe = Probe(run, Asked(os.getppid()))
+        self.probe = Probe(run, Asked(SUPERVISORD))
 
     def observe(self, times: int = 1) -> Observation:
         for _ in range(times):
@@ -255,12 +261,12 @@ def test_asks_supervisord_once_a_second_while_all_run(machine: Machine) -> None:
     assert machine.questions == [0.5, 1.5, 2.5]
 
 
-@pytest.mark.parametrize("state", [[], ["Z", str(os.getppid())], ["S", "1"]], ids=["no", "dead", "another"])
+@pytest.mark.parametrize("state", [[], ["Z", str(SUPERVISORD)], ["S", "1"]], ids=["no", "dead", "another"])
 def test_asks_supervisord_at_once_when_a_process_has_ended(machine: Machine, state: list[str]) -> None:
     machine.observe(times=2)
     machine.states[PIDS["velocity"]] = state
     machine.programs[0] = program("velocity", pid=900)
-    machine.states[900] = ["T", str(os.getppid())]
+    machine.states[900] = ["T", str(SUPERVISORD)]
     observation = machine.observe()
     assert machine.questions == [PERIOD, 3 * PERIOD]
     assert observation.programs == machine.programs

@@ -13,17 +13,19 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from diagnostic_msgs.msg import DiagnosticStatus
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rclpy.serialization import serialize_message
 from rclpy.time import Time
 
 from deploy.supervision import manifest, processes, sentinel
 from deploy.supervision.errors import DeploymentError
-from deploy.supervision.machine import Figures
+from deploy.supervision.machine import FLOOD, Figures
 from deploy.supervision.manifest import SENTINEL
 from deploy.supervision.policy import Action, Observation, Timeouts
 from deploy.supervision.service_manager import notify
 from deploy.supervision.supervisord import Program, Supervisord
 from interfaces.topics import DIAGNOSTICS
+from reactive_node.sampled_reader import BUFFER
 from reactive_node.testing import MakeNode, SpinFor, SpinUntil
 from tests.component.wiring import Wired
 
@@ -48,19 +50,22 @@ class Probe:
         self.threads.add(threading.get_ident())
         if self.failure:
             raise DeploymentError(self.failure)
-        return Observation(0.0, self.programs, self.last_health)
+        return Observation(0.0, self.programs, last_health=self.last_health)
 
 
 class Policy:
     def __init__(self) -> None:
         self.kill_inhibited_by = ""
+        self.delayed: list[str] = []
         self.reasons: dict[str, str] = {"velocity": "no health"}
         self.recent_restarts: dict[str, int] = {"velocity": 3}
         self.actions: list[Action] = []
         self.timeouts: Timeouts | None = None
+        self.floods: set[str] = set()
         self.hears_itself = True
 
     def decide(self, observation: Observation) -> list[Action]:
+        self.floods.add(observation.flood)
         actions, self.actions = self.actions, []
         return actions
 
@@ -75,7 +80,7 @@ class Machine:
 
     def warnings(self, seen: Figures) -> dict[str, str]:
         assert seen.loopback_is_up
-        return self.found
+        return dict(self.found)
 
     def skip(self) -> None:
         self.skipped += 1
@@ -133,6 +138,27 @@ def wired(make_node: MakeNode, spin_until: SpinUntil, monkeypatch: pytest.Monkey
     return make
 
 
+Notifications = Callable[[], list[str]]
+
+
+@pytest.fixture
+def notifications(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Notifications]:
+    """What systemd has been sent so far."""
+    heard: list[str] = []
+
+    def listen() -> list[str]:
+        with suppress(BlockingIOError):
+            while True:
+                heard.append(systemd.recv(100).decode())
+        return heard
+
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_NONBLOCK) as systemd:
+        systemd.bind(str(tmp_path / "notify"))
+        monkeypatch.setenv("NOTIFY_SOCKET", str(tmp_path / "notify"))
+        yield listen
+
+
+@pytest.mark.timed
 def test_states_are_published_on_change_and_every_second(wired: Any, spin_until: SpinUntil) -> None:
     watching = wired(namespace="/arm1")
     spin_until(lambda: len(watching.states()) >= 3)
@@ -190,8 +216,8 @@ def test_program_that_another_host_runs_as_well_is_reported(
 
 
 def test_actions_are_carried_out_and_reported(wired: Any, spin_until: SpinUntil, tmp_path: Path) -> None:
-    watching = wired(health_timeout=1.5, start_timeout=4.0)
-    assert watching.policy.timeouts == Timeouts(0.05, 1.5, 4.0)
+    watching = wired(health_timeout=3.0, start_timeout=6.0)
+    assert watching.policy.timeouts == Timeouts(0.05, 3.0, 6.0)
     assert watching.probe.made_of == (tmp_path, os.getppid())
     action = Action("kill", "velocity", 501, "no health for 3.0 s")
     watching.policy.actions = [action]
@@ -210,6 +236,59 @@ def test_reason_to_kill_no_silent_service_is_reported(wired: Any, spin_until: Sp
         each.startswith("sentinel: kills no silent service: 3 of 4 services are silent at once")
         for each in watching.remarks()
     )
+    watching.policy.actions = [Action("kill", "velocity", 501, "stopped for 3.0 s")]
+    spin_until(lambda: watching.carried_out)  # what the kernel reports is certain
+
+
+def test_service_that_the_machine_delays_is_reported(wired: Any, spin_until: SpinUntil) -> None:
+    watching = wired()
+    watching.policy.delayed = ["velocity"]
+    spin_until(watching.remarks)
+    assert watching.remarks()[0].startswith(
+        "velocity: its loop is late, because the machine or a flood keeps it from running"
+    )
+
+
+def test_flood_is_reported_and_the_policy_knows_it(wired: Any, spin_until: SpinUntil) -> None:
+    watching = wired()
+    spin_until(lambda: watching.policy.floods)
+    assert watching.policy.floods == {""}
+    watching.machine.found = {FLOOD: "many datagrams arrive"}
+    spin_until(lambda: "many datagrams arrive" in watching.policy.floods)
+    assert "flood: many datagrams arrive" in watching.remarks()
+
+
+def test_lost_reports_are_reported_with_their_sender(
+    wired: Any, spin_until: SpinUntil, spin_for: SpinFor
+) -> None:
+    watching = wired()
+    publisher = watching.peer.create_publisher(DIAGNOSTICS.type, DIAGNOSTICS.name, 2 * BUFFER)
+    octets = serialize_message(DiagnosticArray(status=[DiagnosticStatus(name="wheel: motor")]))
+    spin_until(lambda: publisher.get_subscription_count() >= 2)
+
+    def is_known() -> bool:
+        for _ in range(2 * BUFFER):
+            publisher.publish(octets)
+        spin_for(0.2)  # two looks and more
+        return DIAGNOSTICS.name in watching.service.health.standing
+
+    spin_until(is_known)
+    words = watching.service.health.standing[DIAGNOSTICS.name]
+    assert words.startswith("so many messages arrive that reports of health are lost, most of them about ")
+    assert "'wheel: motor'" in words
+    assert "'/peer'" in words
+    spin_until(lambda: words in watching.policy.floods)
+
+
+def test_simulated_time_that_stands_still_stops_no_supervision(
+    wired: Any, spin_until: SpinUntil, notifications: Notifications
+) -> None:
+    watching = wired(use_sim_time=True)
+    spin_until(lambda: len(watching.states()) >= 3)
+    assert watching.service.get_clock().now().nanoseconds == 0
+    spin_until(lambda: notifications().count("WATCHDOG=1") >= 2)
+    stamp = Time.from_msg(watching.states()[-1].header.stamp).nanoseconds
+    assert abs(time.time_ns() - stamp) < 10e9, "reports carry the time of day, by which hosts compare clocks"
 
 
 def test_failed_observation_is_reported_and_not_the_last(wired: Any, spin_until: SpinUntil) -> None:
@@ -263,58 +342,41 @@ def test_a_look_that_waited_for_supervisord_makes_no_overload(wired: Any, spin_u
 
 # systemd
 
-Told = Callable[[], list[str]]
 
-
-@pytest.fixture
-def told(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Told]:
-    """What systemd has been told so far."""
-    heard: list[str] = []
-
-    def listen() -> list[str]:
-        with suppress(BlockingIOError):
-            while True:
-                heard.append(systemd.recv(100).decode())
-        return heard
-
-    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_NONBLOCK) as systemd:
-        systemd.bind(str(tmp_path / "notify"))
-        monkeypatch.setenv("NOTIFY_SOCKET", str(tmp_path / "notify"))
-        yield listen
-
-
-def test_systemd_is_told_once_that_all_services_are_up(wired: Any, spin_until: SpinUntil, told: Told) -> None:
-    watching = wired()
-    watching.probe.last_health = {("velocity", 400): 0.0}  # of an earlier process
-    spin_until(lambda: told().count("WATCHDOG=1") == 2)
-    assert "READY=1" not in told()
-
-    watching.probe.last_health = {("velocity", VELOCITY.pid): 0.0}
-    spin_until(lambda: "READY=1" in told())
-    spin_until(lambda: told().count("WATCHDOG=1") == 4)
-    assert told().count("READY=1") == 1
-
-
-def test_systemd_is_not_told_that_a_deaf_sentinel_is_alive(
-    wired: Any, spin_until: SpinUntil, spin_for: SpinFor, told: Told
+def test_systemd_is_notified_once_that_all_services_are_up(
+    wired: Any, spin_until: SpinUntil, notifications: Notifications
 ) -> None:
     watching = wired()
-    spin_until(lambda: "WATCHDOG=1" in told())
+    watching.probe.last_health = {("velocity", 400): 0.0}  # of an earlier process
+    spin_until(lambda: notifications().count("WATCHDOG=1") == 2)
+    assert "READY=1" not in notifications()
+
+    watching.probe.last_health = {("velocity", VELOCITY.pid): 0.0}
+    spin_until(lambda: "READY=1" in notifications())
+    spin_until(lambda: notifications().count("WATCHDOG=1") == 4)
+    assert notifications().count("READY=1") == 1
+
+
+def test_systemd_is_not_notified_that_a_deaf_sentinel_is_alive(
+    wired: Any, spin_until: SpinUntil, spin_for: SpinFor, notifications: Notifications
+) -> None:
+    watching = wired()
+    spin_until(lambda: "WATCHDOG=1" in notifications())
     watching.policy.hears_itself = False
-    before = len(told())
+    before = len(notifications())
     spin_for(1.5)
-    assert len(told()) == before
+    assert len(notifications()) == before
 
     watching.policy.hears_itself = True
-    spin_until(lambda: len(told()) > before)
+    spin_until(lambda: len(notifications()) > before)
     watching.probe.failure = "supervisord does not answer"
     spin_until(watching.remarks)
-    before = len(told())
+    before = len(notifications())
     spin_for(1.5)
-    assert len(told()) == before
+    assert len(notifications()) == before
 
 
-def test_an_abstract_address_of_systemd_is_told_as_well(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_abstract_address_of_systemd_is_notified_as_well(monkeypatch: pytest.MonkeyPatch) -> None:
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_NONBLOCK) as systemd:
         systemd.bind("")  # the kernel chooses an abstract address
         monkeypatch.setenv("NOTIFY_SOCKET", f"@{systemd.getsockname()[1:].decode()}")
@@ -323,7 +385,7 @@ def test_an_abstract_address_of_systemd_is_told_as_well(monkeypatch: pytest.Monk
 
 
 def test_systemd_that_is_gone_or_full_changes_nothing(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, told: Told
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, notifications: Notifications
 ) -> None:
     for _ in range(100_000):  # more than fit
         notify("WATCHDOG=1")
@@ -331,7 +393,7 @@ def test_systemd_that_is_gone_or_full_changes_nothing(
     notify("WATCHDOG=1")
     monkeypatch.delenv("NOTIFY_SOCKET")
     notify("WATCHDOG=1")
-    assert told()
+    assert notifications()
 
 
 # Actions
@@ -344,17 +406,20 @@ class Answering(Supervisord):
 
 def test_kill_reaches_the_process_of_the_program_only(tmp_path: Path) -> None:
     mark = {processes.MARK: str(tmp_path), "SUPERVISOR_PROCESS_NAME": "velocity"}
-    code = "import signal; print(flush=True); signal.pause()"
-    command = [sys.executable, "-c", code]
-    with subprocess.Popen(command, env=os.environ | mark, stdout=subprocess.PIPE) as process:
+    code = "import sys; print(flush=True); [print(line, flush=True) for line in sys.stdin]"
+    command, pipe = [sys.executable, "-c", code], subprocess.PIPE
+    with subprocess.Popen(command, env=os.environ | mark, stdin=pipe, stdout=pipe) as process:
         try:
+            assert process.stdin is not None
             assert process.stdout is not None
             process.stdout.readline()
             sentinel.carry_out(Action("kill", "kinematics", process.pid, ""), tmp_path, Answering(1))
             sentinel.carry_out(Action("kill", "velocity", process.pid, ""), tmp_path / "other", Answering(1))
             # A supervisord that does not answer would not replace the process.
             sentinel.carry_out(Action("kill", "velocity", process.pid, ""), tmp_path, Supervisord(1))
-            assert process.poll() is None
+            process.stdin.write(b"alive\n")
+            process.stdin.flush()
+            assert process.stdout.readline() == b"alive\n"
             sentinel.carry_out(Action("kill", "velocity", process.pid, ""), tmp_path, Answering(1))
             assert process.wait(5.0) == -signal.SIGKILL
         finally:

@@ -148,7 +148,7 @@ def test_a_full_disk_is_reported_with_the_file(site: Site) -> None:
 def test_a_service_in_the_same_domain_is_reported(site: Site) -> None:
     # In the environment of conftest.py: it is killed, and leaves no shared memory behind.
     service = site.begin_alone([sys.executable, "-m", "services.velocity"], {**os.environ})
-    while not instance.is_claimed("/velocity", site.domain):
+    while not instance.holders("/velocity", site.domain):
         assert service.is_alive, service.output
         time.sleep(0.02)
     code, printed = site.do("start", STEADY)
@@ -163,7 +163,7 @@ def test_the_sentinel_runs_only_under_supervisord(site: Site) -> None:
 
 def test_a_disk_without_space_for_a_log_is_reported(site: Site) -> None:
     site.run.mkdir()
-    fill = 'mount -t tmpfs -o size=64k tmpfs "$0" && head -c 61440 /dev/zero >"$0/fill" && exec "$@"'
+    fill = 'mount -t tmpfs -o size=64k,mode=700 tmpfs "$0" && head -c 61440 /dev/zero >"$0/fill" && exec "$@"'
     launcher = [sys.executable, "-m", "deploy.commands.launcher", "start", STEADY]
     code, printed = site.do_command(
         "unshare", "--mount", "--map-root-user", "sh", "-c", fill, str(site.run), *launcher

@@ -62,8 +62,8 @@ def test_page_knows_the_limits_of_other_services(tmp_path: Path) -> None:
     file = tmp_path / "parameters.yaml"
     file.write_text(
         "operator_watchdog: {ros__parameters: {silence: 2.0, repeat: 0.2}}\n"
-        "engine_controller: {ros__parameters: {presence_timeout: 4.0, max_presence_age: 0.5}}\n"
+        "engine_controller: {ros__parameters: {presence_timeout: 4.0, max_presence_age: 0.8}}\n"
     )
-    limits = {"silence": 2.0, "presence_timeout": 4.0, "max_presence_age": 0.5}
+    limits = {"silence": 2.0, "presence_timeout": 4.0, "max_presence_age": 0.8}
     for namespace in ("", "/arm1"):
         assert port_of("", namespace, str(file)) == limits
